@@ -1,0 +1,47 @@
+"""The errors a user can meet: every one carries words, none needs a traceback."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing wrong with an input, and what to do about it.
+
+    Attributes:
+        file: the input the finding is about, as the user named it.
+        problem: what is wrong, one sentence without a full stop.
+        remedy: what to do, one sentence without a full stop.
+        row: line of the file, 1 = header line; None when it concerns the file.
+        column: header or dotted key; None when it concerns the row or file.
+    """
+
+    file: str
+    problem: str
+    remedy: str
+    row: int | None = None
+    column: str | None = None
+
+    def __str__(self) -> str:
+        where = self.file
+        if self.row is not None:
+            where += f", row {self.row}"
+        if self.column is not None:
+            where += f", column '{self.column}'"
+        return f"{where}: {self.problem}. {self.remedy}."
+
+
+class HdcalError(Exception):
+    """Base of every error that hdcal raises on purpose."""
+
+
+class InputError(HdcalError):
+    """The input cannot be used; holds every finding, not only the first."""
+
+    def __init__(self, findings: Iterable[Finding]):
+        self.findings = tuple(findings)
+        super().__init__("\n".join(str(finding) for finding in self.findings))
+
+
+class NotUsable(HdcalError):
+    """A result exists but failed its checks, so nothing may be derived from it."""

@@ -1,0 +1,219 @@
+"""The likelihood of a problem's data, whatever form they are kept in."""
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Key
+
+from hdcal.inference import compress
+from hdcal.inference.distributions import distribution
+from hdcal.inference.gap import BASIS_SIZE, prior_sd
+from hdcal.inference.likelihood import log_probability
+from hdcal.inference.members import Linear, contrasts
+from hdcal.inference.problem import Problem
+from hdcal.physics.chain import (
+    Base,
+    linear_coefficients,
+    predict_reading,
+)
+from hdcal.physics.effect import Effect, Noise, parameters
+from hdcal.rig.records import Records
+
+Values = Mapping[str, Float[Array, "..."]]
+
+# A normal prior of these is cut at zero.
+POSITIVE = frozenset({"E0"})
+# Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
+_CORE, _ONE = 4, 2
+
+
+def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
+    """Return K·k_theory at T_ref, per mm as read [N/mm]."""
+    radial = values["K"] * values["E0"] * problem.unit_stiffness
+    return radial * problem.reading.radial_per_read
+
+
+def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
+    """Return the base parameters of given runs and specimens.
+
+    Deviations that are not among the values (integrated out) count as zero.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        run: run indices, or None for the mean of the tested runs.
+        specimen: specimen indices, or None likewise.
+    """
+    scale, offset = values["K"] * values["E0"] * problem.unit_stiffness, 0.0
+    if specimen is not None and "specimen_deviation" in values:
+        scale = scale * (1.0 + values["specimen_deviation"][specimen])
+    if run is not None and "run_offset" in values:
+        offset = values["run_offset"][run]
+    return Base(
+        stiffness=scale,
+        alpha=values["alpha"],
+        deformation_offset=values["deformation_offset"],
+        force_offset=values["force_offset"] + offset,
+        sigma=values["sigma"],
+    )
+
+
+def build_effects(problem: Problem, values: Values) -> tuple[Effect, ...]:
+    """Return the effects of the problem with the parameters of one draw."""
+    return tuple(
+        effect(**{name: values[f"{effect.name}.{name}"] for name in parameters(effect)})
+        for effect in problem.effects
+    )
+
+
+def predict_rows(
+    problem: Problem, values: Values, records: Records, columns
+) -> tuple[Float[Array, " n"], Noise]:
+    """Return mean reading [N] and noise of rows of the tested runs and specimens.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        records: the rows.
+        columns: basis of the gap at the rows, or None.
+    """
+    base = member_base(problem, values, records.run, records.specimen)
+    mean, noise = predict_reading(
+        base, build_effects(problem, values), records, problem.reading
+    )
+    if "gap_weights" in values:
+        mean = mean + columns @ values["gap_weights"]
+    return mean, noise
+
+
+def _with_rounding(noise: Noise, step) -> Noise:
+    """Add Sheppard's variance of the rounding to the noise."""
+    return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + step**2 / 12.0))
+
+
+def pointwise_log_likelihood(
+    problem: Problem, values: Values, records: Records, columns
+) -> Float[Array, " n"]:
+    """Return the log likelihood of each row given all values [log 1/N]."""
+    mean, noise = predict_rows(problem, values, records, columns)
+    if not problem.rounded:
+        noise = _with_rounding(noise, problem.step)
+    return log_probability(
+        records.force, mean, noise, problem.step, rounded=problem.rounded
+    )
+
+
+def log_likelihood(problem: Problem, values: Values) -> Float[Array, ""]:
+    """Return the log likelihood of all data, members integrated out where they can."""
+    if problem.integrated:
+        return linear_part(problem, values).log_likelihood()
+    if problem.blocks is None:
+        rows = pointwise_log_likelihood(
+            problem, values, problem.records, problem.columns
+        )
+        return jnp.sum(rows)
+    coefficients = _block_coefficients(problem, values)
+    return compress.log_likelihood(
+        problem.blocks, coefficients, values["sigma"], problem.step
+    )
+
+
+def linear_part(problem: Problem, values: Values) -> Linear:
+    """Return the residual that the integrated members have to explain."""
+    scale = []
+    if "run" in problem.integrated:
+        scale.append(jnp.full(problem.runs - 1, values["run_offset_sd"]))
+    if "specimen" in problem.integrated:
+        scale.append(jnp.full(problem.specimens - 1, values["specimen_sd"]))
+    if "gap" in problem.integrated:
+        scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
+    make = _linear_rows if problem.blocks is None else _linear_blocks
+    return make(problem, values, jnp.concatenate(scale))
+
+
+def _linear_rows(problem: Problem, values: Values, scale) -> Linear:
+    records = problem.records
+    mean, noise = predict_rows(problem, values, records, None)
+    sd = _with_rounding(noise, problem.step).sd[0]
+    design = []
+    if "run" in problem.integrated:
+        design.append(contrasts(problem.runs)[records.run])
+    if "gap" in problem.integrated:
+        design.append(problem.columns)
+    return Linear(
+        residual=records.force - mean,
+        design=jnp.concatenate(design, axis=1),
+        sd=sd,
+        scale=scale,
+        log_volume=jnp.sum(jnp.log(sd)),
+        count=len(sd),
+    )
+
+
+def _linear_blocks(problem: Problem, values: Values, scale) -> Linear:
+    blocks = problem.blocks
+    groups, width = blocks.factor.shape[:2]
+    design = []  # each [group, column of X, weight]
+    if "run" in problem.integrated:
+        rows = contrasts(problem.runs)[blocks.run]
+        unit = jnp.zeros(width - 1).at[_ONE].set(1.0)
+        design.append(unit[None, :, None] * rows[:, None, :])
+    if "specimen" in problem.integrated:
+        rows = contrasts(problem.specimens)[blocks.specimen]
+        base = member_base(problem, {**values, "force_offset": 0.0})
+        slope = jnp.zeros(width - 1)
+        slope = slope.at[:_CORE].set(linear_coefficients(base, problem.reading))
+        design.append(slope[None, :, None] * rows[:, None, :])
+    if "gap" in problem.integrated:
+        gap = jnp.eye(width - 1)[:, _CORE:]
+        design.append(jnp.broadcast_to(gap, (groups, *gap.shape)))
+    variance = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    mapped = jnp.einsum(
+        "gij,gjk->gik", blocks.factor[..., :-1], jnp.concatenate(design, axis=-1)
+    )
+    residual = compress.residual(blocks, _block_coefficients(problem, values))
+    return Linear(
+        residual=residual.reshape(-1),
+        design=mapped.reshape(groups * width, -1),
+        sd=jnp.repeat(jnp.sqrt(variance), width),
+        scale=scale,
+        log_volume=0.5 * jnp.sum(blocks.count * jnp.log(variance)),
+        count=jnp.sum(blocks.count),
+    )
+
+
+def _block_coefficients(problem: Problem, values: Values) -> Float[Array, "g p"]:
+    """Return the coefficients of each block, those of the gap zero."""
+    blocks = problem.blocks
+    base = member_base(problem, values, blocks.run, blocks.specimen)
+    core = linear_coefficients(base, problem.reading)
+    core = jnp.broadcast_to(core, (len(blocks.count), _CORE))
+    width = blocks.factor.shape[-1] - 1
+    return jnp.pad(core, ((0, 0), (0, width - _CORE)))
+
+
+def draw_members(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
+    """Draw the integrated members given the shared parameters of one draw."""
+    if not problem.integrated:
+        return {}
+    weights = linear_part(problem, values).draw(key)
+    drawn, used = {}, 0
+    if "run" in problem.integrated:
+        used = problem.runs - 1
+        drawn["run_offset"] = contrasts(problem.runs) @ weights[:used]
+    if "specimen" in problem.integrated:
+        own = weights[used : used + problem.specimens - 1]
+        drawn["specimen_deviation"] = contrasts(problem.specimens) @ own
+    if "gap" in problem.integrated:
+        drawn["gap_weights"] = weights[-BASIS_SIZE:]
+    return drawn
+
+
+def log_prior(problem: Problem, values: Values) -> Float[Array, ""]:
+    """Return the log prior of the named parameters, each in its own coordinate."""
+    total = jnp.zeros(())
+    for name, prior in problem.priors.items():
+        if name in values and prior.family != "fixed":
+            law = distribution(prior, positive=name in POSITIVE)
+            total = total + law.log_prob(values[name])
+    return total

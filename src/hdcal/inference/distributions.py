@@ -1,0 +1,84 @@
+"""From a prior table to NumPyro: the distribution and its unconstrained scale."""
+
+import jax.numpy as jnp
+import numpy as np
+import numpyro.distributions as dist
+from scipy import stats
+
+from hdcal.rig.priors import Prior
+
+
+def distribution(prior: Prior, *, positive: bool = False) -> dist.Distribution:
+    """Return the distribution of a prior that is not fixed.
+
+    Args:
+        prior: family and numbers.
+        positive: cut a normal prior at zero (a modulus cannot be negative).
+    """
+    numbers = prior.numbers
+    match prior.family:
+        case "normal" if positive:
+            return dist.TruncatedNormal(numbers[0], numbers[1], low=0.0)
+        case "normal":
+            return dist.Normal(numbers[0], numbers[1])
+        case "lognormal":
+            return dist.LogNormal(jnp.log(numbers[0]), numbers[1])
+        case "half_normal":
+            return dist.HalfNormal(numbers[0])
+        case "uniform":
+            return dist.Uniform(numbers[0], numbers[1])
+        case "beta":
+            return dist.Beta(numbers[0], numbers[1])
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+
+
+def frozen(prior: Prior) -> "stats.rv_continuous":
+    """Return the prior as a SciPy distribution: cdf, quantiles and moments."""
+    numbers = [float(number) for number in prior.numbers]
+    match prior.family:
+        case "normal":
+            return stats.norm(*numbers)
+        case "lognormal":
+            return stats.lognorm(numbers[1], scale=numbers[0])
+        case "half_normal":
+            return stats.halfnorm(scale=numbers[0])
+        case "uniform":
+            return stats.uniform(numbers[0], numbers[1] - numbers[0])
+        case "beta":
+            return stats.beta(*numbers)
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+
+
+def bounds(prior: Prior) -> tuple[float, float]:
+    """Return the ends of the prior's support."""
+    low, high = frozen(prior).support()
+    return float(low), float(high)
+
+
+def unconstrained(prior: Prior, *, positive: bool = False) -> tuple[float, float]:
+    """Return centre and scale of the prior where NumPyro samples it.
+
+    Only a starting point and a unit for the optimiser: quantiles are mapped, not
+    moments, because they survive the map.
+    """
+    quantiles = np.asarray(frozen(prior).ppf([0.16, 0.5, 0.84]))
+    low, high = bounds(prior)
+    if positive:
+        low = 0.0
+        quantiles = np.maximum(quantiles, 1e-3 * quantiles[1])
+    if np.isfinite(low) and np.isfinite(high):
+        share = (quantiles - low) / (high - low)
+        quantiles = np.log(share / (1.0 - share))
+    elif np.isfinite(low):
+        quantiles = np.log(quantiles - low)
+    return float(quantiles[1]), float((quantiles[2] - quantiles[0]) / 2.0)
+
+
+def scaled(prior: Prior, factor) -> Prior:
+    """Return the prior of factor × parameter (factor > 0)."""
+    count = {"lognormal": 1, "beta": 0}.get(prior.family, len(prior.numbers))
+    if prior.family == "beta":
+        raise ValueError("a beta prior cannot be rescaled")
+    numbers = prior.numbers
+    moved = tuple(number * factor for number in numbers[:count])
+    return Prior(prior.family, moved + numbers[count:], prior.unit, prior.source)

@@ -1,0 +1,59 @@
+"""How probable a reading is, given its mean and noise, rounding included."""
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.special import log_ndtr, logsumexp
+from jaxtyping import Array, Float, Key
+
+from hdcal.physics.effect import Noise
+
+
+def _log_interval(low, high):
+    """Return log(Φ(high) − Φ(low)) without cancellation in either tail."""
+    flip = low > 0.0
+    low, high = jnp.where(flip, -high, low), jnp.where(flip, -low, high)
+    upper, lower = log_ndtr(high), log_ndtr(low)
+    return upper + jnp.log(-jnp.expm1(lower - upper))
+
+
+def log_probability(
+    force: Float[Array, " n"],
+    mean: Float[Array, " n"],
+    noise: Noise,
+    step: float | Float[Array, ""],
+    *,
+    rounded: bool,
+) -> Float[Array, " n"]:
+    """Return the log probability of each reading.
+
+    Args:
+        force: as read [N].
+        mean: expected reading [N].
+        noise: mixture of normals before rounding [N].
+        step: rounding step q of the reading [N].
+        rounded: whether a reading y stands for the interval y ± q/2 (then the
+            result is a probability divided by q, so that it stays a density in N)
+            or for the number itself.
+    """
+    error = (force - mean) / noise.sd
+    if rounded:
+        half = 0.5 * step / noise.sd
+        each = _log_interval(error - half, error + half) - jnp.log(step)
+    else:
+        each = -0.5 * (error**2 + jnp.log(2.0 * jnp.pi)) - jnp.log(noise.sd)
+    return logsumexp(each + noise.log_weight[:, None], axis=0)
+
+
+def draw_reading(
+    key: Key[Array, ""],
+    mean: Float[Array, " n"],
+    noise: Noise,
+    step: float | Float[Array, ""] = 0.0,
+) -> Float[Array, " n"]:
+    """Draw a reading of each row, rounded to `step` when it is positive [N]."""
+    pick, normal = jax.random.split(key)
+    component = jax.random.categorical(pick, noise.log_weight, shape=mean.shape)
+    sd = jnp.take_along_axis(noise.sd, component[None], axis=0)[0]
+    reading = mean + sd * jax.random.normal(normal, mean.shape)
+    unit = jnp.where(step > 0.0, step, 1.0)
+    return jnp.where(step > 0.0, unit * jnp.round(reading / unit), reading)

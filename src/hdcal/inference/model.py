@@ -1,0 +1,94 @@
+"""The one NumPyro model: the force model with any set of effects.
+
+Stiffness identifies K·E₀ only, so that product is sampled, given E₀, under exactly
+the prior that K and E₀ imply; K follows from both. Sites whose names begin with
+"_" are coordinates of the sampler, not results.
+"""
+
+import jax.numpy as jnp
+import numpyro
+import numpyro.distributions as dist
+
+from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
+from hdcal.inference.distributions import distribution
+from hdcal.inference.gap import BASIS_SIZE, prior_sd
+from hdcal.inference.problem import Problem
+from hdcal.physics.effect import parameters
+from hdcal.rig.priors import Prior
+
+
+def _sample(name: str, prior: Prior):
+    if prior.family == "fixed":
+        return numpyro.deterministic(name, jnp.asarray(prior.numbers[0]))
+    return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
+
+
+def _sample_amplitude(name: str, prior: Prior):
+    """Sample a parameter of an effect.
+
+    A half-normal one is the size of a normal coordinate: a logarithm would stretch
+    the neighbourhood of zero, where an absent effect has its posterior, to infinity.
+    """
+    if prior.family != "half_normal":
+        return _sample(name, prior)
+    signed = numpyro.sample(f"_{name}", dist.Normal(0.0, prior.numbers[0]))
+    return numpyro.deterministic(name, jnp.abs(signed))
+
+
+def _sample_influence(prior: Prior, modulus):
+    """Sample K·E₀ under the prior of K, and return K."""
+    if prior.family == "fixed":
+        return _sample("K", prior)
+    of_K = distribution(prior)
+    times_modulus = dist.transforms.AffineTransform(0.0, modulus, domain=of_K.support)
+    product = numpyro.sample("_KE0", dist.TransformedDistribution(of_K, times_modulus))
+    return numpyro.deterministic("K", product / modulus)
+
+
+def _sample_members(name: str, sd, count: int):
+    """Sample how far each tested member is from the mean of the tested members.
+
+    Half-centred, √sd · N(0, sd): between the form that suits members clearly apart
+    and the one that suits members alike, each of which is a funnel for the other.
+    """
+    half = jnp.sqrt(sd)
+    score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(half, (count,)))
+    return numpyro.deterministic(name, half * score)
+
+
+def _sample_structure(problem: Problem, values: dict) -> None:
+    """Sample what belongs to runs, specimens and the gap, and their scales."""
+    integrated, priors = problem.integrated, problem.priors
+    if problem.runs:
+        values["run_offset_sd"] = _sample("run_offset_sd", priors["run_offset_sd"])
+        if "run" not in integrated:
+            sd = values["run_offset_sd"]
+            values["run_offset"] = _sample_members("run_offset", sd, problem.runs)
+    if problem.specimens:
+        values["specimen_sd"] = _sample("specimen_sd", priors["specimen_sd"])
+        if "specimen" not in integrated:
+            sd, name = values["specimen_sd"], "specimen_deviation"
+            values[name] = _sample_members(name, sd, problem.specimens)
+    if problem.gap is not None:
+        for name in ("gap_sd", "gap_length"):
+            values[name] = _sample(name, priors[name])
+        if "gap" not in integrated:
+            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([BASIS_SIZE]))
+            scale = prior_sd(values["gap_sd"], values["gap_length"])
+            values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
+
+
+def model(problem: Problem) -> None:
+    """Declare the joint density of parameters and data."""
+    priors = problem.priors
+    values = {"E0": _sample("E0", priors["E0"])}
+    values["K"] = _sample_influence(priors["K"], values["E0"])
+    for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
+        values[name] = _sample(name, priors[name])
+    for effect in problem.effects:
+        for field in parameters(effect):
+            name = f"{effect.name}.{field}"
+            values[name] = _sample_amplitude(name, priors[name])
+    _sample_structure(problem, values)
+    numpyro.deterministic("stiffness", stiffness(problem, values))
+    numpyro.factor("force", log_likelihood(problem, values))

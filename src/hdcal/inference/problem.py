@@ -1,0 +1,212 @@
+"""One inference problem: data, priors and structure, as a pytree of arrays."""
+
+from collections.abc import Mapping, Sequence
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Array, Float
+
+from hdcal.errors import Finding, InputError
+from hdcal.inference.compress import Blocks, compress, group_rows
+from hdcal.inference.distributions import scaled
+from hdcal.inference.gap import Gap, build_gap
+from hdcal.physics.chain import Reading, linear_columns
+from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.theory import THEORIES
+from hdcal.rig.case import Case, Theory
+from hdcal.rig.priors import Prior
+from hdcal.rig.records import Records
+
+# Below this many rows the rounding likelihood is always exact: it is cheap there.
+_FEW_ROWS = 500
+# Largest rounding step, in residual sds, for which Sheppard's correction is used: the
+# noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
+_FINE_STEP = 1.3
+
+
+class Problem(eqx.Module):
+    """Everything the model needs; only arrays change between data sets of one shape.
+
+    Attributes:
+        priors: by site name, in code units; K under the problem's own theory.
+        unit_stiffness: k_theory/E, radial [mm].
+        reading: how the rig reads.
+        records: all rows, or None when they are compressed.
+        blocks: compressed rows, or None.
+        columns: basis of the gap at the rows, or None.
+        gap: the leftover discrepancy, or None.
+        step: rounding step [N], 0 = none.
+        effects: the effect classes of the hypothesis.
+        rounded: exact rounding likelihood (else Sheppard's correction).
+        runs: number of runs with an offset of their own, 0 = none.
+        specimens: number of specimens with a stiffness of their own, 0 = none.
+        integrated: which of "run", "specimen", "gap" are integrated out exactly.
+    """
+
+    priors: dict[str, Prior]
+    unit_stiffness: Float[Array, ""] | float
+    reading: Reading
+    records: Records | None
+    blocks: Blocks | None
+    columns: Float[Array, "n m"] | None
+    gap: Gap | None
+    step: Float[Array, ""] | float
+    effects: tuple[type[Effect], ...] = eqx.field(static=True)
+    rounded: bool = eqx.field(static=True)
+    runs: int = eqx.field(static=True)
+    specimens: int = eqx.field(static=True)
+    integrated: frozenset[str] = eqx.field(static=True)
+
+
+def _bare(prior: Prior) -> Prior:
+    # Text is static: left in, another source line would mean another compilation.
+    return Prior(prior.family, tuple(map(np.float64, prior.numbers)))
+
+
+def problem_priors(
+    case: Case,
+    effects: Sequence[type[Effect]],
+    shipped: Mapping[str, Prior],
+    theory: Theory,
+) -> dict[str, Prior]:
+    """Return the priors of every site, K carried over to the theory in use.
+
+    Args:
+        case: gear with its own priors, which win.
+        effects: the effects in the model.
+        shipped: priors of every effect in the library.
+        theory: which stiffness K multiplies.
+
+    Raises:
+        InputError: an effect's parameter has no prior.
+    """
+    gear = case.gear
+    table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
+    names = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
+    names += ["run_offset_sd", "specimen_sd", "gap_sd", "gap_length"]
+    names += [f"{effect.name}.{p}" for effect in effects for p in parameters(effect)]
+    missing = [name for name in names if name not in table]
+    if missing:
+        raise InputError(
+            Finding(
+                case.name,
+                f"no prior for {name}",
+                f"add it to the gear file's [priors], e.g. {name} = "
+                '{ family = "normal", mean = 0.0, sd = 1.0 }',
+            )
+            for name in missing
+        )
+    priors = {name: table[name] for name in names}
+    ratio = _unit_stiffness(case, gear.K_theory) / _unit_stiffness(case, theory)
+    priors["K"] = scaled(priors["K"], ratio)
+    return priors
+
+
+def _unit_stiffness(case: Case, theory: Theory) -> float:
+    return float(THEORIES[theory](case.gear.geometry, 1.0))
+
+
+def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
+    findings = [
+        Finding(
+            case.name,
+            f"effect '{effect.name}' needs {need}, which these data do not have",
+            "measure it, or leave the effect out",
+        )
+        for effect in effects
+        for need in sorted(effect.needs - case.records.known)
+    ]
+    if findings:
+        raise InputError(findings)
+
+
+def _pilot_noise(columns, records: Records) -> float:
+    """Return the noise sd within runs and specimens of a least-squares fit [N]."""
+    design = np.asarray(columns)
+    beta, _, rank, _ = np.linalg.lstsq(design, records.force, rcond=None)
+    residual = records.force - design @ beta
+    noise = np.inf
+    for index in (records.run, records.specimen):
+        count = np.bincount(index)
+        within = residual - (np.bincount(index, residual) / count)[index]
+        free = max(len(within) - len(count) - int(rank), 1)
+        noise = min(noise, np.sqrt(within @ within / free))
+    return float(noise)
+
+
+def build_problem(
+    case: Case,
+    shipped: Mapping[str, Prior],
+    effects: Sequence[type[Effect]] = (),
+    *,
+    theory: Theory | None = None,
+    with_gap: bool = False,
+) -> Problem:
+    """Turn a case into an inference problem.
+
+    Rows are kept when an effect bends the chain or the rounding is coarse; else
+    they are compressed to triangular factors.
+
+    Args:
+        case: records and gear.
+        shipped: priors of every effect in the library.
+        effects: effects in the model.
+        theory: overrides the gear's theory.
+        with_gap: add the leftover discrepancy.
+
+    Raises:
+        InputError: an effect lacks its covariates or a prior.
+    """
+    _check_needs(case, effects)
+    theory = theory or case.gear.theory
+    records = case.records
+    priors = problem_priors(case, effects, shipped, theory)
+    reading = case_reading(case)
+    base_columns = np.asarray(linear_columns(records, reading))
+    noise_sd = _pilot_noise(base_columns, records)
+    runs = len(case.run_labels) if "run" in records.known else 0
+    specimens = len(case.specimen_labels) if "specimen" in records.known else 0
+    members = {
+        kind
+        for kind, present in (("run", runs), ("specimen", specimens), ("gap", with_gap))
+        if present
+    }
+    step = case.gear.force_resolution
+    few = len(records.force) <= _FEW_ROWS and not members
+    rounded = step > 0.0 and (few or step > _FINE_STEP * noise_sd)
+    gap = build_gap(records.deformation, base_columns) if with_gap else None
+    columns = None
+    if gap is not None:
+        columns = np.asarray(gap.columns(records.deformation, base_columns))
+    keep_rows = bool(effects) or rounded
+    blocks = None
+    if not keep_rows:
+        distinct, group = group_rows(records.run, records.specimen, records.force_sd)
+        design = base_columns if columns is None else np.hstack([base_columns, columns])
+        blocks = compress(design, records.force, distinct, group)
+    else:
+        # Through an effect the force need not be linear in the stiffness.
+        members.discard("specimen")
+    gaussian = not rounded and all(effect.stage != "noise" for effect in effects)
+    integrated = frozenset(members if gaussian else ())
+    return Problem(
+        priors={name: _bare(prior) for name, prior in priors.items()},
+        unit_stiffness=_unit_stiffness(case, theory),
+        reading=reading,
+        records=records if keep_rows else None,
+        blocks=blocks,
+        columns=columns if keep_rows else None,
+        gap=gap,
+        step=step,
+        effects=tuple(effects),
+        rounded=rounded,
+        runs=runs,
+        specimens=specimens,
+        integrated=integrated,
+    )
+
+
+def case_reading(case: Case) -> Reading:
+    """Return how the rig reads."""
+    half = case.gear.reading == "diametral"
+    return Reading(0.5 if half else 1.0, case.gear.reference_temperature)

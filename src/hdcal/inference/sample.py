@@ -1,0 +1,179 @@
+"""The only sampler: NumPyro's NUTS in whitened coordinates.
+
+One compiled program serves every data set of one shape, because data, priors and
+whitening are arguments of it. It advances in short stretches, so that progress can
+be shown and an interruption is heard.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Key
+from numpyro.infer.hmc import hmc
+from numpyro.infer.util import constrain_fn
+
+from hdcal.inference.density import draw_members
+from hdcal.inference.laplace import Whitening, potential
+from hdcal.inference.model import model
+from hdcal.inference.problem import Problem
+
+# Called with (iterations done, iterations in all).
+Progress = Callable[[int, int], None]
+
+MAX_TREE_DEPTH = 10
+# Mean acceptance aimed at; each further value is for a run that still diverged.
+TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
+_STRETCH = 50
+# Chains start this many posterior sds apart, so that R-hat can see them disagree.
+_OVERDISPERSION = 2.0
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Draws and how they were come by; leading axes are chain and draw.
+
+    Attributes:
+        values: by site name, in code units.
+        energy: Hamiltonian of each draw.
+        potential: −log posterior density in unconstrained coordinates.
+        diverging: whether the trajectory diverged.
+        tree_depth: doublings of the trajectory.
+        acceptance: mean acceptance probability of the trajectory.
+        step_size: adapted step size.
+        target_acceptance: mean acceptance that the step size was adapted to.
+    """
+
+    values: dict[str, np.ndarray]
+    energy: np.ndarray
+    potential: np.ndarray
+    diverging: np.ndarray
+    tree_depth: np.ndarray
+    acceptance: np.ndarray
+    step_size: np.ndarray
+    target_acceptance: float
+
+
+def _kernel(problem: Problem, whitening: Whitening, warmup: int, target):
+    """Return NUTS' own init and step functions on standard coordinates."""
+    init, step = hmc(
+        lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
+    )
+    start = partial(
+        init,
+        num_warmup=warmup,
+        target_accept_prob=target,
+        max_tree_depth=MAX_TREE_DEPTH,
+        trajectory_length=None,
+    )
+    return start, step
+
+
+@partial(jax.jit, static_argnames="warmup")
+def _start(problem, whitening, keys, target, warmup):
+    def one(key):
+        place, walk = jax.random.split(key)
+        spread = jax.random.normal(place, (len(whitening.factor),))
+        start, _ = _kernel(problem, whitening, warmup, target)
+        return start(_OVERDISPERSION * spread, rng_key=walk)
+
+    return jax.vmap(one)(keys)
+
+
+@partial(jax.jit, static_argnames=("warmup", "length"))
+def _advance(problem, whitening, states, target, warmup, length):
+    start, step = _kernel(problem, whitening, warmup, target)
+    # The step function takes its settings from the last call of its init.
+    start(jnp.zeros(len(whitening.factor)))
+
+    def one(state, _):
+        state = jax.vmap(step)(state)
+        kept = (
+            state.z,
+            state.energy,
+            state.potential_energy,
+            state.diverging,
+            state.num_steps,
+            state.accept_prob,
+            state.adapt_state.step_size,
+        )
+        return state, kept
+
+    return jax.lax.scan(one, states, length=length)
+
+
+@jax.jit
+def _constrain(problem, whitening, standard, keys):
+    def one(e, key):
+        values = constrain_fn(
+            model, (problem,), {}, whitening.position(e), return_deterministic=True
+        )
+        named = {name: v for name, v in values.items() if not name.startswith("_")}
+        return named | draw_members(problem, named, key)
+
+    return jax.vmap(jax.vmap(one))(standard, keys)
+
+
+def sample(
+    problem: Problem,
+    whitening: Whitening,
+    key: Key[Array, ""],
+    *,
+    chains: int = 4,
+    warmup: int = 1000,
+    draws: int = 1000,
+    progress: Progress | None = None,
+) -> Draws:
+    """Draw from the posterior.
+
+    A run with divergent trajectories is thrown away whole and repeated with shorter
+    steps; what is returned is one run, with the divergences it still has.
+
+    Args:
+        problem: the inference problem.
+        whitening: coordinates from `laplace.fit`.
+        key: source of randomness; the same key gives the same draws.
+        chains: independent chains, advanced side by side.
+        warmup: iterations of adaptation per chain, discarded.
+        draws: iterations kept per chain.
+        progress: told after every stretch.
+    """
+    for target in TARGET_ACCEPTANCE:
+        kept = _run(problem, whitening, key, target, chains, warmup, draws, progress)
+        if not kept[3].any():
+            break
+    standard, energy, potential_, diverging, steps, acceptance, step_size = kept
+    members = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
+    values = _constrain(problem, whitening, standard, members)
+    return Draws(
+        values={name: np.asarray(value) for name, value in values.items()},
+        energy=energy,
+        potential=potential_,
+        diverging=diverging,
+        tree_depth=np.ceil(np.log2(steps + 1)).astype(int),
+        acceptance=acceptance,
+        step_size=step_size,
+        target_acceptance=target,
+    )
+
+
+def _run(problem, whitening, key, target, chains, warmup, draws, progress):
+    """Run all chains; return what is kept of each draw, axes chain and draw first."""
+    states = _start(problem, whitening, jax.random.split(key, chains), target, warmup)
+    total, done, kept = warmup + draws, 0, []
+    while done < total:
+        # Stretches end with the warm-up, so that all but the last ones are alike.
+        left = warmup - done if done < warmup else total - done
+        length = min(_STRETCH, left)
+        states, new = _advance(problem, whitening, states, target, warmup, length)
+        if done >= warmup:
+            kept.append(jax.device_get(new))
+        done += length
+        if progress is not None:
+            progress(done, total)
+    return [
+        np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)
+    ]

@@ -1,0 +1,44 @@
+"""Charge that leaks from a piezo sensor's amplifier: readings sink towards zero."""
+
+from typing import ClassVar, Literal
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from hdcal.physics.effect import Effect, Rows, Stage, parameter
+from hdcal.physics.history import leaky_sum
+
+
+class ChargeLeakage(Effect):
+    """dF_m = dF − λ F_m dt, reset at the start of each run; λ = 1/τ.
+
+    The force is taken as linear in time between rows, for which the step is exact:
+    F_m ← F_m e^(−λΔt) + ΔF (1 − e^(−λΔt))/(λΔt). Before its first row a run has
+    climbed from zero since the reset at t = 0.
+
+    Source: charge-amplifier handbooks (discharge time constant τ = R C).
+    """
+
+    name: ClassVar[str] = "charge_leakage"
+    stage: ClassVar[Stage] = "sensor"
+    family: ClassVar[str] = "drift"
+    needs: ClassVar[frozenset[str]] = frozenset({"time"})
+    symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
+
+    rate: Float[Array, ""] | float = parameter(
+        "1/s", "leak rate, one over the time constant", typical=1e-3, null=0.0
+    )
+
+    def apply(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:
+        """Return the force as the leaking amplifier shows it."""
+        records = rows.records
+        starts = jnp.diff(records.run, prepend=records.run[:1] - 1) != 0
+        step = jnp.where(starts, records.time, jnp.diff(records.time, prepend=0.0))
+        gain = jnp.where(starts, signal, jnp.diff(signal, prepend=0.0))
+        loss = self.rate * step
+        # (1 − e^−x)/x, with its series where the quotient would be 0/0.
+        small = jnp.abs(loss) < 1e-6
+        safe = jnp.where(small, 1.0, loss)
+        kept = jnp.where(small, 1.0 - 0.5 * loss, -jnp.expm1(-safe) / safe)
+        decay = jnp.where(starts, 0.0, jnp.exp(-loss))
+        return leaky_sum(decay, gain * kept)

@@ -1,0 +1,30 @@
+"""What is believed about one parameter, as a typed pytree."""
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+# family -> the numbers it needs, in the order of the distribution's arguments
+FAMILIES: dict[str, tuple[str, ...]] = {
+    "fixed": ("value",),
+    "normal": ("mean", "sd"),
+    "lognormal": ("median", "log_sd"),
+    "half_normal": ("sd",),
+    "uniform": ("low", "high"),
+    "beta": ("a", "b"),
+}
+
+
+class Prior(eqx.Module):
+    """What is believed about one parameter before the data, in code units.
+
+    Attributes:
+        family: a key of FAMILIES.
+        numbers: the family's numbers in the order of FAMILIES[family].
+        unit: unit of the parameter, for people.
+        source: where the numbers come from.
+    """
+
+    family: str = eqx.field(static=True)
+    numbers: tuple[Float[Array, ""] | float, ...]
+    unit: str = eqx.field(static=True, default="")
+    source: str = eqx.field(static=True, default="")

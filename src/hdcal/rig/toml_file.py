@@ -1,0 +1,108 @@
+"""A TOML file that still knows on which line each key stands."""
+
+import re
+import tomllib
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from hdcal.errors import Finding, InputError
+
+LARGEST = 1 << 20
+
+_TABLE = re.compile(r"\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?")
+_KEY = re.compile(r"\s*(?P<name>[\w.\"'-]+(\s*\.\s*[\w\"'-]+)*)\s*=")
+_PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """A parsed TOML file.
+
+    Attributes:
+        file: how the user named it.
+        table: its content.
+        lines: its text.
+    """
+
+    file: str
+    table: dict
+    lines: tuple[str, ...]
+
+    def finding(self, problem: str, remedy: str, key: str) -> Finding:
+        """A finding about a dotted key, with its line where that is found."""
+        return Finding(self.file, problem, remedy, self.row(key), key)
+
+    def row(self, key: str) -> int | None:
+        """Line of a dotted key, or of the innermost table around it."""
+        best, row, table = "", None, ""
+        for number, line in enumerate(self.lines, 1):
+            if match := _TABLE.fullmatch(line):
+                table = here = _bare(match["name"])
+            elif match := _KEY.match(line):
+                here = ".".join(filter(None, (table, _bare(match["name"]))))
+            else:
+                continue
+            if len(here) > len(best) and (key == here or key.startswith(here + ".")):
+                best, row = here, number
+        return row
+
+
+def read_toml(source: Traversable | Path, file: str) -> TomlFile:
+    """Read and parse a TOML file.
+
+    Args:
+        source: a path, or a file shipped with hdcal.
+        file: how the user named it.
+
+    Raises:
+        InputError: missing, unreadable, too large, or not TOML.
+    """
+    try:
+        with source.open("rb") as stream:
+            raw = stream.read(LARGEST + 1)
+    except FileNotFoundError:
+        raise _refusal(file, "does not exist", "Check the name") from None
+    except IsADirectoryError:
+        raise _refusal(file, "is a folder", "Name the file inside it") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        words = f"cannot be read ({reason})"
+        raise _refusal(file, words, "Check name and permissions") from None
+    if len(raw) > LARGEST:
+        raise _refusal(file, "is larger than 1 MiB", "Name a TOML file")
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = raw.count(b"\n", 0, error.start) + 1
+        words = "is not UTF-8 text"
+        raise _refusal(file, words, "Save it as UTF-8", row) from None
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        # RecursionError: thousands of nested brackets
+        message = str(error) if isinstance(error, ValueError) else "nested too deeply"
+        place = _PLACE.search(message)
+        words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
+        row = int(place["row"]) if place else None
+        raise _refusal(file, words, "Mend that line", row) from None
+    return TomlFile(file, table, tuple(text.splitlines()))
+
+
+def nearest(name: str, known: list[str], what: str = "Known are") -> str:
+    """A remedy that names the likeliest meaning of an unknown name, and the rest."""
+    by_lower = {item.lower(): item for item in known}
+    near = get_close_matches(name.lower(), by_lower, 1, 0.5)
+    hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
+    return f"{hint}{what}: {', '.join(known)}"
+
+
+def _bare(name: str) -> str:
+    return re.sub(r"[\"'\s]", "", name)
+
+
+def _refusal(
+    file: str, problem: str, remedy: str, row: int | None = None
+) -> InputError:
+    return InputError([Finding(file, problem, remedy, row)])

@@ -1,0 +1,84 @@
+"""The import contracts hold, and each of them catches the import that it is for."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+CONTRACTS = {
+    contract["id"]: contract
+    for contract in tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"][
+        "importlinter"
+    ]["contracts"]
+}
+
+# contract -> (module that sins, what it imports); one entry for every contract
+VIOLATIONS = {
+    "floors": ("rig/records.py", "import hdcal.physics.chain"),
+    "effects": (
+        "physics/effects/outliers.py",
+        "import hdcal.physics.effects.coulomb_friction",
+    ),
+    "physics": ("physics/chain.py", "import xarray"),
+    "numpyro": ("rig/records.py", "import numpyro.distributions"),
+    "pint": ("rig/records.py", "import pint"),
+    "pydantic": ("inference/__init__.py", "import pydantic"),
+    "pandas": ("inference/__init__.py", "import pandas"),
+    "matplotlib": ("rig/records.py", "import matplotlib.pyplot"),
+    "click": ("rig/records.py", "import click"),
+    "root": ("physics/chain.py", "from hdcal import InputError"),
+}
+
+
+def lint(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
+    """Run import-linter on the package in `folder`/src."""
+    script = "import sys; from importlinter.cli import lint_imports_command as c; c()"
+    return subprocess.run(
+        [sys.executable, "-c", script, "--no-cache", *options],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder / "src")},
+        capture_output=True,
+        text=True,
+    )
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """Return a copy of the package and its contracts, free to be spoiled."""
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "src", tmp_path / "src", ignore=ignore)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def test_the_package_keeps_every_contract():
+    result = lint(ROOT)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert f"Contracts: {len(CONTRACTS)} kept, 0 broken." in result.stdout
+
+
+def test_every_contract_has_a_violation_to_catch():
+    assert VIOLATIONS.keys() == CONTRACTS.keys()
+
+
+@pytest.mark.parametrize("contract", VIOLATIONS)
+def test_a_planted_import_breaks_its_contract(contract: str, tree: Path):
+    module, statement = VIOLATIONS[contract]
+    path = tree / "src" / "hdcal" / module
+    path.write_text(f"{path.read_text('utf-8')}\n{statement}\n", "utf-8")
+    result = lint(tree, "--contract", contract)
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert "Contracts: 0 kept, 1 broken." in result.stdout
+    assert f"{CONTRACTS[contract]['name']} BROKEN" in result.stdout
+
+
+def test_a_module_on_no_floor_breaks_the_floors(tree: Path):
+    (tree / "src" / "hdcal" / "attic.py").write_text('"""On no floor."""\n', "utf-8")
+    result = lint(tree, "--contract", "floors")
+    assert result.returncode == 1, result.stdout + result.stderr
+    assert "attic" in result.stdout

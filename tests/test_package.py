@@ -1,0 +1,116 @@
+"""What is handed over works away from this checkout and names no machine."""
+
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+FOREIGN = {
+    "a path of one machine": r"(?<![\w.~/-])/(?:work|farm|root|home|Users)/\w",
+    "a temporary path": r"(?<![\w.])/tmp/\w",
+    "the address of a package index": r"https?://[^\s<>]*(?:pypi|pythonhosted|npm)",
+    "an option naming an index": r"^\s*-(?:i |f |-[a-z-]*index|-find-links|-trusted)",
+}
+
+LIST_PRIORS = """
+import hdcal
+from hdcal.rig.resources import priors_folder
+
+print(hdcal.__file__)
+print(*sorted(entry.name for entry in priors_folder().iterdir()))
+"""
+
+
+def run(*command: str | Path, **options) -> str:
+    """Run a command that has to succeed, and return what it prints."""
+    done = subprocess.run(command, capture_output=True, text=True, **options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def shipped(folder: str) -> set[str]:
+    """Return the files below a top-level folder, as paths from the root."""
+    return {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / folder).rglob("*")
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the sdist, and from nothing but the sdist the wheel."""
+    out = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--no-isolation", "--outdir", out, ROOT)
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Install the wheel, without its dependencies, into a folder of its own."""
+    target = tmp_path_factory.mktemp("installed")
+    options = ["--quiet", "--no-deps", "--no-index", "--target", target]
+    run(sys.executable, "-m", "pip", "install", *options, wheel)
+    return target
+
+
+@pytest.mark.parametrize("folder", ["priors", "datasets"])
+def test_the_wheel_holds_the_data(folder: str, wheel: Path):
+    expected = {f"hdcal/_data/{name}" for name in shipped(folder)}
+    assert expected
+    assert expected <= set(zipfile.ZipFile(wheel).namelist())
+
+
+def test_the_wheel_holds_nothing_but_the_package(wheel: Path):
+    tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert tops == {"hdcal", f"{'-'.join(wheel.name.split('-')[:2])}.dist-info"}
+
+
+@pytest.mark.parametrize("form", ["installed", "wheel"])
+def test_priors_are_found_away_from_the_checkout(
+    form: str, request: pytest.FixtureRequest, tmp_path: Path
+):
+    # A wheel on the path is imported as a zip: no file of it exists on disk.
+    place = request.getfixturevalue(form)
+    environment = {**os.environ, "PYTHONPATH": str(place)}
+    printed = run(
+        sys.executable, "-c", LIST_PRIORS, cwd=tmp_path, env=environment
+    ).splitlines()
+    assert printed[0].startswith(str(place))
+    names = {Path(name).name for name in shipped("priors")}
+    assert set(printed[1].split()) == names
+
+
+def test_no_file_names_a_machine_or_a_package_index():
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+    )
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout")
+    patterns = {what: re.compile(rule, re.M) for what, rule in FOREIGN.items()}
+    found = []
+    for name in filter(None, listed.stdout.decode().split("\0")):
+        path = ROOT / name
+        content = path.read_bytes() if path.is_file() else b""
+        if b"\0" in content:
+            continue
+        text = content.decode("utf-8", "replace")
+        found += [f"{name}: {what}" for what, p in patterns.items() if p.search(text)]
+    assert not found, "\n".join(found)
+
+
+def test_every_pin_has_a_hash():
+    for name in ("requirements.lock", "requirements-bench.lock"):
+        text = (ROOT / name).read_text("utf-8").replace("\\\n", "")
+        pins = [line for line in text.splitlines() if re.match(r"[a-z]", line)]
+        assert pins
+        assert all("--hash=sha256:" in pin for pin in pins), name
