@@ -1,0 +1,62 @@
+"""hdcal: calibrate the force model of a harmonic-drive flexspline.
+
+Public names load on first use, so that importing hdcal costs nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hdcal.answers.bands import Bands, predict
+    from hdcal.answers.calibration import calibrate
+    from hdcal.answers.residuals import Residuals, residuals
+    from hdcal.answers.summary import summarise
+    from hdcal.errors import Finding, HdcalError, InputError, NotUsable
+    from hdcal.inference.posterior import Posterior
+    from hdcal.physics.chain import force
+    from hdcal.physics.effect import Effect, Noise, Rows, parameter
+    from hdcal.physics.registry import EFFECTS
+    from hdcal.physics.theory import THEORIES
+    from hdcal.rig.case import Case, Gear
+    from hdcal.rig.priors import Prior
+    from hdcal.rig.reading import read_case
+    from hdcal.rig.records import Geometry, Records
+
+_HOMES = {
+    "Bands": "answers.bands",
+    "Case": "rig.case",
+    "EFFECTS": "physics.registry",
+    "Effect": "physics.effect",
+    "Finding": "errors",
+    "Gear": "rig.case",
+    "Geometry": "rig.records",
+    "HdcalError": "errors",
+    "InputError": "errors",
+    "Noise": "physics.effect",
+    "NotUsable": "errors",
+    "Posterior": "inference.posterior",
+    "Prior": "rig.priors",
+    "Records": "rig.records",
+    "Residuals": "answers.residuals",
+    "Rows": "physics.effect",
+    "THEORIES": "physics.theory",
+    "calibrate": "answers.calibration",
+    "force": "physics.chain",
+    "parameter": "physics.effect",
+    "predict": "answers.bands",
+    "read_case": "rig.reading",
+    "residuals": "answers.residuals",
+    "summarise": "answers.summary",
+}
+
+__all__ = [*sorted(_HOMES)]  # noqa: PLE0604
+
+
+def __getattr__(name: str):
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hdcal' has no attribute {name!r}")
+    return getattr(import_module(f"hdcal.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

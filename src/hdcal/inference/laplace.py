@@ -124,7 +124,9 @@ def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
         options={"gtol": _TOLERANCE, "maxiter": 300, "max_trust_radius": 1e4},
     )
     factor = scale[:, None] * _inverse_root(expand(found.x)[2])
-    centre = {name: np.asarray(v) for name, v in unravel(flat + scale * found.x).items()}
+    centre = {
+        name: np.asarray(v) for name, v in unravel(flat + scale * found.x).items()
+    }
     return Whitening(centre, factor)
 
 

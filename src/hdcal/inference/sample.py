@@ -174,6 +174,4 @@ def _run(problem, whitening, key, target, chains, warmup, draws, progress):
         done += length
         if progress is not None:
             progress(done, total)
-    return [
-        np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)
-    ]
+    return [np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)]

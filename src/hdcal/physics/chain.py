@@ -11,7 +11,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from hdcal.physics.effect import Effect, Noise, Rows, Stage
-from hdcal.rig.records import Records
+from hdcal.physics.theory import THEORIES
+from hdcal.rig.records import Geometry, Records
 
 Value = Float[Array, ""] | Float[Array, " n"] | float
 
@@ -82,9 +83,7 @@ def predict_reading(
     return mean, _apply("noise", effects, noise, rows)
 
 
-def linear_columns(
-    records: Records, reading: Reading
-) -> Float[Array, "n 4"]:
+def linear_columns(records: Records, reading: Reading) -> Float[Array, "n 4"]:
     """Return the columns in which the chain without effects is linear.
 
     mean = s ρ·ω − s α ρ·ω ΔT + (b − s ρ ω₀) + s α ρ ω₀·ΔT, with ρ the radial
@@ -108,3 +107,36 @@ def linear_coefficients(base: Base, reading: Reading) -> Float[Array, "*g 4"]:
         slope * base.alpha * zero,
     )
     return jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, parts)), axis=-1)
+
+
+def force(
+    geometry: Geometry,
+    modulus: Value,
+    influence: Value,
+    deformation: Value,
+    *,
+    theory: str = "ring",
+    alpha: Value = 0.0,
+    temperature_rise: Value = 0.0,
+    deformation_offset: Value = 0.0,
+    force_offset: Value = 0.0,
+) -> Float[Array, "..."]:
+    """Compute F = K k(E₀ (1 − α ΔT)) (ω − ω₀) + b, differentiable in every argument.
+
+    Args:
+        geometry: sizes [mm].
+        modulus: Young's modulus E₀ at the reference temperature [MPa].
+        influence: K under `theory` [-].
+        deformation: radial ω [mm].
+        theory: ring, cup or article.
+        alpha: relative loss of modulus per kelvin [1/K].
+        temperature_rise: ΔT = T − T_ref [K].
+        deformation_offset: ω₀ [mm].
+        force_offset: b [N].
+
+    Returns:
+        Force [N], broadcast over the arguments.
+    """
+    warm = modulus * (1.0 - alpha * temperature_rise)
+    stiffness = influence * THEORIES[theory](geometry, warm)
+    return jnp.asarray(stiffness * (deformation - deformation_offset) + force_offset)

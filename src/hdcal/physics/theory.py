@@ -34,9 +34,7 @@ def ring(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
         of Materials).
     """
     slenderness = geometry.wall_thickness / geometry.radius
-    return (
-        jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
-    )
+    return jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
 
 
 def cup(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:

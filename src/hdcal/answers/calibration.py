@@ -1,0 +1,197 @@
+"""Calibrate a case: from records and gear to a checked posterior."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+
+import jax
+import numpy as np
+
+from hdcal.errors import Finding, InputError
+from hdcal.inference import laplace
+from hdcal.inference.checks import (
+    Check,
+    bound_check,
+    conflict_check,
+    diagnose_parameters,
+    identification_checks,
+    sampling_checks,
+)
+from hdcal.inference.density import POSITIVE, log_likelihood, log_prior
+from hdcal.inference.distributions import distribution
+from hdcal.inference.flat import dead_parameters, flat_directions, sensitivity
+from hdcal.inference.posterior import (
+    Posterior,
+    build_tree,
+    gap_columns,
+    versions,
+)
+from hdcal.inference.problem import Problem, build_problem, problem_priors
+from hdcal.inference.sample import Draws, Progress, sample
+from hdcal.physics.effect import Effect
+from hdcal.physics.registry import EFFECTS
+from hdcal.rig.case import Case, Theory
+from hdcal.rig.priors import Prior, effect_priors
+
+_PRIOR_DRAWS = 2000
+
+
+def choose_effects(
+    names: Sequence[str], registry: Mapping[str, type[Effect]] = EFFECTS
+) -> tuple[type[Effect], ...]:
+    """Look effects up by name.
+
+    Args:
+        names: of effects; each counts once.
+        registry: the library.
+
+    Raises:
+        InputError: a name is not in the library; the nearest one is suggested.
+    """
+    findings = []
+    for name in names:
+        if name not in registry:
+            near = get_close_matches(name, registry, n=1)
+            hint = f"did you mean '{near[0]}'? " if near else ""
+            findings.append(
+                Finding(
+                    "--effect",
+                    f"no effect is called '{name}'",
+                    f"{hint}The library holds: {', '.join(sorted(registry))}",
+                )
+            )
+    if findings:
+        raise InputError(findings)
+    return tuple(registry[name] for name in dict.fromkeys(names))
+
+
+def calibrate(
+    case: Case,
+    *,
+    effects: Sequence[str] = (),
+    theory: Theory | None = None,
+    with_gap: bool = False,
+    chains: int = 4,
+    warmup: int = 1000,
+    draws: int = 1000,
+    seed: int = 0,
+    registry: Mapping[str, type[Effect]] = EFFECTS,
+    progress: Progress | None = None,
+) -> Posterior:
+    """Calibrate the force model against a case.
+
+    The result depends on the arguments only: the same seed gives the same draws.
+
+    Args:
+        case: from `read_case`.
+        effects: names of effects to include.
+        theory: overrides the gear's theory.
+        with_gap: add a leftover discrepancy, orthogonal to the base model.
+        chains: independent chains, two or more so that they can be compared.
+        warmup: iterations of adaptation per chain.
+        draws: draws kept per chain.
+        seed: of `jax.random.key`.
+        registry: the library in which names are looked up.
+        progress: called with (iterations done, iterations in all).
+
+    Returns:
+        The posterior; it may have failed its checks, see `Posterior.usable`.
+
+    Raises:
+        InputError: an effect is unknown, has no prior, or lacks its covariates.
+    """
+    _check_settings(chains, warmup, draws)
+    began = time.perf_counter()
+    chosen = choose_effects(effects, registry)
+    theory = theory or case.gear.theory
+    shipped = effect_priors()
+    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
+    priors = problem_priors(case, chosen, shipped, theory)
+    of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
+    whitening = laplace.fit(problem, of_fit)
+    found = sample(
+        problem,
+        whitening,
+        of_draws,
+        chains=chains,
+        warmup=warmup,
+        draws=draws,
+        progress=progress,
+    )
+    settings = {
+        "seed": seed,
+        "chains": chains,
+        "warmup": warmup,
+        "draws": draws,
+        "with_gap": with_gap,
+        "target_acceptance": found.target_acceptance,
+        "versions": versions(),
+    }
+    posterior = _assemble(
+        case, theory, chosen, priors, problem, found, of_prior, settings
+    )
+    seconds = round(time.perf_counter() - began, 3)
+    return replace(posterior, settings={**settings, "seconds": seconds})
+
+
+def _check_settings(chains: int, warmup: int, draws: int) -> None:
+    least = {"chains": (chains, 2), "warmup": (warmup, 1), "draws": (draws, 4)}
+    findings = [
+        Finding(f"--{name}", f"{value} is too few", f"use {low} or more")
+        for name, (value, low) in least.items()
+        if value < low
+    ]
+    if findings:
+        raise InputError(findings)
+
+
+@jax.jit
+def _densities(problem: Problem, values):
+    def both(one):
+        return log_prior(problem, one), log_likelihood(problem, one)
+
+    return jax.vmap(jax.vmap(both))(values)
+
+
+def _assemble(
+    case: Case, theory, effects, priors, problem: Problem, found: Draws, key, settings
+) -> Posterior:
+    of_prior, of_data = map(np.asarray, _densities(problem, found.values))
+    sampled = {
+        name: prior
+        for name, prior in priors.items()
+        if name in found.values and prior.family != "fixed"
+    }
+    scalars = {name: found.values[name] for name in sampled}
+    diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
+    tree = build_tree(case, problem, found, _draw_priors(sampled, key), of_data)
+    checks = (
+        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses),
+        conflict_check(scalars, sampled),
+        bound_check(scalars, sampled),
+        *_identification(case, problem, found),
+    )
+    return Posterior(case, theory, effects, priors, tree, diagnoses, checks, settings)
+
+
+def _identification(case: Case, problem: Problem, found: Draws) -> tuple[Check, ...]:
+    centre = {
+        name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
+    }
+    columns = gap_columns(problem, case)
+    slopes = sensitivity(problem, centre, case.records, columns)
+    sigma = float(centre["sigma"])
+    dead = dead_parameters(slopes, problem, sigma)
+    alive = {name: slope for name, slope in slopes.items() if name not in dead}
+    return identification_checks(dead, flat_directions(alive, problem, sigma))
+
+
+def _draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
+    keys = jax.random.split(key, len(priors))
+    return {
+        name: np.asarray(
+            distribution(prior, positive=name in POSITIVE).sample(k, (_PRIOR_DRAWS,))
+        )
+        for k, (name, prior) in zip(keys, priors.items(), strict=True)
+    }

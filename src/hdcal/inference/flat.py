@@ -1,0 +1,132 @@
+"""Which parameters the data cannot tell apart, said in words."""
+
+from itertools import combinations
+
+import jax
+import numpy as np
+
+from hdcal.inference.density import predict_rows
+from hdcal.inference.distributions import frozen
+from hdcal.inference.problem import Problem
+from hdcal.rig.records import Records
+
+# Parameters of the mean that are compared; sigma is not one of them.
+_MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset")
+# A leftover direction is named with the parameters that carry this part of it.
+_SHARE = 0.3
+# A parameter moves the mean less than this many noise sds over its whole prior: dead.
+_DEAD = 1e-3
+
+
+def sensitivity(
+    problem: Problem, values: dict, records: Records, columns
+) -> dict[str, np.ndarray]:
+    """Return by how much each parameter moves the mean reading of each row.
+
+    Args:
+        problem: structure.
+        values: one set of parameters, in code units.
+        records: the rows.
+        columns: basis of the gap, or None.
+
+    Returns:
+        Derivatives [N per unit of the parameter], shape (n,), by parameter.
+    """
+    names = [n for n in (*_MEAN, *(k for k in values if "." in k)) if n in values]
+    moved = {name: values[name] for name in names if _varies(problem, name)}
+
+    def mean(part):
+        return predict_rows(problem, {**values, **part}, records, columns)[0]
+
+    slopes = jax.jacfwd(mean)(moved)
+    return {name: np.asarray(slope) for name, slope in slopes.items()}
+
+
+def _varies(problem: Problem, name: str) -> bool:
+    return problem.priors[name].family != "fixed"
+
+
+def dead_parameters(slopes: dict, problem: Problem, sigma: float) -> list[str]:
+    """Return the parameters that these data cannot see at all."""
+    dead = []
+    for name, slope in slopes.items():
+        reach = np.sqrt(np.sum(slope**2)) * frozen(problem.priors[name]).std()
+        if reach < _DEAD * sigma:
+            dead.append(name)
+    return dead
+
+
+def flat_directions(slopes: dict, problem: Problem, sigma: float) -> list[str]:
+    """Name what the data leave to the prior: parameters, pairs, then the rest.
+
+    A direction is flat when the data say less along it than the priors do: with J the
+    sensitivity and S the prior sds, where ‖J v‖²/σ² < ‖v/S‖².
+
+    Args:
+        slopes: from `sensitivity`, dead parameters left out.
+        problem: priors.
+        sigma: noise sd [N].
+
+    Returns:
+        One sentence for each flat direction.
+    """
+    # In units of its prior sd every parameter has prior precision one.
+    scaled = {
+        name: slope * frozen(problem.priors[name]).std() / sigma
+        for name, slope in slopes.items()
+    }
+    unseen = [name for name, column in scaled.items() if column @ column < 1.0]
+    sentences = [
+        f"{name} is hardly seen by this data; its prior is the answer"
+        for name in unseen
+    ]
+    seen = {name: column for name, column in scaled.items() if name not in unseen}
+    pairs = [pair for pair in combinations(seen, 2) if _flat(*(seen[n] for n in pair))]
+    sentences += [_sentence(list(pair)) for pair in pairs]
+    for names in _leftover(seen, _joined(pairs)):
+        sentences.append(_sentence(names))
+    return sentences
+
+
+def _flat(*columns: np.ndarray) -> bool:
+    return _strengths(columns)[0][-1] < 1.0
+
+
+def _strengths(columns) -> tuple[np.ndarray, np.ndarray]:
+    """Return singular values, largest first, and right singular vectors."""
+    table = np.stack(columns, axis=1)
+    # One singular value per column, also with fewer rows than columns.
+    padded = np.vstack([table, np.zeros((table.shape[1], table.shape[1]))])
+    _, strength, vectors = np.linalg.svd(padded, full_matrices=False)
+    return strength, vectors
+
+
+def _joined(pairs: list[tuple[str, str]]) -> list[set[str]]:
+    """Return the groups that the pairs connect."""
+    groups: list[set[str]] = []
+    for pair in pairs:
+        touched = [group for group in groups if group & set(pair)]
+        groups = [group for group in groups if group not in touched]
+        groups.append(set(pair).union(*touched))
+    return groups
+
+
+def _leftover(seen: dict, groups: list[set[str]]) -> list[list[str]]:
+    """Return the flat directions beyond those inside the named groups."""
+    if len(seen) < 3:
+        return []
+    strength, vectors = _strengths(list(seen.values()))
+    named = sum(len(group) - 1 for group in groups)
+    weakest = int(np.sum(strength < 1.0)) - named
+    found = []
+    for vector in vectors[::-1][: max(weakest, 0)]:
+        part = np.abs(vector) / np.abs(vector).max()
+        found.append([n for n, p in zip(seen, part, strict=True) if p >= _SHARE])
+    return [names for names in found if len(names) > 1]
+
+
+def _sentence(names: list[str]) -> str:
+    if set(names) == {"K", "E0"}:
+        return "K and E0 cannot be told apart by this data; their product can"
+    listed = ", ".join(names[:-1]) + " and " + names[-1]
+    return f"{listed} cannot be told apart by this data; one combination of them can"

@@ -1,0 +1,260 @@
+"""The calibrated posterior: draws, what they rest on, and whether they may be used."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from importlib import metadata
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+from arviz_base import from_dict
+
+from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.inference import archive
+from hdcal.inference.checks import Check, Diagnosis
+from hdcal.inference.density import pointwise_log_likelihood
+from hdcal.inference.problem import Problem, build_problem, case_reading
+from hdcal.inference.sample import Draws
+from hdcal.physics.chain import linear_columns
+from hdcal.physics.effect import Effect
+from hdcal.rig.case import Case, Theory
+from hdcal.rig.priors import Prior
+
+FILE_NAME = "posterior.nc"
+FORMAT = "hdcal.posterior/1"
+_PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
+# Above this many numbers the log likelihood of every row and draw is not kept.
+_MOST_LOG_LIKELIHOODS = 8_000_000
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """A calibration: draws in code units, priors, checks and provenance.
+
+    Attributes:
+        case: data and gear.
+        theory: which stiffness K multiplies.
+        effects: effects in the model.
+        priors: of every site, in code units, K under `theory`.
+        tree: ArviZ DataTree with the groups posterior, prior, sample_stats,
+            observed_data, constant_data and log_likelihood.
+        diagnoses: sampling quality and driver by parameter.
+        checks: what was checked and what came out.
+        settings: seed, chains, warmup, draws, seconds, with_gap, versions.
+    """
+
+    case: Case
+    theory: Theory
+    effects: tuple[type[Effect], ...]
+    priors: Mapping[str, Prior]
+    tree: xr.DataTree
+    diagnoses: Mapping[str, Diagnosis]
+    checks: tuple[Check, ...]
+    settings: Mapping[str, object]
+
+    @property
+    def usable(self) -> bool:
+        """Whether every check passed that a result must pass."""
+        return not self.reasons
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the result must not be used; empty when it may be."""
+        failed = (check for check in self.checks if check.outcome == "failed")
+        return tuple(f"{check.name}: {check.words}" for check in failed)
+
+    @property
+    def draws(self) -> dict[str, np.ndarray]:
+        """All draws in code units by site, chains joined: [draw, …]."""
+        group = self.tree["posterior"].to_dataset()
+        return {
+            str(name): values.to_numpy().reshape(-1, *values.shape[2:])
+            for name, values in group.data_vars.items()
+        }
+
+    @cached_property
+    def problem(self) -> Problem:
+        """The inference problem that was sampled."""
+        return build_problem(
+            self.case,
+            self.priors,
+            self.effects,
+            theory=self.theory,
+            with_gap=bool(self.settings["with_gap"]),
+        )
+
+    def require_usable(self) -> None:
+        """Raise when nothing may be derived from this posterior.
+
+        Raises:
+            NotUsable: with the reasons.
+        """
+        if not self.usable:
+            raise NotUsable(
+                "this calibration failed its checks and must not be used: "
+                + "; ".join(self.reasons)
+            )
+
+    def save(self, path: Path | str) -> None:
+        """Write the posterior as a NetCDF file that ArviZ opens."""
+        tree = self.tree.copy()
+        tree.attrs = {
+            "hdcal_format": FORMAT,
+            "status": "ok" if self.usable else "failed",
+            "case": archive.describe_case(self.case),
+            "model": json.dumps(
+                {
+                    "theory": self.theory,
+                    "effects": [effect.name for effect in self.effects],
+                    "priors": {
+                        name: archive.describe_prior(prior)
+                        for name, prior in self.priors.items()
+                    },
+                    "settings": dict(self.settings),
+                    "diagnoses": {n: vars(d) for n, d in self.diagnoses.items()},
+                    "checks": [vars(check) for check in self.checks],
+                }
+            ),
+        }
+        tree.to_netcdf(path, engine="h5netcdf")
+
+    @classmethod
+    def load(
+        cls, path: Path | str, effects: Mapping[str, type[Effect]] | None = None
+    ) -> "Posterior":
+        """Read a posterior back.
+
+        Args:
+            path: a result folder or its posterior.nc.
+            effects: the library in which the effects' names are looked up; needed
+                for effects from outside.
+
+        Raises:
+            InputError: the file is missing, damaged or from another version, or
+                names an effect that the library lacks.
+        """
+        path = Path(path)
+        file = path / FILE_NAME if path.is_dir() else path
+        tree = archive.open_tree(file)
+        try:
+            if tree.attrs["hdcal_format"] != FORMAT:
+                raise KeyError("hdcal_format")
+            model = json.loads(tree.attrs["model"])
+            case = archive.restore_case(
+                tree.attrs["case"],
+                tree["constant_data"].to_dataset(),
+                tree["observed_data"]["force"],
+            )
+            return cls(
+                case=case,
+                theory=model["theory"],
+                effects=_look_up(model["effects"], effects, file),
+                priors={
+                    name: archive.restore_prior(prior)
+                    for name, prior in model["priors"].items()
+                },
+                tree=tree,
+                diagnoses={n: Diagnosis(**d) for n, d in model["diagnoses"].items()},
+                checks=tuple(Check(**check) for check in model["checks"]),
+                settings=model["settings"],
+            )
+        except (KeyError, ValueError, TypeError) as error:
+            raise InputError([archive.not_a_posterior(file)]) from error
+
+
+def _look_up(names, library, file) -> tuple[type[Effect], ...]:
+    if library is None:
+        from hdcal.physics.registry import EFFECTS as library
+    unknown = [name for name in names if name not in library]
+    if unknown:
+        raise InputError(
+            Finding(
+                str(file),
+                f"the effect '{name}' is not in the library",
+                "pass a library that holds it: Posterior.load(path, effects=…)",
+            )
+            for name in unknown
+        )
+    return tuple(library[name] for name in names)
+
+
+def gap_columns(problem: Problem, case: Case):
+    """Return the basis of the gap at the rows of the case, or None."""
+    if problem.gap is None:
+        return None
+    base_columns = linear_columns(case.records, case_reading(case))
+    return problem.gap.columns(jnp.asarray(case.records.deformation), base_columns)
+
+
+@jax.jit
+def _pointwise(problem, values, records, columns):
+    one = partial(pointwise_log_likelihood, problem)
+    inner = jax.vmap(one, in_axes=(0, None, None))
+    return jax.vmap(inner, in_axes=(0, None, None))(values, records, columns)
+
+
+def build_tree(
+    case: Case,
+    problem: Problem,
+    draws: Draws,
+    prior_draws: Mapping[str, np.ndarray],
+    log_likelihood: np.ndarray,
+) -> xr.DataTree:
+    """Collect everything in ArviZ' groups.
+
+    Args:
+        case: data and gear.
+        problem: what was sampled.
+        draws: from the sampler.
+        prior_draws: by parameter, each (draw,).
+        log_likelihood: total of each draw, (chain, draw).
+    """
+    records = case.records
+    size = log_likelihood.size * len(records.force)
+    by_row = {"total": log_likelihood}
+    if size <= _MOST_LOG_LIKELIHOODS:
+        columns = gap_columns(problem, case)
+        by_row = {"force": _pointwise(problem, draws.values, records, columns)}
+    stats = {
+        "energy": draws.energy,
+        "lp": -draws.potential,
+        "diverging": draws.diverging,
+        "tree_depth": draws.tree_depth,
+        "acceptance_rate": draws.acceptance,
+        "step_size": draws.step_size,
+    }
+    tree = from_dict(
+        {
+            "posterior": draws.values,
+            "prior": {name: values[None] for name, values in prior_draws.items()},
+            "sample_stats": stats,
+            "observed_data": {"force": np.asarray(records.force)},
+            "constant_data": archive.covariates(records),
+            "log_likelihood": {n: np.asarray(v) for n, v in by_row.items()},
+        },
+        dims={
+            "force": ["row"],
+            **{name: ["row"] for name in archive.UNITS},
+            "run_offset": ["run_label"],
+            "specimen_deviation": ["specimen_label"],
+            "gap_weights": ["basis"],
+        },
+        coords={
+            "run_label": list(case.run_labels),
+            "specimen_label": list(case.specimen_labels),
+        },
+    )
+    if size > _MOST_LOG_LIKELIHOODS:
+        tree["log_likelihood"].attrs["note"] = (
+            f"{size} values by row and draw are not kept; this is their sum over rows"
+        )
+    return tree
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that a result depends on."""
+    return {package: metadata.version(package) for package in _PACKAGES}

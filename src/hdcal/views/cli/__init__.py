@@ -1,0 +1,105 @@
+"""The command line: read, call, write.
+
+Heavy imports stay inside the commands, so that `hdcal --help` answers at once.
+"""
+
+import os
+import signal
+import sys
+
+import click
+
+from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.views.cli.calibrate import calibrate
+from hdcal.views.cli.check import check
+from hdcal.views.cli.console import Console, usage_error
+from hdcal.views.cli.effects import effects
+from hdcal.views.cli.predict import predict
+
+DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+def _show_version(context: click.Context, _, wanted: bool) -> None:
+    if wanted and not context.resilient_parsing:
+        from importlib.metadata import version
+
+        click.echo(f"hdcal {version('hdcal')}")
+        context.exit()
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_show_version,
+    help="Show the version and stop.",
+)
+def hdcal() -> None:
+    """Calibrate the force model of a harmonic-drive flexspline.
+
+    DATA is a CSV file of measurements with a gear file (--gear), or a folder
+    holding data.csv and gear.toml.
+
+    \b
+    Exit codes: 0 done, 1 the result must not be used, 2 bad input,
+    130 interrupted.
+    """
+
+
+for _command in (calibrate, predict, check, effects):
+    hdcal.add_command(_command)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; every outcome is an exit code and plain words."""
+    given = sys.argv[1:] if arguments is None else arguments
+    console = Console(json="--json" in given)
+    console.prepare()
+    _hear_termination()
+    sys.exit(_run(given, console))
+
+
+def _run(arguments: list[str], console: Console) -> int:
+    try:
+        code = hdcal.main(arguments, "hdcal", standalone_mode=False, obj=console)
+        return code if isinstance(code, int) else DONE
+    except click.UsageError as error:
+        console.findings([usage_error(error)], error.show)
+        return BAD_INPUT
+    except InputError as error:
+        console.findings(error.findings)
+        return BAD_INPUT
+    except NotUsable as error:
+        console.failure("failed", str(error))
+        return NOT_TO_BE_USED
+    except HdcalError as error:
+        console.failure("error", str(error))
+        return NOT_TO_BE_USED
+    except (KeyboardInterrupt, click.Abort):
+        console.words("interrupted: nothing was written")
+        return INTERRUPTED
+    except Exception as error:
+        return _internal(error, console)
+
+
+def _internal(error: Exception, console: Console) -> int:
+    if os.environ.get("HDCAL_DEBUG") == "1":
+        raise error
+    what = " ".join(str(error).split())[:200] or "no further words"
+    console.failure(
+        "error",
+        f"internal error ({type(error).__name__}: {what}); please report it, with "
+        "what HDCAL_DEBUG=1 prints",
+    )
+    return NOT_TO_BE_USED
+
+
+def _hear_termination() -> None:
+    """Let a polite kill clean up as an interruption does."""
+
+    def stop(*_) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)

@@ -1,0 +1,37 @@
+"""Compiled programs are kept between runs: compiling costs more than sampling."""
+
+import os
+import secrets
+from pathlib import Path
+
+
+def keep_compilations() -> None:
+    """Point JAX at a cache of compiled programs; without a writable one do nothing.
+
+    The folder is the user's cache folder, or what HDCAL_CACHE_DIR names. To be
+    called before anything compiles.
+    """
+    folder = _writable_folder()
+    if folder is None:
+        return
+    import jax
+
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    # By default JAX keeps only what took long; a run here is many short ones.
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _writable_folder() -> Path | None:
+    import platformdirs
+
+    named = os.environ.get("HDCAL_CACHE_DIR")
+    folder = Path(named or platformdirs.user_cache_dir("hdcal", False)) / "compiled"
+    trial = folder / f".trial-{secrets.token_hex(4)}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        trial.touch()
+        trial.unlink()
+    except (OSError, ValueError, RuntimeError):
+        return None
+    return folder

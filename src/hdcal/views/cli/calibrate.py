@@ -1,0 +1,106 @@
+"""`hdcal calibrate`: from measurements to a result folder."""
+
+import shlex
+import sys
+
+import click
+
+from hdcal.errors import InputError
+from hdcal.views.cli.acceleration import keep_compilations
+from hdcal.views.cli.console import Console
+from hdcal.views.cli.options import (
+    case_options,
+    force_option,
+    json_option,
+    read_columns,
+)
+
+_MANY = click.IntRange(1, 1_000_000)
+
+
+@click.command()
+@case_options
+@click.option(
+    "--effect",
+    "effects",
+    metavar="NAME",
+    multiple=True,
+    help="Include an effect of the library; may be repeated.",
+)
+@click.option(
+    "--with-gap",
+    is_flag=True,
+    help="Fit what no effect explains as a smooth leftover discrepancy.",
+)
+@click.option(
+    "--chains",
+    type=click.IntRange(1, 64),
+    default=4,
+    show_default=True,
+    help="Independent chains.",
+)
+@click.option(
+    "--warmup",
+    type=_MANY,
+    default=1000,
+    show_default=True,
+    help="Iterations of adaptation per chain.",
+)
+@click.option(
+    "--draws", type=_MANY, default=1000, show_default=True, help="Draws kept per chain."
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0, 2**32 - 1),
+    default=0,
+    show_default=True,
+    help="The same seed gives the same result.",
+)
+@click.option(
+    "--out", metavar="DIR", help="Result folder to make [default: NAME-calibration]."
+)
+@force_option
+@json_option
+@click.pass_obj
+def calibrate(console: Console, data, gear, columns, theory, out, force, **settings):
+    """Calibrate the force model against DATA and write a result folder."""
+    from hdcal.rig.reading import read_case
+    from hdcal.views.folder import check_target
+
+    findings = []
+    case = None
+    try:
+        case = read_case(data, gear, columns=read_columns(columns), theory=theory)
+    except InputError as error:
+        findings += error.findings
+    # Said now, not after minutes of sampling.
+    target = out if out is not None else f"{case.name if case else 'x'}-calibration"
+    if case is not None or out is not None:
+        try:
+            check_target(target, force=force)
+        except InputError as error:
+            findings += error.findings
+    if findings or case is None:
+        raise InputError(findings)
+    return _calibrate(console, case, theory, settings, target, force)
+
+
+def _calibrate(console: Console, case, theory, settings, target, force) -> int:
+    keep_compilations()
+    from hdcal.answers.calibration import calibrate as run
+    from hdcal.answers.calibration import choose_effects
+    from hdcal.views.cli.closing import closing_words
+    from hdcal.views.cli.progress import sampling_progress
+    from hdcal.views.result import write_result
+
+    choose_effects(settings["effects"])
+    for note in case.notes:
+        console.words(note)
+    with sampling_progress() as progress:
+        posterior = run(case, theory=theory, progress=progress, **settings)
+    command = shlex.join(["hdcal", *sys.argv[1:]])
+    summary = write_result(posterior, target, command=command, force=force)
+    console.table(*closing_words(summary, str(target)))
+    if console.json:
+        console.data(summary)
+    return 0 if summary["status"] == "ok" else 1

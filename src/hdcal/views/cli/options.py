@@ -1,0 +1,107 @@
+"""Options that several commands share, and how their texts are read."""
+
+import math
+from collections.abc import Callable
+
+import click
+
+from hdcal.errors import Finding, InputError
+
+MOST_POINTS = 100_000
+_THEORIES = ("ring", "cup", "article")
+
+
+def case_options(command: Callable) -> Callable:
+    """Add the argument and options that say which case to read."""
+    for add in (
+        click.option(
+            "--theory",
+            type=click.Choice(_THEORIES),
+            help="Stiffness formula that K multiplies; overrides the gear file.",
+        ),
+        click.option(
+            "--column",
+            "columns",
+            metavar="QUANTITY=HEADER",
+            multiple=True,
+            help="Read a quantity from a header of your own: force=Load[kgf].",
+        ),
+        click.option(
+            "--gear",
+            metavar="GEAR.toml",
+            help="The gear file [default: gear.toml beside the data].",
+        ),
+        click.argument("data", metavar="DATA"),
+    ):
+        command = add(command)
+    return command
+
+
+def json_option(command: Callable) -> Callable:
+    """Add --json; the console knows it already, click has to accept it."""
+    words = "Print one JSON object; words go to standard error."
+    option = click.option(
+        "--json", "_json", is_flag=True, expose_value=False, help=words
+    )
+    return option(command)
+
+
+def force_option(command: Callable) -> Callable:
+    """Add --force."""
+    words = "Replace an older result of hdcal."
+    return click.option("--force", is_flag=True, help=words)(command)
+
+
+def read_columns(texts: tuple[str, ...]) -> dict[str, str]:
+    """Read every QUANTITY=HEADER.
+
+    Raises:
+        InputError: one of them has no such form, or a quantity comes twice.
+    """
+    found: dict[str, str] = {}
+    findings = []
+    for text in texts:
+        quantity, sign, header = (part.strip() for part in text.partition("="))
+        if not (quantity and sign and header):
+            remedy = "Write it like force=Load[kgf]"
+            findings.append(Finding("--column", f"'{text}' names no header", remedy))
+        elif quantity in found:
+            words = f"'{quantity}' is given twice"
+            findings.append(Finding("--column", words, "Keep one of them"))
+        found[quantity] = header
+    if findings:
+        raise InputError(findings)
+    return found
+
+
+def read_grid(text: str, option: str) -> list[float]:
+    """Read start:stop:count or a comma list of numbers.
+
+    Raises:
+        InputError: it is neither, or too long.
+    """
+    try:
+        numbers = _range(text) if ":" in text else [float(x) for x in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(map(math.isfinite, numbers)):
+        words = f"'{text[:60]}' is neither start:stop:count nor a list of numbers"
+        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, with at most {MOST_POINTS} points"
+        raise InputError([Finding(option, words, remedy)])
+    return numbers
+
+
+def _range(text: str) -> list[float]:
+    first, last, many = text.split(":")
+    start, stop, count = float(first), float(last), int(many)
+    if not 1 <= count <= MOST_POINTS:
+        raise ValueError(many)
+    if count == 1:
+        return [start]
+    # The ends are met exactly, which start + i·step would not promise.
+    return [
+        (start * (count - 1 - i) + stop * i) / (count - 1)
+        if 0 < i < count - 1
+        else (start if i == 0 else stop)
+        for i in range(count)
+    ]

@@ -1,0 +1,70 @@
+"""`hdcal predict`: bands on the force from a result folder."""
+
+import click
+
+from hdcal.views.cli.acceleration import keep_compilations
+from hdcal.views.cli.console import Console
+from hdcal.views.cli.options import force_option, json_option, read_grid
+
+SCHEMA = "hdcal.prediction/1"
+
+
+@click.command()
+@click.argument("run", metavar="RUN")
+@click.option(
+    "--deformation",
+    required=True,
+    metavar="START:STOP:COUNT",
+    help="Deformations as read [mm]: 0:0.6:61, or a list 0.1,0.2.",
+)
+@click.option(
+    "--temperature",
+    metavar="LIST",
+    help="Temperatures [°C]: 20,60 [default: the reference one].",
+)
+@click.option(
+    "--direction",
+    type=click.Choice(["up", "down"]),
+    default="up",
+    show_default=True,
+    help="Loading or unloading.",
+)
+@click.option(
+    "--out",
+    metavar="FILE.csv",
+    help="Write the table there instead of standard output.",
+)
+@force_option
+@json_option
+@click.pass_obj
+def predict(console: Console, run, deformation, temperature, direction, out, force):
+    """Predict the force with its bands from RUN, a folder of `hdcal calibrate`."""
+    from hdcal.views.folder import check_file, write_whole
+
+    along = read_grid(deformation, "--deformation")
+    warmth = None if temperature is None else read_grid(temperature, "--temperature")
+    if out is not None:
+        check_file(out, force=force)
+    keep_compilations()
+    from hdcal.answers.bands import predict as bands_of
+    from hdcal.inference.posterior import Posterior
+    from hdcal.views.result import bands_csv
+
+    posterior = Posterior.load(run)
+    bands = bands_of(posterior, along, warmth, direction)
+    untested = int((~bands.tested).sum())
+    if untested:
+        size = len(bands.tested)
+        console.words(f"{untested} of {size} rows lie outside what was tested")
+    table = bands_csv(bands)
+    if out is not None:
+        write_whole(out, table, force=force)
+        console.words(f"the table: {out}")
+    elif not console.json:
+        console.result(table.rstrip("\n"))
+    if console.json:
+        columns = bands.columns()
+        console.data(
+            {"schema": SCHEMA, "status": "ok", "interval": 0.95, "columns": columns}
+        )
+    return 0

@@ -1,0 +1,36 @@
+"""A progress bar where a person is looking, silence everywhere else."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def sampling_progress() -> Iterator[Callable[[int, int], None] | None]:
+    """Yield what the sampler may tell its progress; None outside a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("preparing", total=None, start=True)
+
+        def tell(done: int, total: int) -> None:
+            bar.update(task, description="sampling", completed=done, total=total)
+
+        yield tell

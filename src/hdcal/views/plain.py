@@ -1,0 +1,39 @@
+"""Results as plain data for JSON, and texts from files as harmless ones."""
+
+import json
+import math
+from typing import Any
+
+
+def as_plain(value: Any) -> Any:
+    """Return a value as JSON knows it; what is not finite becomes null."""
+    if isinstance(value, dict):
+        return {str(key): as_plain(item) for key, item in value.items()}
+    if isinstance(value, set | frozenset):
+        return as_plain(sorted(value))
+    if isinstance(value, list | tuple):
+        return [as_plain(item) for item in value]
+    if hasattr(value, "tolist"):  # NumPy, without importing it
+        return as_plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def as_json(value: Any) -> str:
+    """Return a result as the text of a JSON file."""
+    return json.dumps(as_plain(value), indent=2, allow_nan=False) + "\n"
+
+
+def printable(text: str) -> str:
+    """Return a text from a file without characters that steer a terminal or XML."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def harmless(value: Any) -> Any:
+    """Return plain data whose texts hold no control characters."""
+    if isinstance(value, dict):
+        return {key: harmless(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [harmless(item) for item in value]
+    return printable(value) if isinstance(value, str) else value

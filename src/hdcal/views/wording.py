@@ -1,0 +1,85 @@
+"""Numbers, priors and names in the form in which people read them."""
+
+import math
+
+from hdcal.answers.summary import UNITS
+from hdcal.rig.prior import FAMILIES, Prior
+
+LABELS = {
+    "K": "influence coefficient K",
+    "E0": "Young's modulus E₀",
+    "alpha": "loss of modulus per kelvin α",
+    "force_offset": "force offset b",
+    "deformation_offset": "deformation offset ω₀",
+    "sigma": "reading noise σ",
+    "run_offset_sd": "spread of zeros between runs",
+    "specimen_sd": "spread of stiffness between gears",
+    "gap_sd": "size of the leftover discrepancy",
+    "gap_length": "length of the leftover discrepancy",
+}
+_FAMILY_WORDS = {
+    "fixed": "exactly {0}",
+    "normal": "{0} ± {1}",
+    "lognormal": "{0}, a factor of {1} either way",
+    "half_normal": "0 to about {0}",
+    "uniform": "anything from {0} to {1}",
+    "beta": "beta({0}, {1})",
+}
+# Those of the families' numbers that carry no unit.
+_PURE = {"log_sd", "a", "b"}
+
+
+def number(value: float | None, width: float | None = None) -> str:
+    """Return a number with the digits that its uncertainty leaves meaningful.
+
+    Args:
+        value: what to write; None is a dash.
+        width: its interval's width; two digits of it are kept.
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    size = max(abs(value), abs(width or 0.0))
+    if value and (size < 1e-3 or size >= 1e6):
+        return f"{value:.3g}"
+    if not width or not math.isfinite(width):
+        return f"{value:.4g}"
+    decimals = max(0, 1 - math.floor(math.log10(abs(width))))
+    return f"{value:.{min(decimals, 6)}f}"
+
+
+def estimate(entry: dict) -> tuple[str, str]:
+    """Return median and interval of a summary entry as two texts."""
+    lo, hi = entry["lo"], entry["hi"]
+    width = None if lo is None or hi is None else hi - lo
+    span = f"{number(lo, width)} … {number(hi, width)}"
+    return number(entry["median"], width), span
+
+
+def unit(name: str) -> str:
+    """Return a unit as it is written behind a number."""
+    return {"1": "", "degC": "°C", "C": "°C"}.get(name, name)
+
+
+def with_unit(text: str, name: str) -> str:
+    """Return a number's text with its unit behind it."""
+    return f"{text} {unit(name)}".rstrip()
+
+
+def prior_words(name: str, prior: Prior) -> str:
+    """Return a prior in words, in the units of the summary."""
+    shown, factor = UNITS.get(name, (prior.unit, 1.0))
+    texts = []
+    for part, value in zip(FAMILIES[prior.family], prior.numbers, strict=True):
+        plain = float(value) * (1.0 if part in _PURE else factor)
+        if part == "log_sd":
+            plain = math.exp(plain)
+        texts.append(f"{plain:.4g}")
+    return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
+
+
+def label(name: str) -> str:
+    """Return what a parameter is called on paper."""
+    effect, dot, parameter = name.partition(".")
+    if dot:
+        return f"{effect}: {parameter}".replace("_", " ")
+    return LABELS.get(name, name.replace("_", " "))
