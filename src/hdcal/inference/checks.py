@@ -4,6 +4,7 @@ A failed check fails the result. A warning or a note leaves it usable and says w
 the reader must know.
 """
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -94,10 +95,14 @@ def diagnose_parameters(
             "log_likelihood": {"force": log_likelihood},
         }
     )
-    bulk, tail = _by_name(ess(tree)), _by_name(ess(tree, method="tail"))
-    split = _by_name(rhat(tree))
-    to_prior = _by_name(psense(tree, group="prior"))
-    to_data = _by_name(psense(tree, group="likelihood"))
+    # On draws that stand still the statistics warn on their way to NaN; a NaN fails
+    # its check, so nothing is hidden by keeping the terminal quiet.
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        bulk, tail = _by_name(ess(tree)), _by_name(ess(tree, method="tail"))
+        split = _by_name(rhat(tree))
+        to_prior = _sensitivity(tree, "prior")
+        to_data = _sensitivity(tree, "likelihood")
     found = {}
     for name, values in draws.items():
         contraction = 1.0 - values.var() / frozen(priors[name]).var()
@@ -113,6 +118,13 @@ def diagnose_parameters(
             driven_by="data" if contraction >= enough else "prior",
         )
     return found
+
+
+def _sensitivity(tree: xr.DataTree, group: str) -> dict[str, float]:
+    try:
+        return _by_name(psense(tree, group=group))
+    except ValueError:  # draws that are all alike have no tail to smooth
+        return dict.fromkeys(map(str, tree["posterior"].data_vars), np.nan)
 
 
 def _by_name(result) -> dict[str, float]:
@@ -133,11 +145,12 @@ def sampling_checks(
     worst = max(diagnoses, key=lambda name: _bad(diagnoses[name].rhat))
     least = min(
         diagnoses,
-        key=lambda name: min(diagnoses[name].ess_bulk, diagnoses[name].ess_tail),
+        key=lambda name: _least(diagnoses[name]),
     )
     top, need = diagnoses[worst].rhat, ESS_PER_CHAIN * chains
-    low = min(diagnoses[least].ess_bulk, diagnoses[least].ess_tail)
-    energy = np.asarray(bfmi(stats["energy"].to_numpy(), chain_axis=0, draw_axis=1))
+    low = _least(diagnoses[least])
+    with np.errstate(all="ignore"):
+        energy = np.asarray(bfmi(stats["energy"].to_numpy(), chain_axis=0, draw_axis=1))
     divergent = int(stats["diverging"].sum())
     saturated = float((stats["tree_depth"] >= MAX_TREE_DEPTH).mean())
     return (
@@ -173,6 +186,11 @@ def sampling_checks(
 def _bad(value: float) -> float:
     # Constant or infinite draws give NaN, which must count as the worst.
     return np.inf if np.isnan(value) else value
+
+
+def _least(diagnosis: Diagnosis) -> float:
+    sizes = (diagnosis.ess_bulk, diagnosis.ess_tail)
+    return 0.0 if np.isnan(sizes).any() else min(sizes)
 
 
 def _check(name: str, passed: bool, words: str) -> Check:

@@ -163,7 +163,7 @@ def _check_existing(real: Path, target: Path | str, force: bool) -> None:
 
 
 def _refusal(target: Path | str, problem: str, remedy: str) -> InputError:
-    return InputError([Finding(str(target), problem, remedy)])
+    return InputError([Finding(str(target) or "--out", problem, remedy)])
 
 
 def _unwritable(target: Path | str, error: OSError) -> InputError:

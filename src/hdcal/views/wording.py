@@ -34,7 +34,7 @@ def number(value: float | None, width: float | None = None) -> str:
 
     Args:
         value: what to write; None is a dash.
-        width: its interval's width; two digits of it are kept.
+        width: its interval's width; three digits of it are kept.
     """
     if value is None or not math.isfinite(value):
         return "–"
@@ -43,7 +43,7 @@ def number(value: float | None, width: float | None = None) -> str:
         return f"{value:.3g}"
     if not width or not math.isfinite(width):
         return f"{value:.4g}"
-    decimals = max(0, 1 - math.floor(math.log10(abs(width))))
+    decimals = max(0, 2 - math.floor(math.log10(abs(width))))
     return f"{value:.{min(decimals, 6)}f}"
 
 
@@ -73,7 +73,7 @@ def prior_words(name: str, prior: Prior) -> str:
         plain = float(value) * (1.0 if part in _PURE else factor)
         if part == "log_sd":
             plain = math.exp(plain)
-        texts.append(f"{plain:.4g}")
+        texts.append(f"{plain:.3g}" if part == "log_sd" else f"{plain:.4g}")
     return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
 
 

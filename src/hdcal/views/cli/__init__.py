@@ -27,7 +27,12 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
         context.exit()
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+_EPILOG = (
+    "Exit codes: 0 done, 1 the result must not be used, 2 bad input, 130 interrupted."
+)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
 @click.option(
     "--version",
     is_flag=True,
@@ -41,10 +46,6 @@ def hdcal() -> None:
 
     DATA is a CSV file of measurements with a gear file (--gear), or a folder
     holding data.csv and gear.toml.
-
-    \b
-    Exit codes: 0 done, 1 the result must not be used, 2 bad input,
-    130 interrupted.
     """
 
 

@@ -18,7 +18,7 @@ from hdcal.views.cli.options import (
 _MANY = click.IntRange(1, 1_000_000)
 
 
-@click.command()
+@click.command(short_help="From measurements to a result folder.")
 @case_options
 @click.option(
     "--effect",

@@ -9,7 +9,7 @@ SCHEMA = "hdcal.check/1"
 _MOST_LISTED = 8
 
 
-@click.command()
+@click.command(short_help="Read DATA only, and say what was understood.")
 @case_options
 @json_option
 @click.pass_obj

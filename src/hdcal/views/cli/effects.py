@@ -8,7 +8,7 @@ from hdcal.views.cli.options import json_option
 SCHEMA = "hdcal.effects/1"
 
 
-@click.command()
+@click.command(short_help="List the library of effects.")
 @json_option
 @click.pass_obj
 def effects(console: Console):

@@ -9,7 +9,7 @@ from hdcal.views.cli.options import force_option, json_option, read_grid
 SCHEMA = "hdcal.prediction/1"
 
 
-@click.command()
+@click.command(short_help="Bands on the force from a result folder.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--deformation",

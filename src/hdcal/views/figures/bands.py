@@ -25,7 +25,7 @@ from hdcal.views.figures.canvas import (
 )
 
 _MARKS = {1: "^", -1: "v"}
-_SENSE = {"up": 1, "down": -1}
+_MOST_COLUMNS = 3
 
 
 def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> Figure:
@@ -40,25 +40,49 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
     levels = np.unique(bands.temperature_C)
     colours = temperature_colours(levels)
     with style():
-        figure = Figure(figsize=(7.6, 7.4), layout="constrained")
-        top, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0])
-        for rows in _curves(bands):
+        figure, top, panels = _panels(len(levels))
+        for rows in reversed(list(_curves(bands))):
             level = int(np.searchsorted(levels, bands.temperature_C[rows][0]))
-            _draw_curve(top, bands, rows, colours[level], baseline=False)
-            _draw_curve(below, bands, rows, colours[level], baseline=True)
-        _draw_points(top, left, left.measured, levels, colours)
-        _draw_points(below, left, _distance(bands, left), levels, colours)
-        below.axhline(0.0, color=DARK, linewidth=0.8, zorder=1)
+            strength = 1.0 / np.sqrt(len(levels))
+            _draw_curve(top, bands, rows, colours[level], strength)
+            # Around its own median unloading has the same bands as loading.
+            if bands.direction[rows[0]] == bands.direction[0]:
+                _draw_curve(panels[level], bands, rows, colours[level], baseline=True)
+        distance = _distance(bands, left)
+        nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
+        for index, (axes, level) in enumerate(zip(panels, levels, strict=True)):
+            here = nearest == index
+            _draw_points(top, left, left.measured, here, colours[index])
+            _draw_points(axes, left, distance, here, colours[index])
+            axes.axhline(0.0, color=DARK, linewidth=0.8, zorder=1)
+            where = f", {level:g} °C" if len(levels) > 1 else ""
+            heading(axes, f"Distance from the fit{where}")
         heading(top, f"{plain(gear.name)}: force as read")
-        heading(below, "Distance from the fit")
         top.set_ylabel("force [N]")
-        below.set_ylabel("force − fit [N]")
-        below.set_xlabel(f"deformation as read ({gear.reading}) [mm]")
-        _limit(below, bands, left)
+        panels[0].set_ylabel("force − fit [N]")
+        _limit(panels[0], bands, distance)
+        figure.supxlabel(f"deformation as read ({gear.reading}) [mm]", fontsize=10)
         _legend(top, bands, left, levels, colours)
         if not posterior.usable:
             watermark(figure)
     return figure
+
+
+def _panels(count: int) -> tuple[Figure, Axes, list[Axes]]:
+    """Return a large panel above one small panel per temperature."""
+    columns = min(count, _MOST_COLUMNS)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(7.6, 5.0 + 2.3 * rows), layout="constrained")
+    grid = figure.add_gridspec(1 + rows, columns, height_ratios=[2.0] + [1.0] * rows)
+    top = figure.add_subplot(grid[0, :])
+    panels: list[Axes] = []
+    for index in range(count):
+        place = grid[1 + index // columns, index % columns]
+        first = panels[0] if panels else None
+        panels.append(figure.add_subplot(place, sharex=first, sharey=first))
+        if index % columns:
+            panels[-1].tick_params(labelleft=False)
+    return figure, top, panels
 
 
 def _distance(bands: Bands, left: Residuals) -> np.ndarray:
@@ -83,7 +107,9 @@ def _curves(bands: Bands) -> Iterator[np.ndarray]:
                 yield np.flatnonzero(found)
 
 
-def _draw_curve(axes: Axes, bands: Bands, rows, colour: str, *, baseline: bool) -> None:
+def _draw_curve(
+    axes: Axes, bands: Bands, rows, colour: str, weight=1.0, *, baseline: bool = False
+) -> None:
     x = bands.deformation_mm[rows]
     zero = bands.physics_median_N[rows] if baseline else np.zeros(len(rows))
     tested = np.asarray(bands.tested[rows], dtype=bool)
@@ -93,7 +119,8 @@ def _draw_curve(axes: Axes, bands: Bands, rows, colour: str, *, baseline: bool) 
     bands_here = [("new_measurement", 0.16), ("physics", 0.38)]
     if np.isfinite(bands.with_gap_median_N).any():
         bands_here.insert(1, ("with_gap", 0.22))
-    for name, strength in bands_here:
+    for name, full in bands_here:
+        strength = full * weight
         low = getattr(bands, f"{name}_lo_N")[rows] - zero
         high = getattr(bands, f"{name}_hi_N")[rows] - zero
         shade = {"color": colour, "linewidth": 0.0}
@@ -112,32 +139,31 @@ def _draw_curve(axes: Axes, bands: Bands, rows, colour: str, *, baseline: bool) 
         axes.plot(x, gap, color=colour, linewidth=1.0, linestyle="-.")
 
 
-def _draw_points(axes: Axes, left: Residuals, values, levels, colours) -> None:
-    shown = thinned(len(values))
-    nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
-    small = len(values) > 300
+def _draw_points(axes: Axes, left: Residuals, values, here, colour: str) -> None:
+    shown = np.zeros(len(values), dtype=bool)
+    shown[thinned(len(values))] = True
+    small = np.count_nonzero(shown) > 300
     for sense, mark in _MARKS.items():
-        for index, colour in enumerate(colours):
-            rows = shown[(nearest[shown] == index) & (left.direction[shown] == sense)]
-            axes.plot(
-                left.deformation[rows],
-                values[rows],
-                mark,
-                markersize=2.5 if small else 5.0,
-                markerfacecolor=colour,
-                markeredgecolor="white" if not small else "none",
-                markeredgewidth=0.5,
-                alpha=0.5 if small else 1.0,
-                zorder=4,
-                rasterized=len(shown) > 1000,
-            )
+        rows = shown & here & (left.direction == sense)
+        axes.plot(
+            left.deformation[rows],
+            values[rows],
+            mark,
+            markersize=2.5 if small else 5.0,
+            markerfacecolor=colour,
+            markeredgecolor="none" if small else "white",
+            markeredgewidth=0.5,
+            alpha=0.5 if small else 1.0,
+            zorder=4,
+            rasterized=small,
+        )
 
 
-def _limit(axes: Axes, bands: Bands, left: Residuals) -> None:
-    """Let the bands inside the tested range and the data fill the lower panel."""
+def _limit(axes: Axes, bands: Bands, distance: np.ndarray) -> None:
+    """Let the bands inside the tested range and the data fill the lower panels."""
     inside = np.asarray(bands.tested, dtype=bool)
     middle = bands.physics_median_N
-    edges = [_distance(bands, left)]
+    edges = [distance]
     for name in ("new_measurement_lo_N", "new_measurement_hi_N"):
         edges.append((getattr(bands, name) - middle)[inside])
     reach = 1.12 * np.max(np.abs(np.concatenate(edges)))

@@ -105,7 +105,7 @@ def sampler_figure(posterior: Posterior) -> Figure:
             words = plain(label(name), 40)
             axes.set_title(words, loc="left", fontsize=8, fontweight="bold")
             axes.set_xlabel(f"rank of the draw (R-hat {rhat:.3f})", fontsize=8)
-        panels[0].set_ylabel("share of even", fontsize=8)
+        panels[0].set_ylabel("count / even count", fontsize=8)
         if not posterior.usable:
             watermark(figure)
     return figure

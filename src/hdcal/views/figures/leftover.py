@@ -108,11 +108,5 @@ def _draw(axes: Axes, x, values, groups) -> None:
         )
     reach = max(3.0, 1.1 * float(np.max(np.abs(values))))
     axes.set_ylim(-reach, reach)
-    axes.text(
-        1.0,
-        2.0,
-        " ±2 sd",
-        transform=axes.get_yaxis_transform(),
-        va="center",
-        color=GREY,
-    )
+    place = {"transform": axes.get_yaxis_transform(), "fontsize": 8, "color": GREY}
+    axes.text(0.995, 1.9, "±2 sd", ha="right", va="top", **place)

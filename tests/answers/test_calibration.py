@@ -1,0 +1,157 @@
+"""Calibration as a library call: repeatable, kept whole on disk, clear when refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigs import cycles, make_case, make_gear, make_records, ramp
+
+from hdcal.answers.calibration import calibrate, choose_effects
+from hdcal.answers.summary import summarise
+from hdcal.errors import InputError
+from hdcal.inference.posterior import Posterior
+from hdcal.physics.registry import EFFECTS
+
+SHORT = {"warmup": 300, "draws": 300}
+
+
+def with_force(records, sd=0.5):
+    noise = np.random.default_rng(0).normal(0.0, sd, len(records.force))
+    force = 205.0 * np.asarray(records.deformation) - 1.0 + noise
+    return replace(records, force=force)
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return calibrate(make_case(with_force(ramp(30))), seed=4, **SHORT)
+
+
+def test_the_same_seed_gives_the_same_draws(posterior):
+    case = posterior.case
+    again, other = (calibrate(case, seed=seed, **SHORT) for seed in (4, 5))
+    for name, values in posterior.draws.items():
+        assert np.array_equal(values, again.draws[name]), name
+    assert not np.array_equal(posterior.draws["K"], other.draws["K"])
+
+
+def test_a_posterior_survives_the_disk(posterior, tmp_path):
+    posterior.save(tmp_path / "posterior.nc")
+    back = Posterior.load(tmp_path)
+    assert summarise(back) == summarise(posterior)
+    for name, values in posterior.draws.items():
+        assert np.array_equal(values, back.draws[name])
+    assert back.case.records.known == posterior.case.records.known
+    groups = {
+        "posterior",
+        "prior",
+        "sample_stats",
+        "observed_data",
+        "constant_data",
+        "log_likelihood",
+    }
+    assert set(back.tree.children) == groups
+
+
+@pytest.mark.parametrize("damage", ["missing", "text", "cut", "foreign"])
+def test_a_damaged_posterior_is_refused(posterior, tmp_path, damage):
+    path = tmp_path / "posterior.nc"
+    posterior.save(path)
+    if damage == "missing":
+        path.unlink()
+    elif damage == "text":
+        path.write_text("not a posterior")
+    elif damage == "cut":
+        path.write_bytes(path.read_bytes()[:3000])
+    else:
+        posterior.tree.to_netcdf(path, mode="w", engine="h5netcdf")
+    with pytest.raises(InputError):
+        Posterior.load(path)
+
+
+def test_an_unknown_effect_is_refused_with_the_nearest():
+    with pytest.raises(InputError, match="did you mean 'coulomb_friction'"):
+        choose_effects(["coulomb_frction"])
+    assert choose_effects(["outliers", "outliers"]) == (EFFECTS["outliers"],)
+
+
+def test_an_effect_without_its_covariates_is_refused():
+    case = make_case(with_force(ramp()))
+    with pytest.raises(InputError) as caught:
+        calibrate(case, effects=["coulomb_friction", "thermal_zero_drift"])
+    assert len(caught.value.findings) == 2
+    assert "needs unloading" in str(caught.value)
+
+
+@pytest.mark.parametrize("setting", [{"chains": 1}, {"warmup": 0}, {"draws": 2}])
+def test_too_small_settings_are_refused(setting):
+    with pytest.raises(InputError):
+        calibrate(make_case(with_force(ramp())), **setting)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_every_effect_is_recovered(name):
+    """Data of the library's own effect at its typical size: truth in the 99 % interval."""
+    from rigs import simulate
+
+    from hdcal.inference.problem import build_problem
+    from hdcal.physics.effect import parameters
+    from hdcal.rig.priors import effect_priors
+
+    case, effect = make_case(cycles(240)), EFFECTS[name]
+    problem = build_problem(case, effect_priors(), (effect,))
+    truth = {
+        "K": 2.5,
+        "E0": 207e3,
+        "alpha": 3e-4,
+        "force_offset": 1.0,
+        "deformation_offset": 0.005,
+        "sigma": 0.4,
+        **{f"{name}.{p}": spec.typical for p, spec in parameters(effect).items()},
+    }
+    import jax
+
+    data = simulate(problem, case, truth, jax.random.key(11))
+    found = calibrate(data, effects=[name], warmup=500, draws=500)
+    assert found.usable, found.reasons
+    for parameter in (n for n in truth if "." in n):
+        low, high = np.quantile(found.draws[parameter], [0.005, 0.995])
+        assert low < truth[parameter] < high, parameter
+
+
+def test_specimens_have_a_stiffness_each():
+    rng = np.random.default_rng(1)
+    specimen = np.repeat([0, 1, 2], 40)
+    scale = np.array([1.0, 1.08, 0.93])
+    deformation = np.tile(np.linspace(0.02, 0.54, 40), 3)
+    force = 205.0 * scale[specimen] * deformation + rng.normal(0.0, 0.3, 120)
+    known = {"specimen", "specimens"}
+    records = make_records(deformation, force, specimen=specimen, known=known)
+    found = calibrate(make_case(records), **SHORT).draws["specimen_deviation"]
+    assert found.mean(axis=0) == pytest.approx(scale / scale.mean() - 1.0, abs=0.01)
+
+
+def test_a_known_sd_by_row_weighs_the_rows():
+    """Rows stated to be poor are; ignoring it would move the slope."""
+    deformation = np.linspace(0.02, 0.54, 60)
+    poor = np.arange(60) % 2 == 0
+    rng = np.random.default_rng(2)
+    force = 205.0 * deformation + np.where(poor, 10.0, 0.1) * rng.normal(size=60)
+    records = make_records(
+        deformation, force, force_sd=np.where(poor, 10.0, 0.0), known={"force_sd"}
+    )
+    found = calibrate(make_case(records), **SHORT)
+    assert found.draws["sigma"].mean() < 0.3
+    assert found.draws["stiffness"].mean() == pytest.approx(205.0, abs=0.5)
+    assert found.draws["stiffness"].std() < 0.3
+
+
+def test_a_diametral_reading_halves_the_radial_displacement():
+    records = with_force(ramp(30))
+    radial, diametral = (
+        calibrate(make_case(records, make_gear(reading=kind)), **SHORT)
+        for kind in ("radial", "diametral")
+    )
+    ratio = np.median(diametral.draws["K"]) / np.median(radial.draws["K"])
+    assert ratio == pytest.approx(2.0, rel=0.02)
+    slopes = [np.median(p.draws["stiffness"]) for p in (radial, diametral)]
+    assert slopes[0] == pytest.approx(slopes[1], rel=0.005)

@@ -1,0 +1,142 @@
+"""Posteriors are calibrated: ranks of the truth are uniform, bands cover.
+
+Simulation-based calibration (Talts et al. 2018): parameters drawn from the prior,
+data from the parameters; the rank of the truth among posterior draws is then uniform.
+"""
+
+from functools import cache
+
+import jax
+import numpy as np
+import pytest
+from rigs import cycles, draw_truth, make_case, make_gear, posterior_draws, simulate
+from scipy import stats
+
+from hdcal.inference.density import member_base
+from hdcal.inference.problem import build_problem
+from hdcal.physics.chain import predict_reading
+from hdcal.physics.registry import EFFECTS
+from hdcal.rig.priors import effect_priors
+
+# Draws that the truth is ranked among, thinned so that they are nearly independent.
+RANKED, BINS = 99, 10
+# False-alarm probability of each uniformity test; the seeds are fixed.
+LEVEL = 1e-3
+COVERAGES = (0.5, 0.9, 0.95)
+MODELS = ["base", "rounded", *EFFECTS]
+
+
+def _setting(model: str):
+    effects = (EFFECTS[model],) if model in EFFECTS else ()
+    gear = make_gear(resolution=0.98 if model == "rounded" else 0.0)
+    return make_case(cycles(), gear), effects
+
+
+def _quantities(values: dict) -> dict:
+    """Return what is ranked: every parameter, with the product for the pair."""
+    skipped = ("run_", "specimen_", "gap_", "K", "E0", "stiffness")
+    named = {n: v for n, v in values.items() if not n.startswith(skipped)}
+    return {"K·E0": values["K"] * values["E0"], **named}
+
+
+@cache
+def run_sbc(model: str, count: int):
+    """Return ranks by quantity, draws by quantity, and hits of the force bands."""
+    case, effects = _setting(model)
+    template = build_problem(case, effect_priors(), effects)
+    ranks, hits = [], []
+    for index in range(count):
+        key = jax.random.key(1000 + index)
+        of_truth, of_data, of_fit = jax.random.split(key, 3)
+        truth = draw_truth(template, of_truth)
+        data = simulate(template, case, truth, of_data)
+        problem, draws = posterior_draws(
+            data, effects, of_fit, chains=4, warmup=300, draws=250
+        )
+        every = len(draws["K"]) // RANKED
+        thin = {n: v[::every][:RANKED] for n, v in draws.items()}
+        true, found = _quantities(truth), _quantities(thin)
+        ranks.append({n: int(np.sum(found[n] < true[n])) for n in true})
+        hits.append(_band_hits(problem, case, truth, draws))
+    return ranks, np.array(hits)
+
+
+def _band_hits(problem, case, truth, draws) -> list[bool]:
+    """Say which central intervals of the force hold the truth, at one row."""
+    row = jax.tree.map(lambda column: column[30:31], case.records)
+
+    def force(values):
+        base = member_base(problem, values)
+        return predict_reading(base, (), row, problem.reading)[0][0]
+
+    names = ("K", "E0", "alpha", "deformation_offset", "force_offset", "sigma")
+    true = float(force({n: truth[n] for n in names}))
+    found = np.asarray(jax.vmap(force)({n: draws[n] for n in names}))
+    below = np.mean(found < true)
+    return [abs(below - 0.5) < level / 2 for level in COVERAGES]
+
+
+def uniformity(ranks) -> float:
+    """Return the p value of a χ² test that ranks 0…RANKED are uniform."""
+    counts, _ = np.histogram(ranks, bins=BINS, range=(0, RANKED + 1))
+    return float(stats.chisquare(counts).pvalue)
+
+
+def _assert_uniform(ranks):
+    worst = {name: uniformity([r[name] for r in ranks]) for name in ranks[0]}
+    assert min(worst.values()) > LEVEL, worst
+
+
+def _assert_covers(hits):
+    for level, share in zip(COVERAGES, hits.sum(axis=0), strict=True):
+        p = stats.binomtest(int(share), len(hits), level).pvalue
+        assert p > LEVEL, (level, share / len(hits))
+
+
+@pytest.mark.parametrize("model", ["base", "progressive_stiffening"])
+def test_a_slice_of_calibration(model):
+    ranks, hits = run_sbc(model, 60)
+    _assert_uniform(ranks)
+    _assert_covers(hits)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", MODELS)
+def test_ranks_are_uniform_and_bands_cover(model):
+    ranks, hits = run_sbc(model, 250)
+    _assert_uniform(ranks)
+    _assert_covers(hits)
+
+
+@pytest.mark.parametrize("fault", ["too narrow", "too wide", "shifted"])
+def test_a_broken_posterior_is_caught(fault):
+    """Ranks of a faulty sampler: its draws are squeezed, spread or moved."""
+    rng = np.random.default_rng(5)
+    width, shift = {
+        "too narrow": (0.5, 0.0),
+        "too wide": (2.0, 0.0),
+        "shifted": (1.0, 0.8),
+    }[fault]
+    truth = rng.normal(size=250)
+    centre = truth + rng.normal(size=250)
+    draws = (centre / 2)[:, None] + np.sqrt(0.5) * rng.normal(size=(250, RANKED))
+    assert uniformity(np.sum(draws < truth[:, None], axis=1)) > LEVEL
+    broken = (centre / 2)[:, None] + shift + width * (draws - (centre / 2)[:, None])
+    assert uniformity(np.sum(broken < truth[:, None], axis=1)) < LEVEL
+
+
+def test_a_broken_likelihood_is_caught(monkeypatch):
+    """The same run on a model that believes a tenth of the noise it has."""
+    from hdcal.inference import compress
+
+    honest = compress.log_likelihood
+
+    def overconfident(blocks, coefficients, sigma, step):
+        return honest(blocks, coefficients, 0.3 * sigma, step)
+
+    run_sbc.cache_clear()
+    jax.clear_caches()
+    monkeypatch.setattr(compress, "log_likelihood", overconfident)
+    ranks, _ = run_sbc.__wrapped__("base", 60)
+    jax.clear_caches()
+    assert uniformity([r["sigma"] for r in ranks]) < LEVEL

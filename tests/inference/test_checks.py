@@ -1,0 +1,194 @@
+"""Every check passes on a good model and trips on one made to trip it."""
+
+import numpy as np
+import pytest
+import xarray as xr
+from rigs import cycles, make_case, make_gear, make_records, ramp
+
+from hdcal.answers.calibration import calibrate
+from hdcal.errors import NotUsable
+from hdcal.inference.checks import (
+    Diagnosis,
+    bound_check,
+    conflict_check,
+    diagnose_parameters,
+    sampling_checks,
+)
+from hdcal.rig.priors import Prior
+
+RHAT, ESS, BFMI, DIVERGENT, DEPTH = range(5)
+
+
+def honest_force(records, slope=205.0, offset=-1.0, sd=0.5, seed=0):
+    noise = np.random.default_rng(seed).normal(0.0, sd, len(records.force))
+    return slope * np.asarray(records.deformation) + offset + noise
+
+
+def case_of(records, gear=None, **change):
+    rows = {n: getattr(records, n) for n in vars(records) if n not in ("known", "force")}
+    force = change.pop("force", honest_force(records))
+    return make_case(make_records(**rows, force=force, known=records.known), gear)
+
+
+@pytest.fixture(scope="module")
+def good():
+    return calibrate(case_of(ramp(40)), seed=1)
+
+
+def outcome(posterior, start):
+    return [c.outcome for c in posterior.checks if c.name.startswith(start)]
+
+
+def stats_of(chains=4, draws=500, **change):
+    rng = np.random.default_rng(0)
+    fields = {
+        "energy": rng.normal(size=(chains, draws)),
+        "diverging": np.zeros((chains, draws), dtype=bool),
+        "tree_depth": np.full((chains, draws), 3),
+    }
+    fields |= change
+    return xr.Dataset({n: (("chain", "draw"), v) for n, v in fields.items()})
+
+
+def diagnoses_of(draws):
+    flat = np.zeros(draws.shape)
+    prior = {"x": Prior("normal", (0.0, 10.0))}
+    rng = np.random.default_rng(1)
+    return diagnose_parameters({"x": draws}, prior, rng.normal(size=flat.shape), flat)
+
+
+GOOD = np.random.default_rng(2).normal(size=(4, 500))
+
+
+def test_a_good_run_passes_everything(good):
+    assert good.usable
+    assert {c.outcome for c in good.checks} <= {"passed", "note"}
+    assert [c.outcome for c in sampling_checks(stats_of(), diagnoses_of(GOOD))] == [
+        "passed"
+    ] * 5
+
+
+def test_chains_in_different_places_fail_rhat():
+    apart = GOOD + np.array([0.0, 0.0, 0.0, 3.0])[:, None]
+    assert sampling_checks(stats_of(), diagnoses_of(apart))[RHAT].outcome == "failed"
+
+
+def test_chains_that_stand_still_fail_rhat():
+    still = np.zeros_like(GOOD)
+    assert sampling_checks(stats_of(), diagnoses_of(still))[RHAT].outcome == "failed"
+
+
+def test_a_slow_walk_fails_the_effective_sample_size():
+    walk = np.random.default_rng(3).normal(size=(4, 500)).cumsum(axis=1)
+    assert sampling_checks(stats_of(), diagnoses_of(walk))[ESS].outcome == "failed"
+
+
+def test_a_tail_that_is_hardly_visited_fails_the_tail_size():
+    stuck = GOOD.copy()
+    stuck[:, :40] = np.where(np.arange(4)[:, None] == 0, 30.0, stuck[:, :40])
+    assert sampling_checks(stats_of(), diagnoses_of(stuck))[ESS].outcome == "failed"
+
+
+def test_energy_that_creeps_fails_bfmi():
+    energy = np.random.default_rng(4).normal(size=(4, 500)).cumsum(axis=1)
+    checks = sampling_checks(stats_of(energy=energy), diagnoses_of(GOOD))
+    assert checks[BFMI].outcome == "failed"
+
+
+def test_one_divergence_fails():
+    diverging = np.zeros((4, 500), dtype=bool)
+    diverging[2, 17] = True
+    checks = sampling_checks(stats_of(diverging=diverging), diagnoses_of(GOOD))
+    assert checks[DIVERGENT].outcome == "failed"
+
+
+def test_trajectories_that_are_cut_off_fail():
+    depth = np.full((4, 500), 3)
+    depth[:, ::50] = 10
+    checks = sampling_checks(stats_of(tree_depth=depth), diagnoses_of(GOOD))
+    assert checks[DEPTH].outcome == "failed"
+
+
+def test_too_short_a_run_fails_closed():
+    posterior = calibrate(case_of(ramp(40)), warmup=5, draws=20)
+    assert not posterior.usable
+    assert posterior.reasons
+    with pytest.raises(NotUsable):
+        posterior.require_usable()
+
+
+def test_a_force_in_the_wrong_unit_conflicts_with_the_prior(good):
+    records = ramp(40)
+    kilo = case_of(records, force=9.80665 * honest_force(records))
+    assert outcome(good, "prior and data") == ["passed"]
+    assert outcome(calibrate(kilo), "prior and data") == ["warning"]
+
+
+def test_a_median_far_in_the_tail_is_a_conflict():
+    prior = {"x": Prior("normal", (0.0, 1.0))}
+    assert conflict_check({"x": GOOD + 2.5}, prior).outcome == "passed"
+    assert conflict_check({"x": GOOD + 3.5}, prior).outcome == "warning"
+
+
+def test_a_prior_that_cuts_the_answer_off_is_a_bound(good):
+    gear = make_gear(K=Prior("uniform", (1.0, 2.3)))
+    posterior = calibrate(case_of(ramp(40), gear))
+    assert outcome(good, "no parameter at a bound") == ["passed"]
+    assert outcome(posterior, "no parameter at a bound") == ["warning"]
+    assert "K at 2.3" in next(c.words for c in posterior.checks if "bound" in c.name)
+
+
+def test_an_effect_that_is_absent_is_pressed_against_zero():
+    absent = calibrate(case_of(cycles(96)), effects=["coulomb_friction"])
+    assert outcome(absent, "no parameter at a bound") == ["warning"]
+    records = cycles(96)
+    force = honest_force(records) + 2.0 * np.asarray(records.sense)
+    present = calibrate(case_of(records, force=force), effects=["coulomb_friction"])
+    assert outcome(present, "no parameter at a bound") == ["passed"]
+
+
+def test_bounds_see_pile_ups_only():
+    half = {"x": Prior("half_normal", (1.0,))}
+    assert bound_check({"x": np.abs(GOOD)}, half).outcome == "warning"
+    assert bound_check({"x": np.abs(GOOD * 0.1 + 1.0)}, half).outcome == "passed"
+
+
+def test_a_parameter_without_its_covariate_is_dead(good):
+    words = [c.words for c in good.checks if c.outcome == "note"]
+    assert "alpha: these data say nothing, the prior is the answer" in words
+    assert good.diagnoses["alpha"].driven_by == "prior"
+    warm = calibrate(case_of(cycles(960), force=honest_force(cycles(960), sd=0.1)))
+    assert not any("alpha" in c.words for c in warm.checks if c.outcome == "note")
+    assert warm.diagnoses["alpha"].driven_by == "data"
+
+
+def test_flat_directions_are_named(good):
+    words = [c.words for c in good.checks if c.outcome == "note"]
+    assert "K and E0 cannot be told apart by this data; their product can" in words
+    assert any("deformation_offset and force_offset" in sentence for sentence in words)
+
+
+def test_a_known_modulus_is_no_flat_direction():
+    gear = make_gear(
+        E0=Prior("fixed", (207e3,)), deformation_offset=Prior("fixed", (0.0,))
+    )
+    posterior = calibrate(case_of(ramp(40), gear))
+    assert not any("told apart by" in c.words for c in posterior.checks)
+
+
+def test_drivers_of_the_article_s_ramp(good):
+    drivers = {name: d.driven_by for name, d in good.diagnoses.items()}
+    assert drivers["E0"] == drivers["alpha"] == "prior"
+    assert drivers["K"] == drivers["sigma"] == "data"
+
+
+def test_power_scaling_overrules_a_middling_contraction():
+    """Contraction .85, likelihood without influence: the prior drives."""
+    rng = np.random.default_rng(6)
+    draws = 0.39 * rng.normal(size=(4, 1000))
+    prior = {"x": Prior("normal", (0.0, 1.0))}
+    of_prior, none = -50.0 * draws**2, 1e-3 * rng.normal(size=draws.shape)
+    weak = diagnose_parameters({"x": draws}, prior, of_prior, none)["x"]
+    strong = diagnose_parameters({"x": draws}, prior, none, of_prior)["x"]
+    assert isinstance(weak, Diagnosis)
+    assert (weak.driven_by, strong.driven_by) == ("prior", "data")

@@ -1,0 +1,300 @@
+"""The chain, written for whole records, is the obvious sum row by row."""
+
+import dataclasses
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+
+from hdcal.physics.chain import (
+    Base,
+    Reading,
+    force,
+    linear_coefficients,
+    linear_columns,
+    predict_reading,
+)
+from hdcal.physics.effects.charge_leakage import ChargeLeakage
+from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.physics.effects.outliers import Outliers
+from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
+from hdcal.physics.effects.seating_slack import SeatingSlack
+from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
+from hdcal.physics.theory import THEORIES
+
+SLACK, GAIN, FRICTION, LEAK, DRIFT = 0.021, 0.37, 1.9, 2.3e-3, 0.11
+SHARE, RATIO = 0.08, 4.5
+EFFECTS = (
+    SeatingSlack(SLACK),
+    ProgressiveStiffening(GAIN),
+    CoulombFriction(FRICTION),
+    ChargeLeakage(LEAK),
+    ThermalZeroDrift(DRIFT),
+    Outliers(SHARE, RATIO),
+)
+
+
+def slow_force(base, records, reading, row, *, effects):
+    """Return the force on the gear and the rise of temperature of one row."""
+    rise = records.temperature[row] - reading.reference_temperature
+    stiffness = base.stiffness * (1.0 - base.alpha * rise)
+    seen = (records.deformation[row] - base.deformation_offset) * (
+        reading.radial_per_read
+    )
+    if not effects:
+        return stiffness * seen, rise
+    relative = seen / SLACK
+    seen -= SLACK * relative / (1.0 + relative**8) ** 0.125
+    corner = 1e-4
+    gain = GAIN * (math.hypot(seen, corner) - corner)
+    friction = FRICTION * records.sense[row]
+    return stiffness * seen * (1.0 + gain) + friction, rise
+
+
+def slow_reading(base, records, reading, *, effects):
+    """The formula of the design, row by row; effects: all six or none."""
+    found = []
+    shown = before = 0.0
+    for row in range(len(records.deformation)):
+        level, rise = slow_force(base, records, reading, row, effects=effects)
+        if effects:
+            first = row == 0 or records.run[row] != records.run[row - 1]
+            if first:
+                shown = before = 0.0
+            span = records.time[row] - (0.0 if first else records.time[row - 1])
+            kept = math.exp(-LEAK * span)
+            shown = shown * kept + (level - before) * (1.0 - kept) / (LEAK * span)
+            before, level = level, shown
+            level += DRIFT * rise
+        found.append(level + base.force_offset)
+    return np.array(found)
+
+
+def random_base(seed: int) -> Base:
+    rng = np.random.default_rng(seed)
+    return Base(
+        rng.uniform(20.0, 400.0),
+        rng.uniform(0.0, 1e-2),
+        rng.normal(0.0, 0.05),
+        rng.normal(0.0, 5.0),
+        rng.uniform(0.1, 2.0),
+    )
+
+
+@pytest.mark.parametrize("per_read", [1.0, 0.5])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("effects", [(), EFFECTS], ids=["bare", "all effects"])
+def test_row_by_row(scattered, effects, seed, per_read):
+    records, base = scattered(seed), random_base(seed)
+    reading = Reading(per_read, 23.0)
+    mean, noise = predict_reading(base, effects, records, reading)
+    slow = slow_reading(base, records, reading, effects=bool(effects))
+    np.testing.assert_allclose(mean, slow, rtol=1e-10, atol=1e-10)
+    sd = [math.hypot(base.sigma, own) for own in records.force_sd]
+    if effects:
+        weights = [1.0 - SHARE, SHARE]
+        sds = [sd, [RATIO * own for own in sd]]
+    else:
+        weights, sds = [1.0], [sd]
+    np.testing.assert_allclose(np.exp(noise.log_weight), weights, rtol=1e-10)
+    np.testing.assert_allclose(noise.sd, sds, rtol=1e-13)
+
+
+def test_stages_not_their_listing_decide_the_order(scattered, base, reading):
+    records = scattered(1)
+    mean, noise = predict_reading(base, EFFECTS, records, reading)
+    # Two sensor effects keep their own order; all others sit alone on their stage
+    # or add to it.
+    moved = [EFFECTS[5], EFFECTS[3], EFFECTS[4], EFFECTS[2], EFFECTS[1], EFFECTS[0]]
+    again, noise_again = predict_reading(base, moved, records, reading)
+    np.testing.assert_allclose(again, mean, rtol=1e-13, atol=1e-12)
+    np.testing.assert_array_equal(noise_again.sd, noise.sd)
+
+
+def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, program):
+    """Away from the corner the stated formulas hold: max(0, ω − ω_c) and |ω|."""
+    deformation = np.linspace(3.0 * SLACK, 0.54, 180)
+    records = dataclasses.replace(program, deformation=deformation)
+    base = dataclasses.replace(base, deformation_offset=0.0, alpha=0.0)
+
+    def mean(*effects):
+        return predict_reading(base, effects, records, reading)[0] - base.force_offset
+
+    sharp = base.stiffness * (deformation - SLACK)
+    np.testing.assert_allclose(mean(SeatingSlack(SLACK)), sharp, rtol=1e-5)
+    sharp = base.stiffness * deformation * (1.0 + GAIN * deformation)
+    np.testing.assert_allclose(mean(ProgressiveStiffening(GAIN)), sharp, rtol=5e-5)
+
+
+def test_offsets_shift_and_nothing_else(scattered, base, reading):
+    records = scattered(2)
+    mean = predict_reading(base, (), records, reading)[0]
+    higher = dataclasses.replace(base, force_offset=base.force_offset + 3.0)
+    lifted = predict_reading(higher, (), records, reading)[0]
+    np.testing.assert_allclose(lifted, mean + 3.0, rtol=1e-14)
+    # A gauge whose zero moved by as much as all its readings.
+    later = dataclasses.replace(base, deformation_offset=base.deformation_offset + 0.02)
+    shifted = dataclasses.replace(records, deformation=records.deformation + 0.02)
+    same = predict_reading(later, (), shifted, reading)[0]
+    np.testing.assert_allclose(same, mean, rtol=1e-12, atol=1e-12)
+
+
+def test_a_diametral_reading_is_twice_the_radial_one(scattered, base, reading):
+    records = scattered(3)
+    diametral = dataclasses.replace(records, deformation=2.0 * records.deformation)
+    wide = dataclasses.replace(base, deformation_offset=2.0 * base.deformation_offset)
+    np.testing.assert_allclose(
+        predict_reading(wide, EFFECTS, diametral, Reading(0.5, 20.0))[0],
+        predict_reading(base, EFFECTS, records, reading)[0],
+        rtol=1e-13,
+        atol=1e-12,
+    )
+
+
+def test_the_modulus_falls_with_temperature(scattered, base, reading):
+    records = scattered(4)
+    offset = base.force_offset
+    warm = predict_reading(base, (), records, reading)[0] - offset
+    cold = dataclasses.replace(records, temperature=np.full(24, 20.0))
+    reference = predict_reading(base, (), cold, reading)[0] - offset
+    loss = 1.0 - base.alpha * (records.temperature - 20.0)
+    np.testing.assert_allclose(warm, reference * loss, rtol=1e-12, atol=1e-12)
+    assert np.ptp(loss) > 0.01
+
+
+def test_parameters_may_differ_from_row_to_row(scattered, reading):
+    records = scattered(5)
+    bases = [random_base(seed) for seed in range(24)]
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bases)
+    mean, noise = predict_reading(stacked, (), records, reading)
+    for row, base in enumerate(bases):
+        alone = predict_reading(base, (), records, reading)
+        assert float(mean[row]) == pytest.approx(float(alone[0][row]), rel=1e-13)
+        assert float(noise.sd[0, row]) == float(alone[1].sd[0, row])
+
+
+@pytest.mark.parametrize("per_read", [1.0, 0.5])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_linear_core_is_exact(scattered, seed, per_read):
+    records, base = scattered(seed + 10), random_base(seed + 10)
+    reading = Reading(per_read, 31.0)
+    columns = linear_columns(records, reading)
+    mean = predict_reading(base, (), records, reading)[0]
+    np.testing.assert_allclose(
+        columns @ linear_coefficients(base, reading), mean, rtol=1e-12, atol=1e-11
+    )
+
+
+def test_the_linear_core_of_many_specimens(scattered, reading):
+    bases = [random_base(seed) for seed in range(3)]
+    shared = bases[0]
+    mixed = Base(
+        jnp.stack([base.stiffness for base in bases]),
+        shared.alpha,
+        shared.deformation_offset,
+        jnp.stack([base.force_offset for base in bases]),
+        shared.sigma,
+    )
+    coefficients = linear_coefficients(mixed, reading)
+    assert coefficients.shape == (3, 4)
+    for index in range(3):
+        own = Base(
+            bases[index].stiffness,
+            shared.alpha,
+            shared.deformation_offset,
+            bases[index].force_offset,
+            shared.sigma,
+        )
+        np.testing.assert_allclose(
+            coefficients[index], linear_coefficients(own, reading), rtol=1e-14
+        )
+
+
+def test_double_precision(scattered, base, reading):
+    # One part in 10⁹ of the deformation is lost in single precision.
+    records = scattered(6)
+    mean, noise = predict_reading(base, EFFECTS, records, reading)
+    assert mean.dtype == noise.sd.dtype == noise.log_weight.dtype == jnp.float64
+    finer = dataclasses.replace(records, deformation=records.deformation * (1 + 1e-9))
+    change = predict_reading(base, (), finer, reading)[0]
+    change -= predict_reading(base, (), records, reading)[0]
+    expected = base.stiffness * records.deformation * 1e-9
+    expected *= 1.0 - base.alpha * (records.temperature - 20.0)
+    np.testing.assert_allclose(change, expected, rtol=1e-4, atol=1e-13)
+
+
+def test_jit_and_vmap(scattered, reading):
+    records = scattered(7)
+
+    def mean(base):
+        return predict_reading(base, EFFECTS, records, reading)[0]
+
+    bases = [random_base(seed) for seed in range(4)]
+    each = jnp.stack([mean(base) for base in bases])
+    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bases)
+    np.testing.assert_allclose(jax.jit(jax.vmap(mean))(stacked), each, rtol=1e-12)
+    # Records and reading are data too: no second compilation for another file.
+    compiled = eqx.filter_jit(predict_reading)
+    found = compiled(bases[0], EFFECTS, records, reading)[0]
+    np.testing.assert_allclose(found, each[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("theory", sorted(THEORIES))
+def test_gradients_of_the_force(gear, differences, theory):
+    point = {
+        "geometry": gear,
+        "modulus": 207e3,
+        "influence": 2.5,
+        "deformation": 0.31,
+        "alpha": 3e-4,
+        "temperature_rise": 35.0,
+        "deformation_offset": 0.004,
+        "force_offset": 1.5,
+    }
+
+    def value(point):
+        return force(**point, theory=theory)
+
+    exact = ravel_pytree(jax.grad(value)(point))[0]
+    assert exact.shape == (12,)
+    slow = differences(value, point)
+    np.testing.assert_allclose(exact, slow, rtol=1e-7, atol=1e-8)
+
+
+@pytest.mark.parametrize("theory", sorted(THEORIES))
+def test_the_force_is_the_chain_without_effects(gear, scattered, reading, theory):
+    records = scattered(8)
+    influence, modulus, alpha, zero, offset = 2.4, 205e3, 4e-4, 0.01, -2.0
+    stiffness = influence * THEORIES[theory](gear, modulus)
+    base = Base(stiffness, alpha, zero, offset, 1.0)
+    found = force(
+        gear,
+        modulus,
+        influence,
+        records.deformation,
+        theory=theory,
+        alpha=alpha,
+        temperature_rise=records.temperature - 20.0,
+        deformation_offset=zero,
+        force_offset=offset,
+    )
+    assert found.shape == (24,)
+    mean = predict_reading(base, (), records, reading)[0]
+    np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)
+
+
+def test_the_force_under_jit_and_vmap(gear):
+    deformation = jnp.linspace(0.0, 0.5, 7)
+
+    def curve(influence, geometry):
+        return force(geometry, 207e3, influence, deformation)
+
+    factors = jnp.array([0.5, 1.0, 2.5])
+    batch = jax.jit(jax.vmap(curve, in_axes=(0, None)))(factors, gear)
+    each = jnp.stack([curve(factor, gear) for factor in factors])
+    np.testing.assert_allclose(batch, each, rtol=1e-14)
+    np.testing.assert_allclose(each[2], 5.0 * each[0], rtol=1e-14)

@@ -1,0 +1,201 @@
+"""The tests of effects catch each an effect that breaks just their promise."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+import pytest
+import test_effect_declarations
+import test_effect_needs
+import test_effect_recovery
+import test_effect_units
+import test_effects
+
+from hdcal import EFFECTS
+from hdcal.physics.effect import Effect, Noise, parameter
+
+
+class Liar(Effect):
+    """An honest thermal zero, to be spoiled."""
+
+    name: ClassVar[str] = "liar"
+    stage: ClassVar[str] = "sensor"
+    family: ClassVar[str] = "lies"
+    needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    symmetry: ClassVar[str] = "even"
+
+    size: float = parameter("N/K", "an amplitude", typical=0.1, null=0.0)
+
+    def apply(self, signal, rows):
+        return signal + self.size * rows.temperature_rise
+
+
+class NotNullAtNull(Liar):
+    def apply(self, signal, rows):
+        return signal + (self.size + 1e-9) * rows.temperature_rise
+
+
+class KinkAtNull(Liar):
+    def apply(self, signal, rows):
+        return signal + jnp.sqrt(self.size**2) * rows.temperature_rise
+
+
+class WrongSlope(Liar):
+    def apply(self, signal, rows):
+        # A step: its derivative is zero wherever it exists.
+        return signal + jnp.round(100.0 * self.size) / 100.0 * rows.temperature_rise
+
+
+class NotEven(Liar):
+    def apply(self, signal, rows):
+        return signal + self.size * rows.temperature_rise * rows.deformation
+
+
+class LooksAtTime(Liar):
+    def apply(self, signal, rows):
+        drift = 1e-3 * rows.records.time
+        return signal + self.size * (rows.temperature_rise + drift)
+
+
+class NeedsNothing(Liar):
+    def apply(self, signal, rows):
+        return signal + 10.0 * self.size
+
+
+class OtherUnit(Liar):
+    def apply(self, signal, rows):
+        return signal + self.size * rows.temperature_rise * rows.stiffness / 200.0
+
+
+class HardCoded(Liar):
+    def apply(self, signal, rows):
+        return signal + 0.1 * jnp.tanh(10.0 * self.size) * rows.temperature_rise
+
+
+class SpoilsOthers(Liar):
+    stage: ClassVar[str] = "noise"
+
+    def apply(self, signal, rows):
+        # Forgets the components that other effects of the noise have made.
+        sd = signal.sd[:1] + self.size * jnp.abs(rows.temperature_rise)
+        return Noise(jnp.zeros(1), sd)
+
+
+class NotToBeFound(Liar):
+    def apply(self, signal, rows):
+        return signal + self.size
+
+
+def liar(monkeypatch, effect):
+    monkeypatch.setitem(EFFECTS, "liar", effect)
+
+
+def test_the_honest_one_passes(
+    monkeypatch, scattered, program, base, reading, differences
+):
+    liar(monkeypatch, Liar)
+    test_effects.test_null_changes_nothing("liar", 0, scattered, base, reading)
+    test_effects.test_at_its_typical_size_it_does_something(
+        "liar", program, base, reading
+    )
+    for size in (test_effects.null, test_effects.typical):
+        test_effects.test_gradients_are_finite(
+            "liar", size, False, scattered, base, reading
+        )
+    test_effects.test_gradients_are_right(
+        "liar", 0, scattered, base, reading, differences
+    )
+    test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
+    test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
+    test_effect_needs.test_it_uses_what_it_needs(
+        "liar", "temperature", program, base, reading
+    )
+    for covariate in test_effect_needs.LICENCES:
+        test_effect_needs.test_it_looks_at_nothing_undeclared(
+            "liar", covariate, program, base, reading
+        )
+    test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
+    test_effect_recovery.test_recovered_from_its_own_data(
+        "liar", program, base, reading
+    )
+
+
+def test_not_null_at_null(monkeypatch, scattered, base, reading):
+    liar(monkeypatch, NotNullAtNull)
+    with pytest.raises(AssertionError):
+        test_effects.test_null_changes_nothing("liar", 0, scattered, base, reading)
+
+
+def test_no_slope_at_null(monkeypatch, scattered, base, reading):
+    liar(monkeypatch, KinkAtNull)
+    with pytest.raises(AssertionError):
+        test_effects.test_gradients_are_finite(
+            "liar", test_effects.null, True, scattered, base, reading
+        )
+
+
+def test_wrong_slope(monkeypatch, scattered, base, reading, differences):
+    class OffTheStep(WrongSlope):
+        size: float = parameter("N/K", "an amplitude", typical=0.10501, null=0.0)
+
+    liar(monkeypatch, OffTheStep)
+    with pytest.raises(AssertionError):
+        test_effects.test_gradients_are_right(
+            "liar", 0, scattered, base, reading, differences
+        )
+
+
+def test_wrong_symmetry(monkeypatch, scattered, base, reading):
+    liar(monkeypatch, NotEven)
+    with pytest.raises(AssertionError):
+        test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
+
+
+def test_undeclared_covariate(monkeypatch, program, base, reading):
+    liar(monkeypatch, LooksAtTime)
+    with pytest.raises(AssertionError):
+        test_effect_needs.test_it_looks_at_nothing_undeclared(
+            "liar", "time", program, base, reading
+        )
+
+
+def test_needless_need(monkeypatch, program, base, reading):
+    liar(monkeypatch, NeedsNothing)
+    with pytest.raises(AssertionError):
+        test_effect_needs.test_it_uses_what_it_needs(
+            "liar", "temperature", program, base, reading
+        )
+
+
+@pytest.mark.parametrize("effect", [OtherUnit, HardCoded])
+def test_wrong_unit(monkeypatch, scattered, base, reading, effect):
+    liar(monkeypatch, effect)
+    with pytest.raises(AssertionError):
+        test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
+
+
+def test_spoils_others(monkeypatch, scattered, base, reading):
+    liar(monkeypatch, SpoilsOthers)
+    with pytest.raises(AssertionError):
+        test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
+
+
+def test_not_to_be_found(monkeypatch, program, base, reading):
+    liar(monkeypatch, NotToBeFound)
+    with pytest.raises((AssertionError, ArithmeticError, ValueError)):
+        test_effect_recovery.test_recovered_from_its_own_data(
+            "liar", program, base, reading
+        )
+
+
+@pytest.mark.parametrize(
+    "promise",
+    [
+        test_effect_declarations.test_priors_exist_with_the_declared_unit,
+        test_effect_declarations.test_the_documentation_has_a_page,
+        test_effect_declarations.test_the_docstring_states_its_source,
+    ],
+)
+def test_undocumented(monkeypatch, promise):
+    liar(monkeypatch, Liar)
+    with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
+        promise("liar")

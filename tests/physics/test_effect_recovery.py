@@ -1,0 +1,82 @@
+"""Every effect of typical size is found again in data that it made."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from effect_bench import everyone, noisy, typical
+from jax.flatten_util import ravel_pytree
+from scipy import optimize
+
+from hdcal import EFFECTS
+from hdcal.inference.likelihood import log_probability
+from hdcal.physics.chain import Base, predict_reading
+from hdcal.physics.effect import parameters
+
+
+@everyone
+def test_recovered_from_its_own_data(name, program, base, reading):
+    """Maximum likelihood finds a typical effect within four standard errors.
+
+    The zero of the deformation is known here; it is the rest of the chain that
+    has to be told from the effect.
+    """
+    truth = (typical(name), base.stiffness, base.alpha, base.force_offset, base.sigma)
+    scale, unravel = ravel_pytree(truth)
+
+    def chain(point):
+        effect, stiffness, alpha, offset, sigma = unravel(scale * point)
+        zero = base.deformation_offset
+        return [effect], Base(stiffness, alpha, zero, offset, sigma)
+
+    one = jnp.ones(len(scale))
+    effects, made_by = chain(one)
+    records = noisy(program, made_by, reading, effects)
+
+    def cost(point):
+        effects, base = chain(point)
+        mean, noise = predict_reading(base, effects, records, reading)
+        rows = log_probability(records.force, mean, noise, 0.0, rounded=False)
+        return -jnp.sum(rows)
+
+    @jax.jit
+    def expand(point):
+        """Return value, slope and curvature, with one compilation for the three."""
+
+        def twice(point):
+            value, slope = jax.value_and_grad(cost)(point)
+            return slope, (value, slope)
+
+        curve, (value, slope) = jax.jacfwd(twice, has_aux=True)(point)
+        return value, slope, curve
+
+    def finite(part):
+        """Return a part of the expansion; harmless where a parameter left its range."""
+
+        def at(point):
+            found = [np.asarray(each) for each in expand(point)]
+            if all(np.isfinite(each).all() for each in found):
+                return found[part]
+            return (np.inf, np.zeros(len(point)), np.eye(len(point)))[part]
+
+        return at
+
+    count = len(parameters(EFFECTS[name]))
+    start = np.where(np.arange(len(scale)) < count, 0.6, 0.9)
+    height, slope, curve = (finite(part) for part in range(3))
+    found = optimize.minimize(
+        height,
+        start,
+        jac=slope,
+        hess=curve,
+        method="trust-exact",
+        options={"gtol": 1e-6},
+    )
+    hessian = curve(found.x)
+    covariance = np.linalg.inv(hessian)
+    error = np.sqrt(np.diag(covariance))
+    assert np.linalg.eigvalsh(hessian)[0] > 0.0
+    # The search has ended at a maximum: what is left of the slope moves nothing.
+    assert np.max(np.abs(covariance @ slope(found.x)) / error) < 1e-3
+    assert np.max(np.abs(found.x - 1.0) / error) < 4.0
+    # And the data say so: at least one parameter of the effect is clearly not absent.
+    assert np.min(error[:count]) < 0.3

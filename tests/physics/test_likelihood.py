@@ -1,0 +1,189 @@
+"""A reading is as probable as its interval of the noise, in every tail."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import logsumexp
+
+from hdcal.inference.likelihood import draw_reading, log_probability
+from hdcal.physics.effect import Noise
+
+STEP = 0.98
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(80)
+
+
+def one(sd, rows):
+    return Noise(jnp.zeros(1), jnp.full((1, rows), sd))
+
+
+def rounded_probability(error, sd, step):
+    """Return log P(reading) of errors on a grid of width `step`."""
+    found = log_probability(
+        error, np.zeros(len(error)), one(sd, len(error)), step, rounded=True
+    )
+    return np.asarray(found) + np.log(step)
+
+
+def slow_log_interval(error, sd, step):
+    """Integrate the density relative to its value at the interval's nearer end."""
+    near = max(abs(error) - step / 2.0, 0.0) / sd
+    if abs(error) < step / 2.0:
+        pieces = [(0.0, (step / 2.0 - error) / sd), (0.0, (step / 2.0 + error) / sd)]
+    else:
+        pieces = [(near, near + step / sd)]
+    total = 0.0
+    for low, high in pieces:
+        # The integrand is gone after some dozens of its own decay lengths.
+        high = min(high, low + 40.0 / max(low, 1.0))
+        edges = np.linspace(low, high, 21)
+        for a, b in zip(edges[:-1], edges[1:], strict=True):
+            t = 0.5 * (a + b) + 0.5 * (b - a) * NODES
+            weight = np.exp(-0.5 * (t**2 - near**2))
+            total += 0.5 * (b - a) * WEIGHTS @ weight
+    return np.log(total / np.sqrt(2.0 * np.pi)) - 0.5 * near**2
+
+
+@pytest.mark.parametrize("sd", [0.05, 0.3, 1.0, 4.0])
+def test_rounding_by_differences_of_the_cdf(sd):
+    error = np.linspace(-5.0 * sd, 5.0 * sd, 41)
+    low, high = (error - STEP / 2.0) / sd, (error + STEP / 2.0) / sd
+    # The difference of the smaller tails is the more exact one.
+    lower = stats.norm.cdf(high) - stats.norm.cdf(low)
+    upper = stats.norm.sf(low) - stats.norm.sf(high)
+    slow = np.log(np.where(error < 0.0, lower, upper))
+    found = rounded_probability(error, sd, STEP)
+    np.testing.assert_allclose(found, slow, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("sd", [0.02, 0.3, 1.0, 7.0])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_rounding_in_both_tails(sd, side):
+    error = side * np.array([0.0, 0.4, 1.0, 5.0, 12.0, 60.0, 300.0])
+    slow = [slow_log_interval(e, sd, STEP) for e in error]
+    found = rounded_probability(error, sd, STEP)
+    np.testing.assert_allclose(found, slow, rtol=1e-11, atol=1e-12)
+    if sd == 0.02:
+        assert found[-1] < -1e8
+
+
+def test_rounding_has_a_finite_slope_in_every_tail():
+    def value(mean, log_sd):
+        error = jnp.array([0.0, 0.49, -5.0, 5.0, 300.0, -300.0])
+        noise = Noise(jnp.zeros(1), jnp.full((1, 6), jnp.exp(log_sd)))
+        mean = jnp.full(6, mean)
+        return log_probability(error, mean, noise, STEP, rounded=True)
+
+    slope = jax.jit(jax.jacfwd(value, argnums=(0, 1)))
+    for log_sd in (-6.0, -1.0, 0.0, 3.0):
+        slopes = slope(0.0, log_sd)
+        assert np.isfinite(slopes).all()
+        # A reading above its mean asks for a larger mean.
+        assert slopes[0][4] > 0.0 > slopes[0][5]
+
+
+@pytest.mark.parametrize("step", [1e-2, 1e-3, 1e-4])
+def test_a_fine_step_is_a_density(step):
+    error = np.linspace(-8.0, 8.0, 33)
+    found = rounded_probability(error, 1.0, step) - np.log(step)
+    # The mean over the interval exceeds the middle by q²/24 times φ''/φ.
+    limit = stats.norm.logpdf(error) + step**2 * (error**2 - 1.0) / 24.0
+    np.testing.assert_allclose(found, limit, rtol=0.0, atol=3.0 * step**4 * 64 + 1e-9)
+
+
+@pytest.mark.parametrize("sd", [0.1, 0.5, 3.0])
+@pytest.mark.parametrize("mean", [0.0, 0.31, -7.77])
+def test_probabilities_over_the_grid_sum_to_one(sd, mean):
+    grid = STEP * np.arange(-80, 81)
+    noise = Noise(
+        jnp.log(jnp.array([0.7, 0.3])),
+        jnp.stack([jnp.full(161, sd), jnp.full(161, 2.0 * sd)]),
+    )
+    found = log_probability(grid, np.full(161, mean), noise, STEP, rounded=True)
+    assert STEP * np.sum(np.exp(found)) == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize("rounded", [True, False])
+def test_a_mixture_is_the_weighted_sum(rounded):
+    rng = np.random.default_rng(2)
+    weights = np.array([0.6, 0.3, 0.1])
+    sd = rng.uniform(0.3, 4.0, (3, 20))
+    mean = rng.normal(0.0, 20.0, 20)
+    force = mean + rng.normal(0.0, 2.0, 20)
+    noise = Noise(jnp.log(weights), jnp.asarray(sd))
+    found = log_probability(force, mean, noise, STEP, rounded=rounded)
+    if rounded:
+        low, high = force - STEP / 2.0 - mean, force + STEP / 2.0 - mean
+        each = np.log((stats.norm.cdf(high / sd) - stats.norm.cdf(low / sd)) / STEP)
+    else:
+        each = stats.norm.logpdf(force, mean, sd)
+    slow = logsumexp(each, axis=0, b=weights[:, None])
+    np.testing.assert_allclose(found, slow, rtol=1e-8)
+
+
+def many_draws(step, rows=40_000):
+    noise = Noise(
+        jnp.log(jnp.array([0.75, 0.25])),
+        jnp.stack([jnp.full(rows, 0.6), jnp.full(rows, 3.0)]),
+    )
+    mean = jnp.full(rows, 11.3)
+    return np.asarray(draw_reading(jax.random.key(1), mean, noise, step)), noise
+
+
+def test_draws_without_rounding():
+    drawn, _ = many_draws(0.0)
+
+    def cdf(x):
+        return 0.75 * stats.norm.cdf(x, 11.3, 0.6) + 0.25 * stats.norm.cdf(x, 11.3, 3.0)
+
+    assert stats.kstest(drawn, cdf).pvalue > 1e-3
+    assert len(np.unique(drawn)) == len(drawn)
+
+
+def test_draws_with_rounding_follow_the_likelihood():
+    drawn, noise = many_draws(STEP)
+    ticks = np.round(drawn / STEP)
+    np.testing.assert_allclose(drawn, STEP * ticks, rtol=1e-14)
+    grid = np.arange(8, 16)
+    own = Noise(noise.log_weight, noise.sd[:, : len(grid)])
+    expected = STEP * np.exp(
+        log_probability(STEP * grid, np.full(len(grid), 11.3), own, STEP, rounded=True)
+    )
+    seen = np.array([np.count_nonzero(ticks == tick) for tick in grid])
+    rest = len(ticks) - seen.sum()
+    found = stats.chisquare(
+        [*seen, rest], len(ticks) * np.array([*expected, 1.0 - expected.sum()])
+    )
+    assert found.pvalue > 1e-3
+
+
+def test_draws_in_each_row_have_that_rows_noise():
+    sd = jnp.array([[0.01, 1.0, 100.0]])
+    mean = jnp.array([5.0, -5.0, 0.0])
+    keys = jax.random.split(jax.random.key(3), 4000)
+    noise = Noise(jnp.zeros(1), sd)
+    drawn = np.asarray(jax.vmap(lambda key: draw_reading(key, mean, noise))(keys))
+    np.testing.assert_allclose(drawn.std(axis=0) / sd[0], 1.0, atol=5.0 / 89.0)
+    assert np.all(np.abs(drawn.mean(axis=0) - mean) < 5.0 * sd[0] / np.sqrt(4000))
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.2, 0.6, 1.0])
+def test_sheppards_correction_where_the_step_is_fine(ratio):
+    """What is left after matching the variance is the uniform's fourth cumulant.
+
+    It is −q⁴/120, which moves log p by −q⁴/2880 s⁻⁴ (x⁴ − 6x² + 3).
+    """
+    sd = STEP / ratio
+    spread = np.hypot(sd, STEP / np.sqrt(12.0))
+    x = np.linspace(-3.0, 3.0, 61)
+    exact = rounded_probability(x * spread, sd, STEP) - np.log(STEP)
+    corrected = stats.norm.logpdf(x * spread, 0.0, spread)
+    fourth = (STEP / spread) ** 4 / 2880.0
+    left = exact - corrected
+    expected = -fourth * (x**4 - 6.0 * x**2 + 3.0)
+    # The sixth cumulant is next, q⁶/252.
+    sixth = (STEP / spread) ** 6 / (252.0 * 720.0)
+    assert np.max(np.abs(left - expected)) < 800.0 * (sixth + fourth**2) + 1e-11
+    without = exact - stats.norm.logpdf(x * spread, 0.0, sd)
+    assert np.max(np.abs(left)) < 0.03 * np.max(np.abs(without))

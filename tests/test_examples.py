@@ -1,0 +1,35 @@
+"""Every example runs as it stands and ends with what it claims."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+LAST_LINES = {
+    "bands_for_a_design.py": "the true forces lie inside the bands",
+    "calibrate_a_csv.py": "the least-squares slope lies inside the interval",
+    "gradient_of_force.py": "the derivatives agree with finite differences",
+    "own_effect.py": "the truth lies inside the interval",
+}
+
+
+@pytest.mark.parametrize("name", LAST_LINES)
+def test_an_example_ends_with_its_claim(name: str, tmp_path: Path):
+    # From another folder: an example finds its data by itself.
+    done = subprocess.run(
+        [sys.executable, "-W", "error", EXAMPLES / name],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        cwd=tmp_path,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == LAST_LINES[name]
+
+
+def test_every_example_is_run():
+    assert {path.name for path in EXAMPLES.glob("*.py")} == set(LAST_LINES)

@@ -1,0 +1,66 @@
+"""The command line as a user runs it, and one result that many tests look at."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+XB1 = ROOT / "datasets" / "xb1-100-80"
+MAIN = [sys.executable, "-c", "from hdcal.views.cli import main; main()"]
+# Enough to pass the checks on fourteen rows, and not more.
+SHORT = ["--warmup", "300", "--draws", "500"]
+
+Done = subprocess.CompletedProcess[str]
+Hdcal = Callable[..., Done]
+
+
+@pytest.fixture(scope="session")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """All processes of a test run share one cache of compiled programs."""
+    base = tmp_path_factory.getbasetemp()
+    # With several workers each has a base of its own inside the common one.
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        base = base.parent
+    return {**os.environ, "HDCAL_CACHE_DIR": str(base / "compiled-by-tests")}
+
+
+@pytest.fixture(scope="session")
+def hdcal(environment: dict[str, str]) -> Hdcal:
+    """Run hdcal in a process of its own."""
+
+    def run(*arguments: object, **options) -> Done:
+        return subprocess.run(
+            [*MAIN, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            env={**environment, **options.pop("env", {})},
+            timeout=300,
+            **options,
+        )
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def calibrated(
+    hdcal: Hdcal, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Done, Path]:
+    """A finished calibration of the bundled gear, and its folder."""
+    folder = tmp_path_factory.mktemp("calibrated") / "result"
+    done = hdcal("calibrate", XB1, *SHORT, "--json", "--out", folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done, folder
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """A small case on disk, to be spoiled by the tests."""
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for name in ("data.csv", "gear.toml"):
+        (folder / name).write_bytes((XB1 / name).read_bytes())
+    return folder
