@@ -32,8 +32,8 @@ def simulate() -> np.ndarray:
     deformation = np.tile(cycle, 3)
     time = np.arange(len(deformation)) * 15.0
     series = (np.pi**2 - 8.0) / 16.0
-    modulus = 1e3 * TRUTH["E0_GPa"] * (
-        1.0 - TRUTH["alpha_per_K"] * (temperature - REFERENCE)
+    modulus = (
+        1e3 * TRUTH["E0_GPa"] * (1.0 - TRUTH["alpha_per_K"] * (temperature - REFERENCE))
     )
     stiffness = np.pi * modulus * LENGTH * (THICKNESS / RADIUS) ** 3 / (24.0 * series)
     force = (

@@ -116,5 +116,3 @@ def posterior_draws(case: Case, effects, key, **settings) -> tuple:
     of_fit, of_draws = jax.random.split(key)
     draws = sample(problem, laplace.fit(problem, of_fit), of_draws, **settings)
     return problem, {n: v.reshape(-1, *v.shape[2:]) for n, v in draws.values.items()}
-
-

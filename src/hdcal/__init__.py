@@ -49,7 +49,7 @@ _HOMES = {
     "summarise": "answers.summary",
 }
 
-__all__ = [*sorted(_HOMES)]  # noqa: PLE0604
+__all__ = [*sorted(_HOMES)]
 
 
 def __getattr__(name: str):

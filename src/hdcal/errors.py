@@ -28,7 +28,8 @@ class Finding:
             where += f", row {self.row}"
         if self.column is not None:
             where += f", column '{self.column}'"
-        return f"{where}: {self.problem}. {self.remedy}."
+        remedy = self.remedy[:1].upper() + self.remedy[1:]
+        return f"{where}: {self.problem}. {remedy}."
 
 
 class HdcalError(Exception):

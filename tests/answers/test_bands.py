@@ -62,7 +62,9 @@ def test_a_new_reading_covers_new_data(rubbing):
 def test_tested_means_inside_the_data(rubbing):
     found = predict(rubbing, [0.01, 0.3, 0.6], [20.0, 90.0])
     assert list(found.tested) == [False, True, False, False, False, False]
-    loading_only = make_case(make_records(np.linspace(0, 0.5, 9), np.linspace(0, 99, 9)))
+    loading_only = make_case(
+        make_records(np.linspace(0, 0.5, 9), np.linspace(0, 99, 9))
+    )
     posterior = replace(rubbing, case=loading_only)
     assert not bands._tested(
         posterior.case.records, np.array([0.3]), np.array([20.0]), np.array([-1.0])
@@ -126,8 +128,10 @@ def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
     found = predict(gap, [0.28, 0.60])
     inside, outside = found.with_gap_hi_N - found.with_gap_lo_N
     assert outside > 2.0 * inside
-    assert found.with_gap_lo_N[0] < np.interp(0.28, deformation, bent) < (
-        found.with_gap_hi_N[0]
+    assert (
+        found.with_gap_lo_N[0]
+        < np.interp(0.28, deformation, bent)
+        < (found.with_gap_hi_N[0])
     )
     # Orthogonal to the base: the slope stays where least squares put it.
     shift = np.median(gap.draws["stiffness"]) - np.median(plain.draws["stiffness"])

@@ -25,7 +25,9 @@ def honest_force(records, slope=205.0, offset=-1.0, sd=0.5, seed=0):
 
 
 def case_of(records, gear=None, **change):
-    rows = {n: getattr(records, n) for n in vars(records) if n not in ("known", "force")}
+    rows = {
+        n: getattr(records, n) for n in vars(records) if n not in ("known", "force")
+    }
     force = change.pop("force", honest_force(records))
     return make_case(make_records(**rows, force=force, known=records.known), gear)
 

@@ -41,10 +41,15 @@ def exact_posterior(case):
     design = np.column_stack([unit * records.deformation, np.ones(len(records.force))])
     gram, cross = design.T @ design, design.T @ records.force
     square = records.force @ records.force
-    mean0, precision0 = np.array([K[0], OFFSET[0]]), np.diag([K[1] ** -2, OFFSET[1] ** -2])
+    mean0, precision0 = (
+        np.array([K[0], OFFSET[0]]),
+        np.diag([K[1] ** -2, OFFSET[1] ** -2]),
+    )
     rest = records.force - design @ np.linalg.solve(gram, cross)
     guess = np.sqrt(rest @ rest / len(rest))
-    grid = np.log(guess) + np.linspace(-6, 10, 4001) * max(0.7 / np.sqrt(len(rest)), 1e-4)
+    grid = np.log(guess) + np.linspace(-6, 10, 4001) * max(
+        0.7 / np.sqrt(len(rest)), 1e-4
+    )
     log_weight, means, covariances = [], [], []
     for log_sigma in grid:
         variance = np.exp(2.0 * log_sigma)

@@ -11,8 +11,20 @@ from hdcal.physics.chain import Base, Reading
 from hdcal.rig.records import Geometry, Records
 
 EVERYTHING = frozenset(
-    "temperature time angle force_sd run specimen unloading holds rates cycles runs "
-    "specimens".split()
+    {
+        "temperature",
+        "time",
+        "angle",
+        "force_sd",
+        "run",
+        "specimen",
+        "unloading",
+        "holds",
+        "rates",
+        "cycles",
+        "runs",
+        "specimens",
+    }
 )
 
 

@@ -50,7 +50,7 @@ def contribution(effects, others, base, records, reading) -> np.ndarray:
     """
     errors = base.sigma * jnp.array([0.0, 0.7, 2.0, 4.0])
     parts = []
-    for chosen in ((*effects, *others), others):
+    for chosen in ((*others, *effects), others):
         mean, noise = compiled_chain(base, tuple(chosen), records, reading)
         parts.append(np.concatenate([mean, np.ravel(density(errors, noise))]))
     return parts[0] - parts[1]

@@ -114,9 +114,6 @@ def test_the_honest_one_passes(
             "liar", covariate, program, base, reading
         )
     test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
-    test_effect_recovery.test_recovered_from_its_own_data(
-        "liar", program, base, reading
-    )
 
 
 def test_not_null_at_null(monkeypatch, scattered, base, reading):
@@ -181,7 +178,7 @@ def test_spoils_others(monkeypatch, scattered, base, reading):
 
 def test_not_to_be_found(monkeypatch, program, base, reading):
     liar(monkeypatch, NotToBeFound)
-    with pytest.raises((AssertionError, ArithmeticError, ValueError)):
+    with pytest.raises(AssertionError):
         test_effect_recovery.test_recovered_from_its_own_data(
             "liar", program, base, reading
         )

@@ -72,9 +72,10 @@ def test_recovered_from_its_own_data(name, program, base, reading):
         options={"gtol": 1e-6},
     )
     hessian = curve(found.x)
+    curvatures = np.linalg.eigvalsh(hessian)
+    assert curvatures[0] > 1e-10 * curvatures[-1]
     covariance = np.linalg.inv(hessian)
     error = np.sqrt(np.diag(covariance))
-    assert np.linalg.eigvalsh(hessian)[0] > 0.0
     # The search has ended at a maximum: what is left of the slope moves nothing.
     assert np.max(np.abs(covariance @ slope(found.x)) / error) < 1e-3
     assert np.max(np.abs(found.x - 1.0) / error) < 4.0

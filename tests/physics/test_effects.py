@@ -141,9 +141,16 @@ def test_symmetry_is_as_declared(name, scattered, base, reading):
 
 @pytest.mark.parametrize(("name", "other"), list(product(sorted(EFFECTS), repeat=2)))
 def test_any_two_compose(name, other, scattered, base, reading):
-    records = noisy(scattered(7), base, reading, ())
+    records = scattered(7)
     both = (typical(name), typical(other))
-    found = score_and_slope(both, base, numbers(records), reading)
-    assert np.isfinite(ravel_pytree(found)[0]).all()
+    assert np.isfinite(contribution(both[1:], both[:1], base, records, reading)).all()
     unchanged = contribution((null(other),), both[:1], base, records, reading)
     assert np.max(np.abs(unchanged)) <= 1e-12
+
+
+@pytest.mark.parametrize("size", [null, typical])
+def test_the_whole_library_composes(size, scattered, base, reading):
+    records = noisy(scattered(8), base, reading, ())
+    library = tuple(size(name) for name in EFFECTS)
+    found = score_and_slope(library, base, numbers(records), reading)
+    assert np.isfinite(ravel_pytree(found)[0]).all()

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from hdcal.inference import compress, density
-from hdcal.inference.gap import BASIS_SIZE, Gap, build_gap, prior_sd
+from hdcal.inference.gap import prior_sd
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.members import Linear, contrasts
 from hdcal.inference.problem import build_problem
@@ -24,6 +24,8 @@ from hdcal.rig.priors import effect_priors, material_priors, rig_priors
 
 SHIPPED = effect_priors()
 log_likelihood = jax.jit(density.log_likelihood)
+predict_rows = jax.jit(density.predict_rows)
+pointwise = jax.jit(density.pointwise_log_likelihood)
 
 
 def labelled(program, seed, *, known, runs=1, specimens=1, sds=(0.0,)):
@@ -135,7 +137,7 @@ def test_a_compressed_problem_is_its_rows(program, gear):
     assert problem.records is None
     values = random_values(1)
     rows = dataclasses.replace(problem, records=records, blocks=None)
-    mean, noise = density.predict_rows(rows, values, records, None)
+    mean, noise = predict_rows(rows, values, records, None)
     slow = log_probability(records.force, mean, noise, 0.0, rounded=False).sum()
     assert float(log_likelihood(problem, values)) == pytest.approx(
         float(slow), rel=1e-11
@@ -208,7 +210,7 @@ def test_contrasts_are_deviations():
 def dense_log_likelihood(problem, case, values):
     """The dense normal density of all readings, members in the covariance."""
     records = case.records
-    mean, noise = density.predict_rows(problem, values, records, None)
+    mean, noise = predict_rows(problem, values, records, None)
     rows = len(records.force)
     covariance = np.diag(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
     if "run" in problem.integrated:
@@ -285,7 +287,7 @@ def test_drawn_members_explain_the_data(structured):
     """Given the members the readings scatter by σ, and deviations sum to zero."""
     case, problem = structured
     values = random_values(0)
-    drawn = density.draw_members(problem, values, jax.random.key(0))
+    drawn = jax.jit(density.draw_members)(problem, values, jax.random.key(0))
     names = {
         "run": "run_offset",
         "specimen": "specimen_deviation",
@@ -295,7 +297,7 @@ def test_drawn_members_explain_the_data(structured):
     for name in set(drawn) - {"gap_weights"}:
         assert abs(float(drawn[name].sum())) < 1e-9
     # Bayes: p(y) = p(y | w) p(w) / p(w | y), with the two latter from dense algebra.
-    linear = density.linear_part(problem, values)
+    linear = jax.jit(density.linear_part)(problem, values)
     weights = members_of(problem, drawn)
     design, prior, noise = dense(linear)
     precision = np.linalg.inv(noise)
@@ -333,61 +335,5 @@ def members_of(problem, drawn):
 def slow_given_members(problem, case, values, drawn):
     """Return the log density of all readings when the members are known."""
     rows = rows_form(problem, case)
-    given = density.pointwise_log_likelihood(
-        rows, {**values, **drawn}, case.records, rows.columns
-    )
+    given = pointwise(rows, {**values, **drawn}, case.records, rows.columns)
     return float(given.sum())
-
-
-# --- the gap ------------------------------------------------------------------------
-
-
-def test_the_gap_takes_nothing_from_the_base(program, reading):
-    columns = np.asarray(linear_columns(program, reading))
-    gap = build_gap(program.deformation, columns)
-    basis = np.asarray(gap.columns(program.deformation, columns))
-    assert basis.shape == (180, BASIS_SIZE)
-    norms = np.linalg.norm(columns, axis=0)[:, None] * np.linalg.norm(basis, axis=0)
-    assert np.max(np.abs(columns.T @ basis) / norms) < 1e-10
-    # It is not empty: what is left bends.
-    assert np.linalg.matrix_rank(basis, tol=1e-6) > 8
-
-
-def test_the_gap_without_temperatures(program, reading):
-    cold = dataclasses.replace(program, temperature=np.full(180, 20.0))
-    columns = np.asarray(linear_columns(cold, reading))
-    gap = build_gap(cold.deformation, columns)
-    basis = np.asarray(gap.columns(cold.deformation, columns))
-    assert np.isfinite(basis).all()
-    assert np.max(np.abs(columns.T @ basis)) < 1e-9
-
-
-def kernel_error(length, project):
-    """Return the largest error of the approximate kernel, as a share of sd²."""
-    deformation, sd = np.linspace(0.02, 0.54, 27), 1.7
-    gap = Gap(0.28, 0.26, np.zeros((4, BASIS_SIZE)))
-    basis = np.asarray(gap.columns(deformation, np.zeros((27, 4))))
-    approximate = (basis * np.asarray(prior_sd(sd, length)) ** 2) @ basis.T
-    distance = deformation[:, None] - deformation
-    # A length-scale is a share of the whole tested range.
-    exact = sd**2 * np.exp(-0.5 * (distance / (length * 0.52)) ** 2)
-    line = np.stack([np.ones(27), deformation], axis=1)
-    off = np.eye(27) - project * line @ np.linalg.pinv(line)
-    return np.max(np.abs(off @ (approximate - exact) @ off)) / sd**2
-
-
-@pytest.mark.parametrize("length", [0.1, 0.15, 0.2, 0.3])
-def test_the_gap_has_a_squared_exponential_kernel(length):
-    # The boundary at two half-ranges is right up to 2/3.2 half-ranges, 0.31.
-    assert kernel_error(length, project=0.0) < 5e-3
-
-
-@pytest.mark.parametrize("length", [0.1, 0.3, 0.6, 1.0, 2.0])
-def test_what_bends_has_the_right_kernel_at_any_length(length):
-    # Beyond that the missing part is nearly straight, which the base explains anyway.
-    assert kernel_error(length, project=1.0) < 2e-2
-
-
-def test_the_gaps_prior_has_a_slope_everywhere():
-    slopes = jax.jacfwd(prior_sd, argnums=(0, 1))(1.0, 2.0)
-    assert np.isfinite(slopes).all()

@@ -1,5 +1,7 @@
 """A reading is as probable as its interval of the noise, in every tail."""
 
+from itertools import pairwise
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -7,9 +9,11 @@ import pytest
 from scipy import stats
 from scipy.special import logsumexp
 
-from hdcal.inference.likelihood import draw_reading, log_probability
+from hdcal.inference import likelihood
+from hdcal.inference.likelihood import draw_reading
 from hdcal.physics.effect import Noise
 
+log_probability = jax.jit(likelihood.log_probability, static_argnames="rounded")
 STEP = 0.98
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(80)
 
@@ -38,7 +42,7 @@ def slow_log_interval(error, sd, step):
         # The integrand is gone after some dozens of its own decay lengths.
         high = min(high, low + 40.0 / max(low, 1.0))
         edges = np.linspace(low, high, 21)
-        for a, b in zip(edges[:-1], edges[1:], strict=True):
+        for a, b in pairwise(edges):
             t = 0.5 * (a + b) + 0.5 * (b - a) * NODES
             weight = np.exp(-0.5 * (t**2 - near**2))
             total += 0.5 * (b - a) * WEIGHTS @ weight

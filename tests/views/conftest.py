@@ -1,9 +1,10 @@
 """The command line as a user runs it, and one result that many tests look at."""
 
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -43,6 +44,33 @@ def hdcal(environment: dict[str, str]) -> Hdcal:
         )
 
     return run
+
+
+@pytest.fixture
+def here(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> Iterator[Hdcal]:
+    """Run hdcal in this process: for what ends before anything is compiled."""
+    from hdcal.views.cli import main
+
+    # A file is no folder for a cache: JAX' own settings stay as they are.
+    monkeypatch.setenv("HDCAL_CACHE_DIR", __file__)
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def run(*arguments: object) -> Done:
+        given = [str(argument) for argument in arguments]
+        with pytest.raises(SystemExit) as ended:
+            main(given)
+        said = capsys.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return subprocess.CompletedProcess(given, code, said.out, said.err)
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
 
 
 @pytest.fixture(scope="session")

@@ -33,28 +33,29 @@ def test_the_version_is_that_of_the_package(hdcal: Hdcal):
     assert hdcal("--version").stdout == f"hdcal {version('hdcal')}\n"
 
 
-def test_effects_lists_the_whole_library(hdcal: Hdcal):
+def test_effects_lists_the_whole_library(here: Hdcal):
     from hdcal.physics.registry import EFFECTS
 
-    done = hdcal("effects", "--json")
+    done = here("effects", "--json")
     listed = json.loads(done.stdout)["effects"]
     assert [effect["name"] for effect in listed] == list(EFFECTS)
     assert all(p["unit"] and p["meaning"] for e in listed for p in e["parameters"])
-    assert all(name in hdcal("effects").stdout for name in EFFECTS)
+    words = here("effects").stdout
+    assert all(name in words for name in EFFECTS)
 
 
-def test_check_says_what_was_read(hdcal: Hdcal):
-    done = hdcal("check", XB1, "--json")
+def test_check_says_what_was_read(here: Hdcal):
+    done = here("check", XB1, "--json")
     found = json.loads(done.stdout)
     assert done.returncode == 0
     assert found["data"]["rows"] == 14
     assert found["data"]["direction"] == {"loading": 14, "holding": 0, "unloading": 0}
     assert found["effects"]["not_testable"]["coulomb_friction"] == ["unloading"]
-    words = hdcal("check", XB1).stdout
+    words = here("check", XB1).stdout
     assert "14 loading" in words and "0.02 … 0.54 mm" in words
 
 
-def test_bad_input_gives_every_finding_and_no_traceback(hdcal: Hdcal, case: Path):
+def test_bad_input_gives_every_finding_and_no_traceback(here: Hdcal, case: Path):
     rows = (case / "data.csv").read_text().splitlines()
     rows[3], rows[5] = "0.1,many", "inf,23.52"
     (case / "data.csv").write_text("\n".join(rows))
@@ -62,7 +63,7 @@ def test_bad_input_gives_every_finding_and_no_traceback(hdcal: Hdcal, case: Path
     (case / "gear.toml").write_text(gear)
     before = set(case.parent.rglob("*"))
     for command in ("check", "calibrate"):
-        done = hdcal(command, case, cwd=case.parent)
+        done = here(command, case)
         assert done.returncode == 2
         assert done.stdout == ""
         lines = done.stderr.splitlines()
@@ -74,6 +75,7 @@ def test_bad_input_gives_every_finding_and_no_traceback(hdcal: Hdcal, case: Path
 
 
 def test_findings_come_as_json_too(hdcal: Hdcal, tmp_path: Path):
+    # In a process of its own: nothing of any library may get between.
     done = hdcal("check", tmp_path / "none.csv", "--json")
     said = json.loads(done.stdout)
     assert done.returncode == 2
@@ -106,26 +108,26 @@ def test_findings_come_as_json_too(hdcal: Hdcal, tmp_path: Path):
         ["predict", XB1 / "data.csv", "--deformation", "0.1"],
     ],
 )
-def test_a_wrong_command_line_is_bad_input(arguments, hdcal: Hdcal, tmp_path: Path):
-    done = hdcal(*arguments, cwd=tmp_path)
+def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Path):
+    done = here(*arguments)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert done.stderr and not done.stdout
     assert not any(tmp_path.iterdir())
-    as_json = hdcal(*arguments, "--json", cwd=tmp_path)
+    as_json = here(*arguments, "--json")
     assert as_json.returncode == 2
     assert json.loads(as_json.stdout)["status"] == "error"
 
 
-def test_an_unknown_effect_is_told_its_nearest(hdcal: Hdcal, tmp_path: Path):
-    done = hdcal("calibrate", XB1, "--effect", "outlier", cwd=tmp_path)
+def test_an_unknown_effect_is_told_its_nearest(here: Hdcal, tmp_path: Path):
+    done = here("calibrate", XB1, "--effect", "outlier")
     assert done.returncode == 2
     assert "did you mean 'outliers'?" in done.stderr
     assert not any(tmp_path.iterdir())
 
 
 def test_a_result_that_cannot_be_written_is_refused_at_once(
-    hdcal: Hdcal, tmp_path: Path
+    here: Hdcal, tmp_path: Path
 ):
     (tmp_path / "file").write_text("mine")
     (tmp_path / "folder").mkdir()
@@ -133,7 +135,7 @@ def test_a_result_that_cannot_be_written_is_refused_at_once(
     for out in ("file", "file/run", "folder", "none/run", "x" * 300, ""):
         # Far too many draws to finish: the refusal has to come before them.
         many = ["--draws", "1000000", "--out", out, "--force"]
-        done = hdcal("calibrate", XB1, *many, cwd=tmp_path)
+        done = here("calibrate", XB1, *many)
         assert done.returncode == 2, out
         assert len(done.stderr.splitlines()) == 1
     assert sorted(p.name for p in tmp_path.rglob("*")) == [
@@ -143,10 +145,10 @@ def test_a_result_that_cannot_be_written_is_refused_at_once(
     ]
 
 
-def test_a_text_from_a_file_cannot_steer_the_terminal(hdcal: Hdcal, case: Path):
+def test_a_text_from_a_file_cannot_steer_the_terminal(here: Hdcal, case: Path):
     gear = (case / "gear.toml").read_text()
     (case / "gear.toml").write_text(gear.replace("XB1-100-80", r"XB1\u001b[31m\u202e"))
-    done = hdcal("check", case)
+    done = here("check", case)
     assert done.returncode == 0
     assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
 
@@ -161,7 +163,7 @@ def test_a_reader_that_goes_away_is_no_error(environment):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_a_defect_of_hdcal_is_one_line(hdcal: Hdcal, environment):
+def test_a_defect_of_hdcal_is_one_line(environment):
     script = (
         "import hdcal.rig.reading as r; from hdcal.views.cli import main\n"
         "def broken(*_, **__): raise ValueError('one\\ntwo')\n"

@@ -52,7 +52,7 @@ def test_force_replaces_the_whole_folder(tmp_path: Path):
 def test_force_never_removes_what_hdcal_did_not_write(tmp_path: Path):
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "thesis.txt").write_text("years of work")
-    with pytest.raises(InputError, match="'thesis.txt'"):
+    with pytest.raises(InputError, match=r"'thesis\.txt'"):
         check_target(tmp_path / "run", force=True)
     (tmp_path / "run" / "thesis.txt").rename(tmp_path / "run" / "report.html")
     (tmp_path / "run" / "posterior.nc").mkdir()

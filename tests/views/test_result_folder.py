@@ -106,12 +106,12 @@ def test_the_report_asks_nothing_of_the_network(calibrated: Calibrated):
 
 
 def test_an_older_result_is_replaced_only_when_told_to(
-    calibrated: Calibrated, hdcal: Hdcal
+    calibrated: Calibrated, hdcal: Hdcal, here: Hdcal
 ):
     _, folder = calibrated
     before = (folder / "summary.json").read_bytes()
     again = ["calibrate", XB1, *SHORT, "--out", folder]
-    done = hdcal(*again)
+    done = here(*again)
     assert done.returncode == 2
     assert "exists already" in done.stderr and "--force" in done.stderr
     assert (folder / "summary.json").read_bytes() == before
@@ -134,13 +134,13 @@ def test_predict_prints_a_table(calibrated: Calibrated, hdcal: Hdcal):
 
 
 def test_predict_writes_a_file_or_json(
-    calibrated: Calibrated, hdcal: Hdcal, tmp_path: Path
+    calibrated: Calibrated, hdcal: Hdcal, here: Hdcal, tmp_path: Path
 ):
     out = tmp_path / "bands.csv"
     asked = ["predict", calibrated[1], "--deformation", "0.1,0.2", "--out", out]
     assert hdcal(*asked).stdout == ""
     assert len(read_bands(out.read_text())) == 2
-    refused = hdcal(*asked)
+    refused = here(*asked)
     assert refused.returncode == 2 and "exists already" in refused.stderr
     done = hdcal(*asked, "--force", "--json", "--direction", "down")
     said = json.loads(done.stdout)

@@ -15,10 +15,10 @@ import numpy as np
 
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import build_effects, member_base
-from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.physics.chain import linear_columns, predict_reading
+from hdcal.physics.effect import Noise
 from hdcal.rig.records import Records
 
 Direction = Literal["up", "down"]
@@ -43,7 +43,7 @@ class Bands:
         with_gap_median_N: its median.
         with_gap_hi_N: its upper end.
         new_measurement_lo_N: predictive band of one more reading, on a new run and a
-            new specimen where these were fitted, rounded as the rig rounds.
+            new specimen where these were fitted, with the rounding of the rig.
         new_measurement_median_N: its median.
         new_measurement_hi_N: its upper end.
         tested: deformation, temperature and direction lie within the data.
@@ -107,10 +107,23 @@ def _predict_block(problem: Problem, values, records: Records, keys):
         base = member_base(problem, {**value, **other}, 0, 0)
         new, _ = predict_reading(base, effects, records, problem.reading)
         leftover = 0.0 if columns is None else columns @ value["gap_weights"]
-        reading = draw_reading(of_noise, new + leftover, noise, problem.step)
-        return mean, mean + leftover, reading
+        error = _reading_error(of_noise, noise, problem.step)
+        return mean, mean + leftover, new + leftover + error
 
     return jax.vmap(one)(values, keys)
+
+
+def _reading_error(key, noise: Noise, step):
+    """Draw the error of a reading [N], the same quantile in every row.
+
+    Bands are row by row, so that rows may share their random numbers; they are then
+    smooth and do not depend on which other rows are asked for. Rounding is uniform
+    over its step for the same reason.
+    """
+    pick, normal, rounding = jax.random.split(key, 3)
+    sd = noise.sd[jax.random.categorical(pick, noise.log_weight)]
+    uniform = jax.random.uniform(rounding, minval=-0.5, maxval=0.5)
+    return sd * jax.random.normal(normal) + step * uniform
 
 
 def _new_member(problem: Problem, value, of_run, of_specimen) -> dict:
@@ -190,10 +203,10 @@ def predict(
     values = posterior.draws
     size = len(values["K"])
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
+    keys = jax.random.split(jax.random.key(seed), size)
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), start), size)
         records = _grid_records(at[rows], warm[rows], sense[rows])
         parts = _predict_block(posterior.problem, values, records, keys)
         blocks.append(np.stack([np.quantile(part, tails, axis=0) for part in parts]))
@@ -238,6 +251,8 @@ def default_bands(posterior: Posterior) -> Bands:
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
     grid = np.linspace(low - (beyond if low < 0.0 else 0.0), high + beyond, 67)
+    # The ends of the data themselves, so that the tested range shows whole.
+    grid = np.union1d(grid, ends)
     levels = np.unique(np.round(records.temperature, 1))
     if len(levels) > _MOST_TEMPERATURES:
         levels = np.linspace(levels[0], levels[-1], 3)

@@ -29,7 +29,7 @@ from hdcal.inference.posterior import (
 )
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, sample
-from hdcal.physics.effect import Effect
+from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior, effect_priors
@@ -64,6 +64,37 @@ def choose_effects(
     if findings:
         raise InputError(findings)
     return tuple(registry[name] for name in dict.fromkeys(names))
+
+
+def check_effect_priors(
+    case: Case, registry: Mapping[str, type[Effect]] = EFFECTS
+) -> None:
+    """Check the gear file's priors of effects against the library.
+
+    Raises:
+        InputError: an effect or parameter is not in the library, or the unit is of
+            another kind.
+    """
+    known = {
+        f"{name}.{field}": spec.unit
+        for name, effect in registry.items()
+        for field, spec in parameters(effect).items()
+    }
+    findings = []
+    for name, prior in case.gear.effect_priors.items():
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f"Did you mean '{near[0]}'? " if near else ""
+            problem = "is no parameter of an effect in the library"
+            remedy = f"{hint}`hdcal effects` lists them"
+        elif prior.unit not in ("", known[name]):
+            problem = f"has the unit {prior.unit}, not {known[name]}"
+            remedy = f"Give it in {known[name]}"
+        else:
+            continue
+        findings.append(Finding("gear file", problem, remedy, column=f"priors.{name}"))
+    if findings:
+        raise InputError(findings)
 
 
 def calibrate(
@@ -104,6 +135,7 @@ def calibrate(
     _check_settings(chains, warmup, draws)
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
+    check_effect_priors(case, registry)
     theory = theory or case.gear.theory
     shipped = effect_priors()
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)

@@ -1,7 +1,6 @@
-"""From a prior table to NumPyro: the distribution and its unconstrained scale."""
+"""From a prior table to NumPyro and SciPy distributions."""
 
 import jax.numpy as jnp
-import numpy as np
 import numpyro.distributions as dist
 from scipy import stats
 
@@ -53,25 +52,6 @@ def bounds(prior: Prior) -> tuple[float, float]:
     """Return the ends of the prior's support."""
     low, high = frozen(prior).support()
     return float(low), float(high)
-
-
-def unconstrained(prior: Prior, *, positive: bool = False) -> tuple[float, float]:
-    """Return centre and scale of the prior where NumPyro samples it.
-
-    Only a starting point and a unit for the optimiser: quantiles are mapped, not
-    moments, because they survive the map.
-    """
-    quantiles = np.asarray(frozen(prior).ppf([0.16, 0.5, 0.84]))
-    low, high = bounds(prior)
-    if positive:
-        low = 0.0
-        quantiles = np.maximum(quantiles, 1e-3 * quantiles[1])
-    if np.isfinite(low) and np.isfinite(high):
-        share = (quantiles - low) / (high - low)
-        quantiles = np.log(share / (1.0 - share))
-    elif np.isfinite(low):
-        quantiles = np.log(quantiles - low)
-    return float(quantiles[1]), float((quantiles[2] - quantiles[0]) / 2.0)
 
 
 def scaled(prior: Prior, factor) -> Prior:

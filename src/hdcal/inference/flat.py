@@ -81,15 +81,7 @@ def flat_directions(slopes: dict, problem: Problem, sigma: float) -> list[str]:
         for name in unseen
     ]
     seen = {name: column for name, column in scaled.items() if name not in unseen}
-    pairs = [pair for pair in combinations(seen, 2) if _flat(*(seen[n] for n in pair))]
-    sentences += [_sentence(list(pair)) for pair in pairs]
-    for names in _leftover(seen, _joined(pairs)):
-        sentences.append(_sentence(names))
-    return sentences
-
-
-def _flat(*columns: np.ndarray) -> bool:
-    return _strengths(columns)[0][-1] < 1.0
+    return sentences + [_sentence(names) for names in _inseparable(seen)]
 
 
 def _strengths(columns) -> tuple[np.ndarray, np.ndarray]:
@@ -101,28 +93,32 @@ def _strengths(columns) -> tuple[np.ndarray, np.ndarray]:
     return strength, vectors
 
 
-def _joined(pairs: list[tuple[str, str]]) -> list[set[str]]:
-    """Return the groups that the pairs connect."""
-    groups: list[set[str]] = []
-    for pair in pairs:
-        touched = [group for group in groups if group & set(pair)]
-        groups = [group for group in groups if group not in touched]
-        groups.append(set(pair).union(*touched))
-    return groups
-
-
-def _leftover(seen: dict, groups: list[set[str]]) -> list[list[str]]:
-    """Return the flat directions beyond those inside the named groups."""
-    if len(seen) < 3:
+def _inseparable(seen: dict[str, np.ndarray]) -> list[list[str]]:
+    """Return as many groups as there are flat directions, pairs before larger ones."""
+    if len(seen) < 2:
         return []
     strength, vectors = _strengths(list(seen.values()))
-    named = sum(len(group) - 1 for group in groups)
-    weakest = int(np.sum(strength < 1.0)) - named
-    found = []
-    for vector in vectors[::-1][: max(weakest, 0)]:
+    flat = int(np.sum(strength < 1.0))
+    weakest = {
+        pair: _strengths([seen[name] for name in pair])[0][-1]
+        for pair in combinations(seen, 2)
+    }
+    groups: list[list[str]] = []
+    linked: dict[str, set[str]] = {name: {name} for name in seen}
+    for (one, other), least in sorted(weakest.items(), key=lambda item: item[1]):
+        if least >= 1.0 or len(groups) == flat:
+            break
+        # A pair that others already link is no further direction.
+        if other not in linked[one]:
+            joined = linked[one] | linked[other]
+            linked |= dict.fromkeys(joined, joined)
+            groups.append([one, other])
+    for vector in vectors[::-1][: flat - len(groups)]:
         part = np.abs(vector) / np.abs(vector).max()
-        found.append([n for n, p in zip(seen, part, strict=True) if p >= _SHARE])
-    return [names for names in found if len(names) > 1]
+        names = [n for n, p in zip(seen, part, strict=True) if p >= _SHARE]
+        if len(names) > 2:
+            groups.append(names)
+    return groups
 
 
 def _sentence(names: list[str]) -> str:

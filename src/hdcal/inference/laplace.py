@@ -93,10 +93,6 @@ def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
     start = initialize_model(
         key, model, init_strategy=init_to_median(num_samples=15), model_args=(problem,)
     ).param_info.z
-    for name, prior in problem.priors.items():
-        if f"_{name}" in start and prior.family == "half_normal":
-            # The median of the signed coordinate, zero, is a saddle of |·|.
-            start[f"_{name}"] = prior.numbers[0]
     flat, unravel = ravel_pytree(start)
     cache: dict[bytes, tuple] = {}
     _, _, hessian = (np.asarray(part) for part in _expand(problem, start))

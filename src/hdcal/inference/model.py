@@ -8,6 +8,7 @@ the prior that K and E₀ imply; K follows from both. Sites whose names begin wi
 import jax.numpy as jnp
 import numpyro
 import numpyro.distributions as dist
+from jax.nn import log_sigmoid, softplus
 
 from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
 from hdcal.inference.distributions import distribution
@@ -23,16 +24,24 @@ def _sample(name: str, prior: Prior):
     return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
 
 
-def _sample_amplitude(name: str, prior: Prior):
+def _sample_amplitude(problem: Problem, name: str):
     """Sample a parameter of an effect.
 
-    A half-normal one is the size of a normal coordinate: a logarithm would stretch
-    the neighbourhood of zero, where an absent effect has its posterior, to infinity.
+    A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
+    resolve: linear where they see it, and a logarithm only below that. A plain
+    logarithm stretches the neighbourhood of zero, where an absent effect has its
+    posterior. The logistic density of u is taken off again, so the prior is exact.
     """
+    prior = problem.priors[name]
     if prior.family != "half_normal":
         return _sample(name, prior)
-    signed = numpyro.sample(f"_{name}", dist.Normal(0.0, prior.numbers[0]))
-    return numpyro.deterministic(name, jnp.abs(signed))
+    unit, logistic = problem.units[name], dist.Logistic(0.0, 1.0)
+    u = numpyro.sample(f"_{name}", logistic)
+    size = unit * softplus(u)
+    log_jacobian = jnp.log(unit) + log_sigmoid(u)
+    log_prior = distribution(prior).log_prob(size) + log_jacobian
+    numpyro.factor(f"_{name}_prior", log_prior - logistic.log_prob(u))
+    return numpyro.deterministic(name, size)
 
 
 def _sample_influence(prior: Prior, modulus):
@@ -88,7 +97,7 @@ def model(problem: Problem) -> None:
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"
-            values[name] = _sample_amplitude(name, priors[name])
+            values[name] = _sample_amplitude(problem, name)
     _sample_structure(problem, values)
     numpyro.deterministic("stiffness", stiffness(problem, values))
     numpyro.factor("force", log_likelihood(problem, values))

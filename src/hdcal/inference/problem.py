@@ -10,6 +10,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.compress import Blocks, compress, group_rows
 from hdcal.inference.distributions import scaled
 from hdcal.inference.gap import Gap, build_gap
+from hdcal.inference.scales import amplitude_units
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import THEORIES
@@ -23,12 +24,17 @@ _FEW_ROWS = 500
 # noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
 _FINE_STEP = 1.3
 
+# Steps below this many residual sds are no rounding: the exact form would only lose
+# digits in the difference of two nearly equal probabilities.
+_NO_STEP = 1e-3
+
 
 class Problem(eqx.Module):
     """Everything the model needs; only arrays change between data sets of one shape.
 
     Attributes:
         priors: by site name, in code units; K under the problem's own theory.
+        units: of the sampling coordinate of each half-normal amplitude.
         unit_stiffness: k_theory/E, radial [mm].
         reading: how the rig reads.
         records: all rows, or None when they are compressed.
@@ -44,6 +50,7 @@ class Problem(eqx.Module):
     """
 
     priors: dict[str, Prior]
+    units: dict[str, float]
     unit_stiffness: Float[Array, ""] | float
     reading: Reading
     records: Records | None
@@ -173,7 +180,7 @@ def build_problem(
     }
     step = case.gear.force_resolution
     few = len(records.force) <= _FEW_ROWS and not members
-    rounded = step > 0.0 and (few or step > _FINE_STEP * noise_sd)
+    rounded = step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
     gap = build_gap(records.deformation, base_columns) if with_gap else None
     columns = None
     if gap is not None:
@@ -191,6 +198,7 @@ def build_problem(
     integrated = frozenset(members if gaussian else ())
     return Problem(
         priors={name: _bare(prior) for name, prior in priors.items()},
+        units=amplitude_units(records, reading, effects, priors, noise_sd),
         unit_stiffness=_unit_stiffness(case, theory),
         reading=reading,
         records=records if keep_rows else None,

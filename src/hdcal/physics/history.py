@@ -1,6 +1,7 @@
 """Recurrences over ordered rows, shared by the effects that remember."""
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 
@@ -9,11 +10,11 @@ def leaky_sum(
 ) -> Float[Array, " n"]:
     """Return y_i = decay_i · y_(i−1) + gain_i with y before the first row zero.
 
-    A decay of zero restarts the sum. Composed as an associative scan, whose depth
-    is log n instead of n.
+    A decay of zero restarts the sum.
     """
 
-    def compose(first, second):
-        return first[0] * second[0], second[0] * first[1] + second[1]
+    def advance(last, row):
+        now = row[0] * last + row[1]
+        return now, now
 
-    return jax.lax.associative_scan(compose, (decay, gain))[1]
+    return jax.lax.scan(advance, jnp.zeros(()), (decay, gain))[1]

@@ -38,13 +38,18 @@ def number(value: float | None, width: float | None = None) -> str:
     """
     if value is None or not math.isfinite(value):
         return "–"
-    size = max(abs(value), abs(width or 0.0))
-    if value and (size < 1e-3 or size >= 1e6):
-        return f"{value:.3g}"
     if not width or not math.isfinite(width):
         return f"{value:.4g}"
-    decimals = max(0, 2 - math.floor(math.log10(abs(width))))
-    return f"{value:.{min(decimals, 6)}f}"
+    place = _place(width)
+    if abs(value) >= 1e6 or place < -8:
+        digits = max(2, _place(value) - place + 2)
+        return f"{value:.{digits}e}"
+    return f"{value:.{max(0, 2 - place)}f}"
+
+
+def _place(value: float) -> int:
+    """Return the power of ten of a number's first digit."""
+    return math.floor(math.log10(abs(value))) if value else 0
 
 
 def estimate(entry: dict) -> tuple[str, str]:

@@ -31,14 +31,19 @@ class ChargeLeakage(Effect):
 
     def apply(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:
         """Return the force as the leaking amplifier shows it."""
-        records = rows.records
-        starts = jnp.diff(records.run, prepend=records.run[:1] - 1) != 0
-        step = jnp.where(starts, records.time, jnp.diff(records.time, prepend=0.0))
-        gain = jnp.where(starts, signal, jnp.diff(signal, prepend=0.0))
+        # Run after run, also where the file takes turns between them.
+        order = jnp.argsort(rows.records.run, stable=True)
+        run, time, force = (
+            jnp.asarray(column)[order]
+            for column in (rows.records.run, rows.records.time, signal)
+        )
+        starts = jnp.diff(run, prepend=run[:1] - 1) != 0
+        step = jnp.where(starts, time, jnp.diff(time, prepend=0.0))
+        gain = jnp.where(starts, force, jnp.diff(force, prepend=0.0))
         loss = self.rate * step
         # (1 − e^−x)/x, with its series where the quotient would be 0/0.
         small = jnp.abs(loss) < 1e-6
         safe = jnp.where(small, 1.0, loss)
         kept = jnp.where(small, 1.0 - 0.5 * loss, -jnp.expm1(-safe) / safe)
         decay = jnp.where(starts, 0.0, jnp.exp(-loss))
-        return leaky_sum(decay, gain * kept)
+        return jnp.zeros_like(force).at[order].set(leaky_sum(decay, gain * kept))

@@ -13,8 +13,8 @@ _NEGLIGIBLE = 1e-6
 class SeatingSlack(Effect):
     """Dead zone of the deformation, ω → ω − ω_c clip(ω/ω_c, −1, 1), smoothed.
 
-    For ω > 0 this is max(0, ω − ω_c). The clip is x (1 + x⁸)^(−1/8): smooth, and
-    within 1 % of the corner a third of a clearance away from it.
+    For ω > 0 this is max(0, ω − ω_c). The clip is x (1 + x⁸)^(−1/8): smooth, and a
+    third of a clearance away from the corner within 1.2 % of a clearance of it.
 
     Source: handbook (play of a bolted or seated joint).
     """

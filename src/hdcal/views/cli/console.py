@@ -1,6 +1,7 @@
 """Where words go: results on standard output, everything else beside it."""
 
 import contextlib
+import io
 import logging
 import os
 import sys
@@ -28,7 +29,7 @@ class Console:
     def prepare(self) -> None:
         """Quiet the libraries, and let any text be printed on any terminal."""
         for stream in (sys.stdout, sys.stderr):
-            if hasattr(stream, "reconfigure"):
+            if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
         if os.environ.get("HDCAL_DEBUG") == "1":
             return

@@ -15,7 +15,6 @@ from hdcal.inference.posterior import Posterior
 from hdcal.views.figures.canvas import (
     DARK,
     GREY,
-    MOST_POINTS,
     heading,
     plain,
     style,
@@ -181,13 +180,14 @@ def _legend(axes: Axes, bands: Bands, left: Residuals, levels, colours) -> None:
         texts.append(text)
 
     size = len(left.measured)
-    note = f" ({MOST_POINTS} of {size} drawn)" if size > MOST_POINTS else ""
     both = len(np.unique(left.direction)) > 1
     for sense, mark in _MARKS.items():
         if np.any(left.direction == sense):
             word = "loading" if sense > 0 else "unloading"
             style_ = {"marker": mark, "linestyle": "", "color": main, "markersize": 5}
-            add(Line2D([], [], **style_), f"measured, {word}{note}")
+            add(Line2D([], [], **style_), f"measured, {word}")
+    if size > MOST_POINTS:
+        add(Patch(alpha=0.0), f"({MOST_POINTS} of {size} readings drawn)")
     line = Line2D([], [], color=main)
     add(
         (Patch(color=main, alpha=0.55, linewidth=0), line), "force model, 95 % credible"

@@ -4,7 +4,7 @@ import io
 import logging
 import warnings
 from functools import cache
-from typing import Literal
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -25,8 +25,9 @@ MOST_POINTS = 4000
 
 # Where installed, these write what the default font lacks, such as Chinese.
 _FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
-_STYLE = {
+_STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
+    "axes.formatter.limits": (-5, 7),
     "axes.edgecolor": "#555555",
     "axes.grid": True,
     "axes.labelsize": 10,
@@ -71,7 +72,7 @@ def plain(text: str, length: int = 80) -> str:
 def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> bytes:
     """Return a figure as the bytes of a file; the same figure, the same bytes."""
     target = io.BytesIO()
-    metadata = {"Title": printable(title)} if title else {}
+    metadata: dict[str, Any] = {"Title": printable(title)} if title else {}
     if kind == "svg":
         metadata["Date"] = None
     level = logging.getLogger("matplotlib").level

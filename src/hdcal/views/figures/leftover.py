@@ -45,7 +45,11 @@ def residual_figure(posterior: Posterior, left: Residuals) -> Figure:
             axes.set_xlabel(unit)
             axes.set_ylabel("(measured − fit) / sd")
         if len(groups) > 1:
-            rows[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+            rows[0].legend(
+                loc="upper left",
+                bbox_to_anchor=(1.0, 1.0),
+                markerscale=2.0 if len(order) > 300 else 1.0,
+            )
         if not posterior.usable:
             watermark(figure)
     return figure
