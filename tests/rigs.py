@@ -73,10 +73,10 @@ def ramp(rows: int = 14) -> Records:
     return make_records(np.linspace(0.02, 0.54, rows))
 
 
-def cycles(rows: int = 48) -> Records:
+def cycles(rows: int = 48, start: float = 0.02) -> Records:
     """Return load/unload cycles at three temperatures out of order, with time."""
     half = rows // 6
-    up = np.linspace(0.02, 0.54, half)
+    up = np.linspace(start, 0.54, half)
     sense = np.concatenate([np.ones(half), -np.ones(half)])
     return make_records(
         np.tile(np.concatenate([up, up[::-1]]), 3),

@@ -62,12 +62,9 @@ def test_a_new_reading_covers_new_data(rubbing):
 def test_tested_means_inside_the_data(rubbing):
     found = predict(rubbing, [0.01, 0.3, 0.6], [20.0, 90.0])
     assert list(found.tested) == [False, True, False, False, False, False]
-    loading_only = make_case(
-        make_records(np.linspace(0, 0.5, 9), np.linspace(0, 99, 9))
-    )
-    posterior = replace(rubbing, case=loading_only)
+    loading_only = make_records(np.linspace(0.0, 0.5, 9))
     assert not bands._tested(
-        posterior.case.records, np.array([0.3]), np.array([20.0]), np.array([-1.0])
+        loading_only, np.array([0.3]), np.array([20.0]), np.array([-1.0])
     )
 
 

@@ -71,7 +71,8 @@ def exact_posterior(case):
     spread += np.einsum("i,ij,ik->jk", weight, means - centre, means - centre)
     of_sigma = weight @ sigma
     sds = [*np.sqrt(np.diag(spread)), np.sqrt(weight @ (sigma - of_sigma) ** 2)]
-    return dict(zip(("K", "force_offset", "sigma"), zip([*centre, of_sigma], sds)))
+    pairs = zip([*centre, of_sigma], sds, strict=True)
+    return dict(zip(("K", "force_offset", "sigma"), pairs, strict=True))
 
 
 @pytest.mark.parametrize("rows", [14, 10_000, 1_000_000])

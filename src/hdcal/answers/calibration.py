@@ -53,7 +53,7 @@ def choose_effects(
     for name in names:
         if name not in registry:
             near = get_close_matches(name, registry, n=1)
-            hint = f"did you mean '{near[0]}'? " if near else ""
+            hint = f"Did you mean '{near[0]}'? " if near else ""
             findings.append(
                 Finding(
                     "--effect",

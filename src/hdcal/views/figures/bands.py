@@ -15,6 +15,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.views.figures.canvas import (
     DARK,
     GREY,
+    MOST_POINTS,
     heading,
     plain,
     style,
