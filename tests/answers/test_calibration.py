@@ -10,6 +10,7 @@ from rigs import cycles, make_case, make_gear, make_records, ramp, simulate
 from hdcal.answers.calibration import calibrate, choose_effects
 from hdcal.answers.summary import summarise
 from hdcal.errors import InputError
+from hdcal.inference.density import log_likelihood
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
@@ -152,3 +153,15 @@ def test_a_diametral_reading_halves_the_radial_displacement():
     assert ratio == pytest.approx(2.0, rel=0.02)
     slopes = [np.median(p.draws["stiffness"]) for p in (radial, diametral)]
     assert slopes[0] == pytest.approx(slopes[1], rel=0.005)
+
+
+def test_a_gap_beside_an_effect_is_integrated_too():
+    """Rows are kept for the effect; drawn members must not count in the likelihood."""
+    case = make_case(with_force(cycles(96)))
+    found = calibrate(case, effects=["coulomb_friction"], with_gap=True, **SHORT)
+    assert {"gap_weights", "coulomb_friction.force"} <= set(found.draws)
+    problem = found.problem
+    one = {name: values[0] for name, values in found.draws.items()}
+    shared = {name: value for name, value in one.items() if name != "gap_weights"}
+    assert "gap" in problem.integrated
+    assert float(log_likelihood(problem, one)) == float(log_likelihood(problem, shared))

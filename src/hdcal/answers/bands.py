@@ -22,6 +22,7 @@ from hdcal.physics.effect import Noise
 from hdcal.rig.records import Records
 
 Direction = Literal["up", "down"]
+DIRECTIONS: tuple[Direction, ...] = ("up", "down")
 _SENSE = {"up": 1.0, "down": -1.0}
 # Rows predicted at a time: with 4000 draws a block takes 64 MB.
 _BLOCK = 2000
@@ -258,7 +259,7 @@ def default_bands(posterior: Posterior) -> Bands:
         levels = np.linspace(levels[0], levels[-1], 3)
     make = partial(predict, posterior, grid, levels, allow_failed=True)
     sides: list[Direction] = [
-        side for side, sense in _SENSE.items() if sense in np.asarray(records.sense)
+        side for side in DIRECTIONS if _SENSE[side] in np.asarray(records.sense)
     ]
     parts = [make(side) for side in sides]
     joined = {

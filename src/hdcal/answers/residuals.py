@@ -101,15 +101,21 @@ def _whiten(posterior: Posterior, centre, columns, residual, sd) -> Whitened:
         pull.append(0.0)
     data, residual = np.stack(table, axis=1), residual / sd
     shapes = shapes_of(records, posterior.case.gear.reference_temperature)
-    shapes = {name: (column / sd, *words) for name, (column, *words) in shapes.items()}
+    shapes = {n: (column / sd, up, down) for n, (column, up, down) in shapes.items()}
     if problem.runs:
         residual, data = (_demean(part, records.run) for part in (residual, data))
-        shapes = {n: (_demean(c, records.run), *w) for n, (c, *w) in shapes.items()}
+        shapes = {
+            n: (_demean(c, records.run), up, down)
+            for n, (c, up, down) in shapes.items()
+        }
     below = np.zeros(len(pull))
     return Whitened(
         residual=np.concatenate([residual, pull]),
         absorbed=np.vstack([data, np.eye(len(pull))]),
-        shapes={n: (np.concatenate([c, below]), *w) for n, (c, *w) in shapes.items()},
+        shapes={
+            n: (np.concatenate([c, below]), up, down)
+            for n, (c, up, down) in shapes.items()
+        },
         free=problem.runs,
     )
 

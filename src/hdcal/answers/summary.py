@@ -94,7 +94,7 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
     settings, case = posterior.settings, posterior.case
     names = [*posterior.diagnoses]
     names += [n for n in posterior.priors if n in posterior.draws and n not in names]
-    stats = posterior.tree["sample_stats"]
+    stats = posterior.tree["sample_stats"].to_dataset()
     warnings = [
         f"{check.name}: {check.words}"
         for check in posterior.checks

@@ -12,7 +12,14 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 from arviz_base import from_dict
-from arviz_stats import bfmi, ess, psense, rhat
+
+# They are put there at import time, out of pyright's sight.
+from arviz_stats import (
+    bfmi,  # pyright: ignore[reportAttributeAccessIssue]
+    ess,  # pyright: ignore[reportAttributeAccessIssue]
+    psense,  # pyright: ignore[reportAttributeAccessIssue]
+    rhat,  # pyright: ignore[reportAttributeAccessIssue]
+)
 
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH

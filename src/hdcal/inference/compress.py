@@ -8,7 +8,9 @@ than the triangular factor of [X y] and their number:
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
+
+from hdcal.rig.records import Array
 
 
 class Blocks(eqx.Module):

@@ -1,9 +1,10 @@
 """The likelihood of a problem's data, whatever form they are kept in."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Key
+from jaxtyping import Float, Key
 
 from hdcal.inference import compress
 from hdcal.inference.distributions import distribution
@@ -17,12 +18,18 @@ from hdcal.physics.chain import (
     predict_reading,
 )
 from hdcal.physics.effect import Effect, Noise, parameters
-from hdcal.rig.records import Records
+from hdcal.rig.records import Array, Records
 
-Values = Mapping[str, Float[Array, "..."]]
+# Float scalars and arrays by site name; what each one is depends on the name.
+Values = Mapping[str, Any]
 
 # A normal prior of these is cut at zero.
 POSITIVE = frozenset({"E0"})
+_MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "gap": "gap_weights",
+}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 _CORE, _ONE = 4, 2
 
@@ -107,19 +114,22 @@ def log_likelihood(problem: Problem, values: Values) -> Float[Array, ""]:
     """Return the log likelihood of all data, members integrated out where they can."""
     if problem.integrated:
         return linear_part(problem, values).log_likelihood()
-    if problem.blocks is None:
-        rows = pointwise_log_likelihood(
-            problem, values, problem.records, problem.columns
+    if problem.blocks is not None:
+        coefficients = _block_coefficients(problem, problem.blocks, values)
+        return compress.log_likelihood(
+            problem.blocks, coefficients, values["sigma"], problem.step
         )
-        return jnp.sum(rows)
-    coefficients = _block_coefficients(problem, values)
-    return compress.log_likelihood(
-        problem.blocks, coefficients, values["sigma"], problem.step
-    )
+    rows, columns = problem.rows, problem.columns
+    return jnp.sum(pointwise_log_likelihood(problem, values, rows, columns))
 
 
 def linear_part(problem: Problem, values: Values) -> Linear:
-    """Return the residual that the integrated members have to explain."""
+    """Return the residual that the integrated members have to explain.
+
+    Members already drawn are left out: they are what is integrated over.
+    """
+    drawn = {_MEMBERS[kind] for kind in problem.integrated}
+    values = {name: value for name, value in values.items() if name not in drawn}
     scale = []
     if "run" in problem.integrated:
         scale.append(jnp.full(problem.runs - 1, values["run_offset_sd"]))
@@ -127,12 +137,13 @@ def linear_part(problem: Problem, values: Values) -> Linear:
         scale.append(jnp.full(problem.specimens - 1, values["specimen_sd"]))
     if "gap" in problem.integrated:
         scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
-    make = _linear_rows if problem.blocks is None else _linear_blocks
-    return make(problem, values, jnp.concatenate(scale))
+    if problem.blocks is not None:
+        return _linear_blocks(problem, problem.blocks, values, jnp.concatenate(scale))
+    return _linear_rows(problem, values, jnp.concatenate(scale))
 
 
 def _linear_rows(problem: Problem, values: Values, scale) -> Linear:
-    records = problem.records
+    records = problem.rows
     mean, noise = predict_rows(problem, values, records, None)
     sd = _with_rounding(noise, problem.step).sd[0]
     design = []
@@ -150,8 +161,9 @@ def _linear_rows(problem: Problem, values: Values, scale) -> Linear:
     )
 
 
-def _linear_blocks(problem: Problem, values: Values, scale) -> Linear:
-    blocks = problem.blocks
+def _linear_blocks(
+    problem: Problem, blocks: compress.Blocks, values: Values, scale
+) -> Linear:
     groups, width = blocks.factor.shape[:2]
     design = []  # each [group, column of X, weight]
     if "run" in problem.integrated:
@@ -171,7 +183,7 @@ def _linear_blocks(problem: Problem, values: Values, scale) -> Linear:
     mapped = jnp.einsum(
         "gij,gjk->gik", blocks.factor[..., :-1], jnp.concatenate(design, axis=-1)
     )
-    residual = compress.residual(blocks, _block_coefficients(problem, values))
+    residual = compress.residual(blocks, _block_coefficients(problem, blocks, values))
     return Linear(
         residual=residual.reshape(-1),
         design=mapped.reshape(groups * width, -1),
@@ -182,9 +194,10 @@ def _linear_blocks(problem: Problem, values: Values, scale) -> Linear:
     )
 
 
-def _block_coefficients(problem: Problem, values: Values) -> Float[Array, "g p"]:
+def _block_coefficients(
+    problem: Problem, blocks: compress.Blocks, values: Values
+) -> Float[Array, "g p"]:
     """Return the coefficients of each block, those of the gap zero."""
-    blocks = problem.blocks
     base = member_base(problem, values, blocks.run, blocks.specimen)
     core = linear_coefficients(base, problem.reading)
     core = jnp.broadcast_to(core, (len(blocks.count), _CORE))

@@ -1,5 +1,7 @@
 """From a prior table to NumPyro and SciPy distributions."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import numpyro.distributions as dist
 from scipy import stats
@@ -31,7 +33,7 @@ def distribution(prior: Prior, *, positive: bool = False) -> dist.Distribution:
     raise ValueError(f"no distribution for the prior family {prior.family!r}")
 
 
-def frozen(prior: Prior) -> "stats.rv_continuous":
+def frozen(prior: Prior) -> Any:
     """Return the prior as a SciPy distribution: cdf, quantiles and moments."""
     numbers = [float(number) for number in prior.numbers]
     match prior.family:

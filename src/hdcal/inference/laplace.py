@@ -1,11 +1,13 @@
 """The Laplace fit: where the posterior is and how it is shaped, for whitening."""
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Array, Float, Key
+from jaxtyping import Float, Key
 from numpyro.infer import init_to_median
 from numpyro.infer.util import constrain_fn, initialize_model, potential_energy
 from scipy import optimize
@@ -13,8 +15,9 @@ from scipy import optimize
 from hdcal.inference.gap import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
+from hdcal.rig.records import Array
 
-Position = dict[str, Float[Array, "..."]]
+Position = dict[str, Any]
 
 # Largest share of the gradient that may be left, in posterior sds, at the mode.
 _TOLERANCE = 1e-6
@@ -40,7 +43,7 @@ class Whitening(eqx.Module):
 
 def potential(problem: Problem, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
-    return potential_energy(model, (problem,), {}, position)
+    return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
 def _typical(problem: Problem, position: Position) -> Float[Array, ""]:

@@ -3,9 +3,10 @@
 import jax
 import jax.numpy as jnp
 from jax.scipy.special import log_ndtr, logsumexp
-from jaxtyping import Array, Float, Key
+from jaxtyping import Float, Key
 
 from hdcal.physics.effect import Noise
+from hdcal.rig.records import Array
 
 
 def _log_interval(low, high):

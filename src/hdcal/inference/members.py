@@ -13,8 +13,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
-from jaxtyping import Array, Float, Key
+from jaxtyping import Float, Key
 from scipy.linalg import helmert
+
+from hdcal.rig.records import Array
 
 
 class Linear(eqx.Module):

@@ -49,7 +49,8 @@ def _sample_influence(prior: Prior, modulus):
     if prior.family == "fixed":
         return _sample("K", prior)
     of_K = distribution(prior)
-    times_modulus = dist.transforms.AffineTransform(0.0, modulus, domain=of_K.support)
+    domain = of_K.support or dist.constraints.real
+    times_modulus = dist.transforms.AffineTransform(0.0, modulus, domain=domain)
     product = numpyro.sample("_KE0", dist.TransformedDistribution(of_K, times_modulus))
     return numpyro.deterministic("K", product / modulus)
 

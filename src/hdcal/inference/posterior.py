@@ -147,7 +147,7 @@ class Posterior:
             case = archive.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
-                tree["observed_data"]["force"],
+                tree["observed_data"].to_dataset()["force"],
             )
             return cls(
                 case=case,

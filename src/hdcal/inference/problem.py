@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import equinox as eqx
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.errors import Finding, InputError
 from hdcal.inference.compress import Blocks, compress, group_rows
@@ -16,7 +16,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import THEORIES
 from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior
-from hdcal.rig.records import Records
+from hdcal.rig.records import Array, Records
 
 # Below this many rows the rounding likelihood is always exact: it is cheap there.
 _FEW_ROWS = 500
@@ -63,6 +63,17 @@ class Problem(eqx.Module):
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: frozenset[str] = eqx.field(static=True)
+
+    @property
+    def rows(self) -> Records:
+        """The kept rows.
+
+        Raises:
+            ValueError: they were compressed.
+        """
+        if self.records is None:
+            raise ValueError("the rows of this problem are compressed")
+        return self.records
 
 
 def _bare(prior: Prior) -> Prior:

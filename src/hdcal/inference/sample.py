@@ -12,7 +12,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Key
+from jaxtyping import Key
 from numpyro.infer.hmc import hmc
 from numpyro.infer.util import constrain_fn
 
@@ -20,6 +20,7 @@ from hdcal.inference.density import draw_members
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
+from hdcal.rig.records import Array
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
@@ -28,6 +29,8 @@ MAX_TREE_DEPTH = 10
 # Mean acceptance aimed at; each further value is for a run that still diverged.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
+# Place of the divergences in what `_advance` keeps of a draw.
+_DIVERGING = 3
 # Chains start this many posterior sds apart, so that R-hat can see them disagree.
 _OVERDISPERSION = 2.0
 
@@ -67,7 +70,7 @@ def _kernel(problem: Problem, whitening: Whitening, warmup: int, target):
         num_warmup=warmup,
         target_accept_prob=target,
         max_tree_depth=MAX_TREE_DEPTH,
-        trajectory_length=None,
+        trajectory_length=None,  # pyright: ignore[reportArgumentType]
     )
     return start, step
 
@@ -141,10 +144,12 @@ def sample(
         draws: iterations kept per chain.
         progress: told after every stretch.
     """
-    for target in TARGET_ACCEPTANCE:
-        kept = _run(problem, whitening, key, target, chains, warmup, draws, progress)
-        if not kept[3].any():
-            break
+    run = partial(_run, problem, whitening, key, chains, warmup, draws, progress)
+    target, *shorter = TARGET_ACCEPTANCE
+    kept = run(target)
+    while shorter and kept[_DIVERGING].any():
+        target = shorter.pop(0)
+        kept = run(target)
     standard, energy, potential_, diverging, steps, acceptance, step_size = kept
     members = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
     values = _constrain(problem, whitening, standard, members)
@@ -160,7 +165,7 @@ def sample(
     )
 
 
-def _run(problem, whitening, key, target, chains, warmup, draws, progress):
+def _run(problem, whitening, key, chains, warmup, draws, progress, target):
     """Run all chains; return what is kept of each draw, axes chain and draw first."""
     states = _start(problem, whitening, jax.random.split(key, chains), target, warmup)
     total, done, kept = warmup + draws, 0, []

@@ -63,4 +63,6 @@ def amplitude_units(
 def _median(prior: Prior, null: float | None) -> float:
     if null is not None:
         return null
-    return prior.numbers[0] if prior.family == "fixed" else frozen(prior).median()
+    return (
+        float(prior.numbers[0]) if prior.family == "fixed" else frozen(prior).median()
+    )

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.physics.effect import Effect, Noise, Rows, Stage
 from hdcal.physics.theory import THEORIES
-from hdcal.rig.records import Geometry, Records
+from hdcal.rig.records import Array, Geometry, Records
 
 Value = Float[Array, ""] | Float[Array, " n"] | float
 

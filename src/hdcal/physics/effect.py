@@ -7,12 +7,17 @@ have a null value: there the effect changes nothing.
 
 import dataclasses
 from abc import abstractmethod
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import equinox as eqx
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from hdcal.rig.records import Records
+from hdcal.rig.records import Array, Records
+
+if TYPE_CHECKING:
+    from typing import ClassVar as AbstractClassVar
+else:
+    from equinox import AbstractClassVar
 
 Stage = Literal["deformation", "force", "sensor", "noise"]
 
@@ -84,9 +89,9 @@ class Effect(eqx.Module):
             `odd` (changes sign), `even` (does not) or `none` (depends on history).
     """
 
-    name: eqx.AbstractClassVar[str]
-    stage: eqx.AbstractClassVar[Stage]
-    family: eqx.AbstractClassVar[str]
+    name: AbstractClassVar[str]
+    stage: AbstractClassVar[Stage]
+    family: AbstractClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
 

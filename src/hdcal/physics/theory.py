@@ -7,18 +7,18 @@ displacement of the loaded point [N/mm]; all of them are linear in the modulus.
 from collections.abc import Callable
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
-from hdcal.rig.records import Geometry
+from hdcal.rig.records import Array, Geometry
 
 Scalar = Float[Array, ""] | float
-Stiffness = Callable[[Geometry, Scalar], Float[Array, ""]]
+Stiffness = Callable[[Geometry, Scalar], Scalar]
 
 # S = Σ_{n=2,4,…} 1/(n²−1)², the compliance series of the inextensible ring.
 RING_SERIES = (jnp.pi**2 - 8.0) / 16.0
 
 
-def ring(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
+def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of an inextensible ring: k = π E L δ³ / (24 R³ S).
 
     Args:
@@ -37,7 +37,7 @@ def ring(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
     return jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
 
 
-def cup(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
+def cup(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of a cup with a held base, deforming inextensionally.
 
     k = (π D / 2R³) (L/c)² / Σ_{n=2,4,…} 1/((n²−1)² (A + B/n²)),
@@ -69,7 +69,7 @@ def cup(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
     return jnp.pi * bending / (2.0 * g.radius**3) * lever**2 / series
 
 
-def article(geometry: Geometry, modulus: Scalar) -> Float[Array, ""]:
+def article(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness that the article plots, scaled from its own gear.
 
     k = 1625.19 N/mm · (E/210 GPa) (δ/0.68 mm)³ (40 mm/R)³.

@@ -6,12 +6,16 @@ are consistent, so nothing below the reading edge converts.
 
 import equinox as eqx
 import jax
-from jaxtyping import Array, Float, Int
+import numpy as np
+from jaxtyping import Float, Int
 
 # The one place where double precision is switched on: every module that computes
 # imports the records first. A product of stiffness and deformation with relative
 # error 1e-7 is larger than the posterior sd at a million rows.
 jax.config.update("jax_enable_x64", True)
+
+# Measured on the reading edge as NumPy arrays, traced as JAX arrays.
+Array = jax.Array | np.ndarray
 
 
 class Geometry(eqx.Module):

@@ -3,10 +3,11 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import leaky_sum
+from hdcal.rig.records import Array
 
 
 class ChargeLeakage(Effect):

@@ -3,9 +3,10 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.physics.effect import Effect, Noise, Rows, Stage, parameter
+from hdcal.rig.records import Array
 
 # A fraction of exactly zero has no logarithm; below this it is none.
 _NONE = 1e-12

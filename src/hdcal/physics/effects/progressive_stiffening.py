@@ -3,9 +3,10 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
+from hdcal.rig.records import Array
 
 # Rounding radius of |ω| at zero [mm], far below any reading.
 _CORNER = 1e-4

@@ -2,9 +2,10 @@
 
 from typing import ClassVar, Literal
 
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
+from hdcal.rig.records import Array
 
 
 class ThermalZeroDrift(Effect):
