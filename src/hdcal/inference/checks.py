@@ -15,10 +15,10 @@ from arviz_base import from_dict
 
 # They are put there at import time, out of pyright's sight.
 from arviz_stats import (
-    bfmi,  # pyright: ignore[reportAttributeAccessIssue]
-    ess,  # pyright: ignore[reportAttributeAccessIssue]
-    psense,  # pyright: ignore[reportAttributeAccessIssue]
-    rhat,  # pyright: ignore[reportAttributeAccessIssue]
+    bfmi,  # pyright: ignore[reportPrivateImportUsage]
+    ess,  # pyright: ignore[reportPrivateImportUsage]
+    psense,  # pyright: ignore[reportPrivateImportUsage]
+    rhat,  # pyright: ignore[reportPrivateImportUsage]
 )
 
 from hdcal.inference.distributions import bounds, frozen
