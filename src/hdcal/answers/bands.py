@@ -16,7 +16,7 @@ import numpy as np
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import build_effects, member_base
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
+from hdcal.inference.problem import Problem, case_reading
 from hdcal.physics.chain import linear_columns, predict_reading
 from hdcal.physics.effect import Noise
 from hdcal.rig.records import Records
@@ -27,6 +27,9 @@ _SENSE = {"up": 1.0, "down": -1.0}
 # Rows predicted at a time: with 4000 draws a block takes 64 MB.
 _BLOCK = 2000
 _MOST_TEMPERATURES = 6
+# How far beyond the data still counts as tested: a thermometer is no better than a
+# kelvin, and a hundredth of the range is no extrapolation.
+_NEAR_K, _NEAR_SHARE = 1.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -163,6 +166,22 @@ def _check_grid(deformation, temperature, direction, interval) -> None:
         raise InputError(findings)
 
 
+def _check_size(deformation, temperature, posterior: Posterior) -> None:
+    """Refuse what is a slip of the unit, as the reader of the data does."""
+    gear, findings = posterior.case.gear, []
+    limit = gear.geometry.radius / case_reading(posterior.case).radial_per_read
+    worst = float(np.max(np.abs(deformation)))
+    if worst >= limit:
+        problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
+        findings.append(Finding("--deformation", problem, "Give it in mm"))
+    rise = np.max(np.abs(temperature - gear.reference_temperature))
+    if np.median(posterior.draws["alpha"]) * rise >= 0.5:
+        problem = "the linear law E(T) would lose half of Young's modulus"
+        findings.append(Finding("--temperature", problem, "Give it in °C"))
+    if findings:
+        raise InputError(findings)
+
+
 def predict(
     posterior: Posterior,
     deformation: Sequence[float] | np.ndarray,
@@ -178,7 +197,8 @@ def predict(
     Args:
         posterior: from `calibrate` or `Posterior.load`.
         deformation: as read [mm], shape (n,).
-        temperature: of the specimen [°C], shape (t,); the reference one by default.
+        temperature: of the specimen [°C], shape (t,); by default the tested one
+            nearest to the reference.
         direction: of the movement, for effects that depend on it.
         interval: probability inside the bands.
         seed: of the new measurements' noise.
@@ -195,10 +215,14 @@ def predict(
         posterior.require_usable()
     gear = posterior.case.gear
     if temperature is None:
-        temperature = [gear.reference_temperature]
+        measured = posterior.case.records.temperature
+        temperature = [
+            np.clip(gear.reference_temperature, np.min(measured), np.max(measured))
+        ]
     along = np.atleast_1d(np.asarray(deformation, dtype=float))
     levels = np.atleast_1d(np.asarray(temperature, dtype=float))
     _check_grid(along, levels, direction, interval)
+    _check_size(along, levels, posterior)
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
     sense = np.full(len(at), _SENSE[direction])
     values = posterior.draws
@@ -227,14 +251,15 @@ def predict(
 
 
 def _tested(records: Records, deformation, temperature, sense) -> np.ndarray:
-    def within(values, measured):
+    def within(values, measured, slack):
         low, high = np.min(measured), np.max(measured)
-        slack = 1e-9 * max(abs(low), abs(high))
         return (values >= low - slack) & (values <= high + slack)
 
     return (
-        within(deformation, records.deformation)
-        & within(temperature, records.temperature)
+        within(
+            deformation, records.deformation, _NEAR_SHARE * np.ptp(records.deformation)
+        )
+        & within(temperature, records.temperature, _NEAR_K)
         & np.isin(sense, np.asarray(records.sense))
     )
 

@@ -96,7 +96,7 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
     names += [n for n in posterior.priors if n in posterior.draws and n not in names]
     stats = posterior.tree["sample_stats"].to_dataset()
     warnings = [
-        f"{check.name}: {check.words}"
+        check.words[:1].upper() + check.words[1:]
         for check in posterior.checks
         if check.outcome == "warning"
     ]

@@ -211,15 +211,15 @@ def conflict_check(
     name = "prior and data agree"
     far = []
     for parameter, values in draws.items():
-        below = float(frozen(priors[parameter]).cdf(np.median(values)))
-        if 2.0 * min(below, 1.0 - below) < CONFLICT_TAIL:
-            far.append(parameter)
+        prior, median = frozen(priors[parameter]), float(np.median(values))
+        if 2.0 * min(prior.cdf(median), prior.sf(median)) < CONFLICT_TAIL:
+            low, high = prior.interval(1.0 - CONFLICT_TAIL)
+            far.append(f"{parameter} = {median:.3g}, expected {low:.3g} to {high:.3g}")
     if not far:
         return Check(name, "passed", "every median lies within its prior's 99.7 %")
-    words = f"{_list(far)} beyond what the prior held possible"
-    return Check(
-        name, "warning", f"{words}; check units and gear file, or the prior itself"
-    )
+    words = f"far outside what was expected before the data: {_list(far)}"
+    remedy = "a wrong unit, reading (radial or diametral) or size of the gear?"
+    return Check(name, "warning", f"{words}. {remedy}")
 
 
 def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) -> Check:

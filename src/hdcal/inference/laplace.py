@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float, Key
-from numpyro.infer import init_to_median
-from numpyro.infer.util import constrain_fn, initialize_model, potential_energy
+from numpyro.handlers import seed, trace
+from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
 from hdcal.inference.gap import BASIS_SIZE
@@ -21,6 +21,8 @@ Position = dict[str, Any]
 
 # Largest share of the gradient that may be left, in posterior sds, at the mode.
 _TOLERANCE = 1e-6
+# Prior draws whose median starts the search.
+_PRIOR_DRAWS = 15
 
 
 class Whitening(eqx.Module):
@@ -83,6 +85,23 @@ def _expand(problem: Problem, position: Position):
     return *value_and_gradient, jax.hessian(value)(flat)
 
 
+@jax.jit
+def _prior_median(problem: Problem, key: Key[Array, ""]) -> Position:
+    """Return the median of a few prior draws, unconstrained."""
+
+    def draw(key):
+        sites = trace(seed(model, key)).get_trace(problem)
+        values = {
+            name: site["value"]
+            for name, site in sites.items()
+            if site["type"] == "sample" and not site["is_observed"]
+        }
+        return unconstrain_fn(model, (problem,), {}, values)
+
+    draws = jax.vmap(draw)(jax.random.split(key, _PRIOR_DRAWS))
+    return jax.tree.map(lambda values: jnp.median(values, axis=0), draws)
+
+
 def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
     """Find the posterior mode and its curvature.
 
@@ -93,9 +112,7 @@ def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
         problem: the inference problem.
         key: for the prior draws whose median starts the search.
     """
-    start = initialize_model(
-        key, model, init_strategy=init_to_median(num_samples=15), model_args=(problem,)
-    ).param_info.z
+    start = _prior_median(problem, key)
     flat, unravel = ravel_pytree(start)
     cache: dict[bytes, tuple] = {}
     _, _, hessian = (np.asarray(part) for part in _expand(problem, start))

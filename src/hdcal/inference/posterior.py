@@ -31,7 +31,7 @@ _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
 _MOST_LOG_LIKELIHOODS = 8_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Posterior:
     """A calibration: draws in code units, priors, checks and provenance.
 
@@ -55,6 +55,14 @@ class Posterior:
     diagnoses: Mapping[str, Diagnosis]
     checks: tuple[Check, ...]
     settings: Mapping[str, object]
+
+    def __repr__(self) -> str:
+        names = ", ".join(effect.name for effect in self.effects) or "none"
+        state = "usable" if self.usable else "FAILED, do not use"
+        return (
+            f"<Posterior of {self.case.name}: {len(self.draws['K'])} draws, "
+            f"theory {self.theory}, effects {names}, {state}>"
+        )
 
     @property
     def usable(self) -> bool:

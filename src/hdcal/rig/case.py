@@ -48,7 +48,7 @@ class Gear:
     effect_priors: dict[str, Prior] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Case:
     """Records of one data file on one gear, with where they came from.
 
@@ -69,3 +69,7 @@ class Case:
     specimen_labels: tuple[str, ...]
     data_sha256: str
     notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        rows = len(self.records.force)
+        return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"

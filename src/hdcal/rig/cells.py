@@ -139,7 +139,7 @@ def _number(cell: str, comma: bool) -> tuple[float, tuple[str, str] | None]:
         return math.nan, (words, "Leave out the row if nothing was read")
     point = cell
     if comma:
-        if "." in cell and "," not in cell:
+        if "." in cell and "," not in cell and any(map(str.isdigit, cell)):
             words = f"'{_shown(cell)}' has a decimal point among decimal commas"
             return math.nan, (words, "Use one decimal sign in the whole column")
         point = cell if "." in cell else cell.replace(",", ".")

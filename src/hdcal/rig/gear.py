@@ -108,7 +108,8 @@ def _material(
         return material_priors(name), []
     if not name.endswith(".toml"):
         words = f"unknown material '{name[:60]}'"
-        remedy = nearest(name, shipped) + "; or give the path of a .toml file"
+        known = f"Shipped are: {', '.join(shipped)}"
+        remedy = f"{known}; for another one give the path of a .toml file"
         return {}, [toml.finding(words, remedy, key)]
     try:
         facts = read_priors(gear_path.parent / name, MATERIAL_UNITS, name)

@@ -93,7 +93,7 @@ def _example(key: str) -> str:
         "theory": 'theory = "ring"',
         "deformation": 'deformation = "radial"',
     }
-    return examples.get(name, f"{name} = 1.0")
+    return examples.get(name, f"{name} = … (a number)")
 
 
 def size_findings(toml: TomlFile) -> list[Finding]:

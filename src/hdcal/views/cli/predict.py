@@ -55,7 +55,10 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     untested = int((~bands.tested).sum())
     if untested:
         size = len(bands.tested)
-        console.words(f"{untested} of {size} rows lie outside what was tested")
+        console.words(
+            f"{untested} of {size} rows lie outside what was tested: "
+            f"{_tested(posterior.case.records)}"
+        )
     table = bands_csv(bands)
     if out is not None:
         write_whole(out, table, force=force)
@@ -68,3 +71,12 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
             {"schema": SCHEMA, "status": "ok", "interval": 0.95, "columns": columns}
         )
     return 0
+
+
+def _tested(records) -> str:
+    """Say which deformations, temperatures and directions the data hold."""
+    low, high = records.deformation.min(), records.deformation.max()
+    cold, warm = records.temperature.min(), records.temperature.max()
+    ways = {1.0: "up", -1.0: "down"}
+    seen = " and ".join(way for sense, way in ways.items() if sense in records.sense)
+    return f"{low:g} … {high:g} mm, {cold:g} … {warm:g} °C, {seen}"

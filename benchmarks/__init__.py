@@ -1,0 +1,1 @@
+"""Speed, as ratios side by side: `make bench`, or `python -m benchmarks`."""

@@ -1,0 +1,57 @@
+"""Processes of their own to measure in, and a table of what they said."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CASE = ROOT / "datasets" / "xb1-100-80"
+# In hdcal's own words, without the console script's own start.
+HDCAL = ("-c", "from hdcal.views.cli import main; main()")
+
+
+@dataclass(frozen=True)
+class Run:
+    seconds: float
+    peak_bytes: int
+    output: str
+
+
+def run(*arguments, **environment) -> Run:
+    """Run this Python with arguments; what goes wrong there goes wrong here."""
+    command = [sys.executable, *map(str, arguments)]
+    settings = os.environ | {name: str(v) for name, v in environment.items()}
+    began = time.perf_counter()
+    with subprocess.Popen(
+        command,
+        env=settings,
+        cwd=ROOT,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    ) as child:
+        output = child.stdout.read()
+        _, status, usage = os.wait4(child.pid, 0)
+        seconds = time.perf_counter() - began
+        child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode:
+        raise subprocess.CalledProcessError(child.returncode, command, output)
+    # Kibibytes, but bytes on macOS.
+    unit = 1 if sys.platform == "darwin" else 1024
+    return Run(seconds, usage.ru_maxrss * unit, output)
+
+
+def ask(module: str, *arguments, **environment) -> dict:
+    """Run a module of this package as a child; return what it says in JSON."""
+    output = run("-m", f"benchmarks.{module}", *arguments, **environment).output
+    return json.loads(output.splitlines()[-1])
+
+
+def table(heading: tuple[str, ...], rows) -> None:
+    """Print a Markdown table."""
+    for row in (heading, ["---"] * len(heading), *rows):
+        print("|", " | ".join(map(str, row)), "|", flush=True)
