@@ -135,6 +135,23 @@ def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
     assert abs(shift) < plain.draws["stiffness"].std()
 
 
+def test_the_gap_is_the_same_at_every_temperature():
+    """Tested at one temperature away from the reference, it must not tilt at others."""
+    deformation = np.linspace(0.02, 0.54, 60)
+    force = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
+    force = force + np.random.default_rng(1).normal(0.0, 0.3, 60)
+    warm = np.full(60, 60.06)
+    records = make_records(deformation, force, temperature=warm, known={"temperature"})
+    posterior = calibrate(make_case(records), with_gap=True, warmup=500, draws=500)
+    found = predict(posterior, [0.1, 0.28, 0.5], [60.06, 20.0, 100.0])
+    leftover = (found.with_gap_median_N - found.physics_median_N).reshape(3, 3)
+    assert leftover[1] == pytest.approx(leftover[0], abs=0.2)
+    assert leftover[2] == pytest.approx(leftover[0], abs=0.2)
+    assert abs(leftover[0, 1]) > 1.0
+    # The grid of the folder keeps the tested temperature itself, not a rounded one.
+    assert default_bands(posterior).tested.any()
+
+
 def test_a_new_run_and_specimen_are_less_certain_than_the_tested():
     rng = np.random.default_rng(4)
     run = np.repeat(np.arange(4), 30)

@@ -15,7 +15,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.priors import effect_priors
+from hdcal.rig.priors import Prior, effect_priors
 
 SHORT = {"warmup": 300, "draws": 300}
 
@@ -126,6 +126,37 @@ def test_specimens_have_a_stiffness_each():
     records = make_records(deformation, force, specimen=specimen, known=known)
     found = calibrate(make_case(records), **SHORT).draws["specimen_deviation"]
     assert found.mean(axis=0) == pytest.approx(scale / scale.mean() - 1.0, abs=0.01)
+
+
+def test_two_specimens_with_a_fixed_K_and_a_coarse_scale():
+    """The pilot sees each specimen's slope, so coarse rounding is treated exactly."""
+    rng = np.random.default_rng(3)
+    specimen = np.repeat([0, 1], 20)
+    deformation = np.tile(np.linspace(0.02, 0.54, 20), 2)
+    slope = np.array([195.0, 220.0])[specimen]
+    force = slope * deformation + rng.normal(0.0, 0.2, 40)
+    records = make_records(
+        deformation,
+        0.98 * np.round(force / 0.98),
+        specimen=specimen,
+        known={"specimen"},
+    )
+    gear = make_gear(resolution=0.98, K=Prior("fixed", (2.6,)))
+    found = calibrate(make_case(records, gear), **SHORT)
+    assert found.problem.rounded
+    assert 0.05 < np.median(found.draws["sigma"]) < 0.5
+    assert summarise(found)["parameters"]["K"]["driven_by"] == "prior"
+
+
+def test_an_sd_for_every_row_keeps_the_rows():
+    rng = np.random.default_rng(4)
+    deformation = rng.uniform(0.02, 0.54, 3000)
+    sd = rng.uniform(0.1, 0.5, 3000)
+    records = make_records(
+        deformation, 205.0 * deformation + sd * rng.normal(size=3000), force_sd=sd
+    )
+    problem = build_problem(make_case(records), effect_priors())
+    assert problem.blocks is None
 
 
 def test_a_known_sd_by_row_weighs_the_rows():

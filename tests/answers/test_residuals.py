@@ -24,7 +24,7 @@ def whitened(error: np.ndarray) -> Whitened:
     """Return what an offset and a slope leave of the error, in noise sds."""
     deformation = np.asarray(RECORDS.deformation)
     absorbed = np.column_stack([np.ones(len(error)), deformation])
-    return Whitened(error, absorbed, shapes_of(RECORDS, 20.0), 0)
+    return Whitened(error, absorbed, shapes_of(RECORDS, 20.0))
 
 
 @pytest.mark.parametrize("name", shapes_of(RECORDS, 20.0))
@@ -64,7 +64,6 @@ def test_what_the_priors_allow_is_absorbed_and_no_more():
                 ]
             ),
             shapes={n: (np.append(c, 0.0), *w) for n, (c, *w) in data.shapes.items()},
-            free=0,
         )
         found = [shape.name for shape in find_structure(with_prior, np.ones(96))]
         assert ("direction" in found) is expected

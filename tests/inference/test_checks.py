@@ -12,6 +12,8 @@ from hdcal.inference.checks import (
     bound_check,
     conflict_check,
     diagnose_parameters,
+    mixing,
+    rounding_check,
     sampling_checks,
 )
 from hdcal.rig.priors import Prior
@@ -46,7 +48,7 @@ def stats_of(chains=4, draws=500, **change):
     fields = {
         "energy": rng.normal(size=(chains, draws)),
         "diverging": np.zeros((chains, draws), dtype=bool),
-        "tree_depth": np.full((chains, draws), 3),
+        "n_steps": np.full((chains, draws), 7),
     }
     fields |= change
     return xr.Dataset({n: (("chain", "draw"), v) for n, v in fields.items()})
@@ -105,9 +107,9 @@ def test_one_divergence_fails():
 
 
 def test_trajectories_that_are_cut_off_fail():
-    depth = np.full((4, 500), 3)
-    depth[:, ::50] = 10
-    checks = sampling_checks(stats_of(tree_depth=depth), diagnoses_of(GOOD))
+    steps = np.full((4, 500), 7)
+    steps[:, ::50] = 1023
+    checks = sampling_checks(stats_of(n_steps=steps), diagnoses_of(GOOD))
     assert checks[DEPTH].outcome == "failed"
 
 
@@ -147,6 +149,26 @@ def test_an_effect_that_is_absent_is_pressed_against_zero():
     force = honest_force(records) + 2.0 * np.asarray(records.sense)
     present = calibrate(case_of(records, force=force), effects=["coulomb_friction"])
     assert outcome(present, "no parameter at a bound") == ["passed"]
+
+
+def test_an_absent_effect_is_no_conflict():
+    """A half-normal prior expects a zero most of all; only its far end conflicts."""
+    half = {"x": Prior("half_normal", (1.0,))}
+    assert conflict_check({"x": np.abs(1e-5 * GOOD)}, half).outcome == "passed"
+    assert conflict_check({"x": 4.0 + 0.1 * GOOD}, half).outcome == "warning"
+
+
+def test_too_coarse_a_step_for_sheppard_fails():
+    sigma = np.full((4, 500), 0.2)
+    assert rounding_check(0.98, False, sigma).outcome == "failed"
+    assert rounding_check(0.98, True, sigma).outcome == "passed"
+    assert rounding_check(0.25, False, sigma).outcome == "passed"
+
+
+def test_the_headline_must_have_mixed_too():
+    apart = GOOD + np.array([0.0, 0.0, 0.0, 3.0])[:, None]
+    mixed = diagnoses_of(GOOD) | mixing({"stiffness": apart})
+    assert sampling_checks(stats_of(), mixed)[RHAT].outcome == "failed"
 
 
 def test_bounds_see_pile_ups_only():

@@ -225,8 +225,7 @@ def dense_log_likelihood(problem, case, values):
         own = centring[records.specimen][:, records.specimen]
         covariance += values["specimen_sd"] ** 2 * np.outer(elastic, elastic) * own
     if "gap" in problem.integrated:
-        base_columns = linear_columns(records, problem.reading)
-        basis = np.asarray(problem.gap.columns(records.deformation, base_columns))
+        basis = np.asarray(problem.gap.columns(records.deformation))
         sd = np.asarray(prior_sd(values["gap_sd"], values["gap_length"]))
         covariance += (basis * sd**2) @ basis.T
     law = stats.multivariate_normal(np.zeros(rows), covariance)
@@ -262,8 +261,7 @@ def rows_form(problem, case):
     """Return the same problem with its rows kept."""
     columns = None
     if problem.gap is not None:
-        base_columns = linear_columns(case.records, problem.reading)
-        columns = problem.gap.columns(case.records.deformation, base_columns)
+        columns = problem.gap.columns(case.records.deformation)
     return dataclasses.replace(
         problem, records=case.records, blocks=None, columns=columns
     )

@@ -10,14 +10,13 @@ from functools import partial
 from typing import Literal
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import build_effects, member_base
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, case_reading
-from hdcal.physics.chain import linear_columns, predict_reading
+from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 from hdcal.rig.records import Records
 
@@ -74,7 +73,7 @@ class Bands:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-def _grid_records(deformation, temperature, sense) -> Records:
+def _grid_records(deformation, temperature, sense, known_sd: float) -> Records:
     zeros = np.zeros(len(deformation))
     index = np.zeros(len(deformation), dtype=int)
     return Records(
@@ -88,7 +87,7 @@ def _grid_records(deformation, temperature, sense) -> Records:
         run=index,
         specimen=index,
         force=zeros,
-        force_sd=zeros,
+        force_sd=zeros + known_sd,
         known=frozenset(),
     )
 
@@ -97,10 +96,7 @@ def _grid_records(deformation, temperature, sense) -> Records:
 def _predict_block(problem: Problem, values, records: Records, keys):
     """Return mean, mean with gap and a new reading: [draw, row] each."""
     gap = problem.gap
-    columns = None
-    if gap is not None:
-        base_columns = linear_columns(records, problem.reading)
-        columns = gap.columns(jnp.asarray(records.deformation), base_columns)
+    columns = None if gap is None else gap.columns(records.deformation)
 
     def one(value, key):
         of_run, of_specimen, of_noise = jax.random.split(key, 3)
@@ -229,10 +225,12 @@ def predict(
     size = len(values["K"])
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
     keys = jax.random.split(jax.random.key(seed), size)
+    # A new reading is as good as the tested ones were on average.
+    known_sd = float(np.sqrt(np.mean(posterior.case.records.force_sd**2)))
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        records = _grid_records(at[rows], warm[rows], sense[rows])
+        records = _grid_records(at[rows], warm[rows], sense[rows], known_sd)
         parts = _predict_block(posterior.problem, values, records, keys)
         blocks.append(np.stack([np.quantile(part, tails, axis=0) for part in parts]))
     physics, with_gap, new = np.concatenate(blocks, axis=2)
@@ -279,7 +277,14 @@ def default_bands(posterior: Posterior) -> Bands:
     grid = np.linspace(low - (beyond if low < 0.0 else 0.0), high + beyond, 67)
     # The ends of the data themselves, so that the tested range shows whole.
     grid = np.union1d(grid, ends)
-    levels = np.unique(np.round(records.temperature, 1))
+    # Rounded together, but never out of what was measured.
+    levels = np.unique(
+        np.clip(
+            np.round(records.temperature, 1),
+            np.min(records.temperature),
+            np.max(records.temperature),
+        )
+    )
     if len(levels) > _MOST_TEMPERATURES:
         levels = np.linspace(levels[0], levels[-1], 3)
     make = partial(predict, posterior, grid, levels, allow_failed=True)

@@ -16,11 +16,25 @@ from hdcal.inference.checks import (
     conflict_check,
     diagnose_parameters,
     identification_checks,
+    mixing,
+    rounding_check,
     sampling_checks,
 )
-from hdcal.inference.density import POSITIVE, log_likelihood, log_prior
+from hdcal.inference.density import (
+    MEMBERS,
+    POSITIVE,
+    log_likelihood,
+    log_prior,
+    predict_rows,
+)
 from hdcal.inference.distributions import distribution
-from hdcal.inference.flat import dead_parameters, flat_directions, sensitivity
+from hdcal.inference.flat import (
+    beside_members,
+    dead_parameters,
+    flat_directions,
+    member_columns,
+    sensitivity,
+)
 from hdcal.inference.posterior import (
     Posterior,
     build_tree,
@@ -199,7 +213,11 @@ def _assemble(
     diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
     tree = build_tree(case, problem, found, _draw_priors(sampled, key), of_data)
     checks = (
-        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses),
+        *sampling_checks(
+            tree["sample_stats"].to_dataset(),
+            diagnoses | mixing(_beside_parameters(problem, found)),
+        ),
+        rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
         *_identification(case, problem, found),
@@ -211,12 +229,27 @@ def _identification(case: Case, problem: Problem, found: Draws) -> tuple[Check, 
     centre = {
         name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
     }
-    columns = gap_columns(problem, case)
-    slopes = sensitivity(problem, centre, case.records, columns)
-    sigma = float(centre["sigma"])
-    dead = dead_parameters(slopes, problem, sigma)
+    records, columns = case.records, gap_columns(problem, case)
+    _, noise = predict_rows(problem, centre, records, columns)
+    sd = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    members = member_columns(problem, centre, records, columns)[0] / sd[:, None]
+    slopes = {
+        name: beside_members(slope / sd, members)
+        for name, slope in sensitivity(problem, centre, records, columns).items()
+    }
+    dead = dead_parameters(slopes, problem)
     alive = {name: slope for name, slope in slopes.items() if name not in dead}
-    return identification_checks(dead, flat_directions(alive, problem, sigma))
+    return identification_checks(dead, flat_directions(alive, problem))
+
+
+def _beside_parameters(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
+    """Return what else must have mixed: the headline, and members that were sampled."""
+    others = {"stiffness": found.values["stiffness"]}
+    for kind, name in MEMBERS.items():
+        if name in found.values and kind not in problem.integrated:
+            each = np.moveaxis(found.values[name], -1, 0)
+            others |= {f"{name}[{index}]": draws for index, draws in enumerate(each)}
+    return others
 
 
 def _draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:

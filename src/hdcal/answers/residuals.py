@@ -9,8 +9,7 @@ import numpy as np
 from hdcal.answers.structure import Structure, Whitened, find_structure, shapes_of
 from hdcal.inference.density import predict_rows
 from hdcal.inference.distributions import frozen
-from hdcal.inference.flat import sensitivity
-from hdcal.inference.gap import prior_sd
+from hdcal.inference.flat import member_columns, sensitivity
 from hdcal.inference.posterior import Posterior, gap_columns
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
@@ -86,43 +85,21 @@ def _fit(problem, values, records, columns):
 def _whiten(posterior: Posterior, centre, columns, residual, sd) -> Whitened:
     """Bring residuals, sensitivities and shapes to noise and prior sds."""
     problem, records = posterior.problem, posterior.case.records
-    slopes = sensitivity(problem, centre, records, columns)
-    table, pull = [], []
-    for name, slope in slopes.items():
+    members, place = member_columns(problem, centre, records, columns)
+    table, pull = [members], [-place]
+    for name, slope in sensitivity(problem, centre, records, columns).items():
         law = frozen(posterior.priors[name])
-        table.append(slope / sd * law.std())
-        pull.append((law.mean() - centre[name]) / law.std())
-    if columns is not None:
-        scale = np.asarray(prior_sd(centre["gap_sd"], centre["gap_length"]))
-        table += list((np.asarray(columns) * scale).T / sd)
-        pull += list(-centre["gap_weights"] / scale)
-    for index in range(problem.specimens):
-        table.append(slopes["K"] * (records.specimen == index) / sd)
-        pull.append(0.0)
-    data, residual = np.stack(table, axis=1), residual / sd
+        table.append(slope[:, None] * law.std())
+        pull.append(np.array([(law.mean() - centre[name]) / law.std()]))
+    below = np.concatenate(pull)
     shapes = shapes_of(records, posterior.case.gear.reference_temperature)
-    shapes = {n: (column / sd, up, down) for n, (column, up, down) in shapes.items()}
-    if problem.runs:
-        residual, data = (_demean(part, records.run) for part in (residual, data))
-        shapes = {
-            n: (_demean(c, records.run), up, down)
-            for n, (c, up, down) in shapes.items()
-        }
-    below = np.zeros(len(pull))
     return Whitened(
-        residual=np.concatenate([residual, pull]),
-        absorbed=np.vstack([data, np.eye(len(pull))]),
+        residual=np.concatenate([residual / sd, below]),
+        absorbed=np.vstack(
+            [np.concatenate(table, axis=1) / sd[:, None], np.eye(len(below))]
+        ),
         shapes={
-            n: (np.concatenate([c, below]), up, down)
-            for n, (c, up, down) in shapes.items()
+            name: (np.concatenate([column / sd, np.zeros(len(below))]), up, down)
+            for name, (column, up, down) in shapes.items()
         },
-        free=problem.runs,
     )
-
-
-def _demean(table: np.ndarray, groups) -> np.ndarray:
-    """Take off the mean of each run, which has an offset of its own."""
-    wide = table.reshape(len(table), -1)
-    count = np.bincount(groups)
-    means = np.stack([np.bincount(groups, column) / count for column in wide.T], 1)
-    return (wide - means[groups]).reshape(table.shape)

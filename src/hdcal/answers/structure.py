@@ -42,13 +42,11 @@ class Whitened:
         residual: shape (n + p,).
         absorbed: sensitivity to each parameter, shape (n + p, q).
         shapes: what to look for, each column of shape (n + p,).
-        free: degrees of freedom taken by runs.
     """
 
     residual: np.ndarray
     absorbed: np.ndarray
     shapes: Shapes
-    free: int
 
 
 def shapes_of(records: Records, reference_temperature: float) -> Shapes:
@@ -115,7 +113,7 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
         tests = [
             (*test, name)
             for name, (column, _, _) in shapes.items()
-            if (test := _test(data.residual, column, absorbed, data.free)) is not None
+            if (test := _test(data.residual, column, absorbed)) is not None
         ]
         if not tests:
             break
@@ -131,7 +129,7 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
     return tuple(found)
 
 
-def _test(residual, column, absorbed, fixed: int):
+def _test(residual, column, absorbed):
     """Test one column; None when the model absorbs it or too few rows are left.
 
     Returns:
@@ -143,7 +141,7 @@ def _test(residual, column, absorbed, fixed: int):
     left, strength, _ = np.linalg.svd(basis, full_matrices=False)
     left = left[:, strength > 1e-8 * strength[0]]
     error, column = (part - left @ (left.T @ part) for part in (residual, column))
-    free = len(error) - left.shape[1] - fixed - 1
+    free = len(error) - left.shape[1] - 1
     norm = np.linalg.norm(column)
     # Nearly all of it is absorbed: the rest is rounding, not evidence.
     if free < 1 or norm <= 1e-3 * size:

@@ -29,6 +29,8 @@ MAX_RHAT = 1.01
 ESS_PER_CHAIN = 100
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
+# Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.
+COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
 # Part of the prior variance that must be gone before the data, not the prior, drive;
@@ -59,22 +61,31 @@ class Check:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """Numbers of the checks for one parameter.
+class Mixing:
+    """How well the chains mixed in one quantity.
 
     Attributes:
         rhat: rank-normalised split R-hat.
         ess_bulk: effective draws for the centre.
         ess_tail: effective draws for the interval's ends.
+    """
+
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+
+
+@dataclass(frozen=True)
+class Diagnosis(Mixing):
+    """Mixing, and what drives a parameter.
+
+    Attributes:
         contraction: 1 − var(posterior)/var(prior).
         prior_sensitivity: change of the posterior when the priors are power-scaled.
         likelihood_sensitivity: likewise for the likelihood.
         driven_by: whether the data or the prior decide the parameter.
     """
 
-    rhat: float
-    ess_bulk: float
-    ess_tail: float
     contraction: float
     prior_sensitivity: float
     likelihood_sensitivity: float
@@ -104,10 +115,9 @@ def diagnose_parameters(
     )
     # On draws that stand still the statistics warn on their way to NaN; a NaN fails
     # its check, so nothing is hidden by keeping the terminal quiet.
+    mixed = mixing(draws)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        bulk, tail = _by_name(ess(tree)), _by_name(ess(tree, method="tail"))
-        split = _by_name(rhat(tree))
         to_prior = _sensitivity(tree, "prior")
         to_data = _sensitivity(tree, "likelihood")
     found = {}
@@ -116,15 +126,23 @@ def diagnose_parameters(
         weak = to_data[name] < SENSITIVE < to_prior[name]
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
         found[name] = Diagnosis(
-            rhat=split[name],
-            ess_bulk=bulk[name],
-            ess_tail=tail[name],
+            **vars(mixed[name]),
             contraction=float(contraction),
             prior_sensitivity=to_prior[name],
             likelihood_sensitivity=to_data[name],
             driven_by="data" if contraction >= enough else "prior",
         )
     return found
+
+
+def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
+    """Return how well the chains mixed in each quantity, (chain, draw) each."""
+    tree = from_dict({"posterior": dict(draws)})
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        split, bulk = _by_name(rhat(tree)), _by_name(ess(tree))
+        tail = _by_name(ess(tree, method="tail"))
+    return {name: Mixing(split[name], bulk[name], tail[name]) for name in draws}
 
 
 def _sensitivity(tree: xr.DataTree, group: str) -> dict[str, float]:
@@ -140,26 +158,26 @@ def _by_name(result) -> dict[str, float]:
 
 
 def sampling_checks(
-    stats: xr.Dataset, diagnoses: Mapping[str, Diagnosis]
+    stats: xr.Dataset, mixed: Mapping[str, Mixing]
 ) -> tuple[Check, ...]:
     """Return the checks on the sampler: any of them failed fails the result.
 
     Args:
-        stats: energy, diverging, tree_depth; dimensions chain and draw.
-        diagnoses: by parameter.
+        stats: energy, diverging, n_steps; dimensions chain and draw.
+        mixed: by quantity.
     """
     chains = stats.sizes["chain"]
-    worst = max(diagnoses, key=lambda name: _bad(diagnoses[name].rhat))
+    worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
     least = min(
-        diagnoses,
-        key=lambda name: _least(diagnoses[name]),
+        mixed,
+        key=lambda name: _least(mixed[name]),
     )
-    top, need = diagnoses[worst].rhat, ESS_PER_CHAIN * chains
-    low = _least(diagnoses[least])
+    top, need = mixed[worst].rhat, ESS_PER_CHAIN * chains
+    low = _least(mixed[least])
     with np.errstate(all="ignore"):
         energy = np.asarray(bfmi(stats["energy"].to_numpy(), chain_axis=0, draw_axis=1))
     divergent = int(stats["diverging"].sum())
-    saturated = float((stats["tree_depth"] >= MAX_TREE_DEPTH).mean())
+    saturated = float((stats["n_steps"] >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
         _check(
             "chains agree (R-hat)",
@@ -195,13 +213,31 @@ def _bad(value: float) -> float:
     return np.inf if np.isnan(value) else value
 
 
-def _least(diagnosis: Diagnosis) -> float:
-    sizes = (diagnosis.ess_bulk, diagnosis.ess_tail)
+def _least(mixed: Mixing) -> float:
+    sizes = (mixed.ess_bulk, mixed.ess_tail)
     return 0.0 if np.isnan(sizes).any() else min(sizes)
 
 
 def _check(name: str, passed: bool, words: str) -> Check:
     return Check(name, "passed" if passed else "failed", words)
+
+
+def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
+    """Fail a result whose noise is too small for Sheppard's correction.
+
+    Args:
+        step: rounding step [N].
+        rounded: whether the exact rounding likelihood was used.
+        sigma: draws of the noise sd [N].
+    """
+    limit = COARSEST_STEP * float(np.median(sigma))
+    exact = "exact" if rounded else "by Sheppard's correction"
+    return _check(
+        "rounding is treated rightly",
+        rounded or step <= limit,
+        f"step {step:g} N, {exact}"
+        + ("" if rounded else f"; that holds up to {limit:.3g} N"),
+    )
 
 
 def conflict_check(
@@ -212,7 +248,9 @@ def conflict_check(
     far = []
     for parameter, values in draws.items():
         prior, median = frozen(priors[parameter]), float(np.median(values))
-        if 2.0 * min(prior.cdf(median), prior.sf(median)) < CONFLICT_TAIL:
+        # A density that is highest at zero, as of an effect, expects a zero.
+        below = np.inf if _peaks_at_zero(priors[parameter]) else prior.cdf(median)
+        if 2.0 * min(below, prior.sf(median)) < CONFLICT_TAIL:
             low, high = prior.interval(1.0 - CONFLICT_TAIL)
             far.append(f"{parameter} = {median:.3g}, expected {low:.3g} to {high:.3g}")
     if not far:
@@ -220,6 +258,12 @@ def conflict_check(
     words = f"far outside what was expected before the data: {_list(far)}"
     remedy = "a wrong unit, reading (radial or diametral) or size of the gear?"
     return Check(name, "warning", f"{words}. {remedy}")
+
+
+def _peaks_at_zero(prior: Prior) -> bool:
+    if prior.family == "beta":
+        return float(prior.numbers[0]) <= 1.0
+    return prior.family == "half_normal"
 
 
 def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) -> Check:

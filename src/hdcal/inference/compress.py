@@ -53,8 +53,8 @@ def compress(columns, force, distinct, group) -> Blocks:
     width = table.shape[1]
     factors = np.zeros((len(distinct), width, width))
     count = np.bincount(group, minlength=len(distinct))
-    for index in range(len(distinct)):
-        rows = table if len(distinct) == 1 else table[group == index]
+    table = table[np.argsort(group, kind="stable")]
+    for index, rows in enumerate(np.split(table, np.cumsum(count)[:-1])):
         factor = np.linalg.qr(rows, mode="r")
         factors[index, : len(factor)] = factor
     return Blocks(

@@ -25,7 +25,7 @@ Values = Mapping[str, Any]
 
 # A normal prior of these is cut at zero.
 POSITIVE = frozenset({"E0"})
-_MEMBERS = {
+MEMBERS = {
     "run": "run_offset",
     "specimen": "specimen_deviation",
     "gap": "gap_weights",
@@ -128,7 +128,7 @@ def linear_part(problem: Problem, values: Values) -> Linear:
 
     Members already drawn are left out: they are what is integrated over.
     """
-    drawn = {_MEMBERS[kind] for kind in problem.integrated}
+    drawn = {MEMBERS[kind] for kind in problem.integrated}
     values = {name: value for name, value in values.items() if name not in drawn}
     scale = []
     if "run" in problem.integrated:

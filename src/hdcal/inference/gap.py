@@ -1,8 +1,8 @@
 """The leftover discrepancy: a smooth function of deformation, orthogonal to the base.
 
 A Gaussian process in the Hilbert-space approximation. Its basis is projected off
-the columns of the linear core at the tested rows, so that it cannot take anything
-that stiffness and offsets can explain.
+an offset and a slope at the tested rows, so that it cannot take anything that
+stiffness and offsets can explain. It knows no temperature.
 """
 
 import equinox as eqx
@@ -28,40 +28,39 @@ class Gap(eqx.Module):
     Attributes:
         centre: middle of the tested deformation [mm].
         half_range: half the tested range [mm].
-        absorbed: coefficients of the base columns in each basis function [N].
+        absorbed: offset and slope in each basis function.
     """
 
     centre: float
     half_range: float
-    absorbed: Float[Array, "4 m"]
+    absorbed: Float[Array, "2 m"]
 
-    def columns(
-        self, deformation: Float[Array, " n"], base_columns: Float[Array, "n 4"]
-    ) -> Float[Array, "n m"]:
-        """Return the projected basis at any rows, tested or not."""
-        return _basis(deformation, self.centre, self.half_range) - (
-            base_columns @ self.absorbed
-        )
+    def columns(self, deformation: Float[Array, " n"]) -> Float[Array, "n m"]:
+        """Return the projected basis at any deformations, tested or not."""
+        scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
+        return _basis(scaled) - _line(scaled) @ self.absorbed
 
 
-def _basis(deformation, centre, half_range):
+def _basis(scaled):
     # Beyond the interval the eigenfunctions would repeat; hold them at its end.
-    scaled = jnp.clip((deformation - centre) / half_range, -BOUNDARY, BOUNDARY)
-    return eigenfunctions(scaled, BOUNDARY, BASIS_SIZE)
+    return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
-def build_gap(deformation, base_columns) -> Gap:
-    """Project the basis off the base columns at the tested rows.
+def _line(scaled):
+    return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
+
+
+def build_gap(deformation: Float[Array, " n"]) -> Gap:
+    """Project the basis off an offset and a slope at the tested rows.
 
     Args:
-        deformation: as read [mm], shape (n,).
-        base_columns: columns of the linear core, shape (n, 4).
+        deformation: as read [mm].
     """
     low, high = float(np.min(deformation)), float(np.max(deformation))
     centre, half_range = (low + high) / 2.0, (high - low) / 2.0
-    basis = np.asarray(_basis(deformation, centre, half_range))
-    absorbed = np.linalg.lstsq(np.asarray(base_columns), basis, rcond=1e-10)[0]
-    return Gap(centre, half_range, absorbed)
+    scaled = (np.asarray(deformation) - centre) / half_range
+    line, basis = np.asarray(_line(scaled)), np.asarray(_basis(scaled))
+    return Gap(centre, half_range, np.linalg.lstsq(line, basis, rcond=None)[0])
 
 
 def prior_sd(sd, length) -> Float[Array, " m"]:

@@ -8,7 +8,6 @@ from importlib import metadata
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from arviz_base import from_dict
@@ -17,9 +16,8 @@ from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import archive
 from hdcal.inference.checks import Check, Diagnosis
 from hdcal.inference.density import pointwise_log_likelihood
-from hdcal.inference.problem import Problem, build_problem, case_reading
+from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.sample import Draws
-from hdcal.physics.chain import linear_columns
 from hdcal.physics.effect import Effect
 from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior
@@ -192,10 +190,9 @@ def _look_up(names, library, file) -> tuple[type[Effect], ...]:
 
 def gap_columns(problem: Problem, case: Case):
     """Return the basis of the gap at the rows of the case, or None."""
-    if problem.gap is None:
-        return None
-    base_columns = linear_columns(case.records, case_reading(case))
-    return problem.gap.columns(jnp.asarray(case.records.deformation), base_columns)
+    return (
+        None if problem.gap is None else problem.gap.columns(case.records.deformation)
+    )
 
 
 @jax.jit
@@ -231,7 +228,8 @@ def build_tree(
         "energy": draws.energy,
         "lp": -draws.potential,
         "diverging": draws.diverging,
-        "tree_depth": draws.tree_depth,
+        "n_steps": draws.n_steps,
+        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
         "acceptance_rate": draws.acceptance,
         "step_size": draws.step_size,
     }
@@ -258,7 +256,8 @@ def build_tree(
     )
     if size > _MOST_LOG_LIKELIHOODS:
         tree["log_likelihood"].attrs["note"] = (
-            f"{size} values by row and draw are not kept; this is their sum over rows"
+            f"{size} values by row and draw are not kept; this is the log likelihood "
+            "of all rows, runs, specimens and gap integrated out where they were"
         )
     return tree
 

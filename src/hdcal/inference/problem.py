@@ -20,7 +20,9 @@ from hdcal.rig.records import Array, Records
 
 # Below this many rows the rounding likelihood is always exact: it is cheap there.
 _FEW_ROWS = 500
-# Largest rounding step, in residual sds, for which Sheppard's correction is used: the
+# Up to this many rows of triangular factors cost little, whatever they replace.
+_MANY_FACTOR_ROWS = 10_000
+# Largest rounding step, in noise sds, for which Sheppard's correction is used: the
 # noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
 _FINE_STEP = 1.3
 
@@ -138,18 +140,26 @@ def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
         raise InputError(findings)
 
 
-def _pilot_noise(columns, records: Records) -> float:
-    """Return the noise sd within runs and specimens of a least-squares fit [N]."""
-    design = np.asarray(columns)
-    beta, _, rank, _ = np.linalg.lstsq(design, records.force, rcond=None)
-    residual = records.force - design @ beta
-    noise = np.inf
-    for index in (records.run, records.specimen):
-        count = np.bincount(index)
-        within = residual - (np.bincount(index, residual) / count)[index]
-        free = max(len(within) - len(count) - int(rank), 1)
-        noise = min(noise, np.sqrt(within @ within / free))
-    return float(noise)
+def _pilot_noise(records: Records) -> float:
+    """Return the noise sd left by a generous least-squares fit [N].
+
+    A cubic in deformation with a slope for each specimen, a step for the direction
+    and temperature terms, within runs. Generous, because too small a noise only
+    chooses the exact rounding likelihood, which is never wrong.
+    """
+    scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
+    rise = np.asarray(records.temperature) - np.mean(records.temperature)
+    own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
+    shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
+    table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
+    count = np.bincount(records.run)
+    means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
+    table = table - means[records.run]
+    design, force = table[:, :-1], table[:, -1]
+    beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
+    residual = force - design @ beta
+    free = max(len(force) - len(count) - int(rank), 1)
+    return float(np.sqrt(residual @ residual / free))
 
 
 def build_problem(
@@ -181,7 +191,7 @@ def build_problem(
     priors = problem_priors(case, effects, shipped, theory)
     reading = case_reading(case)
     base_columns = np.asarray(linear_columns(records, reading))
-    noise_sd = _pilot_noise(base_columns, records)
+    noise_sd = _pilot_noise(records)
     runs = len(case.run_labels) if "run" in records.known else 0
     specimens = len(case.specimen_labels) if "specimen" in records.known else 0
     members = {
@@ -192,15 +202,16 @@ def build_problem(
     step = case.gear.force_resolution
     few = len(records.force) <= _FEW_ROWS and not members
     rounded = step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
-    gap = build_gap(records.deformation, base_columns) if with_gap else None
-    columns = None
-    if gap is not None:
-        columns = np.asarray(gap.columns(records.deformation, base_columns))
-    keep_rows = bool(effects) or rounded
+    gap = build_gap(records.deformation) if with_gap else None
+    columns = None if gap is None else np.asarray(gap.columns(records.deformation))
+    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
+    design = base_columns if columns is None else np.hstack([base_columns, columns])
+    # One factor per row (an sd of its own in each) would be larger than the rows.
+    factor_rows = len(distinct) * (design.shape[1] + 1)
+    many = factor_rows > max(len(design), _MANY_FACTOR_ROWS)
+    keep_rows = bool(effects) or rounded or many
     blocks = None
     if not keep_rows:
-        distinct, group = group_rows(records.run, records.specimen, records.force_sd)
-        design = base_columns if columns is None else np.hstack([base_columns, columns])
         blocks = compress(design, records.force, distinct, group)
     else:
         # Through an effect the force need not be linear in the stiffness.

@@ -44,7 +44,7 @@ class Draws:
         energy: Hamiltonian of each draw.
         potential: −log posterior density in unconstrained coordinates.
         diverging: whether the trajectory diverged.
-        tree_depth: doublings of the trajectory.
+        n_steps: leapfrog steps of the trajectory.
         acceptance: mean acceptance probability of the trajectory.
         step_size: adapted step size.
         target_acceptance: mean acceptance that the step size was adapted to.
@@ -54,7 +54,7 @@ class Draws:
     energy: np.ndarray
     potential: np.ndarray
     diverging: np.ndarray
-    tree_depth: np.ndarray
+    n_steps: np.ndarray
     acceptance: np.ndarray
     step_size: np.ndarray
     target_acceptance: float
@@ -158,7 +158,7 @@ def sample(
         energy=energy,
         potential=potential_,
         diverging=diverging,
-        tree_depth=np.ceil(np.log2(steps + 1)).astype(int),
+        n_steps=steps,
         acceptance=acceptance,
         step_size=step_size,
         target_acceptance=target,

@@ -32,7 +32,7 @@ def amplitude_units(
         noise_sd: pilot noise [N].
     """
     columns = np.asarray(linear_columns(records, reading))
-    slope = np.linalg.lstsq(columns, records.force, rcond=None)[0][0]
+    slope = np.polyfit(records.deformation, records.force, 1)[0]
     base = Base(slope / reading.radial_per_read, 0.0, 0.0, 0.0, noise_sd)
     units = {}
     for effect in effects:
