@@ -78,11 +78,12 @@ def _expand(problem: Problem, position: Position):
     """Return the typical potential with its flat gradient and Hessian."""
     flat, unravel = ravel_pytree(position)
 
-    def value(x):
-        return _typical(problem, unravel(x))
+    def slope(x):
+        value, gradient = jax.value_and_grad(lambda x: _typical(problem, unravel(x)))(x)
+        return gradient, (value, gradient)
 
-    value_and_gradient = jax.value_and_grad(value)(flat)
-    return *value_and_gradient, jax.hessian(value)(flat)
+    hessian, (value, gradient) = jax.jacfwd(slope, has_aux=True)(flat)
+    return value, gradient, hessian
 
 
 @jax.jit
