@@ -8,14 +8,12 @@ from rigs import cycles, make_case, make_gear, make_records, ramp
 from hdcal.answers.calibration import calibrate
 from hdcal.errors import NotUsable
 from hdcal.inference.checks import (
-    Diagnosis,
     bound_check,
     conflict_check,
-    diagnose_parameters,
-    mixing,
     rounding_check,
     sampling_checks,
 )
+from hdcal.inference.diagnoses import Diagnosis, diagnose_parameters, mixing
 from hdcal.rig.priors import Prior
 
 RHAT, ESS, BFMI, DIVERGENT, DEPTH = range(5)

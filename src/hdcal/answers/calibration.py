@@ -14,9 +14,7 @@ from hdcal.inference.checks import (
     Check,
     bound_check,
     conflict_check,
-    diagnose_parameters,
     identification_checks,
-    mixing,
     rounding_check,
     sampling_checks,
 )
@@ -27,6 +25,7 @@ from hdcal.inference.density import (
     log_prior,
     predict_rows,
 )
+from hdcal.inference.diagnoses import diagnose_parameters, mixing
 from hdcal.inference.distributions import distribution
 from hdcal.inference.flat import (
     beside_members,

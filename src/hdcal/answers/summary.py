@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdcal.answers.residuals import Residuals, residuals
-from hdcal.inference.checks import Diagnosis
+from hdcal.inference.diagnoses import Diagnosis
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
 from hdcal.physics.theory import THEORIES

@@ -14,8 +14,9 @@ from arviz_base import from_dict
 
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import archive
-from hdcal.inference.checks import Check, Diagnosis
+from hdcal.inference.checks import Check
 from hdcal.inference.density import pointwise_log_likelihood
+from hdcal.inference.diagnoses import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.sample import Draws
 from hdcal.physics.effect import Effect
