@@ -1,5 +1,6 @@
 """Read the gear file: sizes, how it was measured, and what is believed of it."""
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
@@ -108,8 +109,11 @@ def _material(
         return material_priors(name), []
     if not name.endswith(".toml"):
         words = f"unknown material '{name[:60]}'"
+        # A slip of the pen only: the nearest name may be quite another steel.
+        near = get_close_matches(name, shipped, n=1, cutoff=0.85)
+        hint = f"Did you mean '{near[0]}'? " if near else ""
         known = f"Shipped are: {', '.join(shipped)}"
-        remedy = f"{known}; for another one give the path of a .toml file"
+        remedy = f"{hint}{known}; for another one give the path of a .toml file"
         return {}, [toml.finding(words, remedy, key)]
     try:
         facts = read_priors(gear_path.parent / name, MATERIAL_UNITS, name)
