@@ -26,9 +26,8 @@ _SENSE = {"up": 1.0, "down": -1.0}
 # Rows predicted at a time: with 4000 draws a block takes 64 MB.
 _BLOCK = 2000
 _MOST_TEMPERATURES = 6
-# How far beyond the data still counts as tested: a thermometer is no better than a
-# kelvin, and a hundredth of the range is no extrapolation.
-_NEAR_K, _NEAR_SHARE = 1.0, 0.01
+# How far beyond the data still counts as tested [K]: thermometers are no better.
+_NEAR_K = 1.0
 
 
 @dataclass(frozen=True)
@@ -254,9 +253,7 @@ def _tested(records: Records, deformation, temperature, sense) -> np.ndarray:
         return (values >= low - slack) & (values <= high + slack)
 
     return (
-        within(
-            deformation, records.deformation, _NEAR_SHARE * np.ptp(records.deformation)
-        )
+        within(deformation, records.deformation, 1e-9)
         & within(temperature, records.temperature, _NEAR_K)
         & np.isin(sense, np.asarray(records.sense))
     )
