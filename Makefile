@@ -3,6 +3,8 @@ PYTHON ?= python3
 UV ?= uv
 JOBS ?= auto
 ARGS ?=
+CASES ?= 400
+WORKERS ?= 2
 
 BIN := .venv/bin
 BENCH := .venv-bench/bin
@@ -11,16 +13,18 @@ COMPILE := $(UV) pip compile pyproject.toml --universal --python-version 3.11 \
 	--generate-hashes --custom-compile-command "make lock" --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow lint format types contracts docs bench lock clean
+.PHONY: help venv demo test slow lint format types contracts docs bench \
+	bench-diagnosis blind lock clean
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
 
 venv: .venv/installed  ## make .venv with the locked dependencies and hdcal itself
 
-demo: .venv/installed  ## calibrate the bundled gear and say where the report is
+demo: .venv/installed  ## calibrate and diagnose the bundled gear
 	$(BIN)/hdcal calibrate datasets/xb1-100-80 --out demo-out --force
-	@echo "The report: demo-out/report.html"
+	$(BIN)/hdcal diagnose datasets/xb1-100-80 --quick --out demo-verdict --force
+	@echo "The reports: demo-out/report.html, demo-verdict/report.html"
 
 test: .venv/installed  ## all tests but the long statistical ones
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(ARGS)
@@ -49,13 +53,29 @@ docs: .venv/installed  ## the documentation, in docs/_build/html
 bench: .venv-bench/installed  ## compare speed and answers with other tools
 	$(BENCH)/python -m benchmarks $(ARGS)
 
+bench-diagnosis: .venv/installed  ## how often a diagnosis names the true cause (hours)
+	$(BIN)/python -m benchmarks.diagnosis $(ARGS)
+
+# An interrupted check goes on; hdcal itself refuses to mix answers of two versions.
+blind: | .venv/installed  ## seal CASES cases, answer them blind, open and score (long)
+	@if test -e blind-check/opened.json; then \
+		echo "blind-check is opened already. For a new one remove or move both:"; \
+		echo "  rm -r blind-check blind-check.key"; exit 1; fi
+	@if test -e blind-check; then echo "Going on with blind-check ..."; else \
+		$(BIN)/hdcal blind make --cases $(CASES) --mix all --out blind-check; fi
+	@for name in hdcal bic r2 none; do \
+		test -e blind-check/answers-$$name.json || $(BIN)/hdcal blind answer \
+			blind-check --by $$name --jobs $(WORKERS) || exit $$?; done
+	@$(BIN)/hdcal blind open blind-check --key blind-check.key
+
 lock:  ## pin the dependencies anew (needs uv)
 	$(COMPILE) --extra dev --extra docs --output-file requirements.lock
 	$(COMPILE) --extra bench --constraint requirements.lock \
 		--output-file requirements-bench.lock
 
 clean:  ## remove everything that these targets made
-	rm -rf .venv .venv-bench demo-out dist docs/_build .benchmarks
+	rm -rf .venv .venv-bench demo-out demo-verdict blind-check blind-check.key
+	rm -rf dist docs/_build .benchmarks
 	rm -rf .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find src tests benchmarks examples docs -name __pycache__ -prune -exec rm -rf {} +
 

@@ -3,7 +3,7 @@
 import argparse
 from importlib import import_module
 
-NAMES = ("processes", "samplers", "rows", "reading")
+NAMES = ("processes", "samplers", "rows", "reading", "verdicts")
 
 
 def main() -> None:

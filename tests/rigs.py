@@ -74,17 +74,40 @@ def ramp(rows: int = 14) -> Records:
 
 
 def cycles(rows: int = 48, start: float = 0.02) -> Records:
-    """Return load/unload cycles at three temperatures out of order, with time."""
+    """Return load/unload cycles at three temperatures out of order, with time.
+
+    The gear is turned a little after every reading.
+    """
     half = rows // 6
     up = np.linspace(start, 0.54, half)
     sense = np.concatenate([np.ones(half), -np.ones(half)])
     return make_records(
         np.tile(np.concatenate([up, up[::-1]]), 3),
-        known={"temperature", "time", "unloading"},
+        known={"temperature", "time", "angle", "unloading"},
         temperature=np.repeat([20.0, 80.0, 50.0], 2 * half),
         time=np.arange(6 * half) * 15.0,
+        angle=np.arange(6 * half) * 2.4,
         sense=np.tile(sense, 3),
         direction=np.tile(sense, 3),
+    )
+
+
+def program(start: float = -0.1) -> Records:
+    """Return three cycles at three temperatures and speeds, held at the top."""
+    up, steps, held = np.linspace(start, 0.54, 30), np.array([0.2, 1.0, 4.0]), 20.0
+    one = np.concatenate([up, np.full(6, up[-1]), up[::-1]])
+    direction = np.repeat([1.0, 0.0, -1.0], [30, 6, 30])
+    pace = np.concatenate([np.where(direction == 0.0, held, s) for s in steps])
+    speed = np.repeat((up[1] - up[0]) / steps, len(one))
+    direction = np.tile(direction, 3)
+    return make_records(
+        np.tile(one, 3),
+        known={"temperature", "time", "unloading", "holds", "rates", "cycles"},
+        temperature=np.repeat([20.0, 80.0, 50.0], len(one)),
+        time=np.cumsum(pace),
+        sense=np.where(direction == 0.0, 1.0, direction),
+        direction=direction,
+        rate=direction * speed,
     )
 
 

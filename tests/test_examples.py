@@ -11,6 +11,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 LAST_LINES = {
     "bands_for_a_design.py": "the true forces lie inside the bands",
     "calibrate_a_csv.py": "the least-squares slope lies inside the interval",
+    "diagnose_a_gap.py": "without it in the library the cause is called unknown",
     "gradient_of_force.py": "the derivatives agree with finite differences",
     "own_effect.py": "the truth lies inside the interval",
 }

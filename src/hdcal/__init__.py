@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.answers.bands import Bands, predict
     from hdcal.answers.calibration import calibrate
+    from hdcal.answers.diagnosis.diagnose import diagnose
+    from hdcal.answers.diagnosis.verdict import Verdict
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.summary import summarise
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
@@ -40,7 +42,9 @@ _HOMES = {
     "Residuals": "answers.residuals",
     "Rows": "physics.effect",
     "THEORIES": "physics.theory",
+    "Verdict": "answers.diagnosis.verdict",
     "calibrate": "answers.calibration",
+    "diagnose": "answers.diagnosis.diagnose",
     "force": "physics.chain",
     "parameter": "physics.effect",
     "predict": "answers.bands",

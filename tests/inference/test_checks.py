@@ -14,7 +14,10 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.diagnoses import Diagnosis, diagnose_parameters, mixing
-from hdcal.rig.priors import Prior
+from hdcal.inference.flat import sensitivity
+from hdcal.inference.problem import build_problem
+from hdcal.physics.registry import EFFECTS
+from hdcal.rig.priors import Prior, effect_priors
 
 RHAT, ESS, BFMI, DIVERGENT, DEPTH = range(5)
 
@@ -214,3 +217,13 @@ def test_power_scaling_overrules_a_middling_contraction():
     strong = diagnose_parameters({"x": draws}, prior, none, of_prior)["x"]
     assert isinstance(weak, Diagnosis)
     assert (weak.driven_by, strong.driven_by) == ("prior", "data")
+
+
+def test_what_moves_no_mean_is_not_called_unseen():
+    """A part of the noise has no slope in the mean, yet the data see it."""
+    case = case_of(ramp(40))
+    chosen = (EFFECTS["heteroscedastic_noise"], EFFECTS["outliers"])
+    problem = build_problem(case, effect_priors(), chosen)
+    values = {n: prior.numbers[0] for n, prior in problem.priors.items()}
+    slopes = sensitivity(problem, values, case.records, None)
+    assert set(slopes) == {"K", "E0", "alpha", "force_offset", "deformation_offset"}

@@ -48,7 +48,7 @@ def reading() -> Reading:
 
 @pytest.fixture(scope="session")
 def program() -> Records:
-    """Three runs at three temperatures: up, hold, down fast; up and down slowly."""
+    """Three gears at three temperatures: up, hold, down fast; up and down slowly."""
     top = 0.54
     deformation = np.concatenate(
         [
@@ -73,7 +73,7 @@ def program() -> Records:
         sense=np.tile(sense, 3),
         rate=np.tile(rate, 3),
         run=np.repeat([0, 1, 2], len(deformation)),
-        specimen=np.zeros(rows, int),
+        specimen=np.repeat([0, 1, 2], len(deformation)),
         force=np.zeros(rows),
         force_sd=np.zeros(rows),
         known=EVERYTHING,

@@ -4,19 +4,21 @@ import dataclasses
 
 import numpy as np
 import pytest
-from effect_bench import bare, contribution, everyone, typical
+from effect_bench import BEYOND_RECORDS, bare, contribution, everyone, typical
 
 from hdcal import EFFECTS
 
 # Covariates that an effect may only look at if it needs one of these features.
+# A memory of time or of unloading starts anew with the run or the specimen.
 LICENCES = {
     "temperature": {"temperature"},
     "time": {"time", "holds", "rates", "cycles"},
     "angle": {"angle"},
     "rate": {"rates", "time"},
     "sense": {"unloading", "holds", "cycles"},
-    "run": {"run", "runs", "time", "cycles"},
-    "specimen": {"specimen", "specimens"},
+    # A loop remembers the movements of its run, load cycles those of their specimen.
+    "run": {"run", "runs", "time", "cycles", "unloading"},
+    "specimen": {"specimen", "specimens", "cycles", "unloading"},
 }
 # Features, and the covariates of which at least one must then matter.
 CARRIERS = {
@@ -87,7 +89,11 @@ def test_it_looks_at_nothing_undeclared(name, covariate, program, base, reading)
 
 @pytest.mark.parametrize(
     ("name", "need"),
-    [(name, need) for name in sorted(EFFECTS) for need in sorted(EFFECTS[name].needs)],
+    [
+        (name, need)
+        for name in sorted(EFFECTS)
+        for need in sorted(EFFECTS[name].needs - BEYOND_RECORDS)
+    ],
 )
 def test_it_uses_what_it_needs(name, need, program, base, reading):
     used = [

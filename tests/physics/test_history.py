@@ -9,7 +9,7 @@ from scipy import integrate
 
 from hdcal.physics.effect import Rows
 from hdcal.physics.effects.charge_leakage import ChargeLeakage
-from hdcal.physics.history import leaky_sum
+from hdcal.physics.history import leaky_sum, play
 
 
 def slow_leaky_sum(decay, gain):
@@ -121,3 +121,37 @@ def test_runs_may_be_interleaved(scattered):
         rtol=1e-12,
         atol=1e-12,
     )
+
+
+def slow_play(deformation, half_width, restart):
+    found, at = [], 0.0
+    for pushed, anew in zip(deformation, restart, strict=True):
+        at = 0.0 if anew else at
+        if pushed - at > half_width:
+            at = pushed - half_width
+        elif at - pushed > half_width:
+            at = pushed + half_width
+        found.append(at)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 17, 256])
+def test_play(rows):
+    rng = np.random.default_rng(rows)
+    deformation = np.cumsum(rng.normal(0.0, 0.2, rows))
+    restart = rng.uniform(size=rows) < 0.05
+    found = jax.jit(play)(deformation, 0.3, restart)
+    slow = slow_play(deformation, 0.3, restart)
+    np.testing.assert_allclose(found, slow, rtol=1e-13, atol=1e-13)
+
+
+def test_play_counts_turning_points_only():
+    # However many rows lie between two turning points, and however long it is held.
+    turns = [0.0, 0.5, -0.4, 0.9, 0.2]
+    fine = np.interp(np.arange(0.0, 4.01, 0.125), np.arange(5.0), turns)
+    held = np.repeat(fine, 3)
+    ends = [
+        np.asarray(play(path, 0.3, np.zeros(len(path), bool)))[-1]
+        for path in (np.array(turns), fine, held)
+    ]
+    np.testing.assert_allclose(ends, 0.5, rtol=1e-12)

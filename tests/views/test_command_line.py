@@ -11,7 +11,17 @@ from conftest import MAIN, XB1, Hdcal
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], ["calibrate", "--help"], ["predict", "-h"], ["effects", "-h"]],
+    [
+        ["--help"],
+        ["calibrate", "--help"],
+        ["predict", "-h"],
+        ["effects", "-h"],
+        ["diagnose", "-h"],
+        ["blind", "-h"],
+        ["blind", "make", "-h"],
+        ["blind", "answer", "-h"],
+        ["blind", "open", "-h"],
+    ],
 )
 def test_help_is_given_without_heavy_imports(arguments, environment):
     script = (
@@ -98,6 +108,9 @@ def test_findings_come_as_json_too(hdcal: Hdcal, tmp_path: Path):
         ["calibrate", XB1, "--column", "force"],
         ["calibrate", XB1, "--column", "force=a[N]", "--column", "force=b[N]"],
         ["calibrate", XB1, "--effect", "coulomb_friction"],
+        ["diagnose"],
+        ["diagnose", XB1, "--jobs", "0"],
+        ["diagnose", XB1, "--seed", "x"],
         ["predict", XB1],
         ["predict", XB1, "--deformation", "0:1"],
         ["predict", XB1, "--deformation", "0:1:0"],

@@ -259,7 +259,7 @@ def _tested(records: Records, deformation, temperature, sense) -> np.ndarray:
     )
 
 
-def default_bands(posterior: Posterior) -> Bands:
+def default_bands(posterior: Posterior, interval: float = 0.95) -> Bands:
     """Return the bands of a result folder: the tested range and a tenth beyond.
 
     One block per tested temperature (three over the range if there are many) and
@@ -284,7 +284,9 @@ def default_bands(posterior: Posterior) -> Bands:
     )
     if len(levels) > _MOST_TEMPERATURES:
         levels = np.linspace(levels[0], levels[-1], 3)
-    make = partial(predict, posterior, grid, levels, allow_failed=True)
+    make = partial(
+        predict, posterior, grid, levels, interval=interval, allow_failed=True
+    )
     sides: list[Direction] = [
         side for side in DIRECTIONS if _SENSE[side] in np.asarray(records.sense)
     ]

@@ -19,6 +19,7 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.density import (
+    MEMBER_SD,
     MEMBERS,
     POSITIVE,
     log_likelihood,
@@ -44,6 +45,7 @@ from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, sample
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
+from hdcal.physics.scatter import Scatter
 from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior, effect_priors
 
@@ -62,6 +64,18 @@ def choose_effects(
     Raises:
         InputError: a name is not in the library; the nearest one is suggested.
     """
+    check_names(names, registry, "--effect")
+    return tuple(registry[name] for name in dict.fromkeys(names))
+
+
+def check_names(
+    names: Sequence[str], registry: Mapping[str, type[Effect]], option: str
+) -> None:
+    """Check that effects are in the library.
+
+    Raises:
+        InputError: a name is not; the nearest one is suggested.
+    """
     findings = []
     for name in names:
         if name not in registry:
@@ -69,14 +83,13 @@ def choose_effects(
             hint = f"Did you mean '{near[0]}'? " if near else ""
             findings.append(
                 Finding(
-                    "--effect",
+                    option,
                     f"no effect is called '{name}'",
                     f"{hint}The library holds: {', '.join(sorted(registry))}",
                 )
             )
     if findings:
         raise InputError(findings)
-    return tuple(registry[name] for name in dict.fromkeys(names))
 
 
 def check_effect_priors(
@@ -85,17 +98,25 @@ def check_effect_priors(
     """Check the gear file's priors of effects against the library.
 
     Raises:
-        InputError: an effect or parameter is not in the library, or the unit is of
-            another kind.
+        InputError: an effect or parameter is not in the library, the unit is of
+            another kind, or the spread belongs to the model's own members.
     """
     known = {
         f"{name}.{field}": spec.unit
         for name, effect in registry.items()
         for field, spec in parameters(effect).items()
     }
+    scatter = {
+        f"{name}.sd": MEMBER_SD[effect.members]
+        for name, effect in registry.items()
+        if issubclass(effect, Scatter)
+    }
     findings = []
     for name, prior in case.gear.effect_priors.items():
-        if name not in known:
+        if name in scatter:
+            problem = "has its prior under another name"
+            remedy = f"Give it as {scatter[name]}"
+        elif name not in known:
             near = get_close_matches(name, known, n=1)
             hint = f"Did you mean '{near[0]}'? " if near else ""
             problem = "is no parameter of an effect in the library"

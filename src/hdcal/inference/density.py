@@ -30,6 +30,8 @@ MEMBERS = {
     "specimen": "specimen_deviation",
     "gap": "gap_weights",
 }
+# The site of the spread of those that are labels in the data.
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 _CORE, _ONE = 4, 2
 

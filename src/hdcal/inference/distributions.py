@@ -1,5 +1,6 @@
 """From a prior table to NumPyro and SciPy distributions."""
 
+from functools import cache
 from typing import Any
 
 import jax.numpy as jnp
@@ -35,8 +36,13 @@ def distribution(prior: Prior, *, positive: bool = False) -> dist.Distribution:
 
 def frozen(prior: Prior) -> Any:
     """Return the prior as a SciPy distribution: cdf, quantiles and moments."""
-    numbers = [float(number) for number in prior.numbers]
-    match prior.family:
+    return _law(prior.family, tuple(float(number) for number in prior.numbers))
+
+
+# SciPy writes a docstring for each frozen law, which costs more than its use.
+@cache
+def _law(family: str, numbers: tuple[float, ...]) -> Any:
+    match family:
         case "normal":
             return stats.norm(*numbers)
         case "lognormal":
@@ -47,7 +53,7 @@ def frozen(prior: Prior) -> Any:
             return stats.uniform(numbers[0], numbers[1] - numbers[0])
         case "beta":
             return stats.beta(*numbers)
-    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+    raise ValueError(f"no distribution for the prior family {family!r}")
 
 
 def bounds(prior: Prior) -> tuple[float, float]:

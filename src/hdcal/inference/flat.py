@@ -11,7 +11,8 @@ from hdcal.inference.gap import prior_sd
 from hdcal.inference.problem import Problem
 from hdcal.rig.records import Records
 
-# Parameters of the mean that are compared; sigma is not one of them.
+# Parameters of the mean that are compared; sigma is not one of them, nor is any
+# parameter of an effect on the noise.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset")
 # A leftover direction is named with the parameters that carry this part of it.
 _SHARE = 0.3
@@ -34,7 +35,9 @@ def sensitivity(
     Returns:
         Derivatives [N per unit of the parameter], shape (n,), by parameter.
     """
-    names = [n for n in (*_MEAN, *(k for k in values if "." in k)) if n in values]
+    of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
+    sizes = [name for name in values if name.partition(".")[0] in of_mean]
+    names = [n for n in (*_MEAN, *sizes) if n in values]
     moved = {name: values[name] for name in names if _varies(problem, name)}
 
     def mean(part):

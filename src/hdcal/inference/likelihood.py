@@ -9,7 +9,7 @@ from hdcal.physics.effect import Noise
 from hdcal.rig.records import Array
 
 
-def _log_interval(low, high):
+def log_interval(low, high):
     """Return log(Φ(high) − Φ(low)) without cancellation in either tail."""
     flip = low > 0.0
     low, high = jnp.where(flip, -high, low), jnp.where(flip, -low, high)
@@ -39,7 +39,7 @@ def log_probability(
     error = (force - mean) / noise.sd
     if rounded:
         half = 0.5 * step / noise.sd
-        each = _log_interval(error - half, error + half) - jnp.log(step)
+        each = log_interval(error - half, error + half) - jnp.log(step)
     else:
         each = -0.5 * (error**2 + jnp.log(2.0 * jnp.pi)) - jnp.log(noise.sd)
     return logsumexp(each + noise.log_weight[:, None], axis=0)

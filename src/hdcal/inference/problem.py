@@ -13,6 +13,7 @@ from hdcal.inference.gap import Gap, build_gap
 from hdcal.inference.scales import amplitude_units
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior
@@ -44,7 +45,7 @@ class Problem(eqx.Module):
         columns: basis of the gap at the rows, or None.
         gap: the leftover discrepancy, or None.
         step: rounding step [N], 0 = none.
-        effects: the effect classes of the hypothesis.
+        effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
@@ -83,6 +84,16 @@ def _bare(prior: Prior) -> Prior:
     return Prior(prior.family, tuple(map(np.float64, prior.numbers)))
 
 
+def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Return the effects less those that the model's own members carry.
+
+    Runs have a zero and specimens a stiffness of their own whenever there are two,
+    with the priors `run_offset_sd` and `specimen_sd`: a second spread beside each
+    would only share it.
+    """
+    return tuple(effect for effect in effects if not issubclass(effect, Scatter))
+
+
 def problem_priors(
     case: Case,
     effects: Sequence[type[Effect]],
@@ -93,14 +104,14 @@ def problem_priors(
 
     Args:
         case: gear with its own priors, which win.
-        effects: the effects in the model.
+        effects: the effects in the model; those of scatter have no site.
         shipped: priors of every effect in the library.
         theory: which stiffness K multiplies.
 
     Raises:
         InputError: an effect's parameter has no prior.
     """
-    gear = case.gear
+    gear, effects = case.gear, without_scatter(effects)
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
     names = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
     names += ["run_offset_sd", "specimen_sd", "gap_sd", "gap_length"]
@@ -140,7 +151,7 @@ def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
         raise InputError(findings)
 
 
-def _pilot_noise(records: Records) -> float:
+def pilot_noise(records: Records) -> float:
     """Return the noise sd left by a generous least-squares fit [N].
 
     A cubic in deformation with a slope for each specimen, a step for the direction
@@ -178,7 +189,8 @@ def build_problem(
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: effects in the model.
+        effects: effects in the model. Those of scatter must have what they need and
+            then change nothing: the model's own members carry them.
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
 
@@ -186,12 +198,13 @@ def build_problem(
         InputError: an effect lacks its covariates or a prior.
     """
     _check_needs(case, effects)
+    effects = without_scatter(effects)
     theory = theory or case.gear.theory
     records = case.records
     priors = problem_priors(case, effects, shipped, theory)
     reading = case_reading(case)
     base_columns = np.asarray(linear_columns(records, reading))
-    noise_sd = _pilot_noise(records)
+    noise_sd = pilot_noise(records)
     runs = len(case.run_labels) if "run" in records.known else 0
     specimens = len(case.specimen_labels) if "specimen" in records.known else 0
     members = {
@@ -228,7 +241,7 @@ def build_problem(
         columns=columns if keep_rows else None,
         gap=gap,
         step=step,
-        effects=tuple(effects),
+        effects=effects,
         rounded=rounded,
         runs=runs,
         specimens=specimens,

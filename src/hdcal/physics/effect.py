@@ -86,7 +86,7 @@ class Effect(eqx.Module):
         needs: features of the records without which it cannot be tested.
         family: effects of one family look alike.
         symmetry: how the contribution answers to tension instead of compression,
-            `odd` (changes sign), `even` (does not) or `none` (depends on history).
+            `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
     """
 
     name: AbstractClassVar[str]

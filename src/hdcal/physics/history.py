@@ -2,7 +2,7 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from hdcal.rig.records import Array
 
@@ -20,3 +20,126 @@ def leaky_sum(
         return now, now
 
     return jax.lax.scan(advance, jnp.zeros(()), (decay, gain))[1]
+
+
+def play(
+    deformation: Float[Array, " n"],
+    half_width: Float[Array, ""] | float,
+    restart: Bool[Array, " n"],
+) -> Float[Array, " n"]:
+    """Return what follows a deformation with play: it moves only when pushed.
+
+    y_i = max(x_i − r, min(x_i + r, y_(i−1))), y = 0 before the first row.
+
+    Args:
+        deformation: x [mm], in the order in which it was passed through.
+        half_width: r [mm].
+        restart: rows before which y is zero again.
+    """
+
+    def advance(last, row):
+        pushed, anew = row
+        last = jnp.where(anew, 0.0, last)
+        now = jnp.maximum(pushed - half_width, jnp.minimum(pushed + half_width, last))
+        return now, now
+
+    return jax.lax.scan(advance, jnp.zeros(()), (deformation, restart))[1]
+
+
+def by_label(label: Int[Array, " n"]) -> tuple[Int[Array, " n"], Bool[Array, " n"]]:
+    """Return the rows label after label, and which of those start a label.
+
+    The file may take turns between runs or specimens; the order within each is kept.
+    """
+    order = jnp.argsort(label, stable=True)
+    own = jnp.asarray(label)[order]
+    return order, jnp.diff(own, prepend=own[:1] - 1) != 0
+
+
+def fading(
+    signal: Float[Array, " n"],
+    time: Float[Array, " n"],
+    run: Int[Array, " n"],
+    rate: Float[Array, ""] | float,
+) -> Float[Array, " n"]:
+    """Return y with dy = d(signal) − rate · y dt, from zero at each run's reset.
+
+    The signal is taken as linear in time between rows, for which the step is exact:
+    y ← y e^(−λΔt) + Δs (1 − e^(−λΔt))/(λΔt). Before its first row a run has climbed
+    from zero since the reset at t = 0.
+
+    Args:
+        signal: in any unit.
+        time: since the reset of the row's run [s].
+        run: index of the mounting.
+        rate: λ, one over the time constant [1/s].
+    """
+    order, starts = by_label(run)
+    time, signal = jnp.asarray(time)[order], jnp.asarray(signal)[order]
+    step = jnp.where(starts, time, jnp.diff(time, prepend=0.0))
+    gain = jnp.where(starts, signal, jnp.diff(signal, prepend=0.0))
+    loss = rate * step
+    # (1 − e^−x)/x, with its series where the quotient would be 0/0.
+    small = jnp.abs(loss) < 1e-6
+    safe = jnp.where(small, 1.0, loss)
+    kept = jnp.where(small, 1.0 - 0.5 * loss, -jnp.expm1(-safe) / safe)
+    decay = jnp.where(starts, 0.0, jnp.exp(-loss))
+    return jnp.zeros_like(signal).at[order].set(leaky_sum(decay, gain * kept))
+
+
+def stop_cells(
+    deformation: Float[Array, " n"],
+    run: Int[Array, " n"],
+    reach: Float[Array, " c"],
+) -> Float[Array, "c n"]:
+    """Return z ← clip(z + Δω/reach, −1, 1) of each cell: it sticks, then slips.
+
+    Every run starts from rest: its first row is a move from ω = 0.
+
+    Args:
+        deformation: ω in the order it was taken [mm].
+        run: index of the mounting.
+        reach: deformation from rest to slip, cell by cell [mm].
+    """
+    order, starts = by_label(run)
+    own = jnp.asarray(deformation)[order]
+    move = jnp.where(starts, own, jnp.diff(own, prepend=0.0))
+
+    def advance(last, row):
+        kept, step = row
+        now = jnp.clip(kept * last + step / reach, -1.0, 1.0)
+        return now, now
+
+    rows = (jnp.where(starts, 0.0, 1.0), move)
+    states = jax.lax.scan(advance, jnp.zeros_like(reach), rows)[1].T
+    return jnp.zeros_like(states).at[:, order].set(states)
+
+
+def load_cycle(
+    sense: Float[Array, " n"], run: Int[Array, " n"], specimen: Int[Array, " n"]
+) -> Float[Array, " n"]:
+    """Return the number of the load cycle that each specimen is in, from 1.
+
+    A cycle begins with each run, and within it wherever the movement turns back to
+    the sense in which the run began. Rows count in the order of the file.
+
+    Args:
+        sense: sign of the last movement.
+        run: index of the mounting; a run belongs to one specimen.
+        specimen: index of the gear.
+    """
+    order, starts = by_label(run)
+    own = jnp.asarray(sense)[order]
+    home = own[_group_start(starts)]
+    begins = starts | ((jnp.diff(own, prepend=own[:1]) != 0.0) & (own == home))
+    begins = jnp.zeros_like(begins).at[order].set(begins)
+
+    order, starts = by_label(specimen)
+    total = jnp.cumsum(begins[order].astype(float))
+    number = total - total[_group_start(starts)] + 1.0
+    return jnp.zeros_like(number).at[order].set(number)
+
+
+def _group_start(starts: Bool[Array, " n"]) -> Int[Array, " n"]:
+    """Return for each row the last one at or before it that starts a group."""
+    return jax.lax.cummax(jnp.where(starts, jnp.arange(len(starts)), 0))

@@ -3,7 +3,7 @@
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -19,17 +19,47 @@ OUTPUTS = frozenset(
         "report.html",
         "calibration.svg",
         "calibration.png",
+        "where.svg",
+        "where.png",
+        "which.svg",
+        "which.png",
+        "shrink.svg",
+        "shrink.png",
+        "bands.svg",
+        "bands.png",
+        "scores.json",
+        "bar.svg",
+        "bar.png",
+        "confusion.svg",
+        "confusion.png",
+        "reliability.svg",
+        "reliability.png",
+        "detection.svg",
+        "detection.png",
+        "opening.json",
+        "labels.json",
     }
 )
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
 
 
-def check_target(target: Path | str, *, force: bool = False) -> None:
+def is_result(entry: Path) -> bool:
+    """Tell whether something in a folder belongs to a calibration or diagnosis."""
+    return _is_output(entry) or _is_verdict(entry)
+
+
+def check_target(
+    target: Path | str,
+    *,
+    force: bool = False,
+    ours: Callable[[Path], bool] = is_result,
+) -> None:
     """Refuse a result that could not be written, before any work is done.
 
     Args:
         target: the folder to make.
         force: whether an older result may be replaced.
+        ours: tells what in an older folder may be replaced.
 
     Raises:
         InputError: it exists, is a file, or its parent cannot be written to.
@@ -37,7 +67,7 @@ def check_target(target: Path | str, *, force: bool = False) -> None:
     _check_place(Path(target))
     real = _real(target)
     if real.is_dir():
-        _check_existing(real, target, force)
+        _check_existing(real, target, force, ours)
     elif real.exists():
         raise _refusal(target, "is a file", "Name a folder that does not exist yet")
 
@@ -58,7 +88,12 @@ def check_file(target: Path | str, *, force: bool = False) -> None:
 
 
 @contextmanager
-def whole_folder(target: Path | str, *, force: bool = False) -> Iterator[Path]:
+def whole_folder(
+    target: Path | str,
+    *,
+    force: bool = False,
+    ours: Callable[[Path], bool] = is_result,
+) -> Iterator[Path]:
     """Yield a folder beside the target that takes its place when all went well.
 
     An older result stays until the new one is complete. Whatever goes wrong, an
@@ -67,11 +102,12 @@ def whole_folder(target: Path | str, *, force: bool = False) -> Iterator[Path]:
     Args:
         target: the folder to make.
         force: whether an older result may be replaced.
+        ours: tells what in an older folder may be replaced.
 
     Raises:
         InputError: as `check_target`, or the disk refused.
     """
-    check_target(target, force=force)
+    check_target(target, force=force, ours=ours)
     real = _real(target)
     building = _sibling(real)
     try:
@@ -147,19 +183,33 @@ def _check_place(target: Path) -> None:
         raise _unwritable(target, error) from error
 
 
-def _check_existing(real: Path, target: Path | str, force: bool) -> None:
+def _check_existing(
+    real: Path, target: Path | str, force: bool, ours: Callable[[Path], bool]
+) -> None:
     if not force:
         remedy = "Name another folder with --out, or say --force to replace it"
         raise _refusal(target, "exists already", remedy)
     foreign = sorted(
         entry.name
         for entry in real.iterdir()
-        if entry.name not in OUTPUTS | _LITTER or not entry.is_file()
+        if not (ours(entry) or entry.name in _LITTER)
     )
     if foreign:
         words = f"holds '{foreign[0]}', which hdcal did not write"
         remedy = "--force replaces results only: name another folder"
         raise _refusal(target, words, remedy)
+
+
+def _is_output(entry: Path) -> bool:
+    return entry.name in OUTPUTS | _LITTER and entry.is_file()
+
+
+def _is_verdict(entry: Path) -> bool:
+    """Tell whether it is one case's folder among those of many cases."""
+    if not entry.is_dir() or entry.is_symlink():
+        return False
+    inside = list(entry.iterdir())
+    return (entry / "verdict.json") in inside and all(map(_is_output, inside))
 
 
 def _refusal(target: Path | str, problem: str, remedy: str) -> InputError:

@@ -8,8 +8,9 @@ from jaxtyping import Float
 from hdcal.physics.effect import Effect, Noise, Rows, Stage, parameter
 from hdcal.rig.records import Array
 
-# A fraction of exactly zero has no logarithm; below this it is none.
-_NONE = 1e-12
+# A fraction of exactly zero has no logarithm. This one is nothing in double precision
+# for readings up to 26 sds out, and the slope at zero stays right.
+_NONE = 1e-150
 
 
 class Outliers(Effect):

@@ -10,9 +10,11 @@ import sys
 import click
 
 from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.views.cli.blind import blind
 from hdcal.views.cli.calibrate import calibrate
 from hdcal.views.cli.check import check
 from hdcal.views.cli.console import Console, usage_error
+from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.predict import predict
 
@@ -42,14 +44,14 @@ _EPILOG = (
     help="Show the version and stop.",
 )
 def hdcal() -> None:
-    """Calibrate the force model of a harmonic-drive flexspline.
+    """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
 
-    DATA is a CSV file of measurements with a gear file (--gear), or a folder
+    DATA and CASE are a CSV file of measurements with a gear file (--gear), or a folder
     holding data.csv and gear.toml.
     """
 
 
-for _command in (calibrate, predict, check, effects):
+for _command in (calibrate, diagnose, predict, check, effects, blind):
     hdcal.add_command(_command)
 
 

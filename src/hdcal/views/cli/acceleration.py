@@ -5,6 +5,15 @@ import secrets
 from pathlib import Path
 
 
+def one_thread_for_algebra() -> None:
+    """Keep OpenBLAS to one thread; to be called before NumPy is imported.
+
+    A diagnosis solves thousands of small systems, over which threads only wait for
+    each other. What the user has set stands.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
 def keep_compilations() -> None:
     """Point JAX at a cache of compiled programs; without a writable one do nothing.
 

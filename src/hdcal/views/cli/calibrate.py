@@ -13,6 +13,7 @@ from hdcal.views.cli.options import (
     force_option,
     json_option,
     read_columns,
+    seed_option,
 )
 
 _MANY = click.IntRange(1, 1_000_000)
@@ -49,13 +50,7 @@ _MANY = click.IntRange(1, 1_000_000)
 @click.option(
     "--draws", type=_MANY, default=1000, show_default=True, help="Draws kept per chain."
 )
-@click.option(
-    "--seed",
-    type=click.IntRange(0, 2**32 - 1),
-    default=0,
-    show_default=True,
-    help="The same seed gives the same result.",
-)
+@seed_option
 @click.option(
     "--out", metavar="DIR", help="Result folder to make [default: NAME-calibration]."
 )
@@ -90,13 +85,13 @@ def _calibrate(console: Console, case, theory, settings, target, force) -> int:
     from hdcal.answers.calibration import calibrate as run
     from hdcal.answers.calibration import choose_effects
     from hdcal.views.cli.closing import closing_words
-    from hdcal.views.cli.progress import sampling_progress
+    from hdcal.views.cli.progress import progress_bar
     from hdcal.views.result import write_result
 
     choose_effects(settings["effects"])
     for note in case.notes:
         console.words(note)
-    with sampling_progress() as progress:
+    with progress_bar() as progress:
         posterior = run(case, theory=theory, progress=progress, **settings)
     command = shlex.join(["hdcal", *sys.argv[1:]])
     summary = write_result(posterior, target, command=command, force=force)

@@ -22,9 +22,9 @@ def closing_words(summary: dict, folder: str) -> Iterator[RenderableType]:
     summary = harmless(summary)
     yield from _status(summary)
     yield _parameters(summary)
-    yield from _paragraph("Remarks", summary["flat_directions"])
-    yield from _paragraph("Warnings", summary["warnings"], "yellow")
-    yield from _paragraph("What to do next", summary["next_steps"])
+    yield from paragraph("Remarks", summary["flat_directions"])
+    yield from paragraph("Warnings", summary["warnings"], "yellow")
+    yield from paragraph("What to do next", summary["next_steps"])
     yield Text(f"\nThe result: {harmless(folder)}  (open report.html)")
 
 
@@ -65,9 +65,10 @@ def _parameters(summary: dict) -> Table:
     return table
 
 
-def _paragraph(
+def paragraph(
     heading: str, sentences: list[str], colour: str = ""
 ) -> Iterator[RenderableType]:
+    """Yield sentences under a heading; without any, nothing."""
     if not sentences:
         return
     yield Text(heading, f"bold {colour}".strip())

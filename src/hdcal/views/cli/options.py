@@ -13,6 +13,11 @@ _THEORIES = ("ring", "cup", "article")
 
 def case_options(command: Callable) -> Callable:
     """Add the argument and options that say which case to read."""
+    return reading_options(click.argument("data", metavar="DATA")(command))
+
+
+def reading_options(command: Callable) -> Callable:
+    """Add the options that say how cases are read."""
     for add in (
         click.option(
             "--theory",
@@ -31,7 +36,6 @@ def case_options(command: Callable) -> Callable:
             metavar="GEAR.toml",
             help="The gear file [default: gear.toml beside the data].",
         ),
-        click.argument("data", metavar="DATA"),
     ):
         command = add(command)
     return command
@@ -50,6 +54,17 @@ def force_option(command: Callable) -> Callable:
     """Add --force."""
     words = "Replace an older result of hdcal."
     return click.option("--force", is_flag=True, help=words)(command)
+
+
+def seed_option(command: Callable) -> Callable:
+    """Add --seed."""
+    return click.option(
+        "--seed",
+        type=click.IntRange(0, 2**32 - 1),
+        default=0,
+        show_default=True,
+        help="The same seed gives the same result.",
+    )(command)
 
 
 def read_columns(texts: tuple[str, ...]) -> dict[str, str]:

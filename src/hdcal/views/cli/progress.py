@@ -6,8 +6,10 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def sampling_progress() -> Iterator[Callable[[int, int], None] | None]:
-    """Yield what the sampler may tell its progress; None outside a terminal."""
+def progress_bar(
+    doing: str = "sampling",
+) -> Iterator[Callable[[int, int], None] | None]:
+    """Yield what takes how much is done of how much; None outside a terminal."""
     if not sys.stderr.isatty():
         yield None
         return
@@ -32,6 +34,6 @@ def sampling_progress() -> Iterator[Callable[[int, int], None] | None]:
         task = bar.add_task("preparing", total=None, start=True)
 
         def tell(done: int, total: int) -> None:
-            bar.update(task, description="sampling", completed=done, total=total)
+            bar.update(task, description=doing, completed=done, total=total)
 
         yield tell

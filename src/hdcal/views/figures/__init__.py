@@ -1,14 +1,30 @@
-"""The figures of a calibration; the only place that knows matplotlib."""
+"""All figures; the only place that knows matplotlib."""
 
 from hdcal.views.figures.bands import calibration_figure
+from hdcal.views.figures.blind import (
+    bar_figure,
+    confusion_figure,
+    detection_figure,
+    reliability_figure,
+)
 from hdcal.views.figures.canvas import render
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
+from hdcal.views.figures.shrink import shrink_figure
+from hdcal.views.figures.where import where_figure
+from hdcal.views.figures.which import which_figure
 
 __all__ = [
+    "bar_figure",
     "calibration_figure",
+    "confusion_figure",
+    "detection_figure",
     "prior_figure",
+    "reliability_figure",
     "render",
     "residual_figure",
     "sampler_figure",
+    "shrink_figure",
+    "where_figure",
+    "which_figure",
 ]

@@ -2,6 +2,7 @@
 
 import io
 import logging
+import math
 import warnings
 from functools import cache
 from typing import Any, Literal
@@ -20,6 +21,7 @@ BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#E69F00", "#009E73", "#CC79A7"
 GREY, DARK, RED = "#8a8a8a", "#222222", "#b00020"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#D55E00")
 FAILED = "FAILED — do not use"
+_MARK_LENGTH = 7.1
 # More points than this tell the eye nothing and make files of many megabytes.
 MOST_POINTS = 4000
 
@@ -89,6 +91,9 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
 
 def watermark(figure: Figure) -> None:
     """Write across a figure that its result must not be used."""
+    # The words are some 7 inches long and half an inch high: all of them must show.
+    rise = (0.95 * figure.get_figheight() - 0.6) / _MARK_LENGTH
+    lean = min(28.0, math.degrees(math.asin(min(max(rise, 0.0), 1.0))))
     figure.text(
         0.5,
         0.5,
@@ -97,7 +102,7 @@ def watermark(figure: Figure) -> None:
         alpha=0.35,
         fontsize=44,
         fontweight="bold",
-        rotation=28,
+        rotation=lean,
         ha="center",
         va="center",
         zorder=100,

@@ -1,0 +1,62 @@
+"""Name an effect of one's own from outside the library, beside all the others."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+
+import hdcal
+
+FOLDER = Path(__file__).parents[1] / "datasets" / "thermal-demo"
+
+
+class WarmFriction(hdcal.Effect):
+    """F → F + h s (T − T_ref): friction that grows with temperature.
+
+    Source: made up for this example.
+    """
+
+    name: ClassVar[str] = "warm_friction"
+    stage: ClassVar[str] = "force"
+    family: ClassVar[str] = "friction"
+    needs: ClassVar[frozenset[str]] = frozenset({"temperature", "unloading"})
+    symmetry: ClassVar[str] = "none"
+
+    slope: float = hdcal.parameter("N/K", "friction per kelvin", typical=0.02, null=0.0)
+
+    def apply(self, signal, rows):
+        """Return the force with friction that the warmth brought."""
+        return signal + self.slope * rows.temperature_rise * rows.records.sense
+
+
+def main() -> None:
+    case = hdcal.read_case(FOLDER)
+    prior = hdcal.Prior("half_normal", (0.03,), "N/K", "made up for this example")
+    gear = replace(case.gear, effect_priors={"warm_friction.slope": prior})
+    records = case.records
+    rise = np.asarray(records.temperature) - gear.reference_temperature
+    # The bundled data drift with temperature; these also rub when warm.
+    force = np.asarray(records.force) + 0.03 * rise * np.asarray(records.sense)
+    case = replace(case, gear=gear, records=replace(records, force=jnp.asarray(force)))
+
+    library = hdcal.EFFECTS | {WarmFriction.name: WarmFriction}
+    verdict = hdcal.diagnose(case, library=library, quick=True)
+    found = verdict.which
+    print(f"{found.verdict}: {found.effect}, beside it {found.second_effect}")
+    for name, share in sorted(found.inclusion.items(), key=lambda item: -item[1])[:4]:
+        print(f"  {name}: {share:.0%}")
+    assert found.inclusion["warm_friction"] > 0.9
+
+    # A prior for an effect that is not in the library would be refused.
+    without = hdcal.diagnose(
+        replace(case, gear=replace(gear, effect_priors={})), quick=True
+    )
+    assert "warm_friction" not in without.which.inclusion
+    assert without.which.verdict == "unknown"
+    print("without it in the library the cause is called unknown")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Where is the sim-to-real gap, which effect causes it, how far does it shrink."""

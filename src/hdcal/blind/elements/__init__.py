@@ -1,0 +1,1 @@
+"""The gear as finite elements: what presses back in the blind check's rig."""

@@ -1,0 +1,111 @@
+"""What is sealed about a case, and what a diagnoser answered."""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Kind = Literal["null", "effect", "pair", "outside", "real"]
+Span = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Label:
+    """The truth about one case; only the opened seal shows it.
+
+    Attributes:
+        case: name of the case, the stem of its CSV.
+        kind: null (nothing is missing), effect (one of the library's), pair (two of
+            them), outside (in no library), real (measured data with a stated cause).
+        truth: names of what was switched on; of real data, of what may be answered.
+        program: name of the loading program.
+        rows: number of readings n.
+        r: RMS of what the effect leaves beside the base model, over the noise sd.
+        noise: iid or ar (serial).
+        correlation: AR(1) coefficient of the noise.
+        sigma: sd of the noise [N].
+        spanned: of an outside mechanism, whether it is of the list that was given
+            beforehand; None else.
+        withheld: effects taken out of the library for this case.
+        clean: readings without noise [N].
+        curve: what the effect leaves beside the base model [N].
+        amplitude: true value of a library parameter `effect.parameter` where the
+            mechanism has just that one, in the library's unit.
+        oracle: what Bayes' rule gives who knows r and the noise, by mechanism.
+        mix: the part of the check that the case belongs to.
+    """
+
+    case: str
+    kind: Kind
+    truth: tuple[str, ...]
+    program: str
+    rows: int
+    r: float
+    noise: str
+    correlation: float
+    sigma: float
+    spanned: bool | None = None
+    withheld: tuple[str, ...] = ()
+    clean: tuple[float, ...] = ()
+    curve: tuple[float, ...] = ()
+    amplitude: dict[str, float] = field(default_factory=dict)
+    oracle: dict[str, float] = field(default_factory=dict)
+    mix: str = ""
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_plain(cls, data: dict[str, Any]) -> "Label":
+        """Return the label of plain data."""
+        lists = ("truth", "withheld", "clean", "curve")
+        made: dict[str, Any] = {
+            name: tuple(value) if name in lists else value
+            for name, value in data.items()
+        }
+        return cls(**made)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a diagnoser says of one case; the words are those of verdict.json.
+
+    Attributes:
+        case: name of the case.
+        verdict: none, named, ambiguous or unknown.
+        effect: most probable effect, None where nothing is named.
+        second_effect: another that is present beside it.
+        set: smallest set of hypotheses with 90 %, most probable first.
+        probabilities: of all hypotheses; they sum to 1.
+        inclusion: of each effect over singles and pairs.
+        detected: whether the gate was passed.
+        p_value: of the gate.
+        gap: RMS of the gap, quantiles .5, .05, .95 [N].
+        amplitude: value of a parameter `effect.parameter`, quantiles .5, .05, .95.
+        closed: share closed on held-out rows, quantiles .5, .05, .95.
+        noise_sd: of a reading [N].
+    """
+
+    case: str
+    verdict: Literal["none", "named", "ambiguous", "unknown"]
+    effect: str | None
+    second_effect: str | None
+    set: tuple[str, ...]
+    probabilities: dict[str, float]
+    inclusion: dict[str, float]
+    detected: bool
+    p_value: float | None = None
+    gap: Span | None = None
+    amplitude: dict[str, Span] = field(default_factory=dict)
+    closed: Span | None = None
+    noise_sd: float | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_plain(cls, data: dict[str, Any]) -> "Answer":
+        """Return the answer of plain data."""
+        spans = {k: data[k] and tuple(data[k]) for k in ("gap", "closed") if k in data}
+        sizes = {k: tuple(v) for k, v in data.get("amplitude", {}).items()}
+        return cls(**{**data, **spans, "amplitude": sizes, "set": tuple(data["set"])})

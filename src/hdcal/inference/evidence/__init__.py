@@ -1,0 +1,1 @@
+"""Closed-form evidence of what may be missing from the force model."""

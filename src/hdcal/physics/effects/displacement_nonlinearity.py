@@ -1,0 +1,31 @@
+"""A displacement gauge whose characteristic is slightly curved."""
+
+from typing import ClassVar, Literal
+
+from jaxtyping import Float
+
+from hdcal.physics.effect import Effect, Rows, Stage, parameter
+from hdcal.rig.records import Array
+
+
+class DisplacementNonlinearity(Effect):
+    """ω → ω + e₁ ω².
+
+    A gauge knows no tension: its parabola goes on through zero, so the error keeps
+    its sign on either side.
+
+    Source: handbook (linearity error in the data sheet of a displacement gauge).
+    """
+
+    name: ClassVar[str] = "displacement_nonlinearity"
+    stage: ClassVar[Stage] = "deformation"
+    family: ClassVar[str] = "curvature"
+    symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
+
+    curvature: Float[Array, ""] | float = parameter(
+        "1/mm", "relative error of the gauge per mm", typical=0.04, null=0.0
+    )
+
+    def apply(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:
+        """Return the deformation as a straight gauge would have read it."""
+        return signal * (1.0 + self.curvature * signal)

@@ -1,0 +1,30 @@
+"""A rig that gives way itself: its stretch is read as deformation of the gear."""
+
+from typing import ClassVar
+
+from jaxtyping import Float
+
+from hdcal.physics.effect import Effect, Rows, Stage, parameter
+from hdcal.rig.records import Array
+
+
+class RigCompliance(Effect):
+    """ω → ω/(1 + c k): springs in series, 1/k_read = 1/k + c.
+
+    Source: handbook (machine compliance, ISO 14577-1).
+    """
+
+    name: ClassVar[str] = "rig_compliance"
+    stage: ClassVar[Stage] = "deformation"
+    family: ClassVar[str] = "stiffness"
+    # No table of readings on the gear holds it, so nothing here is ever tested:
+    # the readings are those of a softer gear.
+    needs: ClassVar[frozenset[str]] = frozenset({"bare_rig"})
+
+    compliance: Float[Array, ""] | float = parameter(
+        "mm/N", "stretch of rig and fixture per force", typical=2.5e-4, null=0.0
+    )
+
+    def apply(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:
+        """Return what the rig leaves to the gear."""
+        return signal / (1.0 + self.compliance * rows.stiffness)

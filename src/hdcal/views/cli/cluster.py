@@ -1,0 +1,86 @@
+"""Work shared by a Dask cluster; the workers need no disk of ours."""
+
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import contextmanager
+from itertools import islice
+from typing import Any
+
+from hdcal.errors import Finding, HdcalError, InputError
+
+_SECONDS_TO_ANSWER, _SECONDS_FOR_A_WORKER = 10, 30
+# Tasks per thread of the cluster that wait there with their data, and no more.
+_AHEAD = 2
+_GO_ON = "what was answered is kept; run the same command again to go on"
+
+
+def completed_on_cluster(
+    work: Callable, tasks: Iterator[tuple], address: str
+) -> Iterator[Any]:
+    """Yield what `work` makes of every task, in the order in which they are done.
+
+    What a lost worker had begun goes to another one; each result comes once.
+
+    Args:
+        work: can be imported by name on the workers.
+        tasks: its arguments; taken as workers become free.
+        address: of the scheduler.
+
+    Raises:
+        InputError: Dask is not installed, or nobody answers or works there.
+        HdcalError: the cluster was lost, or a task has cost several workers.
+    """
+    with _client(address) as client:
+        from distributed import KilledWorker, as_completed
+
+        width = _AHEAD * max(1, sum(client.nthreads().values()))
+        # Equal tasks are two tasks: what comes back is counted.
+        begun = (client.submit(work, *task, pure=False) for task in tasks)
+        waiting = as_completed(list(islice(begun, width)), loop=client.loop)
+        try:
+            for future in waiting:
+                outcome = future.result()
+                future.release()
+                waiting.update(list(islice(begun, 1)))
+                yield outcome
+        except KilledWorker as error:
+            words = "one case has cost several workers their life (memory?)"
+            raise HdcalError(f"--scheduler {address}: {words}; {_GO_ON}") from error
+        except (CancelledError, OSError) as error:
+            words = "the scheduler went away"
+            raise HdcalError(f"--scheduler {address}: {words}; {_GO_ON}") from error
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    try:
+        from distributed import Client
+    except ImportError:
+        words = "Dask's package 'distributed' is not installed"
+        raise _refusal(words, "Install hdcal[cluster], or leave it out") from None
+    # What a lost connection means is said once, by whoever catches it. Dask gives
+    # its loggers levels and handlers of their own, so that no parent quiets them.
+    for name in list(logging.root.manager.loggerDict):
+        if name.startswith("distributed"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=_SECONDS_TO_ANSWER, set_as_default=False)
+    except (OSError, ValueError) as error:
+        reason = " ".join(str(error).split())[:120]
+        words = f"no scheduler answers at '{address[:80]}' ({reason})"
+        remedy = "Start one with 'dask scheduler' and name its address"
+        raise _refusal(words, remedy) from None
+    try:
+        client.wait_for_workers(1, timeout=_SECONDS_FOR_A_WORKER)
+        yield client
+    except TimeoutError:
+        words = f"the scheduler at '{address[:80]}' has no workers"
+        remedy = f"Start some with 'dask worker {address[:80]}'"
+        raise _refusal(words, remedy) from None
+    finally:
+        client.close(timeout=_SECONDS_TO_ANSWER)
+
+
+def _refusal(problem: str, remedy: str) -> InputError:
+    return InputError([Finding("--scheduler", problem, remedy)])

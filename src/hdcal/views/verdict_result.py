@@ -1,0 +1,78 @@
+"""What one diagnosis leaves behind, in a folder that is there already."""
+
+from pathlib import Path
+
+from hdcal.answers.averaged import averaged_bands
+from hdcal.answers.diagnosis.verdict import Verdict
+from hdcal.answers.residuals import residuals
+from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.views import figures
+from hdcal.views.plain import as_json
+from hdcal.views.result import bands_csv
+from hdcal.views.verdict_json import verdict_json
+from hdcal.views.verdict_report import verdict_report
+
+
+def write_verdict(
+    verdict: Verdict,
+    folder: Path,
+    *,
+    command: str = "",
+    report: bool = True,
+    seed: int = 0,
+    quick: bool = False,
+) -> dict:
+    """Write everything that `hdcal diagnose` leaves behind for one case.
+
+    Args:
+        verdict: from `diagnose`.
+        folder: an empty one, from `whole_folder`.
+        command: how the result was made, for its provenance.
+        report: whether figures and report are wanted; they take most of the time.
+        seed: the diagnosis was made with.
+        quick: whether nothing was sampled.
+
+    Returns:
+        The verdict as plain data, as it was written.
+    """
+    found = verdict_json(verdict, seed=seed, quick=quick)
+    (folder / "verdict.json").write_text(as_json(found), "utf-8")
+    refit, bands = corrected(verdict), None
+    if refit is not None:
+        bands = averaged_bands(list(verdict.posteriors.values()))
+        refit[1].save(folder / FILE_NAME)
+        (folder / "bands.csv").write_text(bands_csv(bands), "utf-8", newline="")
+    if report:
+        images = _draw(verdict, refit, bands, folder)
+        page = verdict_report(verdict, found, images, command, refit).encode(
+            "utf-8", "xmlcharrefreplace"
+        )
+        (folder / "report.html").write_bytes(page)
+    return found
+
+
+def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
+    """Return the most probable corrected model with its name."""
+    weighed = verdict.posteriors
+    if not weighed:
+        return None
+    name = max(weighed, key=lambda name: weighed[name][0])
+    return name, weighed[name][1]
+
+
+def _draw(verdict: Verdict, refit, bands, folder: Path) -> dict[str, bytes]:
+    """Write every figure, and return the SVG files by name."""
+    title = f"{verdict.case.gear.name}: diagnosis"
+    drawn = {
+        "where": figures.where_figure(verdict),
+        "which": figures.which_figure(verdict),
+        "shrink": figures.shrink_figure(verdict),
+    }
+    if refit is not None:
+        left = residuals(refit[1])
+        drawn["bands"] = figures.calibration_figure(refit[1], bands, left)
+    images = {name: figures.render(f, "svg", title) for name, f in drawn.items()}
+    for name, figure in drawn.items():
+        (folder / f"{name}.svg").write_bytes(images[name])
+        (folder / f"{name}.png").write_bytes(figures.render(figure, "png", title))
+    return images

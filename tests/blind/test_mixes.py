@@ -1,0 +1,137 @@
+"""Cases are what their labels say, and their names and order say nothing."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from hdcal.blind.mixes import MIXES, _plans, draw_cases, known_on
+from hdcal.blind.oracle import curves, judge
+from hdcal.blind.programs import PROGRAMS, Program
+from hdcal.blind.virtual_rig import ALPHA, ALPHA_SD, Bench, draw_noise
+from hdcal.errors import InputError
+
+COUNT = 40
+
+
+@pytest.fixture(scope="module", params=["prior", "withheld", "all"])
+def drawn(request):
+    return request.param, list(draw_cases(request.param, COUNT, seed=3))
+
+
+def test_labels_are_those_of_the_files(drawn):
+    _, cases = drawn
+    assert [label.case for _, label in cases] == [f"case-{i:02}" for i in range(1, 41)]
+    for text, label in cases:
+        table = np.genfromtxt(text.splitlines(), delimiter=",", names=True, dtype=None)
+        assert len(table) == label.rows == len(label.clean)
+        error = table["force_N"] - np.array(label.clean)
+        if not set(label.truth) & {"outliers", "heteroscedastic_noise", "quantisation"}:
+            assert np.std(error) == pytest.approx(label.sigma, rel=0.5)
+        seen = np.sqrt(np.mean(np.square(label.curve)))
+        if label.kind == "null":
+            assert label.truth == () and seen == 0.0
+        elif label.kind != "pair" and seen > 0.0:
+            assert seen / label.sigma == pytest.approx(label.r, rel=0.01)
+        assert (
+            set(label.truth) <= set(known_on(label.program))
+            or label.spanned is not None
+        )
+        whole = sum(label.oracle.values())
+        assert whole == pytest.approx(1.0 if label.oracle else 0.0, abs=1e-4)
+
+
+def test_mixes_hold_what_they_promise(drawn):
+    mix, cases = drawn
+    kinds = Counter(label.kind for _, label in cases)
+    if mix == "withheld":
+        assert set(kinds) == {"effect"}
+        assert all(set(label.withheld) > set(label.truth) for _, label in cases)
+        assert all(len(label.withheld) == 2 for _, label in cases)
+    if mix == "all":
+        assert {label.mix for _, label in cases} == MIXES.keys() - {"all"}
+
+
+def test_the_same_seed_gives_the_same_cases(drawn):
+    mix, cases = drawn
+    assert list(draw_cases(mix, COUNT, seed=3)) == cases
+    assert list(draw_cases(mix, COUNT, seed=4)) != cases
+
+
+def test_neighbours_are_no_more_alike_than_others():
+    """The order is random: agreement of neighbours' names against chance."""
+    names = np.array([label.truth for _, label in draw_cases("withheld", 200, 1)])[:, 0]
+    same = np.mean(names[1:] == names[:-1])
+    assert same < 0.12
+
+
+def test_the_oracle_is_bayes_rule():
+    """Against dense normals whose free columns have a very wide prior instead."""
+    program, rng = PROGRAMS["fleet"](), np.random.default_rng(5)
+    bench = Bench(program.history, sigma=0.6)
+    made = bench.at_size("coulomb_friction", 0.5, rng)
+    curve = bench.curve(made)
+    reading = bench.plain + curve + draw_noise(bench, rng, 0.3)
+    told = {"truth": "coulomb_friction", "curve": curve, "r": 0.5, "correlation": 0.3}
+    found = judge(program, bench, reading, **told)
+    order, run = bench.history.order, bench.history.run
+    apart = np.abs(order[:, None] - order)
+    serial = np.where(run[:, None] == run, 0.3**apart, 0.0)
+    x, rise = bench.history.deformation, bench.history.rise
+    base = np.stack([1e3 * x, 1e3 + 0.0 * x, bench.stiffness * ALPHA_SD * x * rise])
+    law = multivariate_normal(cov=0.36 * serial + base.T @ base)
+    left = reading - replace(bench, alpha=ALPHA).plain
+    slow = {}
+    for name, bank in curves("fleet").items():
+        shapes = 0.5 / bench.visible(bank)[:, None] * bank
+        if name == "coulomb_friction":
+            shapes = np.concatenate([shapes, curve[None]])
+        slow[name] = logsumexp(law.logpdf(left - shapes)) - np.log(len(shapes))
+    total = logsumexp(list(slow.values()))
+    for name, value in slow.items():
+        assert found[name] == pytest.approx(np.exp(value - total), abs=0.01)
+    assert max(found, key=found.get) == "coulomb_friction"
+    # With the sign of the mechanism turned the true one is no longer to be seen.
+    turned = judge(program, bench, bench.plain - curve, **told)
+    assert turned["coulomb_friction"] < 0.05
+
+
+def test_a_program_of_one_s_own_is_gone_through():
+    """Nothing else is: what it cannot tell is replaced."""
+    own = replace(PROGRAMS["ramp"](), name="given")
+    for text, label in draw_cases("effects", 12, 5, own):
+        table = np.genfromtxt(text.splitlines(), delimiter=",", names=True, dtype=None)
+        gone = table["deformation_mm"]
+        np.testing.assert_allclose(gone, own.history.deformation, atol=1e-5)
+        assert label.program == "given"
+        assert {*label.truth} <= {*known_on("ramp")}
+
+
+def test_a_program_that_shows_nothing_is_refused():
+    whole = PROGRAMS["ramp"]().history
+    still = replace(whole, deformation=np.full(60, 0.3))
+    with pytest.raises(InputError, match="shows next to nothing"):
+        list(draw_cases("effects", 3, 5, Program("given", still)))
+
+
+def test_cases_are_drawn_in_the_proportions_that_are_said():
+    plans = _plans("prior", 4000, np.random.default_rng(2))
+    kinds = Counter(plan.kind for plan in plans)
+    for kind, share in {
+        "null": 0.5,
+        "outside": 0.1,
+        "pair": 0.03,
+        "effect": 0.37,
+    }.items():
+        assert kinds[kind] / 4000 == pytest.approx(share, abs=0.025)
+    assert np.mean([plan.serial for plan in plans]) == pytest.approx(0.25, abs=0.03)
+    nulls = _plans("null", 400, np.random.default_rng(2))
+    assert np.mean([plan.serial for plan in nulls]) == 0.5
+    everything = Counter(
+        plan.mix for plan in _plans("all", 1000, np.random.default_rng(2))
+    )
+    assert everything["effects"] == 450
+    assert everything["prior"] == 200

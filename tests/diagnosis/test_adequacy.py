@@ -1,0 +1,99 @@
+"""A likely cause that leaves more than noise loses to what the library lacks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bench import NOISE, judged, rich, simulated
+from rigs import make_case
+
+from hdcal.answers.diagnosis.adequacy import sign_odds
+from hdcal.answers.diagnosis.weigh import Weighed, doubted
+from hdcal.inference.evidence.noise import lattice_step
+
+DOUBTED = {"none": 0.1, "unknown": 0.1, "a": 0.6, "a+b": 0.2}
+
+
+def test_what_is_doubted_goes_to_unknown():
+    before = Weighed(DOUBTED, {"a": 0.8, "b": 0.2}, np.ones(1), {})
+    after = doubted(before, {"a": 0.5})
+    assert after.probabilities["a"] == pytest.approx(0.3)
+    assert after.probabilities["unknown"] == pytest.approx(0.4)
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    assert after.inclusion == pytest.approx({"a": 0.5, "b": 0.2})
+    assert doubted(before, {}).probabilities == pytest.approx(DOUBTED)
+
+
+def changed(change, seed: int = 3):
+    """Return the verdict on a rig without effects, its force changed by this [N]."""
+    records = simulated(rich(), seed=seed).records
+    return judged(make_case(replace(records, force=records.force + change(records))))
+
+
+def test_a_crack_is_not_fatigue():
+    """The stiffness falls at once in one cycle, not with the logarithm of them all."""
+
+    def crack(records):
+        late = np.arange(len(records.force)) >= 100
+        return np.where(late, -0.03 * 195.0 * records.deformation, 0.0)
+
+    which = changed(crack).which
+    assert which.verdict == "unknown"
+    assert which.inclusion["stiffness_fatigue"] < 0.5
+
+
+def test_fatigue_is_believed():
+    case = simulated(rich(), {"stiffness_fatigue": {"loss": 0.03}}, seed=4)
+    which = judged(case).which
+    assert which.effect == "stiffness_fatigue"
+    assert which.inclusion["stiffness_fatigue"] > 0.8
+
+
+def struck(rows, signs):
+    def change(records):
+        error = np.zeros(len(records.force))
+        error[rows] = 9.0 * NOISE * np.asarray(signs)
+        return error
+
+    return change
+
+
+def test_a_burst_is_not_outliers():
+    """Twelve readings one after the other, all too high, have one cause."""
+    which = changed(struck(np.arange(65, 77), np.ones(12))).which
+    assert which.inclusion["outliers"] < 0.5
+    scattered = np.arange(8, 180, 15)
+    signs = np.resize([1.0, -1.0, -1.0], len(scattered))
+    assert changed(struck(scattered, signs)).which.effect == "outliers"
+
+
+@pytest.mark.parametrize("period", [2.7, 6.0])
+def test_a_hum_is_something_unknown(period):
+    """No covariate shows it, only the order of the rows does."""
+
+    def hum(records):
+        turns = 2.0 * np.pi * np.arange(len(records.force)) / period
+        return 2.5 * NOISE * np.sin(turns)
+
+    verdict = changed(hum)
+    assert verdict.gap.detected
+    assert verdict.which.verdict == "unknown"
+
+
+def test_counts_are_found_through_few_digits():
+    """A converter's step is no round number, and readings are written with four."""
+    rng = np.random.default_rng(2)
+    true = 0.83721
+    readings = np.round(0.3127 + true * rng.integers(0, 120, 200), 4)
+    step, _ = lattice_step(readings, 0.5)
+    assert step == pytest.approx(true, rel=1e-5)
+    assert lattice_step(np.round(rng.normal(50.0, 20.0, 200), 4), 0.5)[0] == 0.0
+
+
+def test_odds_of_signs_are_an_integral():
+    """∫ sᵃ (1 − s)ᵇ 2 ds from ½ to 1, over ½ᵃ⁺ᵇ."""
+    s = np.linspace(0.5, 1.0, 20001)
+    for same, pairs in ((0, 0), (8, 8), (5, 9), (0, 6)):
+        slow = np.trapezoid(2.0 * s**same * (1.0 - s) ** (pairs - same), s) * 2.0**pairs
+        assert sign_odds(same, pairs) == pytest.approx(slow, rel=1e-6)
+    assert sign_odds(8, 8) > 10.0 > 1.0 > sign_odds(3, 8)

@@ -1,0 +1,99 @@
+"""The verdict follows from the probabilities by stated rules."""
+
+import numpy as np
+import pytest
+
+from hdcal.answers.diagnosis.library import choose_library
+from hdcal.answers.diagnosis.weigh import Weighed, log_priors, verdict_word, weigh
+from hdcal.errors import InputError
+from hdcal.physics.registry import EFFECTS
+
+
+def weighed(**share) -> Weighed:
+    """Return a hand-made posterior; what is not said of the names is inferred."""
+    share = {name.replace("__", "+"): value for name, value in share.items()}
+    effects = {p for n in share for p in n.split("+")} - {"none", "unknown"}
+    inclusion = {
+        effect: sum(v for n, v in share.items() if effect in n.split("+"))
+        for effect in sorted(effects)
+    }
+    return Weighed(share, inclusion, np.ones(1), {})
+
+
+@pytest.mark.parametrize(
+    ("share", "detected", "word"),
+    [
+        ({"none": 0.02, "unknown": 0.03, "a": 0.95}, True, "named"),
+        ({"none": 0.02, "unknown": 0.03, "a": 0.95}, False, "none"),
+        ({"none": 0.5, "unknown": 0.0, "a": 0.5}, True, "none"),
+        ({"none": 0.49, "unknown": 0.0, "a": 0.51}, True, "ambiguous"),
+        ({"none": 0.1, "unknown": 0.5, "a": 0.4}, True, "unknown"),
+        ({"none": 0.0, "unknown": 0.1, "a": 0.5, "a__b": 0.4}, True, "named"),
+        ({"none": 0.0, "unknown": 0.1, "a": 0.5, "b": 0.4}, True, "ambiguous"),
+        ({"none": 0.0, "unknown": 0.11, "a": 0.89}, True, "ambiguous"),
+        ({"none": 0.3, "unknown": 0.7}, True, "unknown"),
+    ],
+)
+def test_one_word_for_a_table(share, detected, word):
+    assert verdict_word(weighed(**share), detected) == word
+
+
+def test_the_smallest_set_holds_ninety_per_cent():
+    found = weighed(none=0.05, unknown=0.02, a=0.6, b=0.2, a__c=0.13)
+    assert found.smallest_set == ("a", "b", "c")
+    assert weighed(none=0.05, unknown=0.01, a=0.94).smallest_set == ("a",)
+    assert weighed(none=0.2, unknown=0.0, a=0.8).smallest_set == ("a", "none")
+
+
+def test_priors_sum_to_one_and_groups_keep_their_share():
+    names = ["none", "unknown", "a", "b", "c", "a+b", "a+c", "b+c"]
+    prior = dict(zip(names, np.exp(log_priors(names)), strict=True))
+    assert sum(prior.values()) == pytest.approx(1.0)
+    assert prior["none"] == pytest.approx(0.5)
+    assert prior["unknown"] == pytest.approx(0.1)
+    assert sum(v for n, v in prior.items() if "+" in n) == pytest.approx(0.03)
+    assert prior["a"] == pytest.approx(prior["b"])
+
+
+def test_weighing_is_bayes_rule():
+    """By hand, with two correlations that are equally probable."""
+    names = ["none", "unknown", "a", "b", "a+b"]
+    rng = np.random.default_rng(0)
+    table = {name: rng.normal(-40.0, 2.0, 2) for name in names}
+    prior = np.exp(log_priors(names))
+    joint = prior[:, None] * np.exp(np.stack([table[n] for n in names]))
+    joint /= joint.sum()
+    found = weigh(table)
+    expected = dict(zip(names, joint.sum(axis=1), strict=True))
+    assert found.probabilities == pytest.approx(expected)
+    np.testing.assert_allclose(found.correlation, joint.sum(axis=0))
+    both = expected["a"] + expected["a+b"]
+    assert found.inclusion["a"] == pytest.approx(both)
+    shifted = weigh({name: value + 500.0 for name, value in table.items()})
+    assert shifted.probabilities == pytest.approx(found.probabilities)
+
+
+def test_effects_are_withheld_by_name():
+    assert choose_library() == EFFECTS
+    found = choose_library("minus:hysteresis, ovality")
+    assert set(EFFECTS) - set(found) == {"hysteresis", "ovality"}
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("minus:histeresis", "Did you mean 'hysteresis'"),
+        ("minus:zzz", "The library holds"),
+        ("hysteresis", "minus:NAME"),
+    ],
+)
+def test_a_slip_of_the_pen_is_explained(spec, words):
+    with pytest.raises(InputError) as raised:
+        choose_library(spec)
+    assert words in str(raised.value)
+
+
+def test_every_wrong_name_is_reported_at_once():
+    with pytest.raises(InputError) as raised:
+        choose_library("minus:histeresis,ovalty")
+    assert len(raised.value.findings) == 2

@@ -1,0 +1,90 @@
+"""Effects of scatter name what the model's own members carry, and add nothing."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import numpy as np
+import pytest
+from rigs import make_case, make_gear, make_records
+
+from hdcal.answers.calibration import calibrate, check_effect_priors
+from hdcal.answers.summary import summarise
+from hdcal.errors import InputError
+from hdcal.inference.density import MEMBER_SD, MEMBERS
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import build_problem
+from hdcal.physics.registry import EFFECTS
+from hdcal.physics.scatter import Scatter
+from hdcal.rig.priors import Prior, effect_priors, rig_priors
+
+SCATTER = [name for name, each in EFFECTS.items() if issubclass(each, Scatter)]
+scatter = pytest.mark.parametrize("name", SCATTER)
+
+
+def case_with(labels: int):
+    """Return a case of so many runs, each on a gear of its own."""
+    label = np.repeat(np.arange(labels), 12)
+    deformation = np.tile(np.linspace(0.02, 0.54, 12), labels)
+    noise = np.random.default_rng(labels).normal(0.0, 0.4, 12 * labels)
+    force = 205.0 * deformation + np.array([0.0, 2.0, -1.0])[label] + noise
+    known = {"run", "specimen"} | ({"runs", "specimens"} if labels > 2 else set())
+    records = make_records(deformation, force, run=label, specimen=label, known=known)
+    return make_case(records)
+
+
+def test_both_kinds_of_member_have_their_effect():
+    assert SCATTER == ["specimen_variation", "run_offset"]
+    assert {EFFECTS[name].members for name in SCATTER} == set(MEMBER_SD)
+    assert set(MEMBER_SD) < set(MEMBERS)
+
+
+@scatter
+def test_the_problem_is_the_one_without(name):
+    case = case_with(3)
+    slack = EFFECTS["seating_slack"]
+    for others in ((), (slack,)):
+        bare = build_problem(case, effect_priors(), others)
+        found = build_problem(case, effect_priors(), (EFFECTS[name], *others))
+        assert eqx.tree_equal(found, bare)
+    assert bare.runs == bare.specimens == 3
+
+
+@scatter
+def test_too_few_members_are_refused(name):
+    with pytest.raises(InputError, match=f"'{name}' needs "):
+        build_problem(case_with(2), effect_priors(), (EFFECTS[name],))
+
+
+@scatter
+def test_the_spread_has_the_same_prior_under_both_names(name):
+    found = effect_priors()[f"{name}.sd"]
+    own = rig_priors()[MEMBER_SD[EFFECTS[name].members]]
+    assert (found.family, found.numbers, found.unit) == (
+        own.family,
+        own.numbers,
+        own.unit,
+    )
+
+
+@scatter
+def test_a_prior_under_the_effects_name_is_refused(name):
+    prior = Prior("half_normal", (1.0,), effect_priors()[f"{name}.sd"].unit)
+    gear = replace(make_gear(), effect_priors={f"{name}.sd": prior})
+    with pytest.raises(InputError, match=MEMBER_SD[EFFECTS[name].members]):
+        check_effect_priors(replace(case_with(3), gear=gear))
+
+
+def test_a_calibration_keeps_the_name_and_no_more(tmp_path):
+    settings = {"warmup": 100, "draws": 50, "chains": 2}
+    bare = calibrate(case_with(3), **settings)
+    found = calibrate(case_with(3), effects=["run_offset"], **settings)
+    assert found.effects == (EFFECTS["run_offset"],)
+    assert found.priors.keys() == bare.priors.keys()
+    for name, values in bare.draws.items():
+        assert np.array_equal(found.draws[name], values), name
+    found.save(tmp_path / "posterior.nc")
+    back = Posterior.load(tmp_path)
+    assert eqx.tree_equal(back.problem, bare.problem)
+    summary = summarise(back)
+    assert summary["effects"] == ["run_offset"]
+    assert summary["parameters"].keys() == summarise(bare)["parameters"].keys()

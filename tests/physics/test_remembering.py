@@ -1,0 +1,161 @@
+"""Loops, relaxation and load cycles are what a plain loop over the rows says."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+from scipy import integrate, special
+
+from hdcal.physics.effect import Rows
+from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.physics.effects.hysteresis import Hysteresis
+from hdcal.physics.effects.relaxation import Relaxation
+from hdcal.physics.effects.stiffness_fatigue import StiffnessFatigue
+from hdcal.physics.history import load_cycle, stop_cells
+from hdcal.physics.scatter import scores
+
+MIXED = np.arange(24).reshape(3, 8).T.ravel()
+
+
+def slow_cells(deformation, run, reach):
+    """Move every cell row by row; a run starts from ω = 0 with all cells at rest."""
+    found = np.zeros((len(reach), len(deformation)))
+    for label in np.unique(run):
+        state, last = np.zeros(len(reach)), 0.0
+        for row in np.flatnonzero(run == label):
+            for cell, own in enumerate(reach):
+                moved = state[cell] + (deformation[row] - last) / own
+                state[cell] = min(1.0, max(-1.0, moved))
+            last = deformation[row]
+            found[:, row] = state
+    return found
+
+
+def slow_cycle(sense, run, specimen):
+    """Count rows of the file, specimen by specimen."""
+    found, cycle, last, home = [], {}, {}, {}
+    for s, r, g in zip(sense, run, specimen, strict=True):
+        if r not in home:
+            home[r] = s
+            cycle[g] = cycle.get(g, 0) + 1
+        elif s != last[r] and s == home[r]:
+            cycle[g] += 1
+        last[r] = s
+        found.append(cycle[g])
+    return np.array(found)
+
+
+def slow_relaxation(effect, load, time):
+    """Integrate the Prony arm over straight lines from reading to reading of a run."""
+    times, loads = np.append(0.0, time), np.append(0.0, load)
+    relaxed = []
+    for now in time:
+        total = 0.0
+        for k in np.flatnonzero(times[:-1] < now):
+            slope = (loads[k + 1] - loads[k]) / (times[k + 1] - times[k])
+            total += integrate.quad(
+                lambda t, slope=slope, now=now: (
+                    -np.expm1(-(now - t) / effect.time_constant) * slope
+                ),
+                times[k],
+                times[k + 1],
+                epsabs=1e-11,
+            )[0]
+        relaxed.append(effect.share * total)
+    return np.array(relaxed)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("mixed", [False, True])
+def test_stop_cells(scattered, seed, mixed):
+    records, reach = scattered(seed), np.array([0.05, 0.3, 2.0])
+    order = MIXED if mixed else np.arange(24)
+    deformation, run = records.deformation[order], records.run[order]
+    found = jax.jit(stop_cells)(deformation, run, reach)
+    slow = slow_cells(deformation, run, reach)
+    np.testing.assert_allclose(found, slow, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("mixed", [False, True])
+def test_load_cycles(scattered, seed, mixed):
+    records = scattered(seed)
+    order = MIXED if mixed else np.arange(24)
+    specimen = np.array([0, 1, 0])[records.run]
+    if mixed:  # the runs of one gear never take turns
+        specimen = records.run
+    columns = [c[order] for c in (records.sense, records.run, specimen)]
+    found = jax.jit(load_cycle)(*columns)
+    np.testing.assert_array_equal(found, slow_cycle(*columns))
+
+
+def test_tension_counts_as_many_cycles(scattered):
+    records = scattered(1)
+    there = load_cycle(records.sense, records.run, records.specimen)
+    back = load_cycle(-records.sense, records.run, records.specimen)
+    np.testing.assert_array_equal(there, back)
+
+
+def test_a_tenth_cycle_has_lost_one_decade(scattered):
+    up_down = np.repeat([1.0, -1.0], 5)
+    records = jax.tree.map(lambda leaf: np.resize(leaf, 100), scattered(0))
+    records = dataclasses.replace(
+        records,
+        sense=np.tile(up_down, 10),
+        run=np.zeros(100, int),
+        specimen=np.zeros(100, int),
+    )
+    one = np.ones(100)
+    rows = Rows(records, 0.0 * one, 200.0 * one, 0.5 * one)
+    force = StiffnessFatigue(0.01).apply(100.0 * one, rows)
+    np.testing.assert_allclose(force[:10], 100.0)
+    np.testing.assert_allclose(force[-10:], 99.0)
+
+
+@pytest.mark.parametrize("time_constant", [0.3, 30.0, 3000.0])
+def test_relaxation_is_its_integral(scattered, time_constant):
+    records, effect = scattered(4), Relaxation(0.04, time_constant)
+    stiffness = np.full(24, 200.0)
+    rows = Rows(records, np.zeros(24), stiffness, records.deformation)
+    found = np.asarray(effect.apply(np.zeros(24), rows))
+    for run in range(3):
+        own = records.run == run
+        load = stiffness[own] * records.deformation[own]
+        slow = slow_relaxation(effect, load, records.time[own])
+        np.testing.assert_allclose(-found[own], slow, rtol=1e-8, atol=1e-8)
+
+
+def loop(effect, records):
+    way = np.concatenate([np.linspace(0, 0.5, 26), np.linspace(0.5, 0, 26)[1:]])
+    way = np.concatenate([way, np.linspace(0, 0.5, 26)[1:]])
+    sense = np.repeat([1.0, -1.0, 1.0], [26, 25, 25])
+    records = jax.tree.map(lambda leaf: np.resize(leaf, len(way)), records)
+    records = dataclasses.replace(
+        records, deformation=way, sense=sense, run=np.zeros(len(way), int)
+    )
+    rows = Rows(records, *np.zeros((2, len(way))), way)
+    return np.asarray(effect.apply(np.zeros(len(way)), rows))
+
+
+def test_a_loop_closes_gradually_where_friction_jumps(scattered):
+    found = loop(Hysteresis(4.0, 0.1), scattered(0))
+    assert found[0] == 0.0
+    assert found[25] == pytest.approx(4.0)
+    assert found[50] == pytest.approx(-4.0)
+    # At rest every cell sticks: slope F_h times the mean of 1/ω_j, twice the way back.
+    assert found[1] == pytest.approx(4.0 * 0.02 * np.mean([40.0, 20.0, 40 / 3, 10.0]))
+    assert np.flatnonzero(found[:26] < 4.0 - 1e-9)[-1] == 4
+    back = 4.0 - found[25:51]
+    assert np.all(np.diff(back) >= -1e-12)
+    assert np.flatnonzero(back > 8.0 - 1e-9)[0] == 10
+    jump = loop(CoulombFriction(4.0), scattered(0))
+    assert np.max(np.abs(np.diff(jump))) == 8.0
+    assert np.max(np.abs(np.diff(found[25:]))) < 2.0
+
+
+def test_scores_are_those_of_a_normal():
+    found = np.asarray(scores(np.arange(200)))
+    assert len(np.unique(found)) == 200
+    spread = np.sort(special.ndtr(found))
+    np.testing.assert_allclose(spread, (np.arange(200) + 0.5) / 200, atol=0.01)
