@@ -12,6 +12,7 @@ from typing import Literal
 import jax
 import numpy as np
 
+from hdcal.answers.forces import grid_records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import build_effects, member_base
 from hdcal.inference.posterior import Posterior
@@ -70,25 +71,6 @@ class Bands:
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of bands.csv."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-def _grid_records(deformation, temperature, sense, known_sd: float) -> Records:
-    zeros = np.zeros(len(deformation))
-    index = np.zeros(len(deformation), dtype=int)
-    return Records(
-        deformation=deformation,
-        temperature=temperature,
-        time=zeros,
-        angle=zeros,
-        direction=sense,
-        sense=sense,
-        rate=zeros,
-        run=index,
-        specimen=index,
-        force=zeros,
-        force_sd=zeros + known_sd,
-        known=frozenset(),
-    )
 
 
 @jax.jit
@@ -229,7 +211,7 @@ def predict(
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        records = _grid_records(at[rows], warm[rows], sense[rows], known_sd)
+        records = grid_records(at[rows], warm[rows], sense[rows], known_sd)
         parts = _predict_block(posterior.problem, values, records, keys)
         blocks.append(np.stack([np.quantile(part, tails, axis=0) for part in parts]))
     physics, with_gap, new = np.concatenate(blocks, axis=2)
