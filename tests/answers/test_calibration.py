@@ -108,8 +108,22 @@ WITH_SITES = [
 ]
 
 
-@pytest.mark.parametrize("name", WITH_SITES)
+# One of every stage, and one that remembers.
+SLICE = ("screw_error", "coulomb_friction", "charge_leakage", "outliers")
+
+
+@pytest.mark.parametrize("name", SLICE)
+def test_a_slice_of_effects_is_recovered(name):
+    assert_recovered(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n in WITH_SITES if n not in SLICE])
 def test_every_effect_is_recovered(name):
+    assert_recovered(name)
+
+
+def assert_recovered(name):
     """The library's own effect at its typical size: truth in the 99 % interval."""
     # Into tension too: with one sign only, play and offset are one parameter.
     effect, records = EFFECTS[name], cycles(240, start=-0.1)

@@ -39,8 +39,10 @@ TRUTH = {
     "deformation_offset": 0.005,
     "sigma": 0.4,
 }
-SLICE = ("coulomb_friction", "progressive_stiffening", "contact_onset")
+SLICE = ("progressive_stiffening",)
 OTHERS = (
+    "coulomb_friction",
+    "contact_onset",
     "hysteresis",
     "viscous_damping",
     "charge_leakage",

@@ -20,17 +20,7 @@ Hdcal = Callable[..., Done]
 
 
 @pytest.fixture(scope="session")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """All processes of a test run share one cache of compiled programs."""
-    base = tmp_path_factory.getbasetemp()
-    # With several workers each has a base of its own inside the common one.
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        base = base.parent
-    return {**os.environ, "HDCAL_CACHE_DIR": str(base / "compiled-by-tests")}
-
-
-@pytest.fixture(scope="session")
-def hdcal(environment: dict[str, str]) -> Hdcal:
+def hdcal() -> Hdcal:
     """Run hdcal in a process of its own."""
 
     def run(*arguments: object, **options) -> Done:
@@ -38,7 +28,7 @@ def hdcal(environment: dict[str, str]) -> Hdcal:
             [*MAIN, *map(str, arguments)],
             capture_output=True,
             text=True,
-            env={**environment, **options.pop("env", {})},
+            env={**os.environ, **options.pop("env", {})},
             timeout=300,
             **options,
         )

@@ -35,13 +35,10 @@ def local_cluster(**settings) -> distributed.LocalCluster:
 
 
 @pytest.fixture
-def local(
-    monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], tmp_path: Path
-) -> Iterator:
+def local(tmp_path: Path) -> Iterator:
     """A scheduler here, and two workers in processes and a folder of their own."""
     import dask
 
-    monkeypatch.setenv("HDCAL_CACHE_DIR", environment["HDCAL_CACHE_DIR"])
     quiet = {"distributed.scheduler.allowed-failures": 1}
     with (
         dask.config.set(quiet),

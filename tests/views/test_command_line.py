@@ -23,7 +23,7 @@ from conftest import MAIN, XB1, Hdcal
         ["blind", "open", "-h"],
     ],
 )
-def test_help_is_given_without_heavy_imports(arguments, environment):
+def test_help_is_given_without_heavy_imports(arguments):
     script = (
         "import atexit, sys; from hdcal.views.cli import main;"
         "heavy = {'jax', 'numpy', 'pandas', 'matplotlib', 'rich', 'jinja2'};"
@@ -31,7 +31,7 @@ def test_help_is_given_without_heavy_imports(arguments, environment):
         "main()"
     )
     command = [*MAIN[:-1], script, *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0
     assert done.stdout.startswith("Usage: hdcal")
     assert done.stdout.splitlines()[-1] == "loaded"
@@ -166,27 +166,25 @@ def test_a_text_from_a_file_cannot_steer_the_terminal(here: Hdcal, case: Path):
     assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
 
 
-def test_a_reader_that_goes_away_is_no_error(environment):
+def test_a_reader_that_goes_away_is_no_error():
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run(
-        [*MAIN, "effects"], stdout=write, stderr=subprocess.PIPE, env=environment
-    )
+    done = subprocess.run([*MAIN, "effects"], stdout=write, stderr=subprocess.PIPE)
     os.close(write)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_a_defect_of_hdcal_is_one_line(environment):
+def test_a_defect_of_hdcal_is_one_line():
     script = (
         "import hdcal.rig.reading as r; from hdcal.views.cli import main\n"
         "def broken(*_, **__): raise ValueError('one\\ntwo')\n"
         "r.read_case = broken; main()"
     )
     command = [*MAIN[:-1], script, "check", str(XB1)]
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert "internal error (ValueError: one two); please report it" in done.stderr
-    environment = {**environment, "HDCAL_DEBUG": "1"}
+    environment = {**os.environ, "HDCAL_DEBUG": "1"}
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
     assert "Traceback" in done.stderr

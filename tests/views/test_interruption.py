@@ -12,14 +12,12 @@ from conftest import MAIN, XB1
 
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_leaves_nothing(
-    by: signal.Signals, environment, tmp_path: Path
-):
+def test_an_interrupted_run_leaves_nothing(by: signal.Signals, tmp_path: Path):
     # On a terminal the progress bar tells when sampling has begun.
     ours, theirs = pty.openpty()
     command = [*MAIN, "calibrate", str(XB1), "--draws", "1000000"]
     with subprocess.Popen(
-        command, cwd=tmp_path, stderr=theirs, stdout=subprocess.PIPE, env=environment
+        command, cwd=tmp_path, stderr=theirs, stdout=subprocess.PIPE
     ) as process:
         os.close(theirs)
         said = b""

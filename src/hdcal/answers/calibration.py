@@ -42,6 +42,7 @@ from hdcal.inference.posterior import (
     versions,
 )
 from hdcal.inference.problem import Problem, build_problem, problem_priors
+from hdcal.inference.programs import let_go_of_programs
 from hdcal.inference.sample import Draws, Progress, sample
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
@@ -167,6 +168,7 @@ def calibrate(
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
     _check_settings(chains, warmup, draws)
+    let_go_of_programs()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)

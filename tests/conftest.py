@@ -1,0 +1,38 @@
+"""Compiled programs: shared by all processes of a test run, and let go in time."""
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+
+import pytest
+
+_OWN = pytest.StashKey[str]()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Name one cache for this process, its workers and every command they start."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        return
+    config.stash[_OWN] = os.environ["HDCAL_CACHE_DIR"] = tempfile.mkdtemp("-hdcal")
+    # What `hdcal.views.cli.acceleration` sets for commands.
+    os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{config.stash[_OWN]}/compiled"
+    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
+    os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the cache."""
+    if _OWN in config.stash:
+        shutil.rmtree(config.stash[_OWN], ignore_errors=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_programs() -> Iterator[None]:
+    """Let compiled programs go between files, as calibrations and diagnoses do."""
+    yield
+    if "jax" in sys.modules:
+        from hdcal.inference.programs import let_go_of_programs
+
+        let_go_of_programs()
