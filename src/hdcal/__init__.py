@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.answers.bands import Bands, predict
     from hdcal.answers.calibration import calibrate
+    from hdcal.answers.classical import PolynomialFit, fit
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
     from hdcal.answers.residuals import Residuals, residuals
@@ -36,6 +37,7 @@ _HOMES = {
     "InputError": "errors",
     "Noise": "physics.effect",
     "NotUsable": "errors",
+    "PolynomialFit": "answers.classical",
     "Posterior": "inference.posterior",
     "Prior": "rig.priors",
     "Records": "rig.records",
@@ -45,6 +47,7 @@ _HOMES = {
     "Verdict": "answers.diagnosis.verdict",
     "calibrate": "answers.calibration",
     "diagnose": "answers.diagnosis.diagnose",
+    "fit": "answers.classical",
     "force": "physics.chain",
     "parameter": "physics.effect",
     "predict": "answers.bands",
