@@ -11,6 +11,7 @@ import hdcal
 PUBLIC = [
     "Bands",
     "Case",
+    "Claim",
     "EFFECTS",
     "Effect",
     "Finding",
@@ -28,6 +29,7 @@ PUBLIC = [
     "Rows",
     "THEORIES",
     "Verdict",
+    "audit",
     "calibrate",
     "diagnose",
     "fit",

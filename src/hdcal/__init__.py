@@ -7,6 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hdcal.answers.audit.article import Claim
+    from hdcal.answers.audit.audit import audit
     from hdcal.answers.bands import Bands, predict
     from hdcal.answers.calibration import calibrate
     from hdcal.answers.classical import PolynomialFit, fit
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Bands": "answers.bands",
     "Case": "rig.case",
+    "Claim": "answers.audit.article",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Finding": "errors",
@@ -45,6 +48,7 @@ _HOMES = {
     "Rows": "physics.effect",
     "THEORIES": "physics.theory",
     "Verdict": "answers.diagnosis.verdict",
+    "audit": "answers.audit.audit",
     "calibrate": "answers.calibration",
     "diagnose": "answers.diagnosis.diagnose",
     "fit": "answers.classical",

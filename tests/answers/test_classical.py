@@ -91,7 +91,7 @@ def test_the_line_is_too_simple_and_the_parabola_is_not(xb1):
     line, parabola = (fit(xb1, [degree])[0].lack_of_fit for degree in (1, 2))
     assert line.against == parabola.against == "next degree"
     assert line.dof == (1, 11)
-    assert line.F == pytest.approx(34.2, abs=0.05)
+    assert pytest.approx(34.2, abs=0.05) == line.F
     assert line.p_value == pytest.approx(1.1e-4, abs=1e-5)
     assert parabola.p_value == pytest.approx(0.76, abs=0.005)
 
@@ -144,7 +144,7 @@ def test_pure_error_is_that_of_the_text_book():
     line = stats.linregress(x, y)
     squares = np.sum((y - line.intercept - line.slope * x) ** 2)
     assert (found.against, found.dof) == ("pure error", (2, 4))
-    assert found.F == pytest.approx((squares - pure) / 2 / (pure / 4), rel=1e-9)
+    assert pytest.approx((squares - pure) / 2 / (pure / 4), rel=1e-9) == found.F
 
 
 def simulated(curvature: float, repeats: int, seed: int):
@@ -213,7 +213,7 @@ def test_the_summary_says_what_the_curves_leave_out(pontius):
     assert found["fits"][0]["held_out_runs_N"] > found["fits"][2]["held_out_runs_N"]
     assert min(one["aicc_over_best"] for one in found["fits"]) == 0.0
     top = found["fits"][2]
-    assert top["model"] == model_name((0, 1, 2)) == "c + a ω + b ω^2"
+    assert top["model"] == model_name((0, 1, 2)) == "c + a ω + b ω²"
     force = np.polyval(top["polyfit_order"], 1.0)
     assert top["at"]["force_N"] == pytest.approx(force, rel=1e-12)
     with pytest.raises(InputError, match="no deformation of this gear"):

@@ -28,7 +28,7 @@ def test_a_folder_holds_report_figure_and_numbers(here: Hdcal, tmp_path: Path):
     names = {entry.name for entry in out.iterdir()}
     assert names == {"fit.json", "fit.svg", "fit.png", "report.html"}
     page = (out / "report.html").read_text("utf-8")
-    assert "a ω + b ω^2" in page and "c + a ω" not in page
+    assert "a ω + b ω²" in page and "c + a ω" not in page
     assert here(*arguments).returncode == 2
     assert here(*arguments, "--force").returncode == 0
 

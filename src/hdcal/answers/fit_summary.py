@@ -73,10 +73,14 @@ def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
 
 
 def model_name(powers: Sequence[int]) -> str:
-    """Return a polynomial as it is written, with c, a, b, d … as in a text book."""
-    letters = "cabdefghij"
-    terms = {0: "c", 1: "a ω"} | {p: f"{letters[p]} ω^{p}" for p in range(2, 10)}
+    """Return a polynomial as it is written: c + a ω + b ω² + d ω³ …."""
+    terms = ["c", "a ω", *(f"{'bdefghij'[p - 2]} {omega(p)}" for p in range(2, 10))]
     return " + ".join(terms[power] for power in powers)
+
+
+def omega(power: int) -> str:
+    """Return a power of the deformation as it is written: ω²."""
+    return "ω" if power == 1 else f"ω{'⁰¹²³⁴⁵⁶⁷⁸⁹'[power]}"
 
 
 def _entry(one: PolynomialFit, at: float | None, best: float | None) -> dict:

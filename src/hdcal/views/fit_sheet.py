@@ -1,6 +1,6 @@
-"""Classical fits for a reader: the numbers of a curve-fitting tool, and their errors."""
+"""Classical fits for a reader: the numbers of a curve-fitting tool, with errors."""
 
-from hdcal.answers.fit_summary import DOUBT
+from hdcal.answers.fit_summary import DOUBT, omega
 from hdcal.views.sheet import Section, Sheet
 from hdcal.views.wording import estimate, number
 
@@ -38,7 +38,7 @@ def fit_sheet(found: dict) -> Sheet:
     return Sheet(
         name=data["gear"],
         kind="classical fits",
-        subtitle=f"polynomials by least squares on {data['rows']} rows ({data['name']})",
+        subtitle=f"least-squares polynomials on {data['rows']} rows ({data['name']})",
         answers=_answers(found),
         warnings=found["notes"],
         sections=sections,
@@ -49,7 +49,7 @@ def _curves() -> Section:
     return Section(
         "Data and curves",
         image="fit",
-        caption="Above the readings with every curve; below what the curves leave over.",
+        caption="Above the readings with every curve; below what each leaves over.",
     )
 
 
@@ -60,7 +60,7 @@ def _coefficients(found: dict) -> Section:
         for item in one["coefficients"]:
             value, span = estimate({**item, "median": item["value"]})
             error = number(item["standard_error"])
-            term = {0: "c [N]", 1: "ω"}.get(item["power"], f"ω^{item['power']}")
+            term = omega(item["power"]) if item["power"] else "c"
             rows.append([first, term, value, error, span, item["unit"]])
             first = ""
     lists = [
@@ -160,13 +160,11 @@ def _compared(found: dict) -> Section:
 
 
 def _at(at: dict) -> list[str]:
-    wide = at["hi_N"] - at["lo_N"]
-    reading = at["reading_hi_N"] - at["reading_lo_N"]
-    return [
-        number(at["force_N"], wide),
-        f"{number(at['lo_N'], wide)} … {number(at['hi_N'], wide)}",
-        f"{number(at['reading_lo_N'], reading)} … {number(at['reading_hi_N'], reading)}",
-    ]
+    force, span = estimate(
+        {"median": at["force_N"], "lo": at["lo_N"], "hi": at["hi_N"]}
+    )
+    ends = {"median": None, "lo": at["reading_lo_N"], "hi": at["reading_hi_N"]}
+    return [force, span, estimate(ends)[1]]
 
 
 def _answers(found: dict) -> list[str]:

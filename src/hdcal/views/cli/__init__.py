@@ -10,6 +10,7 @@ import sys
 import click
 
 from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.views.cli.audit import audit
 from hdcal.views.cli.blind import blind
 from hdcal.views.cli.calibrate import calibrate
 from hdcal.views.cli.check import check
@@ -52,7 +53,7 @@ def hdcal() -> None:
     """
 
 
-for _command in (calibrate, diagnose, predict, fit, check, effects, blind):
+for _command in (calibrate, diagnose, predict, fit, check, effects, audit, blind):
     hdcal.add_command(_command)
 
 

@@ -56,7 +56,7 @@ def fit(console: Console, data, gear, columns, theory, out, force, **wanted):
     from hdcal.rig.reading import read_case
     from hdcal.views.folder import check_target
 
-    findings, case, degrees = [], None, []
+    findings, case, fits = [], None, ()
     try:
         case = read_case(data, gear, columns=read_columns(columns), theory=theory)
     except InputError as error:

@@ -28,7 +28,7 @@ def fit_figure(case: Case, fits: Sequence[PolynomialFit]) -> Figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
         above.plot(x[rows], y[rows], "o", color=DARK, label="readings", **size)
         for place, one in enumerate(fits):
-            colour, name = CYCLE[place % len(CYCLE)], _mathematical(one)
+            colour, name = CYCLE[place % len(CYCLE)], model_name(one.powers)
             line = "-" if one.powers[0] == 0 else "--"
             ends = [one.at(value) for value in grid]
             middle = [end["force"] for end in ends]
@@ -47,7 +47,3 @@ def fit_figure(case: Case, fits: Sequence[PolynomialFit]) -> Figure:
         below.set_xlabel("deformation as read [mm]")
         above.legend(loc="upper left")
     return figure
-
-
-def _mathematical(one: PolynomialFit) -> str:
-    return model_name(one.powers).translate(str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹", "^"))
