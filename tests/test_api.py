@@ -28,6 +28,7 @@ PUBLIC = [
     "Residuals",
     "Rows",
     "THEORIES",
+    "Tracker",
     "Verdict",
     "audit",
     "calibrate",

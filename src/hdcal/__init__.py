@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hdcal.answers.diagnosis.verdict import Verdict
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.summary import summarise
+    from hdcal.answers.tracking import Tracker
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
@@ -47,6 +48,7 @@ _HOMES = {
     "Residuals": "answers.residuals",
     "Rows": "physics.effect",
     "THEORIES": "physics.theory",
+    "Tracker": "answers.tracking",
     "Verdict": "answers.diagnosis.verdict",
     "audit": "answers.audit.audit",
     "calibrate": "answers.calibration",

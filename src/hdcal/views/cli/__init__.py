@@ -19,6 +19,7 @@ from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.fit import fit
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.track import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -53,7 +54,17 @@ def hdcal() -> None:
     """
 
 
-for _command in (calibrate, diagnose, predict, fit, check, effects, audit, blind):
+for _command in (
+    calibrate,
+    diagnose,
+    predict,
+    track,
+    fit,
+    check,
+    effects,
+    audit,
+    blind,
+):
     hdcal.add_command(_command)
 
 
