@@ -1,5 +1,6 @@
 """A posterior with effects as particles, if its effects can be followed row by row."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import jax
@@ -16,7 +17,7 @@ from hdcal.inference.sequential import match
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect
 
-PARTICLES = 64
+PARTICLES = 256
 # What a line of the stream can carry beside deformation and force.
 CARRIED = frozenset({"temperature", "time"})
 _SAME = 1e-9
@@ -36,20 +37,21 @@ def build_particles(
         InputError: an effect remembers earlier rows, needs what a stream does not
             carry, shapes the noise, or is not linear in the stiffness.
     """
-    effects = posterior.problem.effects
     chosen = np.linspace(0, len(posterior.draws["K"]) - 1, PARTICLES).astype(int)
-    findings = [f for effect in effects if (f := _not_followed(effect)) is not None]
+    findings = []
+    for effect in posterior.problem.effects:
+        words = _unfit(effect) or _trial(effect, posterior, begin, chosen[::16])
+        if words:
+            remedy = "Calibrate without it, or diagnose blocks of rows"
+            problem = f"its effect '{effect.name}' {words}"
+            findings.append(Finding("RUN", problem, remedy))
     if forget < 1.0:
         words = "does not go with effects"
         findings.append(Finding("--forget", words, "Leave it out"))
-    of_rows = None
-    if not findings:
-        of_rows = _mean_of_rows(posterior, begin, chosen)
-        findings += _probe(of_rows, posterior)
-    if findings or of_rows is None:
+    if findings:
         raise InputError(findings)
+    of_rows = _mean_of_rows(posterior, begin, chosen)
     core = _core(posterior, begin, chosen)
-
     middle = float(np.mean(np.asarray(begin.base.stiffness)))
     pair = jnp.array([0.8, 1.2]) * middle
     per_read = begin.reading.radial_per_read
@@ -64,24 +66,25 @@ def build_particles(
     return core, mean
 
 
-def _not_followed(effect: type[Effect]) -> Finding | None:
-    lacking = sorted(effect.needs - CARRIED)
+def _unfit(effect: type[Effect]) -> str | None:
+    """Say why an effect cannot be followed, as far as it declares it."""
     if effect.stage == "noise":
-        words = f"its effect '{effect.name}' shapes the noise"
-    elif lacking:
-        needs = ", ".join(lacking)
-        words = f"its effect '{effect.name}' needs {needs}, which a stream lacks"
-    else:
-        return None
-    return _refusal(words)
+        return "shapes the noise, which is taken as one normal"
+    lacking = sorted(effect.needs - CARRIED)
+    return f"needs {', '.join(lacking)}, which a stream lacks" if lacking else None
 
 
-def _refusal(words: str) -> Finding:
-    return Finding("RUN", words, "Calibrate without it, or diagnose blocks of rows")
+def _mean_of_rows(
+    posterior: Posterior, begin: Beginning, chosen: np.ndarray, only: str | None = None
+) -> Callable:
+    """Return the function (rows, stiffnesses) → mean reading [stiffness, draw, row].
 
-
-def _mean_of_rows(posterior: Posterior, begin: Beginning, chosen: np.ndarray):
-    """Return the function (rows, stiffnesses) → mean reading [stiffness, draw, row]."""
+    Args:
+        posterior: whose draws fix everything but stiffness and zero.
+        begin: of the same posterior.
+        chosen: draws.
+        only: name of the one effect to keep.
+    """
     problem = posterior.problem
     values = {name: jnp.asarray(v[chosen]) for name, v in posterior.draws.items()}
 
@@ -91,7 +94,8 @@ def _mean_of_rows(posterior: Posterior, begin: Beginning, chosen: np.ndarray):
         records = replace(records, temperature=warmth, time=rows[:, 2])
         base = Base(stiffness, value["alpha"], value["deformation_offset"], 0.0, 1.0)
         effects = build_effects(problem, value)
-        return predict_reading(base, effects, records, begin.reading)[0]
+        kept = tuple(e for e in effects if only in (None, e.name))
+        return predict_reading(base, kept, records, begin.reading)[0]
 
     over_draws = jax.vmap(one, in_axes=(0, None, None))
     over_both = jax.vmap(over_draws, in_axes=(None, 0, None))
@@ -102,11 +106,12 @@ def _mean_of_rows(posterior: Posterior, begin: Beginning, chosen: np.ndarray):
     return of_rows
 
 
-def _probe(of_rows, posterior: Posterior) -> list[Finding]:
+def _trial(effect: type[Effect], posterior, begin, chosen) -> str | None:
     """Try whether a row's force depends on other rows, or bends in the stiffness.
 
     The trial goes far beyond the tested range, so that what begins there is seen.
     """
+    of_rows = _mean_of_rows(posterior, begin, chosen, effect.name)
     rng, size = np.random.default_rng(0), 40
     reach = 0.2 * float(posterior.case.gear.geometry.radius)
     sizes = np.exp(rng.uniform(np.log(0.01), np.log(max(reach, 0.1)), size))
@@ -119,13 +124,12 @@ def _probe(of_rows, posterior: Posterior) -> list[Finding]:
     alone = jax.jit(lambda row: of_rows(row[None, :], levels)[:, :, 0])
     apart = np.stack([np.asarray(alone(row)) for row in rows], axis=-1)
     scale = np.max(np.abs(together))
-    names = ", ".join(f"'{effect.name}'" for effect in posterior.problem.effects)
     if np.max(np.abs(together - apart)) > _SAME * scale:
-        return [_refusal(f"of its effects {names} one remembers earlier rows")]
+        return "remembers earlier rows"
     bend = together[0] - 2.0 * together[1] + together[2]
     if np.max(np.abs(bend)) > _SAME * scale:
-        return [_refusal(f"of its effects {names} one is not linear in the stiffness")]
-    return []
+        return "is not linear in the stiffness"
+    return None
 
 
 def _core(posterior: Posterior, begin: Beginning, chosen: np.ndarray) -> ParticleCore:

@@ -1,6 +1,8 @@
 """Follow a gear reading by reading: stiffness, the next force, and a change alarm."""
 
+from collections.abc import Callable
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from hdcal.rig.case import Gear
 SCHEMA = "hdcal.track/1"
 ALARM_ROWS = 10_000.0
 _COLDEST, _NEAR_K, _NEAR_MM = -273.15, 1.0, 1e-9
+# Beyond it a force [N] or a time [s] was not measured, and squares would overflow.
+_MOST = 1e12
 
 
 class Tracker:
@@ -59,7 +63,7 @@ class Tracker:
         _check_settings(alarm_rows, forget, reopen)
         self._begin = _beginning(known, seed)
         self._core, self._features = _core(known, self._begin, forget)
-        self._limits = _limits(known)
+        self._limits = _limits(known, self._begin)
         self._needs = _needs(known)
         self._alarm, self._alarm_rows = ChangeAlarm(alarm_rows), alarm_rows
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
@@ -103,7 +107,7 @@ class Tracker:
         features = self._features(deformation, warmth - reference, time or 0.0)
         middle, half, score = self._core.step(features, force)
         self.rows += 1
-        sum_share, alarm = self._alarm.step(score)
+        share, alarm = self._alarm.step(score)
         found = {
             "schema": SCHEMA,
             "status": "ok",
@@ -115,22 +119,24 @@ class Tracker:
             },
             "innovation": score,
             "alarm": alarm,
-            "alarm_score": sum_share,
+            "alarm_score": share,
             "alarm_since_row": self._since,
             "tested": self._tested(deformation, warmth),
         }
         if alarm:
-            self.alarms += 1
-            self._since = self.rows + 1
-            if self._reopen:
-                moved = self._reopen * found["stiffness_N_per_mm"]["mean"]
-                self._core.widen(0, moved**2)
-                self._core.widen(self._core.zero, self._begin.remounting)
+            self._restart()
         if isinstance(self._core, ParticleCore):
-            effective = self._core.effective
-            found["effective_particles"] = effective
-            found["degenerate"] = effective < LEAST_EFFECTIVE
+            found |= _degeneracy(self._core, found["stiffness_N_per_mm"])
         return found
+
+    def _restart(self) -> None:
+        """Begin anew to look for a change, and open what may have changed."""
+        self.alarms += 1
+        self._since = self.rows + 1
+        if self._reopen:
+            moved = self._reopen * self._core.coefficient(0)[0]
+            self._core.widen(0, moved**2)
+            self._core.widen(self._core.zero, self._begin.remounting)
 
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""
@@ -174,8 +180,21 @@ class Tracker:
             raise ValueError(
                 f"a deformation of {deformation:g} mm is none of this gear"
             )
+        if abs(force) > _MOST or abs(time or 0.0) > _MOST:
+            raise ValueError("the force or the time is no measured one")
         if temperature is not None and temperature < _COLDEST:
             raise ValueError("the temperature is below absolute zero")
+        if temperature is not None and temperature > self._limits["hottest"]:
+            raise ValueError(f"{temperature:g} °C leaves nothing of the stiffness")
+
+
+def _degeneracy(core: ParticleCore, stiffness: dict) -> dict:
+    effective = core.effective
+    degenerate = effective < LEAST_EFFECTIVE
+    if degenerate:
+        # A few draws are left: their spread is no posterior's.
+        stiffness |= {"sd": None, "credible_95": None, "narrowed": None}
+    return {"effective_particles": effective, "degenerate": degenerate}
 
 
 def _check_settings(alarm_rows: float, forget: float, reopen: float) -> None:
@@ -206,11 +225,16 @@ def _beginning(known: Posterior | Gear, seed: int) -> Beginning:
     return of_posterior(known, seed)
 
 
-def _core(known: Posterior | Gear, begin: Beginning, forget: float):
+def _core(
+    known: Posterior | Gear, begin: Beginning, forget: float
+) -> tuple[LinearCore | Opening | ParticleCore, Callable[..., Any]]:
+    """Return the core, and what makes of a row the features that it takes."""
     if not isinstance(known, Gear) and known.problem.effects:
         return build_particles(known, begin, forget)
     if isinstance(known, Gear):
-        core = Opening(begin.coefficients(), begin.variance, forget)
+        core: LinearCore | Opening = Opening(
+            begin.coefficients(), begin.variance, forget
+        )
     else:
         core = LinearCore(match(begin.coefficients(), begin.variance), forget)
 
@@ -221,16 +245,22 @@ def _core(known: Posterior | Gear, begin: Beginning, forget: float):
     return core, columns
 
 
-def _limits(known: Posterior | Gear) -> dict:
+def _limits(known: Posterior | Gear, begin: Beginning) -> dict:
     gear = known if isinstance(known, Gear) else known.case.gear
-    radius = float(gear.geometry.radius) * (2.0 if gear.reading == "diametral" else 1.0)
+    # Where the linear law E(T) has lost half of the modulus; never hotter than that.
+    alpha = max(float(np.median(begin.base.alpha)), 1e-5)
+    found = {
+        "radius": float(gear.geometry.radius) / begin.reading.radial_per_read,
+        "hottest": gear.reference_temperature + 0.5 / alpha,
+        "tested": None,
+    }
     if isinstance(known, Gear):
-        return {"radius": radius, "tested": None}
+        return found
     records = known.case.records
-    ends = [np.min(records.deformation) - _NEAR_MM, np.max(records.deformation)]
-    ends += [np.min(records.temperature) - _NEAR_K, np.max(records.temperature)]
-    low, high, cold, warm = map(float, ends)
-    return {"radius": radius, "tested": (low, high + _NEAR_MM, cold, warm + _NEAR_K)}
+    low, high = np.min(records.deformation), np.max(records.deformation)
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    ends = (low - _NEAR_MM, high + _NEAR_MM, cold - _NEAR_K, warm + _NEAR_K)
+    return {**found, "tested": tuple(map(float, ends))}
 
 
 def _needs(known: Posterior | Gear) -> frozenset[str]:

@@ -8,7 +8,7 @@ number of rows between false alarms.
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.stats import norm
 
 # Half the shift, in noise sds, that the sums are quickest to find.
@@ -54,7 +54,7 @@ def threshold_for(rows: float) -> float:
     def excess(h: float) -> float:
         return np.log(run_length(h)) - np.log(2.0 * rows)
 
-    return float(brentq(excess, 0.01, _MOST_THRESHOLD, xtol=1e-10))
+    return float(root_scalar(excess, bracket=(0.01, _MOST_THRESHOLD)).root)
 
 
 class ChangeAlarm:

@@ -10,12 +10,15 @@ from dataclasses import dataclass
 from math import copysign, hypot, inf, sqrt
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.special import digamma, ndtri, polygamma, stdtr, stdtrit
 
 # Directions of relative variance below this were never free, as with a fixed prior.
 _NO_VARIANCE = 1e-13
 _MOST_SHAPE = 1e8
+# What is forgotten fades to the start with its sds this many times as wide: a gear
+# that has changed is not held to what it was.
+_FADED = 10.0
 LEVEL = 0.95
 # A normal score beyond this has no probability left in double precision.
 _FARTHEST = 37.0
@@ -89,7 +92,8 @@ def _shape(spread: float) -> float:
 
     if spread <= 1.0 / _MOST_SHAPE:
         return _MOST_SHAPE
-    return float(np.exp(brentq(excess, np.log(1e-6), np.log(10.0 * _MOST_SHAPE))))
+    ends = (np.log(1e-6), np.log(10.0 * _MOST_SHAPE))
+    return float(np.exp(root_scalar(excess, bracket=ends).root))
 
 
 def normal_score(t: float, freedom: float) -> float:
@@ -122,8 +126,8 @@ class LinearCore:
 
     Args:
         start: what is known before the first row.
-        forget: share λ of what the rows said that is kept at each new row; below 1
-            the knowledge is tempered towards the start, p ← p^λ · p₀^(1−λ)
+        forget: share λ of what is known that is kept at each new row; below 1 the
+            knowledge is tempered towards a start ten times as wide, p ← p^λ · p₀^(1−λ)
             (stabilised forgetting, Kulhavý and Zarrop 1993).
     """
 
@@ -199,7 +203,7 @@ class LinearCore:
         ratio = variance / (self.rate / self.shape)
         spread += ratio * np.outer(direction, direction)
         # R is only fixed up to a rotation: bring it back to a triangle.
-        factor = np.linalg.qr(np.linalg.inv(np.linalg.cholesky(spread)), mode="r")
+        factor = np.linalg.qr(np.linalg.inv(np.linalg.cholesky(spread))).R
         self.factor = factor.tolist()
         self.target = (factor @ np.array(self._now)).tolist()
 
@@ -245,9 +249,9 @@ class LinearCore:
         return total
 
     def _fade(self) -> None:
-        """Temper towards the start, whose factor is one and whose target is zero."""
+        """Temper towards the wide start: a multiple of one, with the target zero."""
         keep, size = self._forget, len(self.target)
-        less, anew = sqrt(keep), sqrt(1.0 - keep)
+        less, anew = sqrt(keep), sqrt(1.0 - keep) / _FADED
         self.factor = [[less * value for value in line] for line in self.factor]
         self.target = [less * value for value in self.target]
         for i in range(size):
