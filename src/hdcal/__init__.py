@@ -7,12 +7,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hdcal.answers.audit.article import Claim
+    from hdcal.answers.audit.audit import audit
     from hdcal.answers.bands import Bands, predict
     from hdcal.answers.calibration import calibrate
+    from hdcal.answers.classical import PolynomialFit, fit
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.summary import summarise
+    from hdcal.answers.tracking import Tracker
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
@@ -27,6 +31,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Bands": "answers.bands",
     "Case": "rig.case",
+    "Claim": "answers.audit.article",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Finding": "errors",
@@ -36,15 +41,19 @@ _HOMES = {
     "InputError": "errors",
     "Noise": "physics.effect",
     "NotUsable": "errors",
+    "PolynomialFit": "answers.classical",
     "Posterior": "inference.posterior",
     "Prior": "rig.priors",
     "Records": "rig.records",
     "Residuals": "answers.residuals",
     "Rows": "physics.effect",
     "THEORIES": "physics.theory",
+    "Tracker": "answers.tracking",
     "Verdict": "answers.diagnosis.verdict",
+    "audit": "answers.audit.audit",
     "calibrate": "answers.calibration",
     "diagnose": "answers.diagnosis.diagnose",
+    "fit": "answers.classical",
     "force": "physics.chain",
     "parameter": "physics.effect",
     "predict": "answers.bands",

@@ -38,6 +38,10 @@ OUTPUTS = frozenset(
         "detection.png",
         "opening.json",
         "labels.json",
+        "fit.json",
+        "fit.svg",
+        "fit.png",
+        "audit.json",
     }
 )
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})

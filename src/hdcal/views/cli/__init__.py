@@ -10,13 +10,16 @@ import sys
 import click
 
 from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.views.cli.audit import audit
 from hdcal.views.cli.blind import blind
 from hdcal.views.cli.calibrate import calibrate
 from hdcal.views.cli.check import check
 from hdcal.views.cli.console import Console, usage_error
 from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
+from hdcal.views.cli.fit import fit
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.track import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -51,7 +54,17 @@ def hdcal() -> None:
     """
 
 
-for _command in (calibrate, diagnose, predict, check, effects, blind):
+for _command in (
+    calibrate,
+    diagnose,
+    predict,
+    track,
+    fit,
+    check,
+    effects,
+    audit,
+    blind,
+):
     hdcal.add_command(_command)
 
 

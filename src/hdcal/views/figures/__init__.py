@@ -8,6 +8,7 @@ from hdcal.views.figures.blind import (
     reliability_figure,
 )
 from hdcal.views.figures.canvas import render
+from hdcal.views.figures.classical import fit_figure
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
 from hdcal.views.figures.shrink import shrink_figure
@@ -19,6 +20,7 @@ __all__ = [
     "calibration_figure",
     "confusion_figure",
     "detection_figure",
+    "fit_figure",
     "prior_figure",
     "reliability_figure",
     "render",

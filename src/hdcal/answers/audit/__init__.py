@@ -1,0 +1,1 @@
+"""The article behind the example data, held against its own formula and readings."""
