@@ -32,9 +32,8 @@ from hdcal.rig.toml_file import nearest
 
 _FACTS = ("E0", "alpha", "poisson")
 CARRIED = (
-    "K is carried over from the tested gear to other sizes. That holds for gears of "
-    "the same proportions of teeth, end and wall; the farther from the tested gear, "
-    "the less."
+    "K is carried over from {gear} to other sizes. That holds for gears of the same "
+    "proportions of teeth, end and wall; the farther away, the less."
 )
 OF_THE_GEAR = (
     "Deformation is that of the gear itself, radial and from its free shape; the rig's "
@@ -82,6 +81,11 @@ class Basis:
         return f"equal-tailed {known} interval"
 
     @property
+    def known_as(self) -> str:
+        """What the gear of the draws is called."""
+        return {"posterior": "the tested gear", "prior": "the gear file"}[self.kind]
+
+    @property
     def poisson(self) -> float:
         """Poisson's ratio of the material in use [-]."""
         own = self.material == self.gear.material
@@ -105,7 +109,7 @@ class Basis:
     @property
     def assumptions(self) -> list[str]:
         """Return what every answer from this basis takes for granted, in words."""
-        words = [CARRIED, OF_THE_GEAR]
+        words = [CARRIED.format(gear=self.known_as), OF_THE_GEAR]
         if self.kind == "prior":
             words.insert(0, _PRIOR_ONLY)
         if self.material != self.gear.material:

@@ -30,12 +30,15 @@ from hdcal.answers.sizes import (
     SIZES,
     beyond_tested,
     far_from_tested,
+    geometry_with,
+    named,
     with_reference,
 )
 from hdcal.answers.target import Target
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.rig.case import Gear
+from hdcal.rig.records import Geometry
 
 
 @dataclass(frozen=True)
@@ -54,6 +57,7 @@ class InverseDesign:
         chosen: the nearest to the tested gear.
         candidates: one for each material.
         tested: the tested gear itself.
+        target: what was kept, of the chosen material.
         elasticities: d ln F / d ln x of the kept force at the chosen design.
         warnings: what is extrapolated, in words.
     """
@@ -69,8 +73,14 @@ class InverseDesign:
     chosen: Candidate
     candidates: tuple[Candidate, ...]
     tested: Candidate
+    target: Target
     elasticities: Mapping[str, float]
     warnings: tuple[str, ...]
+
+    @property
+    def drawing(self) -> Geometry:
+        """The chosen gear's sizes [mm]."""
+        return geometry_with(self.basis.gear.geometry, self.chosen.sizes)
 
 
 def inverse_design(
@@ -139,6 +149,7 @@ def inverse_design(
     chosen = min(met, key=lambda one: one.change)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
     own = make(basis, limit_stress=limit_stress)
+    target = make(chosen.basis, limit_stress=limit_stress)
     return InverseDesign(
         basis,
         gear,
@@ -151,14 +162,10 @@ def inverse_design(
         chosen,
         tuple(found),
         candidate(basis, own, {}, at, limit_force),
-        elasticities(chosen, make(chosen.basis), at),
+        target,
+        elasticities(chosen, target, at),
         (*beyond_tested(basis, np.array([at]), levels), *far_from_tested(basis, sizes)),
     )
-
-
-def named(name: str) -> str:
-    """Return what a size is called on paper: wall_thickness_mm is wall thickness."""
-    return name.removesuffix("_mm").replace("_", " ")
 
 
 def _unmet(found, vary, deformation, limit, probability) -> Finding:

@@ -26,6 +26,13 @@ class NextGear:
     shifts: Mapping[str, np.ndarray]
     words: str
 
+    def interval_kind(self, basis: Basis) -> str:
+        """What an interval over these gears is called: one with scatter predicts."""
+        if not self.shifts and not np.any(self.deviation):
+            return basis.interval_kind
+        known = {"posterior": "predictive", "prior": "prior predictive"}[basis.kind]
+        return f"equal-tailed {known} interval"
+
     def factor(self, basis: Basis, geometry: Geometry):
         """Return stiffness over the tested gear's of each gear, shape (draw,)."""
         moved = {

@@ -19,6 +19,11 @@ SIZES = {
 }
 
 
+def named(name: str) -> str:
+    """Return what a size is called on paper: wall_thickness_mm is wall thickness."""
+    return name.removesuffix("_mm").replace("_", " ")
+
+
 def geometry_with(geometry: Geometry, sizes: Mapping[str, Array | float]) -> Geometry:
     """Return the geometry with some of its sizes [mm] replaced, by edge name."""
     return replace(geometry, **{SIZES[name]: value for name, value in sizes.items()})

@@ -38,6 +38,15 @@ OUTPUTS = frozenset(
         "detection.png",
         "opening.json",
         "labels.json",
+        "design.json",
+        "design.svg",
+        "design.png",
+        "profile.svg",
+        "profile.png",
+        "study.csv",
+        "study.json",
+        "study.svg",
+        "study.png",
     }
 )
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})

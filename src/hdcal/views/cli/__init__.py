@@ -14,9 +14,11 @@ from hdcal.views.cli.blind import blind
 from hdcal.views.cli.calibrate import calibrate
 from hdcal.views.cli.check import check
 from hdcal.views.cli.console import Console, usage_error
+from hdcal.views.cli.design import design
 from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.study import study
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -51,7 +53,7 @@ def hdcal() -> None:
     """
 
 
-for _command in (calibrate, diagnose, predict, check, effects, blind):
+for _command in (calibrate, diagnose, predict, design, study, check, effects, blind):
     hdcal.add_command(_command)
 
 
