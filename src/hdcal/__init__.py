@@ -14,13 +14,17 @@ if TYPE_CHECKING:
     from hdcal.answers.classical import PolynomialFit, fit
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
+    from hdcal.answers.inverse_design import InverseDesign, inverse_design
     from hdcal.answers.residuals import Residuals, residuals
+    from hdcal.answers.study import Study, study
     from hdcal.answers.summary import summarise
     from hdcal.answers.tracking import Tracker
+    from hdcal.answers.wave_generator import WaveGenerator, wave_generator
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
+    from hdcal.physics.profile import Profile, ring_profile
     from hdcal.physics.registry import EFFECTS
     from hdcal.physics.theory import THEORIES
     from hdcal.rig.case import Case, Gear
@@ -40,26 +44,34 @@ _HOMES = {
     "HdcalError": "errors",
     "InputError": "errors",
     "Noise": "physics.effect",
+    "InverseDesign": "answers.inverse_design",
     "NotUsable": "errors",
     "PolynomialFit": "answers.classical",
     "Posterior": "inference.posterior",
     "Prior": "rig.priors",
+    "Profile": "physics.profile",
     "Records": "rig.records",
     "Residuals": "answers.residuals",
     "Rows": "physics.effect",
+    "Study": "answers.study",
     "THEORIES": "physics.theory",
     "Tracker": "answers.tracking",
     "Verdict": "answers.diagnosis.verdict",
     "audit": "answers.audit.audit",
+    "WaveGenerator": "answers.wave_generator",
     "calibrate": "answers.calibration",
     "diagnose": "answers.diagnosis.diagnose",
     "fit": "answers.classical",
     "force": "physics.chain",
+    "inverse_design": "answers.inverse_design",
     "parameter": "physics.effect",
     "predict": "answers.bands",
     "read_case": "rig.reading",
     "residuals": "answers.residuals",
+    "ring_profile": "physics.profile",
+    "study": "answers.study",
     "summarise": "answers.summary",
+    "wave_generator": "answers.wave_generator",
 }
 
 __all__ = [*sorted(_HOMES)]

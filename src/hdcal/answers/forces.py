@@ -78,3 +78,51 @@ def force_of(
         base = replace(base, force_offset=jnp.zeros_like(base.force_offset))
         effects = tuple(e for e in effects if e.stage in _OF_THE_GEAR)
     return predict_reading(base, effects, records, problem.reading)
+
+
+def gear_force(
+    problem: Problem,
+    values: Values,
+    deformation: Float[Array, " n"],
+    temperature: Float[Array, " n"],
+    *,
+    factor: Float[Array, " n"] | Float[Array, ""] | float = 1.0,
+) -> Float[Array, " n"]:
+    """Compute the force on a gear at a deformation of its own, without the rig.
+
+    A product has neither the rig's zeros nor its compliance: ω is what the gear sees,
+    counted from its free shape. Left are the force model, effects on the force and,
+    where it was fitted, the leftover discrepancy. Each row is another gear, pressed
+    from rest in one go.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        deformation: radial ω [mm].
+        temperature: of the gear [°C].
+        factor: stiffness relative to the tested gear's [-]; the leftover discrepancy
+            is taken to grow with it.
+
+    Returns:
+        Force [N].
+    """
+    sense = np.ones(len(deformation))
+    as_read = deformation / problem.reading.radial_per_read
+    records = grid_records(as_read, temperature, sense, 0.0)
+    # A run for each row: what remembers starts from rest in each.
+    own = np.arange(len(deformation))
+    records = replace(records, run=own, specimen=own)
+    base = member_base(problem, values)
+    zero = jnp.zeros(())
+    base = replace(
+        base,
+        stiffness=base.stiffness * factor,
+        deformation_offset=zero,
+        force_offset=zero,
+    )
+    effects = [e for e in build_effects(problem, values) if e.stage == "force"]
+    force, _ = predict_reading(base, effects, records, problem.reading)
+    if problem.gap is not None:
+        columns = problem.gap.columns(as_read + values["deformation_offset"])
+        force = force + factor * (columns @ values["gap_weights"])
+    return force

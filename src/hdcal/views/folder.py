@@ -42,6 +42,15 @@ OUTPUTS = frozenset(
         "fit.svg",
         "fit.png",
         "audit.json",
+        "design.json",
+        "design.svg",
+        "design.png",
+        "profile.svg",
+        "profile.png",
+        "study.csv",
+        "study.json",
+        "study.svg",
+        "study.png",
     }
 )
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})

@@ -15,10 +15,12 @@ from hdcal.views.cli.blind import blind
 from hdcal.views.cli.calibrate import calibrate
 from hdcal.views.cli.check import check
 from hdcal.views.cli.console import Console, usage_error
+from hdcal.views.cli.design import design
 from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.fit import fit
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.study import study
 from hdcal.views.cli.track import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -58,6 +60,8 @@ for _command in (
     calibrate,
     diagnose,
     predict,
+    design,
+    study,
     track,
     fit,
     check,

@@ -9,9 +9,15 @@ from hdcal.views.figures.blind import (
 )
 from hdcal.views.figures.canvas import render
 from hdcal.views.figures.classical import fit_figure
+from hdcal.views.figures.design import (
+    generator_figure,
+    inverse_figure,
+    profile_figure,
+)
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
 from hdcal.views.figures.shrink import shrink_figure
+from hdcal.views.figures.study import study_figure
 from hdcal.views.figures.where import where_figure
 from hdcal.views.figures.which import which_figure
 
@@ -21,12 +27,16 @@ __all__ = [
     "confusion_figure",
     "detection_figure",
     "fit_figure",
+    "generator_figure",
+    "inverse_figure",
     "prior_figure",
+    "profile_figure",
     "reliability_figure",
     "render",
     "residual_figure",
     "sampler_figure",
     "shrink_figure",
+    "study_figure",
     "where_figure",
     "which_figure",
 ]

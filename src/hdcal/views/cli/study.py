@@ -1,0 +1,128 @@
+"""`hdcal study`: the force on gears of many sizes, with its bands."""
+
+import shlex
+import sys
+
+import click
+
+from hdcal.errors import Finding, InputError
+from hdcal.views.cli.acceleration import keep_compilations
+from hdcal.views.cli.console import Console
+from hdcal.views.cli.options import force_option, json_option, read_grid, seed_option
+from hdcal.views.cli.quantities import (
+    Collector,
+    names_in,
+    read_list,
+    read_named,
+    read_quantity,
+)
+
+
+@click.command(short_help="Force over sizes and materials, with bands.")
+@click.argument("run", metavar="RUN", required=False)
+@click.option(
+    "--gear", metavar="GEAR.toml", help="Without RUN: a gear of which priors are known."
+)
+@click.option(
+    "--vary",
+    metavar="NAME=VALUES",
+    multiple=True,
+    help="wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45; may be repeated. Also "
+    "length_mm, load_height_mm, deformation_mm, temperature_C.",
+)
+@click.option(
+    "--material",
+    metavar="NAME",
+    multiple=True,
+    help="Materials to compare [default: the gear's].",
+)
+@click.option("--deformation", metavar="MM", help="Radial [default: nominal].")
+@click.option(
+    "--temperature", type=float, metavar="C", help="[default: the reference one]"
+)
+@click.option(
+    "--article",
+    is_flag=True,
+    help="Print the article's Tables 3 and 4 beside consistent values instead.",
+)
+@seed_option
+@click.option("--out", metavar="DIR", help="Result folder [default: NAME-study].")
+@force_option
+@json_option
+@click.pass_obj
+def study(console: Console, run, gear, article, out, force, **given):
+    """Compute the force for every combination of sizes, from RUN.
+
+    RUN is a folder of `hdcal calibrate`.
+    """
+    from hdcal.views.cli.sources import check_source, open_source
+    from hdcal.views.folder import check_target
+
+    keep_compilations()
+    if article:
+        return _article(console, run, gear, out, given)
+    from hdcal.answers.asked import name_findings
+    from hdcal.answers.study import AXES
+
+    collector = Collector()
+    collector.findings += check_source(run, gear)
+    asked = _read(collector, given)
+    names = names_in(given["vary"])
+    collector.findings += name_findings(names, AXES, "--vary")
+    source, name = collector.read(open_source, run, gear) or (None, "x")
+    target = f"{name}-study" if out is None else out
+    collector.read(lambda: check_target(target, force=force))
+    collector.check()
+    return _study(console, source, asked, target, force)
+
+
+def _read(collector: Collector, given: dict) -> dict:
+    text = given["deformation"]
+    if not given["vary"] and not given["material"]:
+        words, remedy = "nothing is varied", "Say --vary wall_thickness_mm=0.6:0.76:5"
+        collector.findings.append(Finding("--vary", words, remedy))
+    return {
+        "vary": collector.read(read_named, given["vary"], "--vary", read_grid),
+        "materials": read_list(given["material"]),
+        "deformation": None
+        if text is None
+        else collector.read(read_quantity, text, "mm", "--deformation"),
+        "temperature": given["temperature"],
+        "seed": given["seed"],
+    }
+
+
+def _study(console: Console, source, asked, target, force) -> int:
+    from hdcal.answers.study import study as run_study
+    from hdcal.views.cli.design_closing import closing_words
+    from hdcal.views.design_result import write_study
+
+    command = shlex.join(["hdcal", *sys.argv[1:]])
+    found = run_study(source, **asked)
+    told = write_study(found, target, command=command, force=force)
+    console.table(*closing_words(told, str(target)))
+    if console.json:
+        console.data(told)
+    return 0
+
+
+def _article(console: Console, run, gear, out, given: dict) -> int:
+    foreign = {"gear": gear, "out": out, **given, "seed": None}
+    findings = [
+        Finding(f"--{name}", "has no meaning with --article", "leave it out")
+        for name, value in foreign.items()
+        if value
+    ]
+    if findings:
+        raise InputError(findings)
+    from hdcal.answers.article_tables import article_rows
+    from hdcal.answers.design_summary import summarise_article
+    from hdcal.inference.posterior import Posterior
+    from hdcal.views.cli.design_closing import article_words
+
+    posterior = None if run is None else Posterior.load(run)
+    told = summarise_article(article_rows(posterior))
+    console.table(*article_words(told))
+    if console.json:
+        console.data(told)
+    return 0
