@@ -18,6 +18,7 @@ PUBLIC = [
     "Geometry",
     "HdcalError",
     "InputError",
+    "Margin",
     "Noise",
     "NotUsable",
     "Posterior",
@@ -30,11 +31,14 @@ PUBLIC = [
     "calibrate",
     "diagnose",
     "force",
+    "k_factor",
+    "margin",
     "parameter",
     "predict",
     "read_case",
     "residuals",
     "summarise",
+    "wilks_size",
 ]
 LOADED = """
 import sys

@@ -11,8 +11,11 @@ if TYPE_CHECKING:
     from hdcal.answers.calibration import calibrate
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
+    from hdcal.answers.margins.answer import Margin
+    from hdcal.answers.margins.margin import margin
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.summary import summarise
+    from hdcal.answers.tolerance import k_factor, wilks_size
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
@@ -34,6 +37,7 @@ _HOMES = {
     "Geometry": "rig.records",
     "HdcalError": "errors",
     "InputError": "errors",
+    "Margin": "answers.margins.answer",
     "Noise": "physics.effect",
     "NotUsable": "errors",
     "Posterior": "inference.posterior",
@@ -46,11 +50,14 @@ _HOMES = {
     "calibrate": "answers.calibration",
     "diagnose": "answers.diagnosis.diagnose",
     "force": "physics.chain",
+    "k_factor": "answers.tolerance",
+    "margin": "answers.margins.margin",
     "parameter": "physics.effect",
     "predict": "answers.bands",
     "read_case": "rig.reading",
     "residuals": "answers.residuals",
     "summarise": "answers.summary",
+    "wilks_size": "answers.tolerance",
 }
 
 __all__ = [*sorted(_HOMES)]

@@ -10,6 +10,7 @@ from hdcal.views.figures.blind import (
 from hdcal.views.figures.canvas import render
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
+from hdcal.views.figures.margin import margin_figure, tornado_figure
 from hdcal.views.figures.shrink import shrink_figure
 from hdcal.views.figures.where import where_figure
 from hdcal.views.figures.which import which_figure
@@ -19,12 +20,14 @@ __all__ = [
     "calibration_figure",
     "confusion_figure",
     "detection_figure",
+    "margin_figure",
     "prior_figure",
     "reliability_figure",
     "render",
     "residual_figure",
     "sampler_figure",
     "shrink_figure",
+    "tornado_figure",
     "where_figure",
     "which_figure",
 ]

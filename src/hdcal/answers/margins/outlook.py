@@ -17,9 +17,9 @@ from scipy import stats
 from scipy.stats import qmc
 
 from hdcal.answers.forces import Quantity, force_of, grid_records
-from hdcal.answers.mixture import Mixture
-from hdcal.answers.population import Population
-from hdcal.answers.tolerances import Nodes
+from hdcal.answers.margins.mixture import Mixture
+from hdcal.answers.margins.population import Population
+from hdcal.answers.margins.tolerances import Nodes
 from hdcal.inference.density import Values
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
@@ -79,6 +79,11 @@ class Outlook:
     quantity: Quantity
     nodes: Nodes
 
+    @property
+    def rounded(self) -> bool:
+        """Whether what is asked for is read in steps."""
+        return self.quantity == "reading" and float(self.posterior.problem.step) > 0.0
+
     def mixture(self, temperature: float, scale=1.0, nodes: Nodes | None = None):
         """Return the mixture of every draw [draw, component] at a temperature [°C].
 
@@ -96,7 +101,7 @@ class Outlook:
             self.nodes if nodes is None else nodes,
             population=self.population,
             quantity=self.quantity,
-            rounded=self.quantity == "reading" and float(self.posterior.problem.step) > 0,
+            rounded=self.rounded,
         )
 
 
@@ -191,7 +196,7 @@ def member_mixture(
     factor = base * (1.0 + centre + own * place)
     within = factor * (nodes.width / nodes.factor)[:, None]
     width2 = ((base * own * tangent) ** 2 + within**2).ravel()
-    at = partial(_reading, problem, value, question, temperature, quantity)
+    at = partial(member_force, problem, value, question, temperature, quantity)
     one = jnp.ones(())
     mean, slope, (log_weight, noise) = jax.vmap(
         lambda f: jax.jvp(at, (f,), (one,), has_aux=True)
@@ -216,7 +221,7 @@ def _split(bent: bool):
     return _AT_NODES * place, share / share.sum(), np.sqrt(1.0 - _AT_NODES**2)
 
 
-def _reading(problem, value, question: Question, temperature, quantity, factor):
+def member_force(problem, value, question: Question, temperature, quantity, factor):
     """Return the mean force of one member, and weights and sds of its noise."""
     along, sense = [question.deformation], [1.0]
     if question.down:

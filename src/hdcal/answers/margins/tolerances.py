@@ -59,13 +59,14 @@ def check_tolerances(
             find(name, f"= {size:g} is no tolerance", "Give the ± part, in mm")
         elif size > _LARGEST * nominal:
             find(name, f"= {size:g} on a size of {nominal:g} mm", "Give it in mm")
-        elif not _matters(field, geometry, theory):
+        elif not matters(field, geometry, theory):
             words = f"does not enter the theory '{theory}'"
             find(name, words, "Leave it out, or calibrate with --theory cup")
     return findings
 
 
-def _matters(field: str, geometry: Geometry, theory: Theory) -> bool:
+def matters(field: str, geometry: Geometry, theory: Theory) -> bool:
+    """Tell whether a size enters a theory's stiffness."""
     stiffness = THEORIES[theory]
     larger = replace(geometry, **{field: 1.01 * float(getattr(geometry, field))})
     return float(stiffness(larger, 1.0)) != float(stiffness(geometry, 1.0))
