@@ -2,7 +2,13 @@
 
 from hdcal.answers.margins.answer import Level, Margin
 from hdcal.inference.posterior import Posterior
-from hdcal.views.margin_words import bound_name, chance, index, input_label
+from hdcal.views.margin_words import (
+    bound_name,
+    chance,
+    index,
+    input_label,
+    newtons,
+)
 from hdcal.views.page import gear_rows, render_page
 from hdcal.views.verdict_words import hypothesis
 from hdcal.views.wording import number
@@ -33,6 +39,10 @@ def margin_report(
         "found": plain,
         "bounds": bound_name(found),
         "levels": [_level(level) for level in found.levels],
+        "averaged": [
+            newtons(found.worst.lower_bound_N),
+            newtons(found.worst.upper_bound_N),
+        ],
         "models": [_model(model) for model in plain["models"]],
         "gradients": [_gradient(slope) for slope in plain["gradients"]],
         "provenance": _provenance(found, posterior, plain, command),
@@ -52,8 +62,8 @@ def _level(level: Level) -> dict:
         "tested": level.tested,
         "mean": _span(level.force_N),
         "member": _span(level.member_N),
-        "lower": f"{level.lower_bound_N:.4g}",
-        "upper": f"{level.upper_bound_N:.4g}",
+        "lower": newtons(level.lower_bound_N),
+        "upper": newtons(level.upper_bound_N),
         "risk": "–" if risk is None else chance(risk.probability),
         "beta": "–" if risk is None else index(risk.beta),
     }
@@ -63,8 +73,8 @@ def _model(model: dict) -> dict:
     return {
         "name": hypothesis(model["model"]),
         "probability": f"{100.0 * model['probability']:.0f} %",
-        "lower": f"{model['lower_bound_N']:.4g}",
-        "upper": f"{model['upper_bound_N']:.4g}",
+        "lower": newtons(model["lower_bound_N"]),
+        "upper": newtons(model["upper_bound_N"]),
     }
 
 

@@ -20,7 +20,7 @@ KINDS = {
     "upper_bound_N": "one-sided bound, content and confidence",
     "capacity_N": "quantile of the population, with the stated confidence",
     "capacity_predictive_N": "quantile of the predictive distribution",
-    "exceedance": "probability of one future member; lo and hi of the population's share",
+    "exceedance": "of one future member; lo and hi: credible interval of the share",
 }
 
 

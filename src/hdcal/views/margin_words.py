@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator
 
-from hdcal.answers.margins.answer import Exceedance, Level, Margin
+from hdcal.answers.margins.answer import Exceedance, Margin
 from hdcal.views.verdict_words import hypothesis
 from hdcal.views.wording import number
 
 _MEMBER = {"readings": "reading", "mountings": "mounting", "specimens": "gear"}
+_MANY = {"readings": "readings", "mountings": "mountings", "specimens": "gears"}
 _INPUTS = {
     "calibration": "calibration (stiffness, zeros)",
     "cause": "which effect is at work",
@@ -73,59 +74,66 @@ def _where(found: Margin) -> str:
     return f"over {min(warm):g} … {max(warm):g} °C"
 
 
-def _newtons(value: float) -> str:
-    return f"{value:.4g} N" if abs(value) < 1e4 else f"{value:.5g} N"
+def newtons(value: float) -> str:
+    """Return a force to four digits."""
+    return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
 
 
 def _force(found: Margin) -> Iterator[str]:
     level, share = found.worst, f"{100.0 * found.content:.6g} %"
-    what = "reading" if found.quantity == "reading" else "load"
-    way = "" if found.direction == "up" else ", unloading"
+    what = "force that the gauge shows" if found.quantity == "reading" else "load"
+    way = "" if found.direction == "up" else ", unloading,"
     several = len(found.levels) > 1
-    at = f" at its worst, {level.temperature_C:g} °C" if several else ""
+    at = f" at its worst, {level.temperature_C:g} °C," if several else ""
     sure = f"{100.0 * found.confidence:.6g} %"
     width = level.force_N.hi - level.force_N.lo
-    low, high = (number(end, width) for end in (level.force_N.lo, level.force_N.hi))
-    yield (
-        f"At {found.deformation_mm:g} mm{way} the mean force ({what}){at} is "
-        f"{number(level.force_N.median, width)} N, 95 % credible interval "
-        f"{low} … {high} N."
+    low, middle, high = (
+        number(end, width)
+        for end in (level.force_N.lo, level.force_N.median, level.force_N.hi)
     )
-    basis = f" ({found.basis})" if found.basis else ""
     yield (
-        f"With {sure} confidence {share} of them need at most "
-        f"{_newtons(level.upper_bound_N)}, {_where(found)}{basis}; by another bound, as "
-        f"sure by itself, {share} need at least {_newtons(level.lower_bound_N)}."
+        f"At {found.deformation_mm:g} mm{way} the mean {what}{at} is {middle} N, 95 % "
+        f"credible interval {low} … {high} N."
     )
-    yield f"“They” are: {found.population_words}"
+    basis = f", an {found.basis} value" if found.basis[:1] == "A" else ""
+    basis = f", a {found.basis} value" if found.basis[:1] == "B" else basis
+    yield (
+        f"With {sure} confidence {share} of {_MANY[found.population]} need at most "
+        f"{newtons(level.upper_bound_N)} {_where(found)}{basis}. Taken by itself, the "
+        f"bound from below is as sure: {share} need at least "
+        f"{newtons(level.lower_bound_N)}."
+    )
+    yield f"Whose forces these are: {_lower(found.population_words)}"
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def _capacity(found: Margin) -> Iterator[str]:
-    level = found.worst
+    level, sure = found.worst, f"{100.0 * found.confidence:.6g} %"
     if level.exceedance is not None:
         yield from _exceedance(found, level.exceedance)
     yield (
-        f"To hold {100.0 * found.required_probability:.8g} % of them, "
-        f"{_needed(found, level)}."
-    )
-
-
-def _needed(found: Margin, level: Level) -> str:
-    sure = f"{100.0 * found.confidence:.6g} %"
-    return (
-        f"a capacity of {_newtons(level.capacity_predictive_N)} is expected to do, and "
-        f"{_newtons(level.capacity_N)} does with {sure} confidence"
+        f"To hold {100.0 * found.required_probability:.8g} % of "
+        f"{_MANY[found.population]}, a capacity of "
+        f"{newtons(level.capacity_predictive_N)} is expected to do; "
+        f"{newtons(level.capacity_N)} does with {sure} confidence."
     )
 
 
 def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     one = f"One future {member_word(found)} needs more than {found.limit_force_N:g} N"
     sure = f"{100.0 * found.confidence:.6g} %"
+    if risk.hi < _RAREST:
+        yield f"{one} with a probability of {chance(risk.hi)}: β is {index(risk.beta)}."
+        return
     yield (
-        f"{one} with probability {chance(risk.probability)} (reliability index β = "
-        f"{index(risk.beta)}). The share of all that do lies between {chance(risk.lo)} "
-        f"and {chance(risk.hi)} (95 %), and with {sure} confidence below "
-        f"{chance(risk.at_confidence)} (β = {index(risk.beta_at_confidence)} or more)."
+        f"{one} with a probability of {chance(risk.probability)}: reliability index "
+        f"β = {index(risk.beta)}. The share of all {_MANY[found.population]} that do lies "
+        f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
+        f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
+        f"{index(risk.beta_at_confidence)}."
     )
 
 
@@ -146,10 +154,10 @@ def _inverse(found: Margin) -> Iterator[str]:
     share = f"{100.0 * found.content:.6g} %"
     tested = "" if got.tested else " Part of this lies outside what was tested."
     yield (
-        f"The other way round: {middle} in the mean{span}; with "
-        f"{100.0 * found.confidence:.6g} % confidence {share} of them get at least to "
-        f"{at(got.lower_bound_mm)}, and {share} at most to {at(got.upper_bound_mm)}."
-        f"{tested}"
+        f"The other way round: {middle} in the mean{span}. With "
+        f"{100.0 * found.confidence:.6g} % confidence {share} of "
+        f"{_MANY[found.population]} get at least to {at(got.lower_bound_mm)}, and as "
+        f"surely {share} get at most to {at(got.upper_bound_mm)}.{tested}"
     )
 
 
@@ -158,7 +166,7 @@ def _models(found: Margin) -> Iterator[str]:
         return
     each = "; ".join(
         f"{hypothesis(model.model)} ({100.0 * model.probability:.0f} %): "
-        f"{_newtons(model.upper_bound_N)}"
+        f"{newtons(model.upper_bound_N)}"
         for model in found.models
     )
     likeliest = max(found.models, key=lambda model: model.probability)

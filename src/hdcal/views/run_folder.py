@@ -14,7 +14,7 @@ ORIGIN = "diagnosis"
 
 
 def member_files(verdict: Verdict) -> dict[str, str]:
-    """Return the file of each calibrated hypothesis; the likeliest has the usual one."""
+    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
     ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
     files = {name: f"posterior-{name}.nc" for name in ranked}
     return files | dict.fromkeys(ranked[:1], FILE_NAME)

@@ -121,10 +121,10 @@ def gradients(
             mixture = at(replace(outlook, values=few), point=point, origin=own)
             return part[part > 0.0] @ mixture.quantile(content)
 
-        for name, slope in jax.jacfwd(centre)(own).items():
+        for name, slope in jax.jit(jax.jacfwd(centre))(own).items():
             force[name] += share * float(slope)
         if part.any():
-            for name, slope in jax.jacfwd(upper)(own).items():
+            for name, slope in jax.jit(jax.jacfwd(upper))(own).items():
                 bound[name] += float(slope)
     return tuple(
         Gradient(n, v, bound[n], force[n], 0.01 * v * bound[n])

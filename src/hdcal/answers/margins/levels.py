@@ -124,6 +124,13 @@ class Answers:
 def ask(
     outlooks: Sequence[tuple[float, Outlook]], temperatures, asked: Asked
 ) -> Answers:
+    """Put the questions to every draw of every model.
+
+    Args:
+        outlooks: of each model, with its probability.
+        temperatures: of the specimen [°C].
+        asked: the questions.
+    """
     wanted = jnp.array([1.0 - asked.content, asked.content, asked.required])
     levels = jnp.array([*_TAILS, asked.required])
     limit = jnp.asarray(np.inf if asked.limit is None else asked.limit)

@@ -9,10 +9,10 @@ from hdcal.answers.residuals import residuals
 from hdcal.inference.posterior import Posterior
 
 CALIBRATION_NOTE = (
-    "“Calibration” is stiffness, zeros, effects and leftover together: the data tie them "
-    "to each other, so that they have no shares of their own; of K and E0 only the "
-    "product matters. The loss of modulus per kelvin stands alone only where it is the "
-    "prior's."
+    "“Calibration” is stiffness, zeros, effects and leftover together: the data tie "
+    "them to each other, so that they have no shares of their own; of K and E0 only "
+    "the product matters. The loss of modulus per kelvin stands alone only where it "
+    "is the prior's."
 )
 # As of the bands: thermometers are no better [K].
 _NEAR_K = 1.0

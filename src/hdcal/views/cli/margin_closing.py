@@ -20,7 +20,7 @@ def closing_words(plain: dict, folder: str | None) -> Iterator[RenderableType]:
     yield Text(f"{plain['gear']['name']}, theory {plain['gear']['theory']}", "bold")
     for sentence in plain["answer"]:
         yield Text(sentence)
-    yield from paragraph("Extrapolated", plain["extrapolated"], "yellow")
+    yield from paragraph("Outside what was tested", plain["extrapolated"], "yellow")
     yield from paragraph("To be aware of", plain["remarks"], "yellow")
     if folder is not None:
         yield Text(f"\nThe result: {harmless(folder)}  (open report.html)")

@@ -90,15 +90,14 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
         axes.axvline(found.limit_force_N, color=RED, linewidth=1.4)
         axes.annotate(
             f"capacity {found.limit_force_N:g} N",
-            (found.limit_force_N, 0.03),
-            (-5, 0),
-            xycoords=("data", "axes fraction"),
+            (found.limit_force_N, 0.5),
+            xytext=(-4, 0),
             textcoords="offset points",
             color=RED,
-            rotation=90,
             ha="right",
-            va="bottom",
+            va="center",
             fontsize=8.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
         )
 
 
@@ -144,7 +143,8 @@ def _draw_window(axes: Axes, found: Margin) -> None:
     axes.set_xlabel("temperature [°C]")
     axes.set_ylabel("force [N]")
     axes.margins(y=0.12)
-    axes.legend(handles, texts, ncols=3, loc="best")
+    under = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
+    axes.legend(handles, texts, ncols=3, **under)
 
 
 def tornado_figure(found: Margin) -> Figure:
@@ -159,7 +159,7 @@ def tornado_figure(found: Margin) -> Figure:
 
 
 def _draw_shares(axes: Axes, found: Margin) -> None:
-    heading(axes, f"What one {member_word(found)}'s scatter is made of")
+    heading(axes, f"What one {member_word(found)} scatters by")
     ranked = sorted(found.shares, key=lambda share: -share.total)
     for place, share in enumerate(ranked):
         colour = _DRIVEN[share.driven_by]
@@ -189,7 +189,7 @@ def _draw_shares(axes: Axes, found: Margin) -> None:
 
 
 def _draw_gradients(axes: Axes, found: Margin) -> None:
-    heading(axes, "What one per cent more does to it")
+    heading(axes, "Upper bound, for + 1 % of")
     ranked = sorted(found.gradients, key=lambda slope: -abs(slope.bound_N_per_percent))
     values = [slope.bound_N_per_percent for slope in ranked]
     colours = [RED if value > 0.0 else BLUE for value in values]
@@ -208,6 +208,6 @@ def _draw_gradients(axes: Axes, found: Margin) -> None:
     axes.set_yticks(range(len(ranked)), [input_label(slope.name) for slope in ranked])
     axes.tick_params(axis="y", labelsize=8.5, length=0)
     axes.set_ylim(len(ranked) - 0.4, -0.6)
-    axes.margins(x=0.32)
-    axes.set_xlabel("change of the upper bound [N]")
+    axes.margins(x=0.4)
+    axes.set_xlabel("change [N]")
     axes.grid(False, axis="y")
