@@ -130,7 +130,7 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         return
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
-        f"β = {index(risk.beta)}. The share of all {_MANY[found.population]} that do lies "
+        f"β = {index(risk.beta)}. The share of {_MANY[found.population]} that do lies "
         f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
         f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
         f"{index(risk.beta_at_confidence)}."

@@ -64,7 +64,7 @@ def check_margin(
         deformation: as read [mm].
         temperature: of the specimen [°C].
         forces: limit_force and given_force [N], or None.
-        shares: content, confidence and required_probability.
+        shares: content, confidence and, where given, required_probability.
         draws: of all models.
         population: whose force, or None.
         quantity: which force.
@@ -130,7 +130,7 @@ def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:
         words = f"{draws} draws cannot tell a confidence of {sure:g}"
         remedy = f"Ask for {most:.4g} or less, or calibrate with more --draws"
         findings.append(Finding("--confidence", words, remedy))
-    for name in ("content", "required_probability"):
+    for name in shares.keys() - {"confidence"}:
         if 1.0 - _RAREST < shares[name] < 1.0:
             words = f"{shares[name]:.12g} is beyond what any model of noise can promise"
             remedy = "Ask for 0.999999999 or less"

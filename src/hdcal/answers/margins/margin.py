@@ -83,11 +83,8 @@ def margin(
         deformation=deformation,
         temperature=warm,
         forces={"limit_force": limit_force, "given_force": given_force},
-        shares={
-            "content": content,
-            "confidence": confidence,
-            "required_probability": required,
-        },
+        shares={"content": content, "confidence": confidence}
+        | ({} if required_probability is None else {"required_probability": required}),
         draws=sum(len(model.draws["K"]) for _, model in members),
         population=population,
         quantity=quantity,

@@ -152,13 +152,9 @@ def pooled(parts: list[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
         weights.append((share[:, None] * jnp.broadcast_to(part.weight, shape)).ravel())
         means.append(part.mean.ravel())
         sds.append(jnp.broadcast_to(part.sd, shape).ravel())
-    steps = {float(part.step) for _, part in parts}
-    return Mixture(
-        jnp.concatenate(weights),
-        jnp.concatenate(means),
-        jnp.concatenate(sds),
-        max(steps),
-    )
+    first = parts[0][1]
+    columns = map(jnp.concatenate, (weights, means, sds))
+    return Mixture(*columns, first.step, first.rounded)
 
 
 def weighted_quantile(
