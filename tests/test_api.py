@@ -20,6 +20,7 @@ PUBLIC = [
     "HdcalError",
     "InputError",
     "InverseDesign",
+    "Margin",
     "Noise",
     "NotUsable",
     "PolynomialFit",
@@ -40,6 +41,8 @@ PUBLIC = [
     "fit",
     "force",
     "inverse_design",
+    "k_factor",
+    "margin",
     "parameter",
     "predict",
     "read_case",
@@ -48,6 +51,7 @@ PUBLIC = [
     "study",
     "summarise",
     "wave_generator",
+    "wilks_size",
 ]
 LOADED = """
 import sys

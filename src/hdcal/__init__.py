@@ -15,9 +15,12 @@ if TYPE_CHECKING:
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
     from hdcal.answers.inverse_design import InverseDesign, inverse_design
+    from hdcal.answers.margins.answer import Margin
+    from hdcal.answers.margins.margin import margin
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.study import Study, study
     from hdcal.answers.summary import summarise
+    from hdcal.answers.tolerance import k_factor, wilks_size
     from hdcal.answers.tracking import Tracker
     from hdcal.answers.wave_generator import WaveGenerator, wave_generator
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
@@ -43,6 +46,7 @@ _HOMES = {
     "Geometry": "rig.records",
     "HdcalError": "errors",
     "InputError": "errors",
+    "Margin": "answers.margins.answer",
     "Noise": "physics.effect",
     "InverseDesign": "answers.inverse_design",
     "NotUsable": "errors",
@@ -64,6 +68,8 @@ _HOMES = {
     "fit": "answers.classical",
     "force": "physics.chain",
     "inverse_design": "answers.inverse_design",
+    "k_factor": "answers.tolerance",
+    "margin": "answers.margins.margin",
     "parameter": "physics.effect",
     "predict": "answers.bands",
     "read_case": "rig.reading",
@@ -72,6 +78,7 @@ _HOMES = {
     "study": "answers.study",
     "summarise": "answers.summary",
     "wave_generator": "answers.wave_generator",
+    "wilks_size": "answers.tolerance",
 }
 
 __all__ = [*sorted(_HOMES)]

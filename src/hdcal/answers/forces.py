@@ -4,7 +4,7 @@ Every answer about the future rests on this: bands, margins, designs and studies
 """
 
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +19,7 @@ from hdcal.rig.records import Array, Records
 # A reading is what the rig's force gauge shows, its zero and errors included; the
 # load is what acts on the gear.
 Quantity = Literal["reading", "load"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 _OF_THE_GEAR = frozenset({"deformation", "force"})
 
 

@@ -1,5 +1,6 @@
-"""A case as part of a posterior file, and back."""
+"""A case as part of a posterior file, and back; a file that was changed is refused."""
 
+import hashlib
 import json
 from dataclasses import fields
 
@@ -10,6 +11,10 @@ from hdcal.errors import Finding, InputError
 from hdcal.rig.case import Case, Gear
 from hdcal.rig.priors import Prior
 from hdcal.rig.records import Geometry, Records
+
+FORMAT = "hdcal.posterior/1"
+# The attribute that holds the digest of everything else.
+DIGEST = "sha256"
 
 UNITS = {
     "deformation": "mm",
@@ -128,3 +133,55 @@ def not_a_posterior(path) -> Finding:
         "is not a posterior that hdcal wrote, or it is damaged",
         "Calibrate again",
     )
+
+
+def digest(tree: xr.DataTree) -> str:
+    """Return a SHA-256 of every number, label and attribute that hdcal reads back.
+
+    It is the same before writing and after reading: groups and variables in the order
+    of their names, numbers as little-endian 64 bits, labels and attributes as text.
+    """
+    whole = hashlib.sha256()
+    for name in sorted(set(tree.attrs) - {DIGEST}):
+        whole.update(json.dumps([name, str(tree.attrs[name])]).encode())
+    for node in sorted(tree.subtree, key=lambda node: node.path):
+        variables = node.to_dataset(inherit=False).variables
+        for name in sorted(map(str, variables)):
+            kind, data = _canonical(np.asarray(variables[name].values))
+            head = [node.path, name, variables[name].dims, kind, len(data)]
+            whole.update(json.dumps(head).encode())
+            whole.update(data)
+    return whole.hexdigest()
+
+
+def _canonical(values: np.ndarray) -> tuple[str, bytes]:
+    """Return kind and bytes of an array, whatever type the file gave it."""
+    if values.dtype.kind in "biuf":
+        kind = "<f8" if values.dtype.kind == "f" else "<i8"
+        return f"{kind}{values.shape}", np.ascontiguousarray(values, kind).tobytes()
+    return f"text{values.shape}", json.dumps([str(v) for v in values.flat]).encode()
+
+
+def check_unchanged(tree: xr.DataTree, path) -> None:
+    """Refuse a posterior of another version, or that is not as hdcal wrote it.
+
+    The digest tells slips and careless edits. It is no signature: who means to forge
+    can compute it anew.
+
+    Raises:
+        InputError: with what is wrong.
+    """
+    written = str(tree.attrs.get("hdcal_format", ""))
+    if not written.startswith("hdcal.posterior/"):
+        raise InputError([not_a_posterior(path)])
+    if written != FORMAT:
+        words = f"has the format {written}, and this hdcal reads {FORMAT}"
+        remedy = "Use the hdcal that wrote it, or calibrate again"
+    elif DIGEST not in tree.attrs:
+        words, remedy = "was written by an older version of hdcal", "Calibrate again"
+    elif tree.attrs[DIGEST] != digest(tree):
+        words = "was changed after hdcal wrote it"
+        remedy = "Take the file as it was written, or calibrate again"
+    else:
+        return
+    raise InputError([Finding(str(path), words, remedy)])

@@ -24,7 +24,6 @@ from hdcal.rig.case import Case, Theory
 from hdcal.rig.priors import Prior
 
 FILE_NAME = "posterior.nc"
-FORMAT = "hdcal.posterior/1"
 _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
 # Above this many numbers the log likelihood of every row and draw is not kept.
 _MOST_LOG_LIKELIHOODS = 8_000_000
@@ -110,7 +109,7 @@ class Posterior:
         """Write the posterior as a NetCDF file that ArviZ opens."""
         tree = self.tree.copy()
         tree.attrs = {
-            "hdcal_format": FORMAT,
+            "hdcal_format": archive.FORMAT,
             "status": "ok" if self.usable else "failed",
             "case": archive.describe_case(self.case),
             "model": json.dumps(
@@ -127,6 +126,7 @@ class Posterior:
                 }
             ),
         }
+        tree.attrs[archive.DIGEST] = archive.digest(tree)
         tree.to_netcdf(path, engine="h5netcdf")
 
     @classmethod
@@ -141,15 +141,14 @@ class Posterior:
                 for effects from outside.
 
         Raises:
-            InputError: the file is missing, damaged or from another version, or
-                names an effect that the library lacks.
+            InputError: the file is missing, damaged, changed or from another
+                version, or names an effect that the library lacks.
         """
         path = Path(path)
         file = path / FILE_NAME if path.is_dir() else path
         tree = archive.open_tree(file)
+        archive.check_unchanged(tree, file)
         try:
-            if tree.attrs["hdcal_format"] != FORMAT:
-                raise KeyError("hdcal_format")
             model = json.loads(tree.attrs["model"])
             case = archive.restore_case(
                 tree.attrs["case"],

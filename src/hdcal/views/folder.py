@@ -51,6 +51,11 @@ OUTPUTS = frozenset(
         "study.json",
         "study.svg",
         "study.png",
+        "margin.json",
+        "margin.svg",
+        "margin.png",
+        "tornado.svg",
+        "tornado.png",
     }
 )
 _LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
@@ -214,7 +219,9 @@ def _check_existing(
 
 
 def _is_output(entry: Path) -> bool:
-    return entry.name in OUTPUTS | _LITTER and entry.is_file()
+    # A diagnosis keeps every model that it calibrated.
+    model = entry.name.startswith("posterior-") and entry.suffix == ".nc"
+    return (model or entry.name in OUTPUTS | _LITTER) and entry.is_file()
 
 
 def _is_verdict(entry: Path) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from hdcal.answers.diagnosis.verdict import SCHEMA, Cell, Verdict, Where, Which
 from hdcal.inference.posterior import versions
 from hdcal.views.plain import as_plain
+from hdcal.views.run_folder import member_files
 from hdcal.views.verdict_words import answer, limits
 
 INTERVAL = 0.9
@@ -34,6 +35,14 @@ def verdict_json(verdict: Verdict, *, seed: int = 0, quick: bool = False) -> dic
             "next_test": [asdict(run) for run in verdict.next_test],
             "next_test_reason": verdict.no_run,
             "budget": asdict(verdict.budget),
+            "refits": [
+                {
+                    "hypothesis": name,
+                    "probability": verdict.posteriors[name][0],
+                    "file": f,
+                }
+                for name, f in member_files(verdict).items()
+            ],
             "library": verdict.library,
             "notes": verdict.notes,
             "seed": seed,

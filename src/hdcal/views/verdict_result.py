@@ -1,14 +1,16 @@
 """What one diagnosis leaves behind, in a folder that is there already."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from hdcal.answers.averaged import averaged_bands
 from hdcal.answers.diagnosis.verdict import Verdict
 from hdcal.answers.residuals import residuals
-from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.inference.posterior import Posterior
 from hdcal.views import figures
 from hdcal.views.plain import as_json
 from hdcal.views.result import bands_csv
+from hdcal.views.run_folder import ORIGIN, member_files
 from hdcal.views.verdict_json import verdict_json
 from hdcal.views.verdict_report import verdict_report
 
@@ -40,7 +42,7 @@ def write_verdict(
     refit, bands = corrected(verdict), None
     if refit is not None:
         bands = averaged_bands(list(verdict.posteriors.values()))
-        refit[1].save(folder / FILE_NAME)
+        _save_models(verdict, folder)
         (folder / "bands.csv").write_text(bands_csv(bands), "utf-8", newline="")
     if report:
         images = _draw(verdict, refit, bands, folder)
@@ -49,6 +51,16 @@ def write_verdict(
         )
         (folder / "report.html").write_bytes(page)
     return found
+
+
+def _save_models(verdict: Verdict, folder: Path) -> None:
+    """Save every calibrated model, each with the probabilities of all."""
+    chances = {name: share for name, (share, _) in verdict.posteriors.items()}
+    for name, file in member_files(verdict).items():
+        posterior = verdict.posteriors[name][1]
+        origin = {"hypothesis": name, "probabilities": chances}
+        settings = {**posterior.settings, ORIGIN: origin}
+        replace(posterior, settings=settings).save(folder / file)
 
 
 def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:

@@ -19,6 +19,7 @@ from hdcal.views.cli.design import design
 from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.fit import fit
+from hdcal.views.cli.margin import margin
 from hdcal.views.cli.predict import predict
 from hdcal.views.cli.study import study
 from hdcal.views.cli.track import track
@@ -60,6 +61,7 @@ for _command in (
     calibrate,
     diagnose,
     predict,
+    margin,
     design,
     study,
     track,

@@ -120,3 +120,49 @@ def _range(text: str) -> list[float]:
         else (start if i == 0 else stop)
         for i in range(count)
     ]
+
+
+# Temperatures over which a window is spread.
+_WINDOW = 11
+
+
+def read_window(text: str, option: str = "--temperature") -> list[float]:
+    """Read from:to, from:to:count or a comma list of numbers.
+
+    Raises:
+        InputError: it is none of them, or an empty window.
+    """
+    if text.count(":") != 1:
+        return read_grid(text, option)
+    first, last = text.split(":")
+    ends = read_grid(f"{first or 'x'},{last or 'x'}", option)
+    if ends[1] < ends[0]:
+        words = f"'{text[:60]}' is an empty window"
+        raise InputError([Finding(option, words, "Give the lower end first")])
+    return read_grid(
+        f"{ends[0]}:{ends[1]}:{_WINDOW if ends[1] > ends[0] else 1}", option
+    )
+
+
+def read_sizes(texts: tuple[str, ...], option: str = "--tolerance") -> dict[str, float]:
+    """Read every NAME=NUMBER.
+
+    Raises:
+        InputError: one of them has no such form, or a name comes twice.
+    """
+    found: dict[str, float] = {}
+    findings = []
+    for text in texts:
+        name, _, number = (part.strip() for part in text.partition("="))
+        try:
+            value = float(number)
+        except ValueError:
+            remedy = "Write it like wall_thickness_mm=0.02"
+            findings.append(Finding(option, f"'{text[:60]}' is no tolerance", remedy))
+            continue
+        if name in found:
+            findings.append(Finding(option, f"'{name}' is given twice", "Keep one"))
+        found[name] = value
+    if findings:
+        raise InputError(findings)
+    return found

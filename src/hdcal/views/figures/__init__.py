@@ -16,6 +16,7 @@ from hdcal.views.figures.design import (
 )
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
+from hdcal.views.figures.margin import margin_figure, tornado_figure
 from hdcal.views.figures.shrink import shrink_figure
 from hdcal.views.figures.study import study_figure
 from hdcal.views.figures.where import where_figure
@@ -29,6 +30,7 @@ __all__ = [
     "fit_figure",
     "generator_figure",
     "inverse_figure",
+    "margin_figure",
     "prior_figure",
     "profile_figure",
     "reliability_figure",
@@ -37,6 +39,7 @@ __all__ = [
     "sampler_figure",
     "shrink_figure",
     "study_figure",
+    "tornado_figure",
     "where_figure",
     "which_figure",
 ]

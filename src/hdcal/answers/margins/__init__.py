@@ -1,0 +1,1 @@
+"""Margins: what force a deformation needs, for how many of whom, how surely."""

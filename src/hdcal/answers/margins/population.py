@@ -1,0 +1,54 @@
+"""Whose forces a bound is about: readings, mountings or gears."""
+
+from typing import Literal, get_args
+
+from hdcal.errors import Finding
+from hdcal.inference.problem import Problem
+
+Population = Literal["readings", "mountings", "specimens"]
+POPULATIONS: tuple[Population, ...] = get_args(Population)
+
+
+def widest(problem: Problem) -> Population:
+    """Return the widest population of which the data hold two members or more."""
+    if problem.specimens >= 2:
+        return "specimens"
+    return "mountings" if problem.runs >= 2 else "readings"
+
+
+def check_population(asked: str | None, problem: Problem) -> list[Finding]:
+    """Return why the data say nothing of a population; empty when they do."""
+    if asked is None or asked == "readings":
+        return []
+    if asked not in POPULATIONS:
+        words = f"'{asked}' is unknown"
+        return [Finding("--population", words, f"Use one of {', '.join(POPULATIONS)}")]
+    what, count = {
+        "mountings": ("mounting (run)", problem.runs),
+        "specimens": ("gear (specimen)", problem.specimens),
+    }[asked]
+    if count >= 2:
+        return []
+    words = f"the data hold one {what}, which says nothing of how much others differ"
+    remedy = f"Measure two or more, or ask for --population {widest(problem)}"
+    return [Finding("--population", words, remedy)]
+
+
+def population_words(population: Population, problem: Problem) -> str:
+    """Return in one sentence whose forces the numbers are about."""
+    if population == "readings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        place = "mountings on average" if problem.runs else "mounting"
+        return (
+            f"Single readings of {gears} in the tested {place}. Another gear or "
+            "another mounting may need a force outside these bounds."
+        )
+    runs = f", each in a new mounting ({problem.runs} were tested)"
+    if population == "mountings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        return (
+            f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
+            "Another gear may need a force outside these bounds."
+        )
+    place = runs if problem.runs else ", in the tested mounting"
+    return f"New gears of this kind ({problem.specimens} were tested){place}."

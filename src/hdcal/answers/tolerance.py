@@ -1,0 +1,93 @@
+"""Classical tolerance limits: what a normal sample, or any sample, can promise.
+
+A bound with content p and confidence γ leaves at most the share 1 − p of a population
+beyond it, in the share γ of all samples. These are the references of the Bayesian
+bounds of `margin`, which agree with them where both exist.
+"""
+
+import numpy as np
+from scipy import stats
+
+from hdcal.errors import Finding, InputError
+
+# Content and confidence of the bounds that aviation names; of a population only.
+BASES = {"A-basis": (0.99, 0.95), "B-basis": (0.90, 0.95)}
+
+
+def check_shares(**shares: float) -> list[Finding]:
+    """Return a finding for every share that does not lie between 0 and 1."""
+    return [
+        Finding(
+            f"--{name.replace('_', '-')}",
+            f"{value:g} does not lie between 0 and 1",
+            "Give a share, such as 0.95",
+        )
+        for name, value in shares.items()
+        if not 0.0 < value < 1.0
+    ]
+
+
+def k_factor(size: int, content: float = 0.99, confidence: float = 0.95) -> float:
+    """Return the one-sided normal tolerance factor k: the bound is mean ± k·s.
+
+    k = t⁻¹(γ; n − 1, z_p √n) / √n, with the quantile of the noncentral t.
+
+    Args:
+        size: of the sample, two or more.
+        content: p, share of the population within the bound.
+        confidence: γ.
+
+    Raises:
+        InputError: a share is not between 0 and 1, or the sample is too small.
+
+    Source:
+        Owen (1968), Technometrics 10; CMH-17, vol. 1, ch. 8 (A- and B-basis).
+    """
+    findings = check_shares(content=content, confidence=confidence)
+    if size < 2:
+        words = f"{size} specimens have no spread"
+        findings.append(Finding("size", words, "Give two or more"))
+    if findings:
+        raise InputError(findings)
+    root = np.sqrt(size)
+    return float(
+        stats.nct.ppf(confidence, size - 1, stats.norm.ppf(content) * root) / root
+    )
+
+
+def wilks_size(
+    content: float = 0.99, confidence: float = 0.95, *, sides: int = 1
+) -> int:
+    """Return how large a sample is whose extremes are a bound, whatever its law.
+
+    One side: the smallest n with 1 − pⁿ ≥ γ. Two sides, lowest and highest together:
+    1 − pⁿ − n (1 − p) pⁿ⁻¹ ≥ γ.
+
+    Args:
+        content: p, share of the population within the bound.
+        confidence: γ.
+        sides: 1 or 2.
+
+    Raises:
+        InputError: a share is not between 0 and 1, or the sides are neither 1 nor 2.
+
+    Source:
+        Wilks (1941), Annals of Mathematical Statistics 12.
+    """
+    findings = check_shares(content=content, confidence=confidence)
+    if sides not in (1, 2):
+        findings.append(Finding("sides", f"{sides} is neither 1 nor 2", "Give 1 or 2"))
+    if findings:
+        raise InputError(findings)
+
+    def short(size: int) -> bool:
+        # Beyond the bound lie at most `sides − 1` of the sample.
+        return stats.binom.cdf(sides - 1, size, 1.0 - content) > 1.0 - confidence
+
+    low, high = 0, 1
+    while short(high):
+        low, high = high, 2 * high
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if short(middle) else (low, middle)
+    return high
