@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
@@ -168,7 +167,7 @@ def integrate(
     corners = force.corners()
     if corners is not None:
         # Where the force bends a step ends: no step may smooth a corner over.
-        inner = (corners - times[0]) * pace
+        inner = (jnp.asarray(corners) - times[0]) * pace
         controller = diffrax.ClipStepSizeController(controller, step_ts=inner)
     shown = (jnp.asarray(times) - times[0]) * pace
     found = diffrax.diffeqsolve(
@@ -183,11 +182,5 @@ def integrate(
         max_steps=MOST_STEPS,
         throw=False,
     )
-    states = found.ys * jnp.stack([size, size * pace])
+    states = jnp.asarray(found.ys) * jnp.stack([size, size * pace])
     return states, found.result == diffrax.RESULTS.successful
-
-
-@jax.jit
-def integrate_each(oscillators, force: Forcing, times: Float[Array, " n"]):
-    """Integrate a batch of oscillators, leading axis of their arrays the draws."""
-    return jax.vmap(integrate, in_axes=(0, None, None))(oscillators, force, times)

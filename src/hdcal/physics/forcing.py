@@ -83,7 +83,8 @@ class Chirp(Forcing):
     def __call__(self, time: Scalar) -> Float[Array, ""]:
         """Return the force [N]."""
         rise = 0.5 * (self.last - self.first) / self.duration
-        return self.amplitude * jnp.sin(2.0 * jnp.pi * (self.first + rise * time) * time)
+        turns = (self.first + rise * time) * time
+        return self.amplitude * jnp.sin(2.0 * jnp.pi * turns)
 
     def largest(self) -> Scalar:
         """Return |A| [N]."""

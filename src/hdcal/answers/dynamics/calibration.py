@@ -1,7 +1,6 @@
 """Calibrate mass, damping and stiffness against a gear that was seen to move."""
 
 import time
-from dataclasses import replace
 
 import jax
 import numpy as np
@@ -113,7 +112,14 @@ def calibrate_dynamic(
     )
     seconds = round(time.perf_counter() - began, 3)
     return DynamicPosterior(
-        case, theory, (), priors, tree, diagnoses, checks, settings | {"seconds": seconds}
+        case,
+        theory,
+        (),
+        priors,
+        tree,
+        diagnoses,
+        checks,
+        settings | {"seconds": seconds},
     )
 
 
@@ -135,7 +141,9 @@ def check_motion(case: Case) -> None:
         find("holds several runs or gears", "Calibrate one run of one gear at a time")
     elif np.any(np.diff(records.time) <= 0.0):
         row = int(np.argmax(np.diff(records.time) <= 0.0)) + 2
-        find(f"reading {row} is not later than the one before", "Give each its own time")
+        find(
+            f"reading {row} is not later than the one before", "Give each its own time"
+        )
     if rows < FEWEST_ROWS:
         find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
     if np.ptp(records.temperature) > _ONE_TEMPERATURE:
@@ -213,10 +221,12 @@ def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
     statistic = rows * (rows + 2) * np.sum(share**2 / (rows - lags))
     p = float(stats.chi2.sf(statistic, len(lags)))
     if p >= _WHITE:
-        return Check(name, "passed", f"no correlation over {len(lags)} rows (p = {p:.2g})")
+        return Check(
+            name, "passed", f"no correlation over {len(lags)} rows (p = {p:.2g})"
+        )
     words = (
         "what is left over is correlated from row to row "
-        f"(p = {p:.1g}): the linear model does not hold, and the intervals are too narrow"
+        f"(p = {p:.1g}): the linear model does not hold, the intervals are too narrow"
     )
     return Check(name, "warning", words)
 

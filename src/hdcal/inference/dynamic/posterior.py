@@ -28,7 +28,7 @@ class DynamicPosterior(Posterior):
 
     kind: ClassVar[str] = "dynamic"
 
-    @property
+    @cached_property
     def problem(self) -> Problem:
         """Raise: there is no model of the force as read.
 
@@ -66,12 +66,13 @@ def build_dynamic_tree(
         prior_draws: by parameter, each (draw,).
     """
     observed = ("force", "deformation")
+    rows = {name: np.asarray(getattr(case.records, name)) for name in observed}
     return from_dict(
         {
             "posterior": draws.values,
             "prior": {name: values[None] for name, values in prior_draws.items()},
             "sample_stats": sampler_statistics(draws),
-            "observed_data": {n: np.asarray(getattr(case.records, n)) for n in observed},
+            "observed_data": rows,
             "constant_data": archive.covariates(case.records),
             "log_likelihood": {
                 "deformation": np.asarray(_pointwise(problem, draws.values))
