@@ -36,6 +36,13 @@ OUTPUTS = frozenset(
         "reliability.png",
         "detection.svg",
         "detection.png",
+        "response.json",
+        "response.csv",
+        "response.svg",
+        "response.png",
+        "motion.csv",
+        "motion.svg",
+        "motion.png",
         "opening.json",
         "labels.json",
     }
