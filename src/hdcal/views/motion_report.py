@@ -53,6 +53,7 @@ def motion_report(
         command: how the result was made.
     """
     entries = {name: summary[name] for name in QUANTITIES if name in summary}
+    entries["mass_kg"] = summary["parameters"]["mass"]
     context = {
         "kind": "dynamic calibration",
         "summary": summary,

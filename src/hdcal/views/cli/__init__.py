@@ -17,6 +17,7 @@ from hdcal.views.cli.console import Console, usage_error
 from hdcal.views.cli.diagnose import diagnose
 from hdcal.views.cli.effects import effects
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.respond import respond
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -51,7 +52,7 @@ def hdcal() -> None:
     """
 
 
-for _command in (calibrate, diagnose, predict, check, effects, blind):
+for _command in (calibrate, diagnose, predict, respond, check, effects, blind):
     hdcal.add_command(_command)
 
 
