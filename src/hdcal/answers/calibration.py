@@ -169,6 +169,7 @@ def calibrate(
     """
     _check_settings(chains, warmup, draws)
     let_go_of_programs()
+    check_settings(chains, warmup, draws)
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)
@@ -203,7 +204,12 @@ def calibrate(
     return replace(posterior, settings={**settings, "seconds": seconds})
 
 
-def _check_settings(chains: int, warmup: int, draws: int) -> None:
+def check_settings(chains: int, warmup: int, draws: int) -> None:
+    """Check that a run is long enough for its own checks.
+
+    Raises:
+        InputError: it is not.
+    """
     least = {"chains": (chains, 2), "warmup": (warmup, 1), "draws": (draws, 4)}
     findings = [
         Finding(f"--{name}", f"{value} is too few", f"use {low} or more")
@@ -233,7 +239,7 @@ def _assemble(
     }
     scalars = {name: found.values[name] for name in sampled}
     diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
-    tree = build_tree(case, problem, found, _draw_priors(sampled, key), of_data)
+    tree = build_tree(case, problem, found, draw_priors(sampled, key), of_data)
     checks = (
         *sampling_checks(
             tree["sample_stats"].to_dataset(),
@@ -274,7 +280,8 @@ def _beside_parameters(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     return others
 
 
-def _draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
+def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
+    """Return draws of each parameter from its prior, (draw,) each."""
     keys = jax.random.split(key, len(priors))
     return {
         name: np.asarray(

@@ -24,6 +24,11 @@ UNITS: dict[str, tuple[str, float]] = {
     "specimen_sd": ("1", 1.0),
     "gap_sd": ("N", 1.0),
     "gap_length": ("1", 1.0),
+    "mass": ("kg", 1e3),
+    "damping_ratio": ("1", 1.0),
+    "initial_deformation": ("mm", 1.0),
+    "initial_velocity": ("mm/s", 1.0),
+    "deformation_sigma": ("mm", 1.0),
 }
 ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
@@ -47,7 +52,8 @@ def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
     return parameters(effect)[field].unit, 1.0
 
 
-def _parameter(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:
+def parameter_entry(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:
+    """Return a parameter as an entry of a summary; fixed ones have no diagnosis."""
     unit, factor = unit_of(posterior, name)
     entry = {"unit": unit, **interval(posterior.draws[name] * factor)}
     if found is None:  # fixed by the gear file
@@ -92,23 +98,13 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
     """
     left = left or residuals(posterior)
     settings, case = posterior.settings, posterior.case
-    names = [*posterior.diagnoses]
-    names += [n for n in posterior.priors if n in posterior.draws and n not in names]
-    stats = posterior.tree["sample_stats"].to_dataset()
-    warnings = [
-        check.words[:1].upper() + check.words[1:]
-        for check in posterior.checks
-        if check.outcome == "warning"
-    ]
+    warnings = warnings_of(posterior)
     return {
         "schema": SCHEMA,
         "status": "ok" if posterior.usable else "failed",
         "reasons": list(posterior.reasons),
         "warnings": warnings + [shape.words for shape in left.structure],
-        "parameters": {
-            name: _parameter(posterior, name, posterior.diagnoses.get(name))
-            for name in names
-        },
+        "parameters": parameter_entries(posterior),
         "stiffness_N_per_mm": interval(posterior.draws["stiffness"]),
         "K_by_theory": K_by_theory(posterior),
         "K_note": ARTICLE_NOTE,
@@ -118,14 +114,7 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
         "residuals": [vars(shape) for shape in left.structure],
         "checks": [vars(check) for check in posterior.checks],
         "next_steps": next_steps(posterior, left),
-        "sampling": {
-            "chains": settings["chains"],
-            "warmup": settings["warmup"],
-            "draws": settings["draws"],
-            "divergences": int(stats["diverging"].sum()),
-            "target_acceptance": settings["target_acceptance"],
-            "seconds": settings["seconds"],
-        },
+        "sampling": sampling_entry(posterior),
         "seed": settings["seed"],
         "versions": settings["versions"],
         "gear": {
@@ -135,12 +124,45 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
         },
         "effects": [effect.name for effect in posterior.effects],
         "with_gap": settings["with_gap"],
-        "data": {
-            "name": case.name,
-            "rows": len(case.records.force),
-            "sha256": case.data_sha256,
-            "notes": list(case.notes),
-        },
+        "data": data_entry(posterior),
+    }
+
+
+def parameter_entries(posterior: Posterior) -> dict[str, dict]:
+    """Return every parameter's entry by name, those that were fixed last."""
+    names = [*posterior.diagnoses]
+    names += [n for n in posterior.priors if n in posterior.draws and n not in names]
+    return {
+        name: parameter_entry(posterior, name, posterior.diagnoses.get(name))
+        for name in names
+    }
+
+
+def warnings_of(posterior: Posterior) -> list[str]:
+    """Return the warnings of the checks as sentences."""
+    return [
+        check.words[:1].upper() + check.words[1:]
+        for check in posterior.checks
+        if check.outcome == "warning"
+    ]
+
+
+def sampling_entry(posterior: Posterior) -> dict:
+    """Return how the draws were come by."""
+    stats = posterior.tree["sample_stats"].to_dataset()
+    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
+    settings = {name: posterior.settings[name] for name in names}
+    return settings | {"divergences": int(stats["diverging"].sum())}
+
+
+def data_entry(posterior: Posterior) -> dict:
+    """Return which data it was."""
+    case = posterior.case
+    return {
+        "name": case.name,
+        "rows": len(case.records.force),
+        "sha256": case.data_sha256,
+        "notes": list(case.notes),
     }
 
 

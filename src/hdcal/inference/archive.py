@@ -53,7 +53,7 @@ def restore_prior(plain: dict) -> Prior:
     )
 
 
-_TABLES = ("priors", "scale_priors", "effect_priors")
+_TABLES = ("priors", "scale_priors", "effect_priors", "dynamic_priors")
 
 
 def describe_case(case: Case) -> str:
@@ -86,6 +86,8 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     """
     plain = json.loads(text)
     gear = plain["gear"]
+    # A file of before there were dynamics is as good as ever for the rest.
+    gear.setdefault("dynamic_priors", {})
     for table in _TABLES:
         gear[table] = {name: restore_prior(p) for name, p in gear[table].items()}
     gear["geometry"] = Geometry(**gear["geometry"])

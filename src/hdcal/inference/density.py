@@ -1,6 +1,7 @@
 """The likelihood of a problem's data, whatever form they are kept in."""
 
 from collections.abc import Mapping
+from functools import singledispatch
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,6 +13,7 @@ from hdcal.inference.gap import BASIS_SIZE, prior_sd
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.members import Linear, contrasts
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled import Sampled
 from hdcal.physics.chain import (
     Base,
     linear_coefficients,
@@ -24,7 +26,7 @@ from hdcal.rig.records import Array, Records
 Values = Mapping[str, Any]
 
 # A normal prior of these is cut at zero.
-POSITIVE = frozenset({"E0"})
+POSITIVE = frozenset({"E0", "mass", "damping_ratio", "deformation_sigma"})
 MEMBERS = {
     "run": "run_offset",
     "specimen": "specimen_deviation",
@@ -207,8 +209,14 @@ def _block_coefficients(
     return jnp.pad(core, ((0, 0), (0, width - _CORE)))
 
 
-def draw_members(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
+@singledispatch
+def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
     """Draw the integrated members given the shared parameters of one draw."""
+    return {}
+
+
+@draw_members.register
+def _(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
     if not problem.integrated:
         return {}
     weights = linear_part(problem, values).draw(key)
@@ -224,7 +232,7 @@ def draw_members(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
     return drawn
 
 
-def log_prior(problem: Problem, values: Values) -> Float[Array, ""]:
+def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
     """Return the log prior of the named parameters, each in its own coordinate."""
     total = jnp.zeros(())
     for name, prior in problem.priors.items():

@@ -9,6 +9,7 @@ from hdcal.inference.density import predict_rows
 from hdcal.inference.distributions import frozen
 from hdcal.inference.gap import prior_sd
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled import Sampled
 from hdcal.rig.records import Records
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
@@ -105,7 +106,7 @@ def _varies(problem: Problem, name: str) -> bool:
     return problem.priors[name].family != "fixed"
 
 
-def dead_parameters(slopes: dict, problem: Problem) -> list[str]:
+def dead_parameters(slopes: dict, problem: Sampled) -> list[str]:
     """Return the parameters that these data cannot see at all.
 
     Args:
@@ -120,7 +121,7 @@ def dead_parameters(slopes: dict, problem: Problem) -> list[str]:
     return dead
 
 
-def flat_directions(slopes: dict, problem: Problem) -> list[str]:
+def flat_directions(slopes: dict, problem: Sampled) -> list[str]:
     """Name what the data leave to the prior: parameters, pairs, then the rest.
 
     A direction is flat when the data say less along it than the priors do: with J the

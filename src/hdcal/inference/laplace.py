@@ -1,5 +1,6 @@
 """The Laplace fit: where the posterior is and how it is shaped, for whitening."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import equinox as eqx
@@ -15,6 +16,7 @@ from scipy import optimize
 from hdcal.inference.gap import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled import Sampled
 from hdcal.rig.records import Array
 
 Position = dict[str, Any]
@@ -43,12 +45,12 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-def potential(problem: Problem, position: Position) -> Float[Array, ""]:
+def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
-def _typical(problem: Problem, position: Position) -> Float[Array, ""]:
+def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return the potential whose minimum is a typical place, not only the mode.
 
     Members that are sampled can shrink with their scale, and a gap can interpolate
@@ -57,6 +59,8 @@ def _typical(problem: Problem, position: Position) -> Float[Array, ""]:
     of what shrinks with it.
     """
     value = potential(problem, position)
+    if not isinstance(problem, Problem):
+        return value
     shrinking = {}
     if problem.gap is not None and "gap" not in problem.integrated:
         shrinking["sigma"] = BASIS_SIZE
@@ -74,7 +78,7 @@ def _typical(problem: Problem, position: Position) -> Float[Array, ""]:
 
 
 @jax.jit
-def _expand(problem: Problem, position: Position):
+def _expand(problem: Sampled, position: Position):
     """Return the typical potential with its flat gradient and Hessian."""
     flat, unravel = ravel_pytree(position)
 
@@ -87,7 +91,7 @@ def _expand(problem: Problem, position: Position):
 
 
 @jax.jit
-def _prior_median(problem: Problem, key: Key[Array, ""]) -> Position:
+def _prior_median(problem: Sampled, key: Key[Array, ""]) -> Position:
     """Return the median of a few prior draws, unconstrained."""
 
     def draw(key):
@@ -103,7 +107,18 @@ def _prior_median(problem: Problem, key: Key[Array, ""]) -> Position:
     return jax.tree.map(lambda values: jnp.median(values, axis=0), draws)
 
 
-def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
+@jax.jit
+def _moved(problem: Sampled, position: Position, values) -> Position:
+    """Return the position with some sites moved to given values."""
+    known = constrain_fn(model, (problem,), {}, position) | values
+    return unconstrain_fn(model, (problem,), {}, known)
+
+
+def fit(
+    problem: Sampled,
+    key: Key[Array, ""],
+    start: Mapping[str, float] | None = None,
+) -> Whitening:
     """Find the posterior mode and its curvature.
 
     The mode only shapes the sampler's coordinates: a poor one costs speed, never
@@ -112,11 +127,14 @@ def fit(problem: Problem, key: Key[Array, ""]) -> Whitening:
     Args:
         problem: the inference problem.
         key: for the prior draws whose median starts the search.
+        start: sites whose value to start from instead, where it is roughly known.
     """
-    start = _prior_median(problem, key)
-    flat, unravel = ravel_pytree(start)
+    place = _prior_median(problem, key)
+    if start:
+        place = _moved(problem, place, dict(start))
+    flat, unravel = ravel_pytree(place)
     cache: dict[bytes, tuple] = {}
-    _, _, hessian = (np.asarray(part) for part in _expand(problem, start))
+    _, _, hessian = (np.asarray(part) for part in _expand(problem, place))
     # Parameters differ by many orders in scale: a trust region wants them alike.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 

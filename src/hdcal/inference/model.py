@@ -1,9 +1,11 @@
-"""The one NumPyro model: the force model with any set of effects.
+"""The NumPyro model: the force model with any set of effects.
 
 Stiffness identifies K·E₀ only, so that product is sampled, given E₀, under exactly
 the prior that K and E₀ imply; K follows from both. Sites whose names begin with
 "_" are coordinates of the sampler, not results.
 """
+
+from functools import singledispatch
 
 import jax.numpy as jnp
 import numpyro
@@ -14,11 +16,13 @@ from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gap import BASIS_SIZE, prior_sd
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled import Sampled
 from hdcal.physics.effect import parameters
 from hdcal.rig.priors import Prior
 
 
-def _sample(name: str, prior: Prior):
+def sample_site(name: str, prior: Prior):
+    """Sample a parameter from its prior; a fixed one is what it is."""
     if prior.family == "fixed":
         return numpyro.deterministic(name, jnp.asarray(prior.numbers[0]))
     return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
@@ -34,7 +38,7 @@ def _sample_amplitude(problem: Problem, name: str):
     """
     prior = problem.priors[name]
     if prior.family != "half_normal":
-        return _sample(name, prior)
+        return sample_site(name, prior)
     unit, logistic = problem.units[name], dist.Logistic(0.0, 1.0)
     u = numpyro.sample(f"_{name}", logistic)
     size = unit * softplus(u)
@@ -44,10 +48,10 @@ def _sample_amplitude(problem: Problem, name: str):
     return numpyro.deterministic(name, size)
 
 
-def _sample_influence(prior: Prior, modulus):
+def sample_influence(prior: Prior, modulus):
     """Sample K·E₀ under the prior of K, and return K."""
     if prior.family == "fixed":
-        return _sample("K", prior)
+        return sample_site("K", prior)
     of_K = distribution(prior)
     domain = of_K.support or dist.constraints.real
     times_modulus = dist.transforms.AffineTransform(0.0, modulus, domain=domain)
@@ -70,31 +74,37 @@ def _sample_structure(problem: Problem, values: dict) -> None:
     """Sample what belongs to runs, specimens and the gap, and their scales."""
     integrated, priors = problem.integrated, problem.priors
     if problem.runs:
-        values["run_offset_sd"] = _sample("run_offset_sd", priors["run_offset_sd"])
+        values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
         if "run" not in integrated:
             sd = values["run_offset_sd"]
             values["run_offset"] = _sample_members("run_offset", sd, problem.runs)
     if problem.specimens:
-        values["specimen_sd"] = _sample("specimen_sd", priors["specimen_sd"])
+        values["specimen_sd"] = sample_site("specimen_sd", priors["specimen_sd"])
         if "specimen" not in integrated:
             sd, name = values["specimen_sd"], "specimen_deviation"
             values[name] = _sample_members(name, sd, problem.specimens)
     if problem.gap is not None:
         for name in ("gap_sd", "gap_length"):
-            values[name] = _sample(name, priors[name])
+            values[name] = sample_site(name, priors[name])
         if "gap" not in integrated:
             score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([BASIS_SIZE]))
             scale = prior_sd(values["gap_sd"], values["gap_length"])
             values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 
-def model(problem: Problem) -> None:
-    """Declare the joint density of parameters and data."""
+@singledispatch
+def model(problem: Sampled) -> None:
+    """Declare the joint density of parameters and data; one for each kind."""
+    raise NotImplementedError(type(problem).__name__)
+
+
+@model.register
+def _(problem: Problem) -> None:
     priors = problem.priors
-    values = {"E0": _sample("E0", priors["E0"])}
-    values["K"] = _sample_influence(priors["K"], values["E0"])
+    values = {"E0": sample_site("E0", priors["E0"])}
+    values["K"] = sample_influence(priors["K"], values["E0"])
     for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
-        values[name] = _sample(name, priors[name])
+        values[name] = sample_site(name, priors[name])
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from importlib import metadata
 from pathlib import Path
+from typing import ClassVar
 
 import jax
 import numpy as np
@@ -44,6 +45,8 @@ class Posterior:
         checks: what was checked and what came out.
         settings: seed, chains, warmup, draws, seconds, with_gap, versions.
     """
+
+    kind: ClassVar[str] = "static"
 
     case: Case
     theory: Theory
@@ -150,6 +153,8 @@ class Posterior:
         archive.check_unchanged(tree, file)
         try:
             model = json.loads(tree.attrs["model"])
+            if model["settings"].get("kind", "static") != cls.kind:
+                raise InputError([_of_another_kind(file, cls.kind)])
             case = archive.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
@@ -170,6 +175,14 @@ class Posterior:
             )
         except (KeyError, ValueError, TypeError) as error:
             raise InputError([archive.not_a_posterior(file)]) from error
+
+
+def _of_another_kind(file, wanted: str) -> Finding:
+    words, remedy = {
+        "static": ("is a calibration of the moving gear", "without --dynamic"),
+        "dynamic": ("is a calibration of the gear at rest", "with --dynamic"),
+    }[wanted]
+    return Finding(str(file), words, f"Name the folder of a calibration {remedy}")
 
 
 def _look_up(names, library, file) -> tuple[type[Effect], ...]:
@@ -224,20 +237,11 @@ def build_tree(
     if size <= _MOST_LOG_LIKELIHOODS:
         columns = gap_columns(problem, case)
         by_row = {"force": _pointwise(problem, draws.values, records, columns)}
-    stats = {
-        "energy": draws.energy,
-        "lp": -draws.potential,
-        "diverging": draws.diverging,
-        "n_steps": draws.n_steps,
-        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
-        "acceptance_rate": draws.acceptance,
-        "step_size": draws.step_size,
-    }
     tree = from_dict(
         {
             "posterior": draws.values,
             "prior": {name: values[None] for name, values in prior_draws.items()},
-            "sample_stats": stats,
+            "sample_stats": sampler_statistics(draws),
             "observed_data": {"force": np.asarray(records.force)},
             "constant_data": archive.covariates(records),
             "log_likelihood": {n: np.asarray(v) for n, v in by_row.items()},
@@ -260,6 +264,19 @@ def build_tree(
             "of all rows, runs, specimens and gap integrated out where they were"
         )
     return tree
+
+
+def sampler_statistics(draws: Draws) -> dict[str, np.ndarray]:
+    """Return what ArviZ wants to know of the sampler, (chain, draw) each."""
+    return {
+        "energy": draws.energy,
+        "lp": -draws.potential,
+        "diverging": draws.diverging,
+        "n_steps": draws.n_steps,
+        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
+        "acceptance_rate": draws.acceptance,
+        "step_size": draws.step_size,
+    }
 
 
 def versions() -> dict[str, str]:

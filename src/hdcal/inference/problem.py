@@ -10,6 +10,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.compress import Blocks, compress, group_rows
 from hdcal.inference.distributions import scaled
 from hdcal.inference.gap import Gap, build_gap
+from hdcal.inference.sampled import Sampled
 from hdcal.inference.scales import amplitude_units
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
@@ -32,7 +33,7 @@ _FINE_STEP = 1.3
 _NO_STEP = 1e-3
 
 
-class Problem(eqx.Module):
+class Problem(Sampled):
     """Everything the model needs; only arrays change between data sets of one shape.
 
     Attributes:
@@ -79,9 +80,15 @@ class Problem(eqx.Module):
         return self.records
 
 
-def _bare(prior: Prior) -> Prior:
-    # Text is static: left in, another source line would mean another compilation.
-    return Prior(prior.family, tuple(map(np.float64, prior.numbers)))
+def bare(priors: Mapping[str, Prior]) -> dict[str, Prior]:
+    """Return priors without their texts.
+
+    Text is static: left in, another source line would mean another compilation.
+    """
+    return {
+        name: Prior(prior.family, tuple(map(np.float64, prior.numbers)))
+        for name, prior in priors.items()
+    }
 
 
 def without_scatter(effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
@@ -128,12 +135,19 @@ def problem_priors(
             for name in missing
         )
     priors = {name: table[name] for name in names}
-    ratio = _unit_stiffness(case, gear.K_theory) / _unit_stiffness(case, theory)
-    priors["K"] = scaled(priors["K"], ratio)
+    priors["K"] = influence_prior(case, theory)
     return priors
 
 
-def _unit_stiffness(case: Case, theory: Theory) -> float:
+def influence_prior(case: Case, theory: Theory) -> Prior:
+    """Return the prior of K carried over to a theory: K_a k_a = K_b k_b."""
+    gear = case.gear
+    ratio = unit_stiffness(case, gear.K_theory) / unit_stiffness(case, theory)
+    return scaled(gear.priors["K"], ratio)
+
+
+def unit_stiffness(case: Case, theory: Theory) -> float:
+    """Return k_theory/E of the case's gear, radial [mm]."""
     return float(THEORIES[theory](case.gear.geometry, 1.0))
 
 
@@ -232,9 +246,9 @@ def build_problem(
     gaussian = not rounded and all(effect.stage != "noise" for effect in effects)
     integrated = frozenset(members if gaussian else ())
     return Problem(
-        priors={name: _bare(prior) for name, prior in priors.items()},
+        priors=bare(priors),
         units=amplitude_units(records, reading, effects, priors, noise_sd),
-        unit_stiffness=_unit_stiffness(case, theory),
+        unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         records=records if keep_rows else None,
         blocks=blocks,

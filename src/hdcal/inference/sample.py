@@ -19,7 +19,7 @@ from numpyro.infer.util import constrain_fn
 from hdcal.inference.density import draw_members
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
-from hdcal.inference.problem import Problem
+from hdcal.inference.sampled import Sampled
 from hdcal.rig.records import Array
 
 # Called with (iterations done, iterations in all).
@@ -60,7 +60,7 @@ class Draws:
     target_acceptance: float
 
 
-def _kernel(problem: Problem, whitening: Whitening, warmup: int, target):
+def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     """Return NUTS' own init and step functions on standard coordinates."""
     init, step = hmc(
         lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
@@ -121,7 +121,7 @@ def _constrain(problem, whitening, standard, keys):
 
 
 def sample(
-    problem: Problem,
+    problem: Sampled,
     whitening: Whitening,
     key: Key[Array, ""],
     *,

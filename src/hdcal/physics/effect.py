@@ -87,6 +87,9 @@ class Effect(eqx.Module):
         family: effects of one family look alike.
         symmetry: how the contribution answers to tension instead of compression,
             `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
+        acts_at_once: whether it is a force or play of the gear itself that depends on
+            deformation, speed and temperature of the moment only; `hdcal respond`
+            takes such effects along and leaves others out.
     """
 
     name: AbstractClassVar[str]
@@ -94,6 +97,7 @@ class Effect(eqx.Module):
     family: AbstractClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
+    acts_at_once: ClassVar[bool] = False
 
     @abstractmethod
     def apply(self, signal: Any, rows: Rows) -> Any:

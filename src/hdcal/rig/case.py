@@ -31,6 +31,9 @@ class Gear:
             in the same way.
         effect_priors: overrides of the gear file only, keyed `effect.parameter`;
             the names are not checked here, the effects live on a higher floor.
+        dynamic_priors: of the moving gear, merged in the same way; `mass` is among
+            them only when the gear file gives it, else `mass_ratio`.
+        density: of the material [N·s²/mm⁴], None where its file says nothing of it.
     """
 
     name: str
@@ -46,6 +49,8 @@ class Gear:
     source: dict = field(default_factory=dict)
     scale_priors: dict[str, Prior] = field(default_factory=dict)
     effect_priors: dict[str, Prior] = field(default_factory=dict)
+    dynamic_priors: dict[str, Prior] = field(default_factory=dict)
+    density: float | None = None
 
 
 @dataclass(frozen=True, repr=False)

@@ -33,7 +33,13 @@ class Column:
 
 
 def match_columns(
-    headers: Sequence[str], mapping: Mapping[str, str], file: str, row: int = 1
+    headers: Sequence[str],
+    mapping: Mapping[str, str],
+    file: str,
+    row: int = 1,
+    *,
+    quantities: Sequence[str] = QUANTITIES,
+    required: Sequence[str] = REQUIRED,
 ) -> tuple[dict[str, Column], list[Finding]]:
     """Find each quantity's column by its name, or by what the user said.
 
@@ -42,6 +48,8 @@ def match_columns(
         mapping: quantity -> header with the unit in square brackets.
         file: how the user named the file.
         row: line of the headers.
+        quantities: what to look for.
+        required: which of them must be there.
 
     Returns:
         The columns by quantity, and what is wrong with the headers.
@@ -51,11 +59,13 @@ def match_columns(
     for quantity in mapping:
         if quantity not in QUANTITIES:
             findings.append(_unknown_quantity(quantity, file))
-    for quantity in QUANTITIES:
+    for quantity in quantities:
         if quantity in mapping:
             found = _mapped(quantity, mapping[quantity], headers, file, row)
         else:
             found = _named(quantity, headers, file, row)
+            if found is None and quantity in required:
+                found = _missing(quantity, headers, file, row)
         if isinstance(found, Column):
             columns[quantity] = found
         elif found is not None:
@@ -85,8 +95,6 @@ def _named(
         return good[0]
     if bad:
         return _bad_unit(quantity, *bad[0], file, row)
-    if quantity in REQUIRED:
-        return _missing(quantity, headers, file, row)
     return None
 
 

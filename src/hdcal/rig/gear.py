@@ -10,10 +10,12 @@ from hdcal.errors import Finding, InputError
 from hdcal.rig.case import Gear, Theory
 from hdcal.rig.gear_schema import GearFile, size_findings, translate
 from hdcal.rig.priors import (
+    DYNAMIC_UNITS,
     MATERIAL_UNITS,
     MODEL_UNITS,
     SCALE_UNITS,
     Prior,
+    dynamic_priors,
     material_names,
     material_priors,
     read_effect_priors,
@@ -95,7 +97,13 @@ def _assemble(
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=effects,
+        dynamic_priors=dynamic_priors() | _part(given, DYNAMIC_UNITS),
+        density=float(facts["density"].numbers[0]) if "density" in facts else None,
     )
+
+
+def _part(priors: dict[str, Prior], units: dict[str, str]) -> dict[str, Prior]:
+    return {name: prior for name, prior in priors.items() if name in units}
 
 
 def _material(
@@ -137,7 +145,7 @@ def _overrides(
     given: dict[str, Prior] = {}
     effects: dict[str, dict] = {}
     findings: list[Finding] = []
-    units = MODEL_UNITS | SCALE_UNITS
+    units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
     table = toml.table.get("priors")
     for name, entry in table.items() if isinstance(table, dict) else ():
         effect, dot, parameter = name.partition(".")

@@ -8,10 +8,17 @@ from hdcal.rig.prior import FAMILIES, Prior
 from hdcal.rig.toml_file import TomlFile, nearest
 from hdcal.rig.units import UnitError, to_code
 
-# A modulus of 207 is meant in GPa and a thermal coefficient of 3 in 1e-4/K, so
-# these two are never read without their unit.
-_UNIT_NEEDED = ("E0", "alpha")
-_SIGNED = ("alpha", "force_offset", "deformation_offset", "cte")
+# A modulus of 207 is meant in GPa, a thermal coefficient of 3 in 1e-4/K and a mass of
+# 0.03 in kg, so these are never read without their unit.
+_UNIT_NEEDED = {"E0": "GPa", "alpha": "1e-4/K", "mass": "kg"}
+_SIGNED = (
+    "alpha",
+    "force_offset",
+    "deformation_offset",
+    "cte",
+    "initial_deformation",
+    "initial_velocity",
+)
 _SIZES = ("sd", "log_sd", "median", "a", "b")
 _WORDS = ("family", "unit", "source", "note")
 
@@ -108,9 +115,9 @@ def _unit(
     here = f"{key}.unit"
     given = entry.get("unit")
     if given is None:
-        if key.rpartition(".")[2] not in _UNIT_NEEDED or unit is None:
+        example = _UNIT_NEEDED.get(key.rpartition(".")[2])
+        if example is None or unit is None:
             return 1.0, unit or "", []
-        example = "GPa" if unit == "MPa" else "1e-4/K"
         words = "is given without a unit"
         return 1.0, "", [toml.finding(words, f'Write unit = "{example}"', key)]
     try:

@@ -10,11 +10,13 @@ from hdcal.rig.resources import priors_folder
 from hdcal.rig.toml_file import TomlFile, nearest, read_toml
 
 __all__ = [
+    "DYNAMIC_UNITS",
     "FAMILIES",
     "MATERIAL_UNITS",
     "MODEL_UNITS",
     "SCALE_UNITS",
     "Prior",
+    "dynamic_priors",
     "effect_priors",
     "material_names",
     "material_priors",
@@ -23,6 +25,8 @@ __all__ = [
     "read_priors",
     "rig_priors",
 ]
+
+_NO_MATERIALS = ("rig", "effects", "dynamics")
 
 # What a prior table may speak of: name -> its unit inside hdcal.
 MODEL_UNITS = {
@@ -38,6 +42,14 @@ SCALE_UNITS = {
     "specimen_sd": "1",
     "gap_sd": "N",
     "gap_length": "1",
+}
+# A gear file may speak of these; `mass` takes the place of the shipped mass_ratio.
+DYNAMIC_UNITS = {
+    "mass": "N*s^2/mm",
+    "damping_ratio": "1",
+    "initial_deformation": "mm",
+    "initial_velocity": "mm/s",
+    "deformation_sigma": "mm",
 }
 MATERIAL_UNITS = {
     "E0": "MPa",
@@ -86,6 +98,12 @@ def rig_priors() -> dict[str, Prior]:
     return read_priors(priors_folder() / "rig.toml", MODEL_UNITS | SCALE_UNITS)
 
 
+def dynamic_priors() -> dict[str, Prior]:
+    """Shipped priors of the moving gear: `DYNAMIC_UNITS`, mass as `mass_ratio`."""
+    units = {**DYNAMIC_UNITS, "mass_ratio": "1"}
+    return read_priors(priors_folder() / "dynamics.toml", units)
+
+
 def effect_priors() -> dict[str, Prior]:
     """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
     toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
@@ -125,7 +143,7 @@ def material_names() -> list[str]:
     """Materials that hdcal ships, in alphabetical order."""
     files = (item.name for item in priors_folder().iterdir())
     stems = (name.removesuffix(".toml") for name in files if name.endswith(".toml"))
-    return sorted(stem for stem in stems if stem not in ("rig", "effects"))
+    return sorted(stem for stem in stems if stem not in _NO_MATERIALS)
 
 
 def material_priors(name: str) -> dict[str, Prior]:

@@ -23,7 +23,12 @@ _LIMITS = {
 
 
 def check_values(
-    values: Values, used: dict[str, Column], layout: Layout, file: str
+    values: Values,
+    used: dict[str, Column],
+    layout: Layout,
+    file: str,
+    *,
+    fewest: int = FEWEST_ROWS,
 ) -> list[Finding]:
     """Findings about what single columns cannot be, whatever the rig.
 
@@ -32,11 +37,12 @@ def check_values(
         used: columns by quantity.
         layout: of the table.
         file: how the user named the file.
+        fewest: rows that are needed.
     """
     findings = []
-    if layout.data_rows < FEWEST_ROWS:
+    if layout.data_rows < fewest:
         words = f"holds {layout.data_rows} rows of readings"
-        remedy = f"At least {FEWEST_ROWS} are needed"
+        remedy = f"At least {fewest} are needed"
         findings.append(Finding(file, words, remedy))
     for quantity, limit in _LIMITS.items():
         if quantity not in values:

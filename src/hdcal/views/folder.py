@@ -36,6 +36,13 @@ OUTPUTS = frozenset(
         "reliability.png",
         "detection.svg",
         "detection.png",
+        "response.json",
+        "response.csv",
+        "response.svg",
+        "response.png",
+        "motion.csv",
+        "motion.svg",
+        "motion.png",
         "opening.json",
         "labels.json",
         "fit.json",
@@ -71,6 +78,7 @@ def check_target(
     *,
     force: bool = False,
     ours: Callable[[Path], bool] = is_result,
+    option: str = "--force",
 ) -> None:
     """Refuse a result that could not be written, before any work is done.
 
@@ -78,6 +86,7 @@ def check_target(
         target: the folder to make.
         force: whether an older result may be replaced.
         ours: tells what in an older folder may be replaced.
+        option: what to say on the command line to replace it.
 
     Raises:
         InputError: it exists, is a file, or its parent cannot be written to.
@@ -85,7 +94,7 @@ def check_target(
     _check_place(Path(target))
     real = _real(target)
     if real.is_dir():
-        _check_existing(real, target, force, ours)
+        _check_existing(real, target, force, ours, option)
     elif real.exists():
         raise _refusal(target, "is a file", "Name a folder that does not exist yet")
 
@@ -202,10 +211,14 @@ def _check_place(target: Path) -> None:
 
 
 def _check_existing(
-    real: Path, target: Path | str, force: bool, ours: Callable[[Path], bool]
+    real: Path,
+    target: Path | str,
+    force: bool,
+    ours: Callable[[Path], bool],
+    option: str,
 ) -> None:
     if not force:
-        remedy = "Name another folder with --out, or say --force to replace it"
+        remedy = f"Name another folder with --out, or say {option} to replace it"
         raise _refusal(target, "exists already", remedy)
     foreign = sorted(
         entry.name
@@ -214,7 +227,7 @@ def _check_existing(
     )
     if foreign:
         words = f"holds '{foreign[0]}', which hdcal did not write"
-        remedy = "--force replaces results only: name another folder"
+        remedy = f"{option} replaces results only: name another folder"
         raise _refusal(target, words, remedy)
 
 

@@ -36,8 +36,8 @@ def calibration_report(
         "parameters": [parameter_row(n, e) for n, e in summary["parameters"].items()],
         "theories": _theories(summary),
         "data_rows": data_rows(posterior.case),
-        "priors": _priors(posterior),
-        "provenance": _provenance(posterior, summary, command),
+        "priors": prior_rows(posterior),
+        "provenance": provenance_rows(posterior, summary, command),
     }
     return render_page(_TEMPLATE, context, images)
 
@@ -67,7 +67,8 @@ def _theories(summary: dict) -> list[dict]:
     return rows
 
 
-def _priors(posterior: Posterior) -> list[dict]:
+def prior_rows(posterior: Posterior) -> list[dict]:
+    """Return the priors as texts of a table's rows."""
     shown = [name for name in posterior.priors if name in posterior.draws]
     return [
         {
@@ -79,7 +80,8 @@ def _priors(posterior: Posterior) -> list[dict]:
     ]
 
 
-def _provenance(posterior: Posterior, summary: dict, command: str) -> list:
+def provenance_rows(posterior: Posterior, summary: dict, command: str) -> list:
+    """Return how a calibration was made, as pairs of name and words."""
     sampling = summary["sampling"]
     rows = [
         *gear_rows(posterior.case, posterior.theory),

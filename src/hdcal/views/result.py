@@ -2,7 +2,10 @@
 
 import csv
 import io
+from collections.abc import Mapping
 from pathlib import Path
+
+import numpy as np
 
 from hdcal.answers.bands import Bands, default_bands
 from hdcal.answers.residuals import residuals
@@ -55,7 +58,11 @@ def write_result(
 
 def bands_csv(bands: Bands) -> str:
     """Return bands as the text of a CSV file; what was not fitted stays empty."""
-    columns = bands.columns()
+    return columns_csv(bands.columns())
+
+
+def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
+    """Return columns as the text of a CSV file."""
     target = io.StringIO()
     writer = csv.writer(target, lineterminator="\n")
     writer.writerow(columns)

@@ -16,6 +16,11 @@ LABELS = {
     "specimen_sd": "spread of stiffness between gears",
     "gap_sd": "size of the leftover discrepancy",
     "gap_length": "length of the leftover discrepancy",
+    "mass": "moved mass m",
+    "damping_ratio": "damping ratio ζ",
+    "initial_deformation": "deformation at the first row",
+    "initial_velocity": "speed at the first row",
+    "deformation_sigma": "noise of the deformation reading",
 }
 _FAMILY_WORDS = {
     "fixed": "exactly {0}",

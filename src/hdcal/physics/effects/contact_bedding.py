@@ -23,6 +23,7 @@ class ContactBedding(Effect):
     name: ClassVar[str] = "contact_bedding"
     stage: ClassVar[Stage] = "deformation"
     family: ClassVar[str] = "curvature"
+    acts_at_once: ClassVar[bool] = True
 
     closure: Float[Array, ""] | float = parameter(
         "mm", "radial closure of the contacts when fully bedded", typical=0.03, null=0.0

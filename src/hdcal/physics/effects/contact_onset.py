@@ -21,6 +21,7 @@ class ContactOnset(Effect):
     name: ClassVar[str] = "contact_onset"
     stage: ClassVar[Stage] = "force"
     family: ClassVar[str] = "curvature"
+    acts_at_once: ClassVar[bool] = True
 
     ratio: Float[Array, ""] | float = parameter(
         "1",

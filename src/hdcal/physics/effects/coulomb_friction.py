@@ -19,6 +19,7 @@ class CoulombFriction(Effect):
     family: ClassVar[str] = "friction"
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
+    acts_at_once: ClassVar[bool] = True
 
     force: Float[Array, ""] | float = parameter(
         "N", "friction force, half the width of the loop", typical=2.0, null=0.0

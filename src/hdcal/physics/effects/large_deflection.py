@@ -24,6 +24,7 @@ class LargeDeflection(Effect):
     stage: ClassVar[Stage] = "force"
     family: ClassVar[str] = "curvature"
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
+    acts_at_once: ClassVar[bool] = True
 
     curvature: Float[Array, ""] | float = parameter(
         "1/mm",

@@ -21,6 +21,7 @@ class ProgressiveStiffening(Effect):
     name: ClassVar[str] = "progressive_stiffening"
     stage: ClassVar[Stage] = "force"
     family: ClassVar[str] = "curvature"
+    acts_at_once: ClassVar[bool] = True
 
     slope: Float[Array, ""] | float = parameter(
         "1/mm", "relative gain of secant stiffness per mm", typical=0.4, null=0.0

@@ -20,6 +20,7 @@ class RigCompliance(Effect):
     # No table of readings on the gear holds it, so nothing here is ever tested:
     # the readings are those of a softer gear.
     needs: ClassVar[frozenset[str]] = frozenset({"bare_rig"})
+    acts_at_once: ClassVar[bool] = True
 
     compliance: Float[Array, ""] | float = parameter(
         "mm/N", "stretch of rig and fixture per force", typical=2.5e-4, null=0.0

@@ -23,6 +23,7 @@ class SeatingSlack(Effect):
     name: ClassVar[str] = "seating_slack"
     stage: ClassVar[Stage] = "deformation"
     family: ClassVar[str] = "curvature"
+    acts_at_once: ClassVar[bool] = True
 
     clearance: Float[Array, ""] | float = parameter(
         "mm", "radial play taken up before contact", typical=0.02, null=0.0

@@ -20,6 +20,7 @@ class ThermalStiffness(Effect):
     stage: ClassVar[Stage] = "force"
     family: ClassVar[str] = "thermal stiffness"
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
+    acts_at_once: ClassVar[bool] = True
 
     slope: Float[Array, ""] | float = parameter(
         "1/K", "relative gain of stiffness per kelvin", typical=3e-4, null=0.0

@@ -19,6 +19,7 @@ class ViscousDamping(Effect):
     family: ClassVar[str] = "friction"
     needs: ClassVar[frozenset[str]] = frozenset({"rates"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
+    acts_at_once: ClassVar[bool] = True
 
     coefficient: Float[Array, ""] | float = parameter(
         "N*s/mm", "drag per rate of deformation", typical=6.0, null=0.0

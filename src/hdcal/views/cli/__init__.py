@@ -21,6 +21,7 @@ from hdcal.views.cli.effects import effects
 from hdcal.views.cli.fit import fit
 from hdcal.views.cli.margin import margin
 from hdcal.views.cli.predict import predict
+from hdcal.views.cli.respond import respond
 from hdcal.views.cli.study import study
 from hdcal.views.cli.track import track
 
@@ -64,6 +65,7 @@ for _command in (
     margin,
     design,
     study,
+    respond,
     track,
     fit,
     check,

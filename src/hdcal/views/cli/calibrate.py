@@ -5,7 +5,7 @@ import sys
 
 import click
 
-from hdcal.errors import InputError
+from hdcal.errors import Finding, InputError
 from hdcal.views.cli.acceleration import keep_compilations
 from hdcal.views.cli.console import Console
 from hdcal.views.cli.options import (
@@ -34,6 +34,11 @@ _MANY = click.IntRange(1, 1_000_000)
     help="Fit what no effect explains as a smooth leftover discrepancy.",
 )
 @click.option(
+    "--dynamic",
+    is_flag=True,
+    help="DATA are a gear that moves: calibrate mass, damping and stiffness.",
+)
+@click.option(
     "--chains",
     type=click.IntRange(1, 64),
     default=4,
@@ -58,12 +63,19 @@ _MANY = click.IntRange(1, 1_000_000)
 @json_option
 @click.pass_obj
 def calibrate(console: Console, data, gear, columns, theory, out, force, **settings):
-    """Calibrate the force model against DATA and write a result folder."""
+    """Calibrate the force model against DATA and write a result folder.
+
+    With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
+    gear set in motion, and mass, damping and stiffness are calibrated.
+    """
     from hdcal.rig.reading import read_case
     from hdcal.views.folder import check_target
 
     findings = []
     case = None
+    dynamic = settings.pop("dynamic")
+    if dynamic:
+        findings += _not_dynamic(settings)
     try:
         case = read_case(data, gear, columns=read_columns(columns), theory=theory)
     except InputError as error:
@@ -77,7 +89,40 @@ def calibrate(console: Console, data, gear, columns, theory, out, force, **setti
             findings += error.findings
     if findings or case is None:
         raise InputError(findings)
+    if dynamic:
+        return _calibrate_dynamic(console, case, theory, settings, target, force)
     return _calibrate(console, case, theory, settings, target, force)
+
+
+def _not_dynamic(settings: dict) -> list[Finding]:
+    """Take the options that --dynamic has no use for, and say so where they are set."""
+    found = []
+    for name, option in (("effects", "--effect"), ("with_gap", "--with-gap")):
+        if settings.pop(name):
+            words = "does not go with --dynamic, whose model is linear"
+            found.append(Finding(option, words, "Leave it out"))
+    return found
+
+
+def _calibrate_dynamic(console: Console, case, theory, settings, target, force) -> int:
+    keep_compilations()
+    from hdcal.answers.dynamics.calibration import calibrate_dynamic
+    from hdcal.views.cli.motion_closing import motion_words
+    from hdcal.views.cli.progress import progress_bar
+    from hdcal.views.motion_result import write_motion
+
+    for note in case.notes:
+        console.words(note)
+    with progress_bar() as progress:
+        posterior = calibrate_dynamic(
+            case, theory=theory, progress=progress, **settings
+        )
+    command = shlex.join(["hdcal", *sys.argv[1:]])
+    summary = write_motion(posterior, target, command=command, force=force)
+    console.table(*motion_words(summary, str(target)))
+    if console.json:
+        console.data(summary)
+    return 0 if summary["status"] == "ok" else 1
 
 
 def _calibrate(console: Console, case, theory, settings, target, force) -> int:

@@ -17,6 +17,7 @@ from hdcal.views.figures.design import (
 from hdcal.views.figures.draws import prior_figure, sampler_figure
 from hdcal.views.figures.leftover import residual_figure
 from hdcal.views.figures.margin import margin_figure, tornado_figure
+from hdcal.views.figures.motion import motion_figure, response_figure
 from hdcal.views.figures.shrink import shrink_figure
 from hdcal.views.figures.study import study_figure
 from hdcal.views.figures.where import where_figure
@@ -31,11 +32,13 @@ __all__ = [
     "generator_figure",
     "inverse_figure",
     "margin_figure",
+    "motion_figure",
     "prior_figure",
     "profile_figure",
     "reliability_figure",
     "render",
     "residual_figure",
+    "response_figure",
     "sampler_figure",
     "shrink_figure",
     "study_figure",

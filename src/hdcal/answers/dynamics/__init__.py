@@ -1,0 +1,1 @@
+"""Answers about a gear that moves: its calibration and its response to a force."""

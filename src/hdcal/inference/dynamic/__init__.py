@@ -1,0 +1,1 @@
+"""Inference of mass, damping and stiffness from a gear that was seen to move."""

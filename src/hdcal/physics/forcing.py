@@ -1,0 +1,115 @@
+"""Forces over time that the dynamic model can be driven with."""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from hdcal.rig.records import Array
+
+Scalar = Float[Array, ""] | float
+
+
+class Forcing(eqx.Module):
+    """A force as a function of time."""
+
+    @abstractmethod
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force at a time [s] as [N]."""
+
+    def corners(self) -> Float[Array, " c"] | None:
+        """Return the times at which the force bends [s], or None."""
+        return None
+
+    @abstractmethod
+    def largest(self) -> Scalar:
+        """Return the largest force in size [N]."""
+
+
+class Step(Forcing):
+    """F = A from t = 0 on.
+
+    Attributes:
+        amplitude: A [N].
+    """
+
+    amplitude: Scalar
+
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force [N]."""
+        return jnp.asarray(self.amplitude) + 0.0 * time
+
+    def largest(self) -> Scalar:
+        """Return |A| [N]."""
+        return jnp.abs(self.amplitude)
+
+
+class Sine(Forcing):
+    """F = A sin(2π f t).
+
+    Attributes:
+        amplitude: A [N].
+        frequency: f [Hz].
+    """
+
+    amplitude: Scalar
+    frequency: Scalar
+
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force [N]."""
+        return self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * time)
+
+    def largest(self) -> Scalar:
+        """Return |A| [N]."""
+        return jnp.abs(self.amplitude)
+
+
+class Chirp(Forcing):
+    """F = A sin(2π (f₀ t + (f₁ − f₀) t²/(2 D))): a sweep from f₀ to f₁ in D.
+
+    Attributes:
+        amplitude: A [N].
+        first: f₀, frequency at the start [Hz].
+        last: f₁, frequency at the end [Hz].
+        duration: D [s].
+    """
+
+    amplitude: Scalar
+    first: Scalar
+    last: Scalar
+    duration: Scalar
+
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force [N]."""
+        rise = 0.5 * (self.last - self.first) / self.duration
+        turns = (self.first + rise * time) * time
+        return self.amplitude * jnp.sin(2.0 * jnp.pi * turns)
+
+    def largest(self) -> Scalar:
+        """Return |A| [N]."""
+        return jnp.abs(self.amplitude)
+
+
+class Table(Forcing):
+    """A force that was sampled: linear between the rows, constant beyond them.
+
+    Attributes:
+        time: increasing [s], shape (n,).
+        force: [N], shape (n,).
+    """
+
+    time: Float[Array, " n"]
+    force: Float[Array, " n"]
+
+    def __call__(self, time: Scalar) -> Float[Array, ""]:
+        """Return the force [N]."""
+        return jnp.interp(time, self.time, self.force)
+
+    def corners(self) -> Float[Array, " c"]:
+        """Return the times of the rows [s]."""
+        return jnp.asarray(self.time)
+
+    def largest(self) -> Scalar:
+        """Return the largest force in size [N]."""
+        return jnp.max(jnp.abs(self.force))
