@@ -167,9 +167,8 @@ def calibrate(
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
-    _check_settings(chains, warmup, draws)
-    let_go_of_programs()
     check_settings(chains, warmup, draws)
+    let_go_of_programs()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)
