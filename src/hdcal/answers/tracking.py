@@ -100,10 +100,7 @@ class Tracker:
         reference = self._begin.reading.reference_temperature
         warmth = reference if temperature is None else temperature
         self._check(deformation, force, temperature, time)
-        if run is not None and run != self._run:
-            if self._run is not None:
-                self._core.widen(self._core.zero, self._begin.remounting)
-            self._run = run
+        self._mount(run)
         features = self._features(deformation, warmth - reference, time or 0.0)
         middle, half, score = self._core.step(features, force)
         self.rows += 1
@@ -128,6 +125,14 @@ class Tracker:
         if isinstance(self._core, ParticleCore):
             found |= _degeneracy(self._core, found["stiffness_N_per_mm"])
         return found
+
+    def _mount(self, run: str | None) -> None:
+        """Open the zero of the force if the label of the mounting is another one."""
+        if run is None or run == self._run:
+            return
+        if self._run is not None:
+            self._core.widen(self._core.zero, self._begin.remounting)
+        self._run = run
 
     def _restart(self) -> None:
         """Begin anew to look for a change, and open what may have changed."""

@@ -64,10 +64,10 @@ class ParticleCore:
             score of the reading in the mixture itself.
         """
         rest, slope = features
-        row = np.stack([slope, np.ones_like(slope)], axis=1)
-        gain = np.einsum("pij,pj->pi", self.spread, row)
-        wide = 1.0 + np.einsum("pi,pi->p", row, gain)
-        expected = rest + np.einsum("pi,pi->p", row, self.mean)
+        # The row of each particle is (slope, 1).
+        gain = slope[:, None] * self.spread[:, 0] + self.spread[:, 1]
+        wide = 1.0 + slope * gain[:, 0] + gain[:, 1]
+        expected = rest + slope * self.mean[:, 0] + self.mean[:, 1]
         error, scale = force - expected, np.sqrt(self.rate / self.shape * wide)
         freedom = 2.0 * self.shape
         t, weight = error / scale, self.weight
@@ -76,7 +76,7 @@ class ParticleCore:
         score = mixture_score(float(weight @ below), float(weight @ above))
         self._learn(t, scale, freedom)
         self.mean += gain * (error / wide)[:, None]
-        self.spread -= np.einsum("pi,pj->pij", gain, gain) / wide[:, None, None]
+        self.spread -= gain[:, :, None] * (gain / wide[:, None])[:, None, :]
         self.rate += 0.5 * error**2 / wide
         self.shape += 0.5
         return middle, half, score
