@@ -13,6 +13,7 @@ LAST_LINES = {
     "calibrate_a_csv.py": "the least-squares slope lies inside the interval",
     "diagnose_a_gap.py": "without it in the library the cause is called unknown",
     "gradient_of_force.py": "the derivatives agree with finite differences",
+    "margin_for_a_design.py": ("the bound holds for the gears that were not measured"),
     "own_effect.py": "the truth lies inside the interval",
 }
 

@@ -1,6 +1,6 @@
 """Margins: what the numbers are, whose they are, and what is refused."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 
 import jax
 import jax.numpy as jnp
@@ -23,8 +23,7 @@ from hdcal.answers.forces import force_of, grid_records
 from hdcal.answers.margins.margin import _outlook
 from hdcal.answers.margins.population import widest
 from hdcal.answers.margins.tolerances import relative_stiffness, tolerance_nodes
-from hdcal.errors import InputError, NotUsable
-from hdcal.inference.checks import Check
+from hdcal.errors import InputError
 
 QUICK = {"sensitivities": False}
 
@@ -254,63 +253,6 @@ def test_the_same_seed_gives_the_same_margin(gears):
         asdict(hdcal.margin(gears, 0.4, seed=seed, **QUICK)) for seed in (1, 1, 2)
     )
     assert first == second != third
-
-
-def test_a_failed_calibration_gives_no_margin(one):
-    failed = replace(one, checks=(Check("made to fail", "failed", "on purpose"),))
-    with pytest.raises(NotUsable, match="made to fail"):
-        hdcal.margin(failed, 0.4)
-    with pytest.raises(NotUsable, match="made to fail"):
-        hdcal.margin([(0.9, one), (0.1, failed)], 0.4)
-
-
-BAD = {
-    "deformation in um": ({"deformation": 400.0}, "Give it in mm"),
-    "no deformation": ({"deformation": np.nan}, "is no deformation"),
-    "limit in mN": ({"limit_force": 120_000.0}, "Give it in N"),
-    "limit in kN": ({"limit_force": 0.12}, "Give it in N"),
-    "no limit": ({"limit_force": np.inf}, "is no force"),
-    "given in mN": ({"given_force": 80_000.0}, "Give it in N"),
-    "empty window": ({"temperature": []}, "empty window"),
-    "below zero": ({"temperature": [-300.0]}, "absolute zero"),
-    "in kelvin by far": ({"temperature": [2500.0]}, "half of Young's modulus"),
-    "content 99": ({"content": 99.0}, "does not lie between 0 and 1"),
-    "confidence 1": ({"confidence": 1.0}, "does not lie between 0 and 1"),
-    "too sure": ({"confidence": 0.9999}, "cannot tell a confidence"),
-    "certainty": ({"required_probability": 1.0}, "does not lie between 0 and 1"),
-    "too rare": ({"required_probability": 1.0 - 1e-12}, "can promise"),
-    "unknown population": ({"population": "planets"}, "is unknown"),
-    "unknown quantity": ({"quantity": "torque"}, "is unknown"),
-    "unknown direction": ({"direction": "sideways"}, "is unknown"),
-    "unknown size": ({"tolerances": {"colour_mm": 0.1}}, "is no size"),
-    "tolerance in um": ({"tolerances": {"wall_thickness_mm": 20.0}}, "Give it in mm"),
-    "negative": ({"tolerances": {"radius_mm": -0.1}}, "is no tolerance"),
-    "no part of ring": ({"tolerances": {"load_height_mm": 1.0}}, "theory 'ring'"),
-}
-
-
-@pytest.mark.parametrize("name", BAD)
-def test_bad_questions_are_refused(one, name):
-    asked, words = BAD[name]
-    asked = {"deformation": 0.4, **asked}
-    with pytest.raises(InputError, match=words) as caught:
-        hdcal.margin(one, **asked)
-    assert len(caught.value.findings) == 1
-
-
-def test_everything_bad_is_said_at_once(one):
-    with pytest.raises(InputError) as caught:
-        hdcal.margin(one, 400.0, temperature=[], content=2.0, population="specimens")
-    assert len(caught.value.findings) == 4
-
-
-def test_models_of_other_data_are_refused(one, gears):
-    other = replace(one, case=replace(one.case, data_sha256="1" * 64))
-    with pytest.raises(InputError, match="same data"):
-        hdcal.margin([(0.5, one), (0.5, other)], 0.4)
-    for models in ([], [(0.0, one)], [(-1.0, one), (2.0, one)]):
-        with pytest.raises(InputError, match="no probability"):
-            hdcal.margin(models, 0.4)
 
 
 def test_the_load_height_matters_to_the_cup():

@@ -82,7 +82,8 @@ def wilks_size(
 
     def short(size: int) -> bool:
         # Beyond the bound lie at most `sides − 1` of the sample.
-        return stats.binom.cdf(sides - 1, size, 1.0 - content) > 1.0 - confidence
+        chance = float(stats.binom.cdf(sides - 1, size, 1.0 - content))
+        return chance > 1.0 - confidence
 
     low, high = 0, 1
     while short(high):

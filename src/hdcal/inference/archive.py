@@ -144,7 +144,7 @@ def digest(tree: xr.DataTree) -> str:
     of their names, numbers as little-endian 64 bits, labels and attributes as text.
     """
     whole = hashlib.sha256()
-    for name in sorted(set(tree.attrs) - {DIGEST}):
+    for name in sorted(set(map(str, tree.attrs)) - {DIGEST}):
         whole.update(json.dumps([name, str(tree.attrs[name])]).encode())
     for node in sorted(tree.subtree, key=lambda node: node.path):
         variables = node.to_dataset(inherit=False).variables

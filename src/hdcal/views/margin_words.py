@@ -135,6 +135,11 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
         f"{index(risk.beta_at_confidence)}."
     )
+    if risk.probability > risk.hi:
+        yield (
+            "The probability lies above the interval of the share because the few "
+            "draws with the widest scatter make most of it."
+        )
 
 
 def _inverse(found: Margin) -> Iterator[str]:

@@ -54,22 +54,27 @@ def read_models(run: Path | str) -> list[tuple[float, Posterior]]:
 
 
 def _read_verdict(path: Path) -> dict:
+    """Return a verdict of this version with whole entries for its models."""
+    words, remedy = "is not a verdict that hdcal wrote", "Diagnose again"
     try:
         found = json.loads(path.read_text("utf-8"))
         schema = str(found["schema"])
-        refits = [(r["hypothesis"], r["probability"]) for r in found.get("refits", [])]
-        files = [Path(r["file"]).name == r["file"] for r in found.get("refits", [])]
-        whole = all(files) and len(dict(refits)) == len(refits) and found["status"]
+        if schema == SCHEMA and _is_whole(found):
+            return found
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        whole, schema = False, SCHEMA
+        schema = SCHEMA
     if schema != SCHEMA:
         words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMA}"
         remedy = "Use the hdcal that wrote it, or diagnose again"
-    elif not whole:
-        words, remedy = "is not a verdict that hdcal wrote", "Diagnose again"
-    else:
-        return found
     raise InputError([Finding(str(path), words, remedy)])
+
+
+def _is_whole(found: dict) -> bool:
+    """Tell whether every model has a name, a probability and a file of this folder."""
+    refits = found.get("refits", [])
+    names = {refit["hypothesis"]: refit["probability"] for refit in refits}
+    inside = all(Path(refit["file"]).name == refit["file"] for refit in refits)
+    return inside and len(names) == len(refits) and isinstance(found["status"], str)
 
 
 def _weighed(run: Path, refits, loaded) -> list[tuple[float, Posterior]]:

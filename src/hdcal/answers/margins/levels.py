@@ -98,8 +98,17 @@ def _exceedance(draws, weights, asked: Asked) -> Exceedance:
         for share in (_TAILS[0], _TAILS[2], asked.confidence)
     )
     chances = np.clip([mean, low, high, sure], 0.0, 1.0)
-    beta, beta_hi, beta_lo, beta_sure = (float(b) for b in -ndtri(chances))
-    return Exceedance(*map(float, chances), beta, beta_lo, beta_hi, beta_sure)
+    beta, beta_hi, beta_lo, beta_sure = map(float, -ndtri(chances))
+    return Exceedance(
+        probability=float(chances[0]),
+        lo=float(chances[1]),
+        hi=float(chances[2]),
+        at_confidence=float(chances[3]),
+        beta=beta,
+        beta_lo=beta_lo,
+        beta_hi=beta_hi,
+        beta_at_confidence=beta_sure,
+    )
 
 
 @dataclass(frozen=True)

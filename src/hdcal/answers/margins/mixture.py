@@ -5,6 +5,8 @@ Of the kinds of scatter those that add up are normal and exact; those that do no
 exact, far into the tails, and differentiable.
 """
 
+from collections.abc import Sequence
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -140,7 +142,7 @@ def _solve(mixture: Mixture, share):
     return jax.lax.while_loop(going, step, start)[2]
 
 
-def pooled(parts: list[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
+def pooled(parts: Sequence[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
     """Return the mixture over draws, each with its weight: the predictive law.
 
     Args:
@@ -153,8 +155,8 @@ def pooled(parts: list[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
         means.append(part.mean.ravel())
         sds.append(jnp.broadcast_to(part.sd, shape).ravel())
     first = parts[0][1]
-    columns = map(jnp.concatenate, (weights, means, sds))
-    return Mixture(*columns, first.step, first.rounded)
+    weight, mean, sd = map(jnp.concatenate, (weights, means, sds))
+    return Mixture(weight, mean, sd, first.step, first.rounded)
 
 
 def weighted_quantile(

@@ -49,7 +49,7 @@ class Question(eqx.Module):
 
     deformation: Float[Array, ""] | float
     turn: Float[Array, ""] | float
-    known_sd: Float[Array, ""] | float
+    known_sd: float
     low: float
     high: float
     down: bool = eqx.field(static=True)
@@ -84,7 +84,9 @@ class Outlook:
         """Whether what is asked for is read in steps."""
         return self.quantity == "reading" and float(self.posterior.problem.step) > 0.0
 
-    def mixture(self, temperature: float, scale=1.0, nodes: Nodes | None = None):
+    def mixture(
+        self, temperature: float, scale=1.0, nodes: Nodes | None = None
+    ) -> Mixture:
         """Return the mixture of every draw [draw, component] at a temperature [°C].
 
         Args:
@@ -128,7 +130,7 @@ def look_out(
     count = len(draws["K"])
     kept = np.linspace(0, count - 1, min(count, _MOST_DRAWS)).round().astype(int)
     values = {name: column[kept] for name, column in draws.items()}
-    spread = qmc.Sobol(5, seed=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
+    spread = qmc.Sobol(5, rng=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
     spread = np.clip(spread[: len(kept)], 1e-9, 1.0 - 1e-9)
     values["_standard"] = stats.norm.ppf(spread[:, :3])
     for column, name in enumerate(("gap_sd", "gap_length"), start=3):

@@ -121,10 +121,15 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
                 f"How much {what} differ rests on the prior: {count} were too few to "
                 "tell."
             )
-    if first.population == "specimens" and first.nodes.factor.size > 1:
+    if first.nodes.factor.size > 1 and first.population == "specimens":
         yield (
             "The tolerances come on top of how much the tested gears differ, which "
             "already holds their own."
+        )
+    elif first.nodes.factor.size > 1:
+        yield (
+            "With tolerances the forces are those of gears that differ from the tested "
+            "ones in these sizes and in nothing else."
         )
     if all(outlook.posterior.problem.gap is None for _, outlook in outlooks):
         for shape in residuals(posterior).structure:

@@ -101,8 +101,7 @@ def tolerance_nodes(
     """
     if not tolerances:
         return Nodes(jnp.ones(1), jnp.zeros(1), jnp.ones(1))
-    # Sobol's points are an even grid in any one size, here without its corner.
-    points = qmc.Sobol(len(tolerances), scramble=True, seed=0)
+    points = qmc.Sobol(len(tolerances), scramble=True, rng=0)
     unit = 2.0 * points.random_base2(_LOG2_GEARS) - 1.0
     shifts = {n: t * unit[:, i] for i, (n, t) in enumerate(tolerances.items())}
     factor = jnp.sort(relative_stiffness(geometry, shifts, theory))
