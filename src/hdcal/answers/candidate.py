@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from hdcal.answers.basis import Basis
 from hdcal.answers.nearest import CLOSE, nearest_kept
-from hdcal.answers.sizes import SIZES
+from hdcal.answers.sizes import SIZES, geometry_with
 from hdcal.answers.target import Target
 from hdcal.rig.records import Geometry
 
@@ -61,29 +61,35 @@ def solve(
         deformation: radial [mm].
         limit: of the force [N].
     """
-    geometry, names = _geometry(basis), list(bounds)
+    geometry, names = _geometry(basis), tuple(bounds)
     own = np.log([float(getattr(geometry, SIZES[name])) for name in names])
     ends = np.log([bounds[name] for name in names]).reshape(-1, 2)
-
-    def excess(z):
-        place = dict(zip(names, jnp.exp(z), strict=True))
-        place |= {"deformation_mm": deformation, **_NEUTRAL}
-        force = target.force(geometry, place) / limit
-        # Without a strength the share is zero, whose logarithm has no slope.
-        stress = target.utilisation(geometry, place) + 1e-12
-        return jnp.log(jnp.stack([force, stress]))
-
-    values, slopes = jax.jit(excess), jax.jit(jax.jacfwd(excess))
+    question = target, geometry, deformation, limit
     z = own
     if names:
         z = nearest_kept(
-            lambda y: np.asarray(values(y)),
-            lambda y: np.asarray(slopes(y)),
+            lambda y: np.asarray(_excess(*question, y, names)),
+            lambda y: np.asarray(_slopes(*question, y, names)),
             own,
             ends,
         )
     sizes = dict(zip(names, map(float, np.exp(z)), strict=True))
     return candidate(basis, target, sizes, deformation, limit)
+
+
+# Compiled once for all materials: everything but the names is an argument.
+@partial(jax.jit, static_argnames="names")
+def _excess(target: Target, geometry, deformation, limit, z, names):
+    """Return the logarithms of force and stress over what is allowed."""
+    place = dict(zip(names, jnp.exp(z), strict=True))
+    place |= {"deformation_mm": deformation, **_NEUTRAL}
+    force = target.force(geometry, place) / limit
+    # Without a strength the share is zero, whose logarithm has no slope.
+    stress = target.utilisation(geometry, place) + 1e-12
+    return jnp.log(jnp.stack([force, stress]))
+
+
+_slopes = partial(jax.jit, static_argnames="names")(jax.jacfwd(_excess, argnums=4))
 
 
 def _geometry(basis: Basis) -> Geometry:
@@ -99,10 +105,9 @@ def candidate(
 ) -> Candidate:
     """Return what given sizes [mm] come to; arguments are those of `solve`."""
     geometry = _geometry(basis)
-    place = {**sizes, "deformation_mm": deformation, **_NEUTRAL}
-    drawn = replace(geometry, **{SIZES[name]: v for name, v in sizes.items()})
-    forces = np.asarray(_all_forces(target, drawn, deformation))
-    share = float(target.utilisation(geometry, place))
+    drawn = geometry_with(geometry, sizes)
+    forces, stresses = map(np.asarray, _draws(target, drawn, deformation))
+    share = float(np.sort(stresses / target.limit)[target.rank])
     force = float(np.sort(forces)[target.rank])
     limited = bool(np.isfinite(target.limit).all())
     steps = [np.log(v / getattr(geometry, SIZES[name])) for name, v in sizes.items()]
@@ -115,14 +120,50 @@ def candidate(
         force=force,
         utilisation=share if limited else None,
         forces=forces,
-        stresses=np.asarray(target.stresses(drawn, deformation, 1.0)),
+        stresses=stresses,
         kept=float(np.mean(forces <= limit * (1.0 + CLOSE))),
     )
 
 
-@eqx.filter_jit
-def _all_forces(target: Target, geometry, deformation):
-    return target.forces(geometry, deformation, 1.0, 1.0)
+@jax.jit
+def _draws(target: Target, geometry, deformation):
+    forces = target.forces(geometry, deformation, 1.0, 1.0)
+    return forces, target.stresses(geometry, deformation, 1.0)
+
+
+def spreads(
+    basis: Basis,
+    target: Target,
+    sizes: Mapping[str, np.ndarray],
+    deformation: float,
+    shares: np.ndarray,
+) -> np.ndarray:
+    """Return quantiles of the force, and the force kept, for many sizes [N].
+
+    Args:
+        basis: draws, of the target's material.
+        target: tells the population.
+        sizes: [mm] by edge name, shape (m,).
+        deformation: radial [mm].
+        shares: probabilities, shape (q,).
+
+    Returns:
+        Shape (q + 1, m), the kept force last.
+    """
+    return np.asarray(
+        _spreads(target, _geometry(basis), deformation, dict(sizes), shares)
+    ).T
+
+
+@jax.jit
+def _spreads(target: Target, geometry, deformation, sizes, shares):
+    def one(point):
+        drawn = geometry_with(geometry, point)
+        ranked = jnp.sort(target.forces(drawn, deformation, 1.0, 1.0))
+        return jnp.append(jnp.quantile(ranked, shares), ranked[target.rank])
+
+    # One after the other: all at once would take a gigabyte.
+    return jax.lax.map(one, sizes)
 
 
 def elasticities(
@@ -134,5 +175,11 @@ def elasticities(
     sizes = {name: float(getattr(geometry, SIZES[name])) for name in names}
     place = {**sizes, **chosen.sizes, "deformation_mm": deformation, **_NEUTRAL}
     place = {name: jnp.asarray(value, dtype=float) for name, value in place.items()}
-    found = target.elasticities(geometry, place)
+    found = _elasticities(target, geometry, place)
     return {name: float(value) for name, value in found.items()}
+
+
+@jax.jit
+def _elasticities(target: Target, geometry, place):
+    force, slopes = jax.value_and_grad(lambda x: target.force(geometry, x))(place)
+    return {name: slope * place[name] / force for name, slope in slopes.items()}

@@ -21,7 +21,7 @@ SIZES = {
 
 def named(name: str) -> str:
     """Return what a size is called on paper: wall_thickness_mm is wall thickness."""
-    return name.removesuffix("_mm").replace("_", " ")
+    return name.removesuffix("_mm").removesuffix("_C").replace("_", " ")
 
 
 def geometry_with(geometry: Geometry, sizes: Mapping[str, Array | float]) -> Geometry:

@@ -137,9 +137,3 @@ class Target(eqx.Module):
         alone = place["deformation_mm"], place["modulus"]
         share = self.stresses(replace(geometry, **sizes), *alone) / self.limit
         return jnp.sort(share)[self.rank]
-
-    @eqx.filter_jit
-    def elasticities(self, geometry: Geometry, place: Mapping[str, Scalar]) -> dict:
-        """Return d ln F / d ln x of the kept force by everything in the place."""
-        force, slopes = jax.value_and_grad(lambda x: self.force(geometry, x))(place)
-        return {name: slope * place[name] / force for name, slope in slopes.items()}

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from hdcal.answers.sizes import named
 from hdcal.views.verdict_words import percent
 from hdcal.views.wording import estimate, number
 
@@ -68,13 +69,13 @@ def inverse_words(found: dict) -> Iterator[str]:
         f"{what} keeps {asked['limit_force_N']:g} N at {asked['deformation_mm']:g} mm "
         f"and {_warmth(asked['temperature_C'])} with probability {_chance(best)} "
         f"(required {asked['probability']:g}). Of all that keep the limits its sizes "
-        f"are the nearest to {_own(found)}'s."
+        f"are the nearest to those of {_own(found)}."
     )
     middle, span = estimate(best["force_N"])
     yield (
         f"Its force is {middle} N ({percent(found['interval'])} {_kind(found)} {span} "
-        f"N); {_own(found)}'s is {estimate(tested['force_N'])[0]} N, which keeps the "
-        f"limit with probability {_share(tested['probability'])}."
+        f"N). {_own(found).capitalize()} takes {estimate(tested['force_N'])[0]} N and "
+        f"keeps the limit with probability {_share(tested['probability'])}."
     )
     yield _stress(best, f"At {asked['deformation_mm']:g} mm")
     if asked["limit_stress_MPa"] is not None:
@@ -112,7 +113,7 @@ def study_words(found: dict) -> Iterator[str]:
         found: from `summarise_study`.
     """
     force = found["columns"]["force_median_N"]
-    varied = ", ".join(name.replace("_", " ") for name in found["varied"]) or "nothing"
+    varied = " and ".join(map(named, found["varied"])) or "nothing"
     yield (
         f"{len(force)} designs, varying {varied}: median force "
         f"{number(min(force))} … {number(max(force))} N."
@@ -121,7 +122,9 @@ def study_words(found: dict) -> Iterator[str]:
 
 
 def _own(found: dict) -> str:
-    return "the tested gear" if found["basis"] == "posterior" else "the file's gear"
+    return (
+        "the tested gear" if found["basis"] == "posterior" else "the gear of the file"
+    )
 
 
 def _kind(found: dict) -> str:

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hdcal.answers.candidate import candidate
+from hdcal.answers.candidate import spreads
 from hdcal.answers.inverse_design import InverseDesign
 from hdcal.answers.sizes import named
 from hdcal.answers.wave_generator import WaveGenerator, gear_forces
@@ -19,6 +19,7 @@ from hdcal.views.figures.canvas import (
     PURPLE,
     RED,
     heading,
+    plain,
     style,
     temperature_colours,
 )
@@ -117,18 +118,16 @@ def inverse_figure(found: InverseDesign) -> Figure:
     return figure
 
 
-def _at(found: InverseDesign, sizes: dict) -> tuple[float, float, float, float]:
-    one = candidate(
-        found.chosen.basis, found.target, sizes, found.deformation, found.limit_force
-    )
-    low, middle, high = np.quantile(one.forces, _TAILS)
-    return float(low), float(middle), float(high), one.force
+def _spreads(found: InverseDesign, sizes: dict) -> np.ndarray:
+    """Return lower end, median, upper end and the kept force at sizes [N]."""
+    basis, tails = found.chosen.basis, np.array(_TAILS)
+    return spreads(basis, found.target, sizes, found.deformation, tails)
 
 
 def _along_one(axes: Axes, found: InverseDesign) -> None:
     name, (low, high) = next(iter(found.bounds.items()))
     along = np.linspace(low, high, _FINE)
-    table = np.array([_at(found, {name: value}) for value in along]).T
+    table = _spreads(found, {name: along})
     axes.fill_between(along, table[0], table[2], color=BLUE, alpha=0.25, linewidth=0)
     axes.plot(along, table[1], color=BLUE, label="median and 95 % band")
     words = f"not exceeded with probability {found.required:g}"
@@ -140,14 +139,19 @@ def _along_one(axes: Axes, found: InverseDesign) -> None:
     axes.set_xlabel(f"{named(name)} [mm]")
     axes.set_ylabel("force [N]")
     axes.legend(loc="best")
-    heading(axes, f"Force at {found.deformation:g} mm, {found.chosen.basis.material}")
+    heading(
+        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
+    )
 
 
 def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
-    (first, ends), (second, others) = list(found.bounds.items())[:2]
-    x, y = np.linspace(*ends, _COARSE), np.linspace(*others, _COARSE)
+    (first, ends), (second, span) = list(found.bounds.items())[:2]
+    x, y = np.linspace(*ends, _COARSE), np.linspace(*span, _COARSE)
     rest = {n: v for n, v in found.chosen.sizes.items() if n not in (first, second)}
-    table = [[_at(found, {**rest, first: a, second: b})[3] for a in x] for b in y]
+    a, b = (grid.ravel() for grid in np.meshgrid(x, y))
+    others = {name: np.full(len(a), value) for name, value in rest.items()}
+    kept = _spreads(found, {**others, first: a, second: b})[-1]
+    table = kept.reshape(len(y), len(x))
     drawn = axes.contourf(x, y, table, 20, cmap="cividis")
     figure.colorbar(drawn, ax=axes, label=f"force kept with {found.required:g} [N]")
     axes.contour(x, y, table, [found.limit_force], colors=RED, linewidths=1.6)
@@ -161,7 +165,9 @@ def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
     axes.set_xlabel(f"{named(first)} [mm]")
     axes.set_ylabel(f"{named(second)} [mm]")
     axes.legend(loc="upper right", frameon=True, facecolor="white")
-    heading(axes, f"Force at {found.deformation:g} mm, {found.chosen.basis.material}")
+    heading(
+        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
+    )
 
 
 def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Figure:

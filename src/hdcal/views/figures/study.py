@@ -67,7 +67,9 @@ def _lines(axes: Axes, found: Study, sizes, rows, materials) -> None:
             axes.plot(along[order], middle[order], ".-", color=colour, label=words)
         else:
             reach = [middle - low, high - middle]
-            axes.errorbar([material], middle, reach, fmt="o", color=BLUE, capsize=4)
+            axes.errorbar(
+                [plain(material)], middle, reach, fmt="o", color=BLUE, capsize=4
+            )
     axes.set_xlabel(_LABELS[sizes[0]] if sizes else "material")
     axes.set_ylabel("force [N]")
     if axes.get_legend_handles_labels()[0]:
