@@ -11,6 +11,7 @@ import hdcal
 PUBLIC = [
     "Bands",
     "Case",
+    "DynamicPosterior",
     "EFFECTS",
     "Effect",
     "Finding",
@@ -24,16 +25,19 @@ PUBLIC = [
     "Prior",
     "Records",
     "Residuals",
+    "Response",
     "Rows",
     "THEORIES",
     "Verdict",
     "calibrate",
+    "calibrate_dynamic",
     "diagnose",
     "force",
     "parameter",
     "predict",
     "read_case",
     "residuals",
+    "respond",
     "summarise",
 ]
 LOADED = """

@@ -11,9 +11,12 @@ if TYPE_CHECKING:
     from hdcal.answers.calibration import calibrate
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
+    from hdcal.answers.dynamics.calibration import calibrate_dynamic
+    from hdcal.answers.dynamics.respond import Response, respond
     from hdcal.answers.residuals import Residuals, residuals
     from hdcal.answers.summary import summarise
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
+    from hdcal.inference.dynamic.posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "Bands": "answers.bands",
     "Case": "rig.case",
+    "DynamicPosterior": "inference.dynamic.posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Finding": "errors",
@@ -40,16 +44,19 @@ _HOMES = {
     "Prior": "rig.priors",
     "Records": "rig.records",
     "Residuals": "answers.residuals",
+    "Response": "answers.dynamics.respond",
     "Rows": "physics.effect",
     "THEORIES": "physics.theory",
     "Verdict": "answers.diagnosis.verdict",
     "calibrate": "answers.calibration",
+    "calibrate_dynamic": "answers.dynamics.calibration",
     "diagnose": "answers.diagnosis.diagnose",
     "force": "physics.chain",
     "parameter": "physics.effect",
     "predict": "answers.bands",
     "read_case": "rig.reading",
     "residuals": "answers.residuals",
+    "respond": "answers.dynamics.respond",
     "summarise": "answers.summary",
 }
 
