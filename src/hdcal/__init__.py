@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from hdcal.answers.classical import PolynomialFit, fit
     from hdcal.answers.diagnosis.diagnose import diagnose
     from hdcal.answers.diagnosis.verdict import Verdict
+    from hdcal.answers.dynamics.calibration import calibrate_dynamic
+    from hdcal.answers.dynamics.respond import Response, respond
     from hdcal.answers.inverse_design import InverseDesign, inverse_design
     from hdcal.answers.margins.answer import Margin
     from hdcal.answers.margins.margin import margin
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from hdcal.answers.tracking import Tracker
     from hdcal.answers.wave_generator import WaveGenerator, wave_generator
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
+    from hdcal.inference.dynamic.posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
@@ -39,6 +42,7 @@ _HOMES = {
     "Bands": "answers.bands",
     "Case": "rig.case",
     "Claim": "answers.audit.article",
+    "DynamicPosterior": "inference.dynamic.posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Finding": "errors",
@@ -56,6 +60,7 @@ _HOMES = {
     "Profile": "physics.profile",
     "Records": "rig.records",
     "Residuals": "answers.residuals",
+    "Response": "answers.dynamics.respond",
     "Rows": "physics.effect",
     "Study": "answers.study",
     "THEORIES": "physics.theory",
@@ -64,6 +69,7 @@ _HOMES = {
     "WaveGenerator": "answers.wave_generator",
     "audit": "answers.audit.audit",
     "calibrate": "answers.calibration",
+    "calibrate_dynamic": "answers.dynamics.calibration",
     "diagnose": "answers.diagnosis.diagnose",
     "fit": "answers.classical",
     "force": "physics.chain",
@@ -74,6 +80,7 @@ _HOMES = {
     "predict": "answers.bands",
     "read_case": "rig.reading",
     "residuals": "answers.residuals",
+    "respond": "answers.dynamics.respond",
     "ring_profile": "physics.profile",
     "study": "answers.study",
     "summarise": "answers.summary",

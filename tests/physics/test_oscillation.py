@@ -1,0 +1,184 @@
+"""The integrated motion is that of the textbook, and of its exact linear twin."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from hdcal import EFFECTS
+from hdcal.physics.chain import Base, Reading
+from hdcal.physics.dynamics import (
+    FRICTION_SPEED,
+    Oscillator,
+    damping_ratio,
+    integrate,
+    natural_frequency,
+    ring_mass,
+)
+from hdcal.physics.forcing import Chirp, Sine, Step, Table
+from hdcal.physics.linear_response import linear_response
+from hdcal.physics.theory import ring
+from hdcal.rig.records import Geometry
+
+XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
+MASS, STIFFNESS, FORCE = 4e-5, 200.0, 80.0
+PACE = np.sqrt(STIFFNESS / MASS)
+TIMES = np.linspace(0.0, 0.05, 401)
+RATIOS = [0.0, 0.015, 0.3, 1.0, 2.5]
+
+
+def gear(ratio: float, effects=(), reading=None) -> Oscillator:
+    """Return an oscillator of a given damping ratio."""
+    base = Base(STIFFNESS, 0.0, 0.0, 0.0, 1.0)
+    reading = reading or Reading(1.0, 20.0)
+    damping = 2.0 * ratio * np.sqrt(STIFFNESS * MASS)
+    return Oscillator(MASS, damping, base, effects, reading, 20.0)
+
+
+@jax.jit
+def move(oscillator, force, times):
+    """Return the integrated motion."""
+    states, done = integrate(oscillator, force, times)
+    return jnp.where(done, states, jnp.nan)
+
+
+exact_response = jax.jit(linear_response)
+
+
+def step_response(ratio: float, times) -> np.ndarray:
+    """Return the deformation after a step from rest, from the textbook [mm]."""
+    rest, tau = FORCE / STIFFNESS, PACE * times
+    if ratio == 1.0:
+        return rest * (1.0 - np.exp(-tau) * (1.0 + tau))
+    root = np.emath.sqrt(ratio**2 - 1.0)
+    fast, slow = -ratio - root, -ratio + root
+    free = (fast * np.exp(slow * tau) - slow * np.exp(fast * tau)) / (slow - fast)
+    return np.real(rest * (1.0 + free))
+
+
+def sine_response(ratio: float, frequency: float, times) -> np.ndarray:
+    """Return steady state and transient under a sine from rest, by residues [mm].
+
+    Y(s) = (A/m) Ω / ((s² + Ω²)(s − p₁)(s − p₂)) for simple poles.
+    """
+    root = np.emath.sqrt(ratio**2 - 1.0)
+    drive = 2.0 * np.pi * frequency
+    poles = [PACE * (-ratio + root), PACE * (-ratio - root), 1j * drive, -1j * drive]
+    total = np.zeros(len(times), complex)
+    for index, pole in enumerate(poles):
+        others = np.prod([pole - p for i, p in enumerate(poles) if i != index])
+        total += np.exp(pole * times) / others
+    return np.real(FORCE / MASS * drive * total)
+
+
+def worst(found, expected) -> float:
+    """Return the largest error relative to the largest value."""
+    return float(np.max(np.abs(found - expected)) / np.max(np.abs(expected)))
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_a_step_is_answered_as_in_the_textbook(ratio):
+    expected = step_response(ratio, TIMES)
+    assert worst(move(gear(ratio), Step(FORCE), TIMES)[:, 0], expected) < 1e-7
+    force, rest = np.full(len(TIMES), FORCE), np.zeros(2)
+    parts = (MASS, gear(ratio).damping, STIFFNESS)
+    exact = exact_response(*parts, TIMES, force, rest)[:, 0]
+    assert worst(exact, expected) < 1e-11
+
+
+@pytest.mark.parametrize("ratio", [0.015, 0.3, 2.5])
+@pytest.mark.parametrize("frequency", [5.0, 350.0, 900.0])
+def test_a_sine_is_answered_as_in_the_textbook(ratio, frequency):
+    expected = sine_response(ratio, frequency, TIMES)
+    found = move(gear(ratio), Sine(FORCE, frequency), TIMES)[:, 0]
+    assert worst(found, expected) < 1e-7
+
+
+def test_the_textbook_notices_another_mass():
+    heavier = replace(gear(0.015), mass=1.001 * MASS)
+    found = move(heavier, Step(FORCE), TIMES)[:, 0]
+    assert worst(found, step_response(0.015, TIMES)) > 1e-3
+
+
+@pytest.mark.parametrize("ratio", [0.015, 1.0, 2.5])
+def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
+    rng = np.random.default_rng(1)
+    time = np.sort(rng.uniform(0.0, 0.05, 80))
+    force = rng.normal(0.0, 40.0, 80)
+    parts = (MASS, gear(ratio).damping, STIFFNESS)
+    exact = exact_response(*parts, time, force, np.zeros(2))
+    found = move(gear(ratio), Table(time, force), time)
+    assert worst(found[:, 0], exact[:, 0]) < 1e-6
+    assert worst(found[:, 1], exact[:, 1]) < 1e-6
+
+
+def test_the_exact_response_has_exact_gradients_through_critical_damping():
+    time, force = np.linspace(0.0, 0.02, 50), np.linspace(0.0, 30.0, 50)
+
+    @jax.jit
+    def end(ratio):
+        damping = 2.0 * ratio * jnp.sqrt(STIFFNESS * MASS)
+        parts = (MASS, damping, STIFFNESS, time, force, jnp.array([0.1, 0.0]))
+        return linear_response(*parts)[-1, 0]
+
+    slope, h = jax.jit(jax.grad(end)), 1e-5
+    for ratio in (0.02, 1.0, 3.0):
+        difference = float(end(ratio + h) - end(ratio - h)) / (2.0 * h)
+        assert float(slope(ratio)) == pytest.approx(difference, rel=1e-6)
+
+
+def test_a_sweep_passes_through_its_frequencies():
+    sweep = Chirp(1.0, 10.0, 50.0, 2.0)
+    # The phase grows by the mean frequency times the duration: sixty turns.
+    phase = 2.0 * np.pi * 60.0
+    assert float(sweep(2.0)) == pytest.approx(np.sin(phase), abs=1e-9)
+    near = np.array([float(sweep(2.0 - h)) for h in (0.0, 1e-6)])
+    assert np.diff(near)[0] / -1e-6 == pytest.approx(2.0 * np.pi * 50.0, rel=1e-3)
+
+
+def test_dry_friction_takes_the_same_from_every_swing():
+    # Free decay: a swing loses 2 F_c/k from peak to peak on the other side.
+    friction = EFFECTS["coulomb_friction"](force=2.0)
+    release = Table(np.array([0.0, 0.2, 0.2001, 0.21]), np.array([0.0, 60.0, 0.0, 0.0]))
+    times = np.linspace(0.2001, 0.206, 2000)
+    swing = np.asarray(move(gear(0.0, (friction,)), release, np.r_[0.0, times])[1:, 0])
+    inner = (np.diff(np.sign(np.diff(swing))) != 0).nonzero()[0] + 1
+    size = np.abs(swing[inner])
+    lost = -np.diff(size)
+    assert len(lost) >= 3
+    assert lost == pytest.approx(np.full(len(lost), 2.0 * 2.0 / STIFFNESS), rel=0.02)
+    assert FRICTION_SPEED == 1.0
+
+
+def test_hardening_raises_the_frequency_and_keeps_the_energy():
+    hard = EFFECTS["progressive_stiffening"](slope=0.8)
+    states = np.asarray(move(gear(0.0, (hard,)), Step(FORCE), TIMES))
+    y, speed = states.T
+    # g = k y (1 + a y) for y > 0: work done is kinetic plus stored energy.
+    stored = STIFFNESS * (y**2 / 2.0 + 0.8 * y**3 / 3.0)
+    energy = 0.5 * MASS * speed**2 + stored
+    assert y.min() > -1e-3
+    assert worst(energy, FORCE * y) < 2e-3
+    assert y.max() < step_response(0.0, TIMES).max() - 0.05
+
+
+def test_a_diametral_reading_has_the_same_frequency():
+    half = gear(0.015, (), Reading(0.5, 20.0))
+    k = float(half.stiffness)
+    assert k == pytest.approx(0.5 * STIFFNESS)
+    assert natural_frequency(0.5 * MASS, k) == pytest.approx(PACE / (2.0 * np.pi))
+    assert damping_ratio(0.5 * MASS, 0.5 * half.damping, k) == pytest.approx(0.015)
+
+
+def test_the_mass_of_the_ring_is_rayleighs():
+    density, modulus = 7.85e-9, 207e3
+    mass = float(ring_mass(XB1, density, 1.0))
+    whole = 2.0 * np.pi * 40.0 * 0.68 * 70.0 * density
+    assert mass == pytest.approx(0.28295 * whole, rel=1e-4)
+    found = float(natural_frequency(mass, ring(XB1, modulus)))
+    # The exact n = 2 mode of a free ring, (6/√5) √(EI/(ρ A R⁴)): the static shape
+    # lies above it, as Rayleigh's quotient must, and not by much.
+    exact = 6.0 / 5**0.5 * np.sqrt(modulus * 0.68**2 / (12.0 * density * 40.0**4))
+    assert 1.0 < found / (exact / (2.0 * np.pi)) < 1.03
