@@ -3,7 +3,7 @@
 import argparse
 from importlib import import_module
 
-NAMES = ("processes", "samplers", "rows", "reading", "verdicts")
+NAMES = ("processes", "samplers", "rows", "reading", "verdicts", "designs")
 
 
 def main() -> None:
