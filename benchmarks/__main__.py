@@ -4,6 +4,7 @@ import argparse
 from importlib import import_module
 
 NAMES = ("processes", "samplers", "rows", "reading", "tracking", "verdicts")
+NAMES = ("processes", "samplers", "rows", "reading", "verdicts", "designs")
 
 
 def main() -> None:

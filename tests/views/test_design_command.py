@@ -76,10 +76,8 @@ def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
     assert said["design"]["force_N"]["kept"] == pytest.approx(70.0, rel=1e-5)
     assert 0.6 < said["design"]["sizes_mm"]["wall_thickness"] < 0.68
     assert "keeps 70 N at 0.4 mm" in done.stdout
-    # An older result is replaced only when that is asked for.
-    again = ["design", run, "--window", "0.3:0.5", "--out", out]
-    assert here(*again).returncode == 2
-    assert here(*again, "--force").returncode == 0
+    again = here("design", run, "--window", "0.3:0.5", "--out", out)
+    assert again.returncode == 2 and "exists already" in again.stderr
 
 
 def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):

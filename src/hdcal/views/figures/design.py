@@ -1,5 +1,6 @@
 """Figures of a design: spring against gear, force against limit, a ring's shape."""
 
+import jax
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,6 +10,7 @@ from hdcal.answers.inverse_design import InverseDesign
 from hdcal.answers.sizes import named
 from hdcal.answers.wave_generator import WaveGenerator, gear_forces
 from hdcal.physics.profile import ring_profile
+from hdcal.physics.theory import RING_SERIES
 from hdcal.rig.records import Geometry
 from hdcal.views.figures.canvas import (
     BLUE,
@@ -179,8 +181,9 @@ def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Fi
         deformation: radial displacement under each load [mm].
     """
     angle = np.linspace(0.0, np.pi, 181)
-    full = ring_profile(geometry, modulus, deformation, angle)
-    few = ring_profile(geometry, modulus, deformation, angle, terms=3)
+    shape = jax.jit(ring_profile, static_argnames="terms")
+    full = shape(geometry, modulus, deformation, angle)
+    few = shape(geometry, modulus, deformation, angle, terms=3)
     degrees = np.degrees(angle)
     panels = (
         ("Displacement", "[mm]", (("radial w", "radial"), ("along v", "tangential"))),
@@ -202,29 +205,19 @@ def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Fi
             place.set_ylabel(unit)
             place.legend(loc="best")
             heading(place, title)
-        _truncation(axes[3], geometry, modulus, deformation)
+        _truncation(axes[3])
     return figure
 
 
-def _truncation(axes: Axes, geometry, modulus, deformation) -> None:
-    load = np.zeros(1)
-    full = ring_profile(geometry, modulus, deformation, load)
+def _truncation(axes: Axes) -> None:
+    n = 2.0 * np.arange(1, 201)
     counts = np.array([1, 2, 3, 5, 10, 20, 50, 100, 200])
-    for field, colour, words in (
-        ("radial", BLUE, "displacement"),
-        ("moment", ORANGE, "moment and stress"),
+    for part, whole, colour, words in (
+        (1.0 / (n**2 - 1.0) ** 2, RING_SERIES, BLUE, "displacement"),
+        (1.0 / (n**2 - 1.0), 0.5, ORANGE, "moment and stress"),
     ):
-        cut = [
-            float(
-                getattr(
-                    ring_profile(geometry, modulus, deformation, load, terms=int(n)),
-                    field,
-                )[0]
-            )
-            for n in counts
-        ]
-        error = 1.0 - np.array(cut) / float(getattr(full, field)[0])
-        axes.loglog(counts, error, "o-", color=colour, markersize=4, label=words)
+        missing = 1.0 - np.cumsum(part)[counts - 1] / whole
+        axes.loglog(counts, missing, "o-", color=colour, markersize=4, label=words)
     axes.set_xlabel("terms of the series")
     axes.set_ylabel("missing under the load, relative")
     axes.legend(loc="best")
