@@ -81,7 +81,7 @@ def calibrate_dynamic(
     priors = dynamic_site_priors(case, theory)
     problem = build_dynamic(case, priors, theory)
     of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
-    whitening, rival = _highest(problem, of_fit)
+    whitening, rival = highest_peak(problem, of_fit)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
     sampled = {name: p for name, p in priors.items() if p.family != "fixed"}
@@ -155,7 +155,7 @@ def check_motion(case: Case) -> None:
         raise InputError(findings)
 
 
-def _highest(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
+def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
     """Climb from every peak of the scan; return the highest, and say how lonely it is.
 
     Chains start around one peak and never cross to another, so that no R-hat could
