@@ -27,6 +27,7 @@ VIOLATIONS = {
     "physics": ("physics/chain.py", "import xarray"),
     "blind": ("rig/records.py", "import hdcal.blind.label"),
     "numpyro": ("rig/records.py", "import numpyro.distributions"),
+    "diffrax": ("inference/model.py", "import diffrax"),
     "pint": ("rig/records.py", "import pint"),
     "pydantic": ("inference/__init__.py", "import pydantic"),
     "pandas": ("inference/__init__.py", "import pandas"),

@@ -15,6 +15,7 @@ from conftest import MAIN, XB1, Hdcal
         ["--help"],
         ["calibrate", "--help"],
         ["predict", "-h"],
+        ["respond", "-h"],
         ["effects", "-h"],
         ["diagnose", "-h"],
         ["fit", "-h"],

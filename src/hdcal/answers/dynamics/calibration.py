@@ -1,6 +1,7 @@
 """Calibrate mass, damping and stiffness against a gear that was seen to move."""
 
 import time
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -81,10 +82,9 @@ def calibrate_dynamic(
     priors = dynamic_site_priors(case, theory)
     problem = build_dynamic(case, priors, theory)
     of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
-    whitening, rival = _highest(problem, of_fit)
+    whitening, rival = highest_peak(problem, of_fit)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
-    sampled = {name: p for name, p in priors.items() if p.family != "fixed"}
     settings = {
         "kind": DynamicPosterior.kind,
         "seed": seed,
@@ -93,16 +93,32 @@ def calibrate_dynamic(
         "target_acceptance": found.target_acceptance,
         "versions": versions(),
     }
-    of_priors = draw_priors(sampled, of_prior)
-    tree = build_dynamic_tree(case, problem, found, of_priors)
-    scalars = {name: found.values[name] for name in sampled}
-    rows = tree["log_likelihood"]["deformation"].to_numpy()
-    diagnoses = diagnose_parameters(
-        scalars, sampled, np.asarray(_log_prior(problem, found.values)), rows.sum(-1)
+    posterior = _assemble(
+        case, theory, priors, problem, found, rival, of_prior, settings
     )
-    others = mixing({name: found.values[name] for name in _DERIVED})
+    seconds = round(time.perf_counter() - began, 3)
+    return replace(posterior, settings={**settings, "seconds": seconds})
+
+
+def _assemble(
+    case: Case,
+    theory: Theory,
+    priors,
+    problem,
+    found: Draws,
+    rival: Check,
+    key,
+    settings,
+) -> DynamicPosterior:
+    sampled = {name: p for name, p in priors.items() if p.family != "fixed"}
+    scalars = {name: found.values[name] for name in sampled}
+    tree = build_dynamic_tree(case, problem, found, draw_priors(sampled, key))
+    of_prior = np.asarray(_log_prior(problem, found.values))
+    of_data = tree["log_likelihood"]["deformation"].to_numpy().sum(-1)
+    diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
+    derived = mixing({name: found.values[name] for name in _DERIVED})
     checks = (
-        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses | others),
+        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses | derived),
         rival,
         whiteness_check(problem, found),
         sampling_rate_check(problem, found),
@@ -110,17 +126,7 @@ def calibrate_dynamic(
         bound_check(scalars, sampled),
         *_identification(problem, found),
     )
-    seconds = round(time.perf_counter() - began, 3)
-    return DynamicPosterior(
-        case,
-        theory,
-        (),
-        priors,
-        tree,
-        diagnoses,
-        checks,
-        settings | {"seconds": seconds},
-    )
+    return DynamicPosterior(case, theory, (), priors, tree, diagnoses, checks, settings)
 
 
 def check_motion(case: Case) -> None:
@@ -155,7 +161,7 @@ def check_motion(case: Case) -> None:
         raise InputError(findings)
 
 
-def _highest(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
+def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
     """Climb from every peak of the scan; return the highest, and say how lonely it is.
 
     Chains start around one peak and never cross to another, so that no R-hat could

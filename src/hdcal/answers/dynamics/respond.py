@@ -113,10 +113,7 @@ def respond(
         partial(make_request, force, amplitude, frequency, duration, points),
         _problems(posterior, temperature, mass, damping, draws),
     )
-    records, gear = posterior.case.records, posterior.case.gear
-    cold, warm = np.min(records.temperature), np.max(records.temperature)
-    at = float(np.clip(gear.reference_temperature, cold, warm))
-    at = at if temperature is None else float(temperature)
+    at = _temperature(posterior) if temperature is None else float(temperature)
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
     kept, left = acting(without_scatter(posterior.effects))
@@ -124,13 +121,7 @@ def respond(
     whole = {**values, "_mass": moved, "_ratio": ratio}
     _check_reach(posterior, request, values)
     states, facts, done = integrate_all(kept, reading, whole, at, damping, request)
-    if not done.all():
-        raise NotUsable(
-            f"{np.count_nonzero(~done)} of {len(done)} motions could not be "
-            "integrated: ask for a shorter duration"
-        )
-    tail = (1.0 - INTERVAL) / 2.0
-    lo, middle, hi = np.quantile(states[..., 0], [tail, 0.5, 1.0 - tail], axis=0)
+    lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
     estimates = {
         name: {**interval(facts[name]), "driven_by": driver}
@@ -152,6 +143,28 @@ def respond(
         tuple(effect.name for effect in left),
         remarks(posterior, request.times, estimates, kept, left, tested),
     )
+
+
+def _temperature(posterior: Posterior) -> float:
+    """Return the tested temperature nearest to the reference [°C]."""
+    tested = posterior.case.records.temperature
+    reference = posterior.case.gear.reference_temperature
+    return float(np.clip(reference, np.min(tested), np.max(tested)))
+
+
+def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
+    """Return the ends and the middle of the band at every time [mm].
+
+    Raises:
+        NotUsable: a motion was not integrated to its end.
+    """
+    if not done.all():
+        raise NotUsable(
+            f"{np.count_nonzero(~done)} of {len(done)} motions could not be "
+            "integrated: ask for a shorter duration"
+        )
+    tail = (1.0 - INTERVAL) / 2.0
+    return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
 
 
 def _checked(make, findings: list[Finding]) -> Request:

@@ -1,0 +1,130 @@
+"""The response of a calibrated gear: right for every draw, honest about its priors."""
+
+import numpy as np
+import pytest
+from moving import TRUTH, motion, still_posterior
+
+from hdcal import InputError, NotUsable, respond
+from hdcal.physics.linear_response import linear_response
+
+# One number of points and draws for all: the integration is compiled once.
+SMALL = {"points": 101, "draws": 50, "duration": 0.02}
+KNOWN = {"mass": TRUTH["mass"], "damping": 3e-3}
+
+
+def test_gears_that_are_known_move_as_the_exact_solution():
+    posterior = still_posterior()
+    found = respond(posterior, "step", amplitude=40.0, **KNOWN, **SMALL)
+    stiffness = motion(TRUTH, posterior.case)[2]
+    force = np.full(101, 40.0)
+    parts = (KNOWN["mass"], KNOWN["damping"], stiffness)
+    exact = linear_response(*parts, found.time_s, force, np.zeros(2))[:, 0]
+    assert found.deformation_median_mm == pytest.approx(np.asarray(exact), abs=1e-7)
+    assert found.deformation_hi_mm - found.deformation_lo_mm == pytest.approx(
+        np.zeros(101), abs=1e-9
+    )
+    assert found.estimates["peak_mm"]["median"] == pytest.approx(
+        float(exact.max()), rel=1e-6
+    )
+    drivers = {name: entry["driven_by"] for name, entry in found.estimates.items()}
+    assert drivers["mass_kg"] == drivers["damping_N_s_per_mm"] == "given"
+    assert drivers["natural_frequency_Hz"] == "data"
+    assert not any("prior" in words for words in found.remarks)
+
+
+def test_without_them_priors_are_the_answer_and_it_says_so():
+    found = respond(still_posterior(), "step", amplitude=40.0, **SMALL)
+    drivers = {name: entry["driven_by"] for name, entry in found.estimates.items()}
+    assert drivers.pop("stiffness_N_per_mm") == "data"
+    assert set(drivers.values()) == {"prior"}
+    assert "mass and damping: there the prior is the answer" in found.remarks[0]
+    frequency = found.estimates["natural_frequency_Hz"]
+    # A mass known to a factor of two either way (sd) leaves √2 of the frequency.
+    assert np.log(frequency["hi"] / frequency["lo"]) == pytest.approx(
+        0.7 * 1.96, rel=0.3
+    )
+    assert found.deformation_hi_mm[-1] - found.deformation_lo_mm[-1] > 0.1
+
+
+def test_the_band_is_as_wide_as_the_stiffness_is_uncertain():
+    posterior = still_posterior(K=0.05)
+    slow = ([0.0, 0.019, 0.02], [0.0, 40.0, 40.0])
+    options = {name: value for name, value in SMALL.items() if name != "duration"}
+    found = respond(posterior, slow, **KNOWN, **options)
+    width = found.deformation_hi_mm[-1] / found.deformation_lo_mm[-1]
+    stiffness = found.estimates["stiffness_N_per_mm"]
+    assert np.log(stiffness["hi"] / stiffness["lo"]) == pytest.approx(0.2, rel=0.35)
+    assert np.log(width) == pytest.approx(
+        np.log(stiffness["hi"] / stiffness["lo"]), rel=0.25
+    )
+
+
+def test_a_warmer_gear_is_softer():
+    cold = respond(still_posterior(), "step", **KNOWN, **SMALL)
+    warm = respond(still_posterior(), "step", temperature=120.0, **KNOWN, **SMALL)
+    parts = [r.estimates["stiffness_N_per_mm"]["median"] for r in (cold, warm)]
+    assert parts[1] / parts[0] == pytest.approx(1.0 - 3e-4 * 100.0, rel=1e-9)
+    assert cold.tested.any() and not warm.tested.any()
+    assert any("extrapolated" in words for words in warm.remarks)
+
+
+def test_effects_of_the_moment_go_along_and_others_are_named():
+    sizes = {"progressive_stiffening.slope": 0.8, "relaxation.share": 0.1}
+    sizes |= {"relaxation.time_constant": 30.0}
+    found = respond(still_posterior(sizes), "step", **KNOWN, **SMALL)
+    linear = respond(still_posterior(), "step", **KNOWN, **SMALL)
+    assert found.effects == ("progressive_stiffening",)
+    assert found.left_out == ("relaxation",)
+    assert any("relaxation" in words for words in found.remarks)
+    peaks = [r.estimates["peak_mm"]["median"] for r in (found, linear)]
+    assert peaks[0] < 0.9 * peaks[1]
+
+
+def test_what_swings_faster_than_the_points_is_told():
+    found = respond(still_posterior(), "step", **KNOWN, **{**SMALL, "duration": 0.5})
+    assert any("more --points" in words for words in found.remarks)
+
+
+def test_nothing_follows_from_a_failed_calibration():
+    with pytest.raises(NotUsable, match="by hand"):
+        respond(still_posterior(usable=False), "step", **KNOWN, **SMALL)
+
+
+@pytest.mark.parametrize(
+    ("force", "options", "words"),
+    [
+        ("push", {}, "no known force"),
+        ("step", {"amplitude": 0.0}, "drives nothing"),
+        ("step", {"amplitude": np.nan}, "drives nothing"),
+        ("step", {"amplitude": 1e6}, "even at rest"),
+        ("step", {"duration": 0.0}, "not positive"),
+        ("step", {"frequency": 5.0}, "no frequency"),
+        ("sine", {}, "needs one frequency"),
+        ("sine", {"frequency": 0.0}, "not positive"),
+        ("sine", {"frequency": -5.0}, "not positive"),
+        ("sine", {"frequency": 1001.0, "duration": 0.5}, "cannot be seen"),
+        ("chirp", {"frequency": 5.0}, "first and last"),
+        ("chirp", {"frequency": (5.0, 5.0)}, "is a sine"),
+        ("chirp", {"frequency": (0.0, 2e4)}, "cannot be seen"),
+        ("step", {"mass": -1e-5}, "is no mass"),
+        ("step", {"damping": -1.0}, "is no damping"),
+        ("step", {"points": 1}, "no usable number"),
+        ("step", {"draws": 1}, "no usable number"),
+        ("step", {"temperature": -300.0}, "absolute zero"),
+        ("step", {"temperature": 5000.0}, "half of Young's modulus"),
+        (([0.0, 1.0], [0.0, 0.0]), {}, "zero throughout"),
+        (([0.0, 0.0], [0.0, 1.0]), {}, "do not rise"),
+        (([0.0], [1.0]), {}, "two or more"),
+        (([0.0, 1.0], [0.0, np.inf]), {}, "no finite number"),
+        (([0.0, 1.0], [0.0, 1.0]), {"duration": 1.0}, "has its own"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(force, options, words):
+    with pytest.raises(InputError, match=words):
+        respond(still_posterior(), force, **options)
+
+
+def test_every_fault_is_told_at_once():
+    with pytest.raises(InputError) as caught:
+        respond(still_posterior(), "sine", duration=-1.0, mass=-1.0, points=0)
+    assert len(caught.value.findings) == 4
