@@ -1,7 +1,10 @@
 """The errors a user can meet: every one carries words, none needs a traceback."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -46,3 +49,12 @@ class InputError(HdcalError):
 
 class NotUsable(HdcalError):
     """A result exists but failed its checks, so nothing may be derived from it."""
+
+
+def attempt(findings: list[Finding], make: Callable[..., T], *arguments) -> T | None:
+    """Return what is made, or None and keep why it cannot be among the findings."""
+    try:
+        return make(*arguments)
+    except InputError as error:
+        findings += error.findings
+        return None

@@ -127,7 +127,7 @@ class Basis:
             words.append("The leftover discrepancy is taken to grow with stiffness.")
         return words
 
-    def of_material(self, name: str, *, seed: int = 0) -> "Basis":
+    def of_material(self, name: str, seed: int = 0) -> "Basis":
         """Return the basis of the same gear made of another material.
 
         Args:

@@ -11,7 +11,6 @@ exact derivatives of the model.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -35,7 +34,7 @@ from hdcal.answers.sizes import (
     with_reference,
 )
 from hdcal.answers.target import Target
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, attempt
 from hdcal.inference.posterior import Posterior
 from hdcal.rig.case import Gear
 from hdcal.rig.records import Geometry
@@ -126,30 +125,22 @@ def inverse_design(
     findings = _findings(
         basis, vary, at, levels, limit_force, limit_stress, probability, materials
     )
-    gear, made = None, []
-    for name in materials or [basis.material]:
-        try:
-            made.append(basis.of_material(name, seed=seed))
-        except InputError as error:
-            findings += error.findings
-    try:
-        gear = next_gear(basis, tolerances, seed=seed)
-    except InputError as error:
-        findings += error.findings
+    listed = materials or [basis.material]
+    made = [attempt(findings, basis.of_material, name, seed) for name in listed]
+    gear = attempt(findings, next_gear, basis, tolerances, seed)
     if findings or gear is None or at is None:
         raise InputError(findings)
-    make = partial(Target.of, gear=gear, temperatures=levels, probability=probability)
-    found = [
-        solve(one, make(one, limit_stress=limit_stress), vary, at, limit_force)
-        for one in made
-    ]
+
+    def target(of: Basis) -> Target:
+        return Target.of(of, gear, levels, probability, limit_stress)
+
+    found = [solve(one, target(one), vary, at, limit_force) for one in made if one]
     met = [one for one in found if one.met]
     if not met:
         raise InputError([_unmet(found, vary, at, limit_force, probability)])
     chosen = min(met, key=lambda one: one.change)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
-    own = make(basis, limit_stress=limit_stress)
-    target = make(chosen.basis, limit_stress=limit_stress)
+    kept = target(chosen.basis)
     return InverseDesign(
         basis,
         gear,
@@ -161,9 +152,9 @@ def inverse_design(
         probability,
         chosen,
         tuple(found),
-        candidate(basis, own, {}, at, limit_force),
-        target,
-        elasticities(chosen, target, at),
+        candidate(basis, target(basis), {}, at, limit_force),
+        kept,
+        elasticities(chosen, kept, at),
         (*beyond_tested(basis, np.array([at]), levels), *far_from_tested(basis, sizes)),
     )
 

@@ -44,7 +44,7 @@ class NextGear:
 
 
 def next_gear(
-    basis: Basis, tolerances: Mapping[str, float] | None = None, *, seed: int = 0
+    basis: Basis, tolerances: Mapping[str, float] | None = None, seed: int = 0
 ) -> NextGear:
     """Draw the gears that a design has to serve.
 

@@ -24,7 +24,7 @@ from hdcal.answers.sizes import (
     geometry_with,
     stiffness_factor,
 )
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, attempt
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.profile import peak_stress
 from hdcal.rig.case import Gear
@@ -93,16 +93,12 @@ def study(
     basis = basis_of(source, seed=seed)
     axes = {name: np.atleast_1d(np.asarray(v, float)) for name, v in vary.items()}
     axes = _with_place(basis, axes, deformation, temperature)
-    made = [basis]
     findings = _findings(basis, axes, materials, interval)
-    for name in materials:
-        try:
-            made.append(basis.of_material(name, seed=seed))
-        except InputError as error:
-            findings += error.findings
+    listed = materials or [basis.material]
+    tried = [attempt(findings, basis.of_material, name, seed) for name in listed]
     if findings:
         raise InputError(findings)
-    made = made[1:] if materials else made
+    made = [one for one in tried if one is not None]
     tables = [_of_material(one, axes, interval) for one in made]
     sizes = {name: values for name, values in axes.items() if name in SIZES}
     varied = [name for name, values in axes.items() if len(values) > 1]

@@ -11,7 +11,7 @@ from hdcal.answers.next_gear import NextGear, next_gear
 from hdcal.answers.sizes import beyond_tested, with_reference
 from hdcal.answers.springs import Spring, judge_all, set_points, softest
 from hdcal.answers.study import all_forces
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, attempt
 from hdcal.inference.posterior import Posterior
 from hdcal.rig.case import Gear
 
@@ -97,11 +97,7 @@ def wave_generator(
     basis = basis_of(source, seed=seed)
     levels = with_reference(basis, temperatures)
     findings = _findings(basis, window, levels, probability, setting_sd, rates)
-    gear = None
-    try:
-        gear = next_gear(basis, tolerances, seed=seed)
-    except InputError as error:
-        findings += error.findings
+    gear = attempt(findings, next_gear, basis, tolerances, seed)
     if findings or gear is None:
         raise InputError(findings)
     along = np.linspace(*window, _ALONG)

@@ -65,8 +65,9 @@ def ring_profile(
 
     Source:
         Series: the article's displacement series with the coefficients of least
-        energy. Closed form: Castigliano's ring, M = F R (1/π − sin φ / 2) for 0 ≤ φ ≤ π, 0.318 F R
-        under the load and −0.182 F R at 90° (Timoshenko, Strength of Materials).
+        energy. Closed form: Castigliano's ring, M = F R (1/π − sin φ / 2) over half a
+        turn, 0.318 F R under the load and −0.182 F R at 90° (Timoshenko, Strength of
+        Materials).
     """
     angle = jnp.asarray(angle, dtype=float)
     shape, slip, bend = _closed(angle) if terms is None else _series(angle, terms)

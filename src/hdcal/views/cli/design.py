@@ -2,15 +2,15 @@
 
 import shlex
 import sys
+from functools import partial
 
 import click
 
-from hdcal.errors import Finding
+from hdcal.errors import Finding, InputError, attempt
 from hdcal.views.cli.acceleration import keep_compilations
 from hdcal.views.cli.console import Console
 from hdcal.views.cli.options import force_option, json_option, seed_option
 from hdcal.views.cli.quantities import (
-    Collector,
     names_in,
     read_ends,
     read_list,
@@ -96,20 +96,19 @@ def design(console: Console, run, gear, out, force, **given):
     keep_compilations()
     from hdcal.answers.asked import name_findings
     from hdcal.answers.sizes import SIZES
-    from hdcal.views.cli.sources import check_source, open_source
+    from hdcal.views.cli.sources import open_source
     from hdcal.views.folder import check_target
 
-    collector = Collector()
-    collector.findings += check_source(run, gear)
-    collector.findings += _one_question(given)
-    asked = _read(collector, given)
+    findings = _one_question(given)
+    asked = _read(findings, given)
     for option in ("vary", "tolerance"):
         names = names_in(given[option])
-        collector.findings += name_findings(names, SIZES, f"--{option}")
-    source, name = collector.read(open_source, run, gear) or (None, "x")
-    target = f"{name}-design" if out is None else out
-    collector.read(lambda: check_target(target, force=force))
-    collector.check()
+        findings += name_findings(names, SIZES, f"--{option}")
+    source, target = open_source(findings, run, gear, out, "design")
+    if target is not None:
+        attempt(findings, lambda: check_target(target, force=force))
+    if findings:
+        raise InputError(findings)
     return _design(console, source, asked, given["window"] is not None, target, force)
 
 
@@ -132,8 +131,8 @@ def _one_question(given: dict) -> list[Finding]:
     ]
 
 
-def _read(collector: Collector, given: dict) -> dict:
-    read = collector.read
+def _read(findings: list[Finding], given: dict) -> dict:
+    read = partial(attempt, findings)
 
     def number(name: str, unit: str):
         option = "--" + name.replace("_", "-")

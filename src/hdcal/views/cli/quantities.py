@@ -118,27 +118,3 @@ def names_in(texts: Sequence[str]) -> list[str]:
     """Return the names in NAME=…, also where what follows cannot be read."""
     names = [text.partition("=")[0].strip() for text in texts if "=" in text]
     return list(dict.fromkeys(filter(None, names)))
-
-
-class Collector:
-    """Read options one after another and keep every finding for the end."""
-
-    def __init__(self) -> None:
-        self.findings: list[Finding] = []
-
-    def read(self, read: Callable[..., T], *arguments: object) -> T | None:
-        """Return what is read, or None and keep why it cannot be."""
-        try:
-            return read(*arguments)
-        except InputError as error:
-            self.findings += error.findings
-            return None
-
-    def check(self) -> None:
-        """Raise everything that was found.
-
-        Raises:
-            InputError: something was.
-        """
-        if self.findings:
-            raise InputError(self.findings)

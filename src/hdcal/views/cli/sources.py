@@ -1,30 +1,40 @@
 """What a design starts from: a calibration, or a gear of which priors are known."""
 
-from hdcal.errors import Finding
+from pathlib import Path
+
+from hdcal.errors import Finding, attempt
 
 
-def check_source(run: str | None, gear: str | None) -> list[Finding]:
-    """Return what is wrong with the choice of a source."""
+def open_source(
+    findings: list[Finding],
+    run: str | None,
+    gear: str | None,
+    out: str | None,
+    kind: str,
+):
+    """Return the calibration or gear, and the folder for the result.
+
+    Args:
+        findings: gains what is wrong; nothing is raised.
+        run: folder of a calibration.
+        gear: a gear file, in its place.
+        out: the folder, if the user named one.
+        kind: ending of the folder's name otherwise.
+
+    Returns:
+        Each None where it cannot be told.
+    """
+    from hdcal.inference.posterior import Posterior
+    from hdcal.rig.gear import read_gear
+
     if (run is None) == (gear is None):
         words = "is missing" if run is None else "and --gear are given both"
         remedy = "Name a folder of hdcal calibrate, or --gear GEAR.toml for priors only"
-        return [Finding("RUN", words, remedy)]
-    return []
-
-
-def open_source(run: str | None, gear: str | None):
-    """Return the calibration or gear, and its name for a folder.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    from pathlib import Path
-
+        findings.append(Finding("RUN", words, remedy))
+        return None, out
     if gear is not None:
-        from hdcal.rig.gear import read_gear
-
-        return read_gear(gear), Path(gear).stem
-    from hdcal.inference.posterior import Posterior
-
-    posterior = Posterior.load(str(run))
-    return posterior, posterior.case.name
+        source, name = attempt(findings, read_gear, gear), Path(gear).stem
+    else:
+        source = attempt(findings, Posterior.load, run)
+        name = source.case.name if source is not None else ""
+    return source, (f"{name}-{kind}" if out is None and source is not None else out)

@@ -5,12 +5,11 @@ import sys
 
 import click
 
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, attempt
 from hdcal.views.cli.acceleration import keep_compilations
 from hdcal.views.cli.console import Console
 from hdcal.views.cli.options import force_option, json_option, read_grid, seed_option
 from hdcal.views.cli.quantities import (
-    Collector,
     names_in,
     read_list,
     read_named,
@@ -55,7 +54,7 @@ def study(console: Console, run, gear, article, out, force, **given):
 
     RUN is a folder of `hdcal calibrate`.
     """
-    from hdcal.views.cli.sources import check_source, open_source
+    from hdcal.views.cli.sources import open_source
     from hdcal.views.folder import check_target
 
     keep_compilations()
@@ -64,29 +63,29 @@ def study(console: Console, run, gear, article, out, force, **given):
     from hdcal.answers.asked import name_findings
     from hdcal.answers.study import AXES
 
-    collector = Collector()
-    collector.findings += check_source(run, gear)
-    asked = _read(collector, given)
+    findings: list[Finding] = []
+    asked = _read(findings, given)
     names = names_in(given["vary"])
-    collector.findings += name_findings(names, AXES, "--vary")
-    source, name = collector.read(open_source, run, gear) or (None, "x")
-    target = f"{name}-study" if out is None else out
-    collector.read(lambda: check_target(target, force=force))
-    collector.check()
+    findings += name_findings(names, AXES, "--vary")
+    source, target = open_source(findings, run, gear, out, "study")
+    if target is not None:
+        attempt(findings, lambda: check_target(target, force=force))
+    if findings:
+        raise InputError(findings)
     return _study(console, source, asked, target, force)
 
 
-def _read(collector: Collector, given: dict) -> dict:
+def _read(findings: list[Finding], given: dict) -> dict:
     text = given["deformation"]
     if not given["vary"] and not given["material"]:
         words, remedy = "nothing is varied", "Say --vary wall_thickness_mm=0.6:0.76:5"
-        collector.findings.append(Finding("--vary", words, remedy))
+        findings.append(Finding("--vary", words, remedy))
     return {
-        "vary": collector.read(read_named, given["vary"], "--vary", read_grid),
+        "vary": attempt(findings, read_named, given["vary"], "--vary", read_grid),
         "materials": read_list(given["material"]),
         "deformation": None
         if text is None
-        else collector.read(read_quantity, text, "mm", "--deformation"),
+        else attempt(findings, read_quantity, text, "mm", "--deformation"),
         "temperature": given["temperature"],
         "seed": given["seed"],
     }
