@@ -202,7 +202,7 @@ BAD = {
     "content in %": (["{one}", *ASK, "--content", "99"], "between 0 and 1"),
     "impossible": (["{one}", *ASK, "--required-probability", "1"], "between 0 and 1"),
     "of one gear": (["{one}", *ASK, "--population", "specimens"], "one gear"),
-    "no tolerance": (["{one}", *ASK, "--tolerance", "thin"], "is no tolerance"),
+    "no tolerance": (["{one}", *ASK, "--tolerance", "thin"], "is not NAME="),
     "twice": (
         ["{one}", *ASK, *["--tolerance", "radius_mm=0.1"] * 2],
         "is given twice",

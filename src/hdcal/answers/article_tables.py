@@ -7,6 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdcal.answers.audit.article import (
+    DEFORMATION,
+    GEAR,
+    INFLUENCE,
+    MODULUS,
+    TABLE_3,
+    TABLE_4,
+)
 from hdcal.answers.basis import Basis, basis_of
 from hdcal.answers.sizes import stiffness_factor
 from hdcal.answers.study import force_quantiles
@@ -16,24 +24,6 @@ from hdcal.physics.theory import article, ring
 from hdcal.rig.records import Geometry
 
 SCHEMA = "hdcal.article/1"
-GEAR = Geometry(0.68, 40.0, 70.0, load_height=70.0, poisson=0.3)
-MODULUS, DEFORMATION, INFLUENCE = 210e3, 0.4, 0.13
-# Deformation [mm]; "original", "revised" and measured force [N].
-TABLE_3 = (
-    (0.1, 162.52, 21.13, 18.62),
-    (0.3, 487.56, 63.38, 56.84),
-    (0.5, 812.60, 105.64, 101.92),
-    (0.7, 1137.64, 147.89, None),
-    (0.9, 1462.68, 190.15, None),
-)
-# Wall thickness and radius [mm]; "original" and "revised" force at 0.4 mm [N].
-TABLE_4 = (
-    (0.60, 40.0, 459.12, 59.69),
-    (0.68, 40.0, 708.33, 92.08),
-    (0.76, 40.0, 1039.21, 135.10),
-    (0.68, 35.0, 1080.15, 140.42),
-    (0.68, 45.0, 520.49, 67.66),
-)
 
 
 @dataclass(frozen=True)
@@ -84,7 +74,7 @@ def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
     rows = [(3, at, *own, *forces) for at, *forces in TABLE_3]
     rows += [
         (4, DEFORMATION, wall, radius, *forces, None)
-        for wall, radius, *forces in TABLE_4
+        for (wall, radius), forces in TABLE_4.items()
     ]
     return tuple(_row(basis, *row) for row in rows)
 

@@ -14,6 +14,7 @@ from hdcal.views.cli.quantities import (
     names_in,
     read_ends,
     read_list,
+    read_millimetres,
     read_named,
     read_quantity,
     read_temperatures,
@@ -148,7 +149,9 @@ def _read(findings: list[Finding], given: dict) -> dict:
         "probability": given["probability"],
         "seed": given["seed"],
         "temperatures": None if warmth is None else read(read_temperatures, warmth),
-        "tolerances": read(read_named, given["tolerance"], "--tolerance", _millimetres),
+        "tolerances": read(
+            read_named, given["tolerance"], "--tolerance", read_millimetres
+        ),
     }
     if given["window"] is not None:
         return {
@@ -165,10 +168,6 @@ def _read(findings: list[Finding], given: dict) -> dict:
         "vary": read(read_named, given["vary"], "--vary", read_ends),
         "materials": read_list(given["material"]),
     }
-
-
-def _millimetres(text: str, option: str) -> float:
-    return read_quantity(text, "mm", option)
 
 
 def _design(console: Console, source, asked, spring: bool, target, force) -> int:

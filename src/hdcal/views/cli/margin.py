@@ -11,10 +11,10 @@ from hdcal.views.cli.console import Console
 from hdcal.views.cli.options import (
     force_option,
     json_option,
-    read_sizes,
     read_window,
     seed_option,
 )
+from hdcal.views.cli.quantities import read_millimetres, read_named
 
 
 @click.command(short_help="Force needed at a deformation, and the margin to it.")
@@ -94,7 +94,7 @@ def margin(console: Console, run, temperature, tolerances, out, force, **asked):
     except InputError as error:
         findings += error.findings
     try:
-        sizes = read_sizes(tolerances)
+        sizes = read_named(tolerances, "--tolerance", read_millimetres)
     except InputError as error:
         findings += error.findings
     if out is not None:

@@ -142,27 +142,3 @@ def read_window(text: str, option: str = "--temperature") -> list[float]:
     return read_grid(
         f"{ends[0]}:{ends[1]}:{_WINDOW if ends[1] > ends[0] else 1}", option
     )
-
-
-def read_sizes(texts: tuple[str, ...], option: str = "--tolerance") -> dict[str, float]:
-    """Read every NAME=NUMBER.
-
-    Raises:
-        InputError: one of them has no such form, or a name comes twice.
-    """
-    found: dict[str, float] = {}
-    findings = []
-    for text in texts:
-        name, _, number = (part.strip() for part in text.partition("="))
-        try:
-            value = float(number)
-        except ValueError:
-            remedy = "Write it like wall_thickness_mm=0.02"
-            findings.append(Finding(option, f"'{text[:60]}' is no tolerance", remedy))
-            continue
-        if name in found:
-            findings.append(Finding(option, f"'{name}' is given twice", "Keep one"))
-        found[name] = value
-    if findings:
-        raise InputError(findings)
-    return found

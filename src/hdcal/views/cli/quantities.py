@@ -45,6 +45,15 @@ def read_quantity(text: str, unit: str, option: str) -> float:
     return number * factor
 
 
+def read_millimetres(text: str, option: str) -> float:
+    """Read a length, in mm where no unit is written.
+
+    Raises:
+        InputError: it is none.
+    """
+    return read_quantity(text, "mm", option)
+
+
 def read_ends(text: str, option: str) -> tuple[float, float]:
     """Read LO:HI.
 
