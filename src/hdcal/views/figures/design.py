@@ -100,7 +100,7 @@ def _probability(axes: Axes, found: WaveGenerator) -> None:
     axes.set_ylim(min(0.0 if min(together) < 0.9 else min(together) - 0.01, 0.98), None)
     axes.set_xlabel("spring rate [N/mm]")
     axes.set_ylabel("probability inside the window")
-    axes.legend(loc="center right")
+    axes.legend(loc="lower right")
     heading(axes, "The softest spring that meets it")
 
 
