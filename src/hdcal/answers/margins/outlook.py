@@ -28,8 +28,6 @@ from hdcal.rig.records import Array
 
 # More draws than this change no digit that is printed.
 _MOST_DRAWS = 8000
-# Draws whose mixtures are made at a time.
-_BATCH = 500
 # Where effects bend the force, a specimen's deviation is split: this share of its sd
 # goes to nodes, the rest is narrow enough to go along the tangent.
 _AT_NODES, _SPLIT = 0.8, 7
@@ -170,7 +168,7 @@ def mixtures(
         population=population,
         quantity=quantity,
     )
-    weight, mean, sd = jax.lax.map(one, dict(values), batch_size=_BATCH)
+    weight, mean, sd = jax.vmap(one)(dict(values))
     return Mixture(weight, mean, sd, problem.step if rounded else 0.0, rounded)
 
 
