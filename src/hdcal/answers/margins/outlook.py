@@ -27,7 +27,7 @@ from hdcal.inference.problem import Problem
 from hdcal.rig.records import Array
 
 # More draws than this change no digit that is printed.
-_MOST_DRAWS = 8000
+MOST_DRAWS = 8000
 # Where effects bend the force, a specimen's deviation is split: this share of its sd
 # goes to nodes, the rest is narrow enough to go along the tangent.
 _AT_NODES, _SPLIT = 0.8, 7
@@ -126,7 +126,7 @@ def look_out(
     """
     draws = posterior.draws
     count = len(draws["K"])
-    kept = np.linspace(0, count - 1, min(count, _MOST_DRAWS)).round().astype(int)
+    kept = np.linspace(0, count - 1, min(count, MOST_DRAWS)).round().astype(int)
     values = {name: column[kept] for name, column in draws.items()}
     spread = qmc.Sobol(5, rng=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
     spread = np.clip(spread[: len(kept)], 1e-9, 1.0 - 1e-9)
