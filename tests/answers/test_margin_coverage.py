@@ -125,7 +125,7 @@ def shortfall(hits: np.ndarray) -> float:
 
 
 def test_a_slice_of_coverage():
-    hits = run("specimens", 5, 40)
+    hits = run("specimens", 5, 25)
     for content in range(2):
         assert shortfall(hits[:, FAIR, content]) > LEVEL
         # The same few cases flag a population believed half as wide,

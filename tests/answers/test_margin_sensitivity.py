@@ -9,16 +9,17 @@ from rigs import make_gear
 import hdcal
 from hdcal.answers.margins.gradients import design_point, gradients, mixture_at
 from hdcal.answers.margins.margin import _outlook
-from hdcal.answers.margins.mixture import weighted_quantile
+from hdcal.answers.margins.mixture import Mixture, weighted_quantile
 from hdcal.answers.margins.shares import shares
 
 CONTENT, CONFIDENCE, WARM = 0.99, 0.95, 40.0
+QUANTILE = jax.jit(Mixture.quantile)
 
 
 def bound(outlook, tolerances, point, origin) -> float:
     """Compute the upper bound of another gear from scratch."""
     mixture = mixture_at(outlook, WARM, tolerances, point, origin)
-    found = np.asarray(jax.jit(type(mixture).quantile)(mixture, CONTENT))
+    found = np.asarray(QUANTILE(mixture, CONTENT))
     return weighted_quantile(found, np.ones(len(found)), CONFIDENCE)[0]
 
 
@@ -26,7 +27,7 @@ def check(posterior, population: str, tolerances: dict) -> None:
     outlook = _outlook(posterior, 0.4, "up", population, "reading", tolerances, 0)
     origin = design_point(outlook)
     mixture = outlook.mixture(WARM)
-    quantiles = np.asarray(mixture.quantile(CONTENT))
+    quantiles = np.asarray(QUANTILE(mixture, CONTENT))
     found = gradients(
         [(1.0, outlook)],
         WARM,

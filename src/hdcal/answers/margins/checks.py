@@ -6,6 +6,7 @@ import numpy as np
 
 from hdcal.answers.bands import DIRECTIONS
 from hdcal.answers.forces import QUANTITIES
+from hdcal.answers.margins.outlook import MOST_DRAWS
 from hdcal.answers.margins.population import check_population
 from hdcal.answers.margins.tolerances import check_tolerances
 from hdcal.answers.tolerance import check_shares
@@ -128,7 +129,8 @@ def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:
     sure, most = shares["confidence"], 1.0 - _BEYOND / draws
     if most < sure < 1.0:
         words = f"{draws} draws cannot tell a confidence of {sure:g}"
-        remedy = f"Ask for {most:.4g} or less, or calibrate with more --draws"
+        more = ", or calibrate with more --draws" if draws < MOST_DRAWS else ""
+        remedy = f"Ask for {most:.4g} or less{more}"
         findings.append(Finding("--confidence", words, remedy))
     for name in shares.keys() - {"confidence"}:
         if 1.0 - _RAREST < shares[name] < 1.0:

@@ -17,7 +17,7 @@ from hdcal.answers.margins.levels import (
     model_bounds,
     worst_level,
 )
-from hdcal.answers.margins.outlook import Outlook, Question, look_out
+from hdcal.answers.margins.outlook import MOST_DRAWS, Outlook, Question, look_out
 from hdcal.answers.margins.population import Population, population_words, widest
 from hdcal.answers.margins.reached import reach
 from hdcal.answers.margins.remarks import extrapolations, is_tested, remarks
@@ -85,7 +85,7 @@ def margin(
         forces={"limit_force": limit_force, "given_force": given_force},
         shares={"content": content, "confidence": confidence}
         | ({} if required_probability is None else {"required_probability": required}),
-        draws=sum(len(model.draws["K"]) for _, model in members),
+        draws=sum(min(len(m.draws["K"]), MOST_DRAWS) for _, m in members),
         population=population,
         quantity=quantity,
         direction=direction,

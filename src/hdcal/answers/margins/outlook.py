@@ -27,9 +27,7 @@ from hdcal.inference.problem import Problem
 from hdcal.rig.records import Array
 
 # More draws than this change no digit that is printed.
-_MOST_DRAWS = 8000
-# Draws whose mixtures are made at a time.
-_BATCH = 500
+MOST_DRAWS = 8000
 # Where effects bend the force, a specimen's deviation is split: this share of its sd
 # goes to nodes, the rest is narrow enough to go along the tangent.
 _AT_NODES, _SPLIT = 0.8, 7
@@ -128,7 +126,7 @@ def look_out(
     """
     draws = posterior.draws
     count = len(draws["K"])
-    kept = np.linspace(0, count - 1, min(count, _MOST_DRAWS)).round().astype(int)
+    kept = np.linspace(0, count - 1, min(count, MOST_DRAWS)).round().astype(int)
     values = {name: column[kept] for name, column in draws.items()}
     spread = qmc.Sobol(5, rng=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
     spread = np.clip(spread[: len(kept)], 1e-9, 1.0 - 1e-9)
@@ -170,7 +168,7 @@ def mixtures(
         population=population,
         quantity=quantity,
     )
-    weight, mean, sd = jax.lax.map(one, dict(values), batch_size=_BATCH)
+    weight, mean, sd = jax.vmap(one)(dict(values))
     return Mixture(weight, mean, sd, problem.step if rounded else 0.0, rounded)
 
 

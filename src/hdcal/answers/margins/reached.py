@@ -20,7 +20,6 @@ from hdcal.answers.margins.outlook import Outlook, member_mixture
 REACH = 2.0
 # Halvings: of a range of a millimetre 2e-12 mm are left.
 _HALVINGS = 40
-_BATCH = 500
 
 
 @dataclass(frozen=True)
@@ -159,4 +158,4 @@ def _solve_all(
 
         return jax.vmap(solve)(jnp.arange(3))
 
-    return jax.lax.map(one, values, batch_size=_BATCH)
+    return jax.vmap(one)(values)
