@@ -98,6 +98,7 @@ def test_nothing_follows_from_a_failed_calibration():
         ("step", {"amplitude": np.nan}, "drives nothing"),
         ("step", {"amplitude": 1e6}, "even at rest"),
         ("step", {"duration": 0.0}, "not positive"),
+        ("step", {"duration": 5e3}, "swings of the gear"),
         ("step", {"frequency": 5.0}, "no frequency"),
         ("sine", {}, "needs one frequency"),
         ("sine", {"frequency": 0.0}, "not positive"),

@@ -19,11 +19,11 @@ from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.dynamic.posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
-from hdcal.physics.dynamics import (
-    acting,
-)
+from hdcal.physics.dynamics import acting, natural_frequency
 
 _MOST_DRAWS = 10_000
+# More take minutes, and a band that long past its start says nothing new.
+_MOST_SWINGS = 20_000
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def respond(
     kept, left = acting(without_scatter(posterior.effects))
     reading = case_reading(posterior.case)
     whole = {**values, "_mass": moved, "_ratio": ratio}
-    _check_reach(posterior, request, values)
+    _check_reach(posterior, request, values, moved)
     states, facts, done = integrate_all(kept, reading, whole, at, damping, request)
     lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
@@ -207,8 +207,9 @@ def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
     return findings
 
 
-def _check_reach(posterior: Posterior, request: Request, values: dict) -> None:
-    """Refuse what is a slip of the unit: a force that would fold the gear."""
+def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> None:
+    """Refuse what is a slip of the unit: to fold the gear, or to swing for hours."""
+    findings = []
     limit = (
         posterior.case.gear.geometry.radius
         / case_reading(posterior.case).radial_per_read
@@ -216,4 +217,12 @@ def _check_reach(posterior: Posterior, request: Request, values: dict) -> None:
     static = float(request.force.largest()) / np.median(values["stiffness"])
     if static >= limit:
         words = f"would deform the gear by {static:.3g} mm even at rest"
-        raise InputError([Finding("--force", words, "Give the force in N")])
+        findings.append(Finding("--force", words, "Give the force in N"))
+    seconds = float(request.times[-1] - request.times[0])
+    swings = seconds * float(np.max(natural_frequency(mass, values["stiffness"])))
+    if swings > _MOST_SWINGS:
+        words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
+        remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
+        findings.append(Finding("--duration", words, remedy))
+    if findings:
+        raise InputError(findings)
