@@ -109,7 +109,7 @@ WITH_SITES = [
 
 
 # One of every stage, and one that remembers.
-SLICE = ("screw_error", "coulomb_friction", "charge_leakage", "outliers")
+SLICE = ("thermal_expansion", "coulomb_friction", "charge_leakage", "outliers")
 
 
 @pytest.mark.parametrize("name", SLICE)

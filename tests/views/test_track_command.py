@@ -92,13 +92,12 @@ def test_bad_arguments_are_refused(here: Hdcal, tmp_path: Path):
     assert here("track", "--gear", tmp_path / "no.toml").returncode == 2
 
 
-def test_an_answer_comes_before_the_next_line_and_ctrl_c_ends(environment):
+def test_an_answer_comes_before_the_next_line_and_ctrl_c_ends():
     with subprocess.Popen(
         [*MAIN, "track", "--gear", str(GEAR)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=environment,
     ) as process:
         assert process.stdin and process.stdout and process.stderr
         process.stdin.write(GOOD + b"\n")
