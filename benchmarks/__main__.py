@@ -3,8 +3,15 @@
 import argparse
 from importlib import import_module
 
-NAMES = ("processes", "samplers", "rows", "reading", "tracking", "verdicts")
-NAMES = ("processes", "samplers", "rows", "reading", "verdicts", "designs")
+NAMES = (
+    "processes",
+    "samplers",
+    "rows",
+    "reading",
+    "tracking",
+    "verdicts",
+    "designs",
+)
 
 
 def main() -> None:
