@@ -119,3 +119,9 @@ def test_every_source_has_its_share():
     # Gears differ by 5 %, their walls by 5 % too: both matter, the noise does not.
     large = {s.name for s in found if s.total > 0.1}
     assert {"gear", "wall_thickness"} <= large and "noise" not in large
+
+
+def test_a_single_source_has_all_of_it():
+    """At the reference temperature the load hangs on the calibration alone."""
+    (only,) = hdcal.margin(single(size=400), 0.4, quantity="load").shares
+    assert (only.name, only.first, only.total) == ("calibration", 1.0, 1.0)

@@ -12,6 +12,7 @@ from typing import Literal
 import jax
 import numpy as np
 
+from hdcal.answers.residuals import misfits
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import POSITIVE, Values
 from hdcal.inference.distributions import distribution, frozen, scaled
@@ -37,7 +38,8 @@ CARRIED = (
 )
 OF_THE_GEAR = (
     "Deformation is that of the gear itself, radial and from its free shape; the rig's "
-    "zeros and its own compliance are left out."
+    "zeros and its own compliance are left out. `hdcal predict` and `hdcal margin` say "
+    "what the rig reads at a deformation as read, which differs by these zeros."
 )
 _PRIOR_ONLY = (
     "Prior only: no gear was measured. Every interval is what is believed before any "
@@ -58,6 +60,7 @@ class Basis:
         material: its name.
         kind: whether the draws are a posterior's or a prior's.
         records: the tested rows, or None.
+        misfits: warnings of shapes that the calibrated model leaves over.
     """
 
     gear: Gear
@@ -68,6 +71,7 @@ class Basis:
     material: str
     kind: Literal["posterior", "prior"]
     records: Records | None
+    misfits: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
@@ -173,6 +177,7 @@ def basis_of(source: Posterior | Gear, *, draws: int = 4000, seed: int = 0) -> B
             gear.material,
             "posterior",
             source.case.records,
+            misfits(source),
         )
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}

@@ -155,7 +155,11 @@ def inverse_design(
         candidate(basis, target(basis), {}, at, limit_force),
         kept,
         elasticities(chosen, kept, at),
-        (*beyond_tested(basis, np.array([at]), levels), *far_from_tested(basis, sizes)),
+        (
+            *beyond_tested(basis, np.array([at]), levels),
+            *far_from_tested(basis, sizes),
+            *basis.misfits,
+        ),
     )
 
 

@@ -103,3 +103,21 @@ def _whiten(posterior: Posterior, centre, columns, residual, sd) -> Whitened:
             for name, (column, up, down) in shapes.items()
         },
     )
+
+
+def misfits(posterior: Posterior) -> tuple[str, ...]:
+    """Return a warning for each shape that a straight model left in the residuals.
+
+    For answers that take the model's shape for right. With a leftover discrepancy in
+    the model there is none to warn of.
+
+    Args:
+        posterior: from `calibrate`.
+    """
+    if posterior.problem.gap is not None:
+        return ()
+    return tuple(
+        "This takes the model's shape for right, but its residuals have one. "
+        f"{shape.words.rstrip('.')}. Diagnose, or calibrate --with-gap."
+        for shape in residuals(posterior).structure
+    )

@@ -112,6 +112,7 @@ def study(
         warnings=(
             *beyond_tested(basis, axes["deformation_mm"], axes["temperature_C"]),
             *far_from_tested(basis, sizes),
+            *basis.misfits,
         ),
     )
 

@@ -122,7 +122,7 @@ def wave_generator(
         chosen,
         forces[[0, _ALONG // 2, -1]],
         error,
-        tuple(beyond_tested(basis, np.array(window), levels)),
+        (*beyond_tested(basis, np.array(window), levels), *basis.misfits),
     )
 
 

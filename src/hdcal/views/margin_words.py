@@ -48,8 +48,10 @@ def chance(probability: float) -> str:
         return f"less than {_RAREST:.0e}"
     if probability > 1.0 - _RAREST:
         return "certain"
+    if probability > 0.999:
+        return "more than 99.9 %"
     if probability > 0.99:
-        return f"{100.0 * probability:.6g} %"
+        return f"{100.0 * probability:.1f} %"
     if probability >= 0.001:
         return f"{100.0 * probability:.2g} %"
     return f"{probability:.1e}"
@@ -113,6 +115,7 @@ def _lower(text: str) -> str:
 def _capacity(found: Margin) -> Iterator[str]:
     level, sure = found.worst, f"{100.0 * found.confidence:.6g} %"
     if level.exceedance is not None:
+        yield _enough(found)
         yield from _exceedance(found, level.exceedance)
     yield (
         f"To hold {100.0 * found.required_probability:.8g} % of "
@@ -120,6 +123,25 @@ def _capacity(found: Margin) -> Iterator[str]:
         f"{newtons(level.capacity_predictive_N)} is expected to do; "
         f"{newtons(level.capacity_N)} does with {sure} confidence."
     )
+
+
+def _enough(found: Margin) -> str:
+    """Say first whether the capacity does."""
+    level, limit = found.worst, found.limit_force_N
+    assert limit is not None
+    many = _MANY[found.population]
+    share = f"{100.0 * found.required_probability:.8g} % of {many}"
+    sure = f"{100.0 * found.confidence:.6g} %"
+    if limit >= level.capacity_N:
+        return (
+            f"A capacity of {limit:g} N is enough for {share}, with {sure} confidence."
+        )
+    if limit >= level.capacity_predictive_N:
+        return (
+            f"A capacity of {limit:g} N is expected to be enough for {share}, but not "
+            f"with {sure} confidence."
+        )
+    return f"A capacity of {limit:g} N is NOT enough for {share}."
 
 
 def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:

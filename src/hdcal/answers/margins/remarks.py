@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hdcal.answers.margins.outlook import Outlook
-from hdcal.answers.residuals import residuals
+from hdcal.answers.residuals import misfits
 from hdcal.inference.posterior import Posterior
 
 CALIBRATION_NOTE = (
@@ -132,11 +132,7 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
             "ones in these sizes and in nothing else."
         )
     if all(outlook.posterior.problem.gap is None for _, outlook in outlooks):
-        for shape in residuals(posterior).structure:
-            yield (
-                "The bounds take the model's shape for right, but its residuals have "
-                f"one. {shape.words.rstrip('.')}. Diagnose, or calibrate --with-gap."
-            )
+        yield from misfits(posterior)
     if (rare is not None and rare < 1.0 / draws) or rounded_tail:
         yield (
             "Such rare cases rest on the normal tails of noise and scatter, which no "

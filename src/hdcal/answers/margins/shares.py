@@ -95,8 +95,8 @@ def shares(
     """
     inputs = _inputs(outlooks, temperature, tolerances)
     names = list(inputs)
-    if not names:
-        return ()
+    if len(names) < 2:
+        return tuple(Share(name, 1.0, 1.0, inputs[name]) for name in names)
     ranked = [_ranked(outlook, temperature) for _, outlook in outlooks]
     chances = np.cumsum([share for share, _ in outlooks])
 

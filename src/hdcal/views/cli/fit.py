@@ -20,7 +20,7 @@ from hdcal.views.cli.options import (
 @click.option(
     "--degree",
     "degrees",
-    default="1,3",
+    default="1,2,3",
     show_default=True,
     metavar="LIST",
     help="Degrees of the polynomials, 1 to 9.",
