@@ -7,7 +7,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from designs import bent, known
+from posteriors import single
 
+from hdcal.answers.basis import basis_of
 from hdcal.answers.forces import gear_force
 from hdcal.answers.next_gear import next_gear
 from hdcal.answers.study import force_quantiles, general_quantiles, is_linear
@@ -151,3 +153,25 @@ def test_tolerances_and_tested_gears_scatter_the_next_one():
         next_gear(basis, {"radius": 0.02})
     with pytest.raises(InputError, match="± part in mm"):
         next_gear(basis, {"wall_thickness_mm": 0.5})
+
+
+def test_the_nominal_deformation_is_the_gears_own():
+    """The gear file says it as read: of a diametral reading half is the gear's."""
+    basis = known()
+    gear = replace(basis.gear, nominal_deformation=0.8)
+    half = replace(basis.problem.reading, radial_per_read=0.5)
+    read = replace(basis, gear=gear, problem=replace(basis.problem, reading=half))
+    assert read.nominal_deformation == pytest.approx(0.4)
+    assert replace(basis, gear=gear).nominal_deformation == pytest.approx(0.8)
+
+
+def test_a_cause_that_is_not_settled_is_told():
+    posterior = single(size=100)
+    assert basis_of(posterior).misfits == ()
+    origin = {"hypothesis": "contact_onset", "probabilities": {"contact_onset": 0.6}}
+    settled = {**posterior.settings, "diagnosis": origin}
+    assert basis_of(replace(posterior, settings=settled)).misfits == ()
+    origin = {**origin, "probabilities": {"contact_onset": 0.6, "none": 0.4}}
+    open_one = {**posterior.settings, "diagnosis": origin}
+    (words,) = basis_of(replace(posterior, settings=open_one)).misfits
+    assert "rests on contact onset alone" in words

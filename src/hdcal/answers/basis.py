@@ -79,6 +79,12 @@ class Basis:
         return len(self.values["K"])
 
     @property
+    def nominal_deformation(self) -> float | None:
+        """Design deformation of the gear itself, radial [mm]; the file's is as read."""
+        read = self.gear.nominal_deformation
+        return None if read is None else read * self.problem.reading.radial_per_read
+
+    @property
     def interval_kind(self) -> str:
         """What an interval from these draws is called."""
         known = {"posterior": "credible", "prior": "prior"}[self.kind]
@@ -177,7 +183,7 @@ def basis_of(source: Posterior | Gear, *, draws: int = 4000, seed: int = 0) -> B
             gear.material,
             "posterior",
             source.case.records,
-            misfits(source),
+            (*_unsettled(source), *misfits(source)),
         )
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
@@ -219,6 +225,18 @@ def read_material(name: str) -> dict[str, Prior]:
         words = f"the material says nothing of {' and '.join(lacking)}"
         raise InputError([Finding(name, words, "Write a table for each")])
     return facts
+
+
+def _unsettled(posterior: Posterior) -> tuple[str, ...]:
+    """Return a warning where a diagnosis left other causes open."""
+    origin = posterior.settings.get("diagnosis")
+    if not isinstance(origin, dict) or len(origin["probabilities"]) < 2:
+        return ()
+    used = str(origin["hypothesis"]).replace("_", " ")
+    return (
+        f"The diagnosis did not settle the cause of the gap: this rests on {used} "
+        "alone. `hdcal margin` averages over all causes.",
+    )
 
 
 def _own_facts(gear: Gear) -> dict[str, Prior]:

@@ -119,7 +119,7 @@ def inverse_design(
         InputError: bad input, or nothing inside the bounds keeps the limits.
     """
     basis = basis_of(source, seed=seed)
-    nominal = basis.gear.nominal_deformation
+    nominal = basis.nominal_deformation
     at = deformation if deformation is not None else nominal
     levels = with_reference(basis, temperatures)
     findings = _findings(

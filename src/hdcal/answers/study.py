@@ -119,7 +119,7 @@ def study(
 
 def _with_place(basis: Basis, axes, deformation, temperature) -> dict[str, np.ndarray]:
     """Return the axes with deformation and temperature among them."""
-    nominal = basis.gear.nominal_deformation
+    nominal = basis.nominal_deformation
     # Without any number the finding about it is told with the others.
     at = np.nan if nominal is None else nominal
     own = {

@@ -147,8 +147,9 @@ def _enough(found: Margin) -> str:
 def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     one = f"One future {member_word(found)} needs more than {found.limit_force_N:g} N"
     sure = f"{100.0 * found.confidence:.6g} %"
-    if risk.hi < _RAREST:
-        yield f"{one} with a probability of {chance(risk.hi)}: β is {index(risk.beta)}."
+    if max(risk.hi, risk.probability) < _RAREST:
+        rarest = chance(risk.probability)
+        yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
         return
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
