@@ -9,6 +9,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.views.cli.acceleration import keep_compilations
 from hdcal.views.cli.console import Console
 from hdcal.views.cli.options import (
+    direction_option,
     force_option,
     json_option,
     read_window,
@@ -62,13 +63,7 @@ from hdcal.views.cli.quantities import read_millimetres, read_named
     show_default=True,
     help="What the gauge shows, or what acts on the gear.",
 )
-@click.option(
-    "--direction",
-    type=click.Choice(["up", "down"]),
-    default="up",
-    show_default=True,
-    help="Loading or unloading.",
-)
+@direction_option
 @click.option(
     "--tolerance",
     "tolerances",

@@ -56,6 +56,17 @@ def force_option(command: Callable) -> Callable:
     return click.option("--force", is_flag=True, help=words)(command)
 
 
+def direction_option(command: Callable) -> Callable:
+    """Add --direction."""
+    return click.option(
+        "--direction",
+        type=click.Choice(["up", "down"]),
+        default="up",
+        show_default=True,
+        help="Loading or unloading.",
+    )(command)
+
+
 def seed_option(command: Callable) -> Callable:
     """Add --seed."""
     return click.option(

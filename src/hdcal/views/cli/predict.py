@@ -4,7 +4,12 @@ import click
 
 from hdcal.views.cli.acceleration import keep_compilations
 from hdcal.views.cli.console import Console
-from hdcal.views.cli.options import force_option, json_option, read_grid
+from hdcal.views.cli.options import (
+    direction_option,
+    force_option,
+    json_option,
+    read_grid,
+)
 
 SCHEMA = "hdcal.prediction/1"
 
@@ -22,13 +27,7 @@ SCHEMA = "hdcal.prediction/1"
     metavar="LIST",
     help="Temperatures [°C]: 20,60 [default: the reference one].",
 )
-@click.option(
-    "--direction",
-    type=click.Choice(["up", "down"]),
-    default="up",
-    show_default=True,
-    help="Loading or unloading.",
-)
+@direction_option
 @click.option(
     "--out",
     metavar="FILE.csv",
