@@ -11,7 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 CASE = ROOT / "datasets" / "xb1-100-80"
 # In hdcal's own words, without the console script's own start.
-HDCAL = ("-c", "from hdcal.views.cli import main; main()")
+HDCAL = ("-m", "hdcal")
 
 
 @dataclass(frozen=True)

@@ -61,8 +61,8 @@ def log_density(e, numbers: Numbers, xp):
 def make_problem():
     """Return hdcal's problem: the XB1-100-80 case, rounding left out."""
     from hdcal import read_case
+    from hdcal.data.priors import effect_priors
     from hdcal.inference.problem import build_problem
-    from hdcal.rig.priors import effect_priors
 
     case = read_case(CASE)
     case = replace(case, gear=replace(case.gear, force_resolution=0.0))

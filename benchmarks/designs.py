@@ -30,8 +30,8 @@ def measure(repeats: int) -> dict:
     import numpy as np
 
     from hdcal import read_case
-    from hdcal.answers.basis import basis_of
-    from hdcal.answers.study import force_quantiles, general_quantiles
+    from hdcal.design.design_draws import basis_of
+    from hdcal.design.study.study import force_quantiles, general_quantiles
     from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
 
     line = basis_of(read_case(CASE).gear, draws=DRAWS)

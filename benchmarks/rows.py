@@ -67,10 +67,10 @@ def measure(repeats: int) -> dict:
     from benchmarks.density import least_ess
     from benchmarks.made import rows
     from hdcal import read_case
+    from hdcal.data.priors import effect_priors
     from hdcal.inference import laplace
     from hdcal.inference.problem import build_problem
     from hdcal.inference.sample import sample
-    from hdcal.rig.priors import effect_priors
 
     small = read_case(CASE)
     gear, key = replace(small.gear, force_resolution=0.0), jax.random.key(0)

@@ -74,7 +74,7 @@ def _cases(size: int, count: int) -> list:
     import numpy as np
 
     import hdcal
-    from hdcal.inference.evidence.ground import take
+    from hdcal.evidence.prepare import take
 
     case = hdcal.read_case(_CYCLES)
     rows = np.arange(size) % len(case.records.force)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
+pytest_plugins = ["commands"]
+
 _OWN = pytest.StashKey[str]()
 
 
@@ -16,7 +18,7 @@ def pytest_configure(config: pytest.Config) -> None:
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
     config.stash[_OWN] = os.environ["HDCAL_CACHE_DIR"] = tempfile.mkdtemp("-hdcal")
-    # What `hdcal.views.cli.acceleration` sets for commands.
+    # What `hdcal.cli.compilation_cache` sets for commands.
     os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{config.stash[_OWN]}/compiled"
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
     os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"

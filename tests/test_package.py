@@ -20,7 +20,7 @@ FOREIGN = {
 
 LIST_PRIORS = """
 import hdcal
-from hdcal.rig.resources import priors_folder
+from hdcal.data.resources import priors_folder
 
 print(hdcal.__file__)
 print(*sorted(entry.name for entry in priors_folder().iterdir()))

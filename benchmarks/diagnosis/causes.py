@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from benchmarks.diagnosis.world import READING, World
+from hdcal.data.priors import effect_priors
+from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter, scores
-from hdcal.rig.priors import effect_priors
-from hdcal.rig.records import Records
 
 MOST = 4.0
 # Shape points, and steps of the amplitude among which r is sought.

@@ -6,7 +6,7 @@ from functools import partial
 from multiprocessing import get_context
 
 from benchmarks.diagnosis.score import Task, score
-from hdcal.views.cli.acceleration import keep_compilations
+from hdcal.cli.compilation_cache import keep_compilations
 
 
 def run(tasks: list[Task], seed: int, processes: int) -> list[dict]:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hdcal.rig.records import Records
+from hdcal.data.records import Records
 
 LOWEST, HIGHEST = 0.02, 0.54
 _PAIRS = 6

@@ -10,10 +10,10 @@ from benchmarks.diagnosis import causes
 from benchmarks.diagnosis.oracle import judge
 from benchmarks.diagnosis.programs import PROGRAMS, line
 from benchmarks.diagnosis.world import World, draw_noise, draw_world
-from hdcal.answers.diagnosis.diagnose import diagnose
-from hdcal.answers.diagnosis.verdict import Verdict
+from hdcal.data.records import Records
+from hdcal.diagnosis.diagnose import diagnose
+from hdcal.diagnosis.verdict import Verdict
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.records import Records
 
 # Rigs on which an effect is tried before it counts as not reaching r.
 _TRIES = 30

@@ -5,10 +5,10 @@ from functools import cached_property
 
 import numpy as np
 
+from hdcal.data.case import Case, Gear
+from hdcal.data.priors import material_priors, rig_priors
+from hdcal.data.records import Geometry, Records
 from hdcal.physics.chain import Base, Reading, predict_reading
-from hdcal.rig.case import Case, Gear
-from hdcal.rig.priors import material_priors, rig_priors
-from hdcal.rig.records import Geometry, Records
 
 READING = Reading(1.0, 20.0)
 # True spread of the loss of modulus per kelvin; the gear's prior states the same.

@@ -7,85 +7,85 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hdcal.answers.audit.article import Claim
-    from hdcal.answers.audit.audit import audit
-    from hdcal.answers.bands import Bands, predict
-    from hdcal.answers.calibration import calibrate
-    from hdcal.answers.classical import PolynomialFit, fit
-    from hdcal.answers.diagnosis.diagnose import diagnose
-    from hdcal.answers.diagnosis.verdict import Verdict
-    from hdcal.answers.dynamics.calibration import calibrate_dynamic
-    from hdcal.answers.dynamics.respond import Response, respond
-    from hdcal.answers.inverse_design import InverseDesign, inverse_design
-    from hdcal.answers.margins.answer import Margin
-    from hdcal.answers.margins.margin import margin
-    from hdcal.answers.residuals import Residuals, residuals
-    from hdcal.answers.study import Study, study
-    from hdcal.answers.summary import summarise
-    from hdcal.answers.tolerance import k_factor, wilks_size
-    from hdcal.answers.tracking import Tracker
-    from hdcal.answers.wave_generator import WaveGenerator, wave_generator
+    from hdcal.calibration.calibrate import calibrate
+    from hdcal.calibration.summary import summarise
+    from hdcal.classical.audit.article import Claim
+    from hdcal.classical.audit.audit import audit
+    from hdcal.classical.fit.fit import PolynomialFit, fit
+    from hdcal.data.case import Case, Gear
+    from hdcal.data.priors import Prior
+    from hdcal.data.reading import read_case
+    from hdcal.data.records import Geometry, Records
+    from hdcal.design.inverse_design import InverseDesign, inverse_design
+    from hdcal.design.study.study import Study, study
+    from hdcal.design.wave_generator import WaveGenerator, wave_generator
+    from hdcal.diagnosis.diagnose import diagnose
+    from hdcal.diagnosis.verdict import Verdict
     from hdcal.errors import Finding, HdcalError, InputError, NotUsable
-    from hdcal.inference.dynamic.posterior import DynamicPosterior
+    from hdcal.inference.dynamic_posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
+    from hdcal.inference.residuals import Residuals, residuals
+    from hdcal.motion.dynamic_calibration import calibrate_dynamic
+    from hdcal.motion.respond.respond import Response, respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
     from hdcal.physics.profile import Profile, ring_profile
     from hdcal.physics.registry import EFFECTS
     from hdcal.physics.theory import THEORIES
-    from hdcal.rig.case import Case, Gear
-    from hdcal.rig.priors import Prior
-    from hdcal.rig.reading import read_case
-    from hdcal.rig.records import Geometry, Records
+    from hdcal.prediction.bands.bands import Bands, predict
+    from hdcal.prediction.margin.margin import margin
+    from hdcal.prediction.margin.result import Margin
+    from hdcal.prediction.tolerance_factors import k_factor, wilks_size
+    from hdcal.tracking.tracker import Tracker
 
 _HOMES = {
-    "Bands": "answers.bands",
-    "Case": "rig.case",
-    "Claim": "answers.audit.article",
-    "DynamicPosterior": "inference.dynamic.posterior",
+    "Bands": "prediction.bands.bands",
+    "Case": "data.case",
+    "Claim": "classical.audit.article",
+    "DynamicPosterior": "inference.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
     "Finding": "errors",
-    "Gear": "rig.case",
-    "Geometry": "rig.records",
+    "Gear": "data.case",
+    "Geometry": "data.records",
     "HdcalError": "errors",
     "InputError": "errors",
-    "InverseDesign": "answers.inverse_design",
-    "Margin": "answers.margins.answer",
+    "InverseDesign": "design.inverse_design",
+    "Margin": "prediction.margin.result",
     "Noise": "physics.effect",
     "NotUsable": "errors",
-    "PolynomialFit": "answers.classical",
+    "PolynomialFit": "classical.fit.fit",
     "Posterior": "inference.posterior",
-    "Prior": "rig.priors",
+    "Prior": "data.priors",
     "Profile": "physics.profile",
-    "Records": "rig.records",
-    "Residuals": "answers.residuals",
-    "Response": "answers.dynamics.respond",
+    "Records": "data.records",
+    "Residuals": "inference.residuals",
+    "Response": "motion.respond.respond",
     "Rows": "physics.effect",
-    "Study": "answers.study",
+    "Study": "design.study.study",
     "THEORIES": "physics.theory",
-    "Tracker": "answers.tracking",
-    "Verdict": "answers.diagnosis.verdict",
-    "WaveGenerator": "answers.wave_generator",
-    "audit": "answers.audit.audit",
-    "calibrate": "answers.calibration",
-    "calibrate_dynamic": "answers.dynamics.calibration",
-    "diagnose": "answers.diagnosis.diagnose",
-    "fit": "answers.classical",
+    "Tracker": "tracking.tracker",
+    "Verdict": "diagnosis.verdict",
+    "WaveGenerator": "design.wave_generator",
+    "audit": "classical.audit.audit",
+    "calibrate": "calibration.calibrate",
+    "calibrate_dynamic": "motion.dynamic_calibration",
+    "diagnose": "diagnosis.diagnose",
+    "fit": "classical.fit.fit",
     "force": "physics.chain",
-    "inverse_design": "answers.inverse_design",
-    "k_factor": "answers.tolerance",
-    "margin": "answers.margins.margin",
+    "inverse_design": "design.inverse_design",
+    "k_factor": "prediction.tolerance_factors",
+    "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
-    "predict": "answers.bands",
-    "read_case": "rig.reading",
-    "residuals": "answers.residuals",
-    "respond": "answers.dynamics.respond",
+    "predict": "prediction.bands.bands",
+    "read_case": "data.reading",
+    "residuals": "inference.residuals",
+    "respond": "motion.respond.respond",
     "ring_profile": "physics.profile",
-    "study": "answers.study",
-    "summarise": "answers.summary",
-    "wave_generator": "answers.wave_generator",
-    "wilks_size": "answers.tolerance",
+    "study": "design.study.study",
+    "summarise": "calibration.summary",
+    "wave_generator": "design.wave_generator",
+    "wilks_size": "prediction.tolerance_factors",
 }
 
 __all__ = [*sorted(_HOMES)]

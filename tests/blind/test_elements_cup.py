@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from hdcal.blind.virtual_rig.virtual_rig.elements import cup
 
-from hdcal.blind.elements import cup
-from hdcal.blind.elements.banded import multiply
-from hdcal.blind.elements.cup import cup_stiffness, harmonic_stiffness
-from hdcal.blind.elements.end import End, end_stiffness
+from hdcal.blind.virtual_rig.elements.banded import multiply
+from hdcal.blind.virtual_rig.elements.cup import cup_stiffness, harmonic_stiffness
+from hdcal.blind.virtual_rig.elements.end import End, end_stiffness
+from hdcal.data.records import Geometry
 from hdcal.physics import theory
-from hdcal.rig.records import Geometry
 
 R, WALL, LENGTH, E, NU = 40.0, 0.68, 70.0, 210e3, 0.3
 HEIGHT = 62.0

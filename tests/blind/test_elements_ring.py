@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from hdcal.blind.virtual_rig.virtual_rig.elements import ring
 from scipy import integrate
 
-from hdcal.blind.elements import ring
-from hdcal.blind.elements.ring import (
+from hdcal.blind.virtual_rig.elements.ring import (
     load_curve,
     stiffness,
     strain_energy,

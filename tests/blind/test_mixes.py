@@ -8,10 +8,10 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from hdcal.blind.mixes import MIXES, _plans, draw_cases, known_on
-from hdcal.blind.oracle import curves, judge
-from hdcal.blind.programs import PROGRAMS, Program
-from hdcal.blind.virtual_rig import ALPHA, ALPHA_SD, Bench, draw_noise
+from hdcal.blind.virtual_rig.loadings import PROGRAMS, Program
+from hdcal.blind.virtual_rig.mixes import MIXES, _plans, draw_cases, known_on
+from hdcal.blind.virtual_rig.oracle import curves, judge
+from hdcal.blind.virtual_rig.virtual_rig import ALPHA, ALPHA_SD, Bench, draw_noise
 from hdcal.errors import InputError
 
 COUNT = 40

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from hdcal.blind.history import History
-from hdcal.blind.outside import CHOSEN, LISTED, UNSEEN
+from hdcal.blind.virtual_rig.history import History
+from hdcal.blind.virtual_rig.outside import CHOSEN, LISTED, UNSEEN
 
 MECHANISMS = LISTED | CHOSEN | UNSEEN
 SEEDS = range(5)

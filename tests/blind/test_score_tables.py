@@ -8,7 +8,7 @@ import pytest
 from handmade import KINDS, row, said, scored, truth
 from honest import FAMILIES, make_check
 
-from hdcal.blind.scores import order_dependence, score
+from hdcal.blind.scoring.scores import order_dependence, score
 from hdcal.errors import InputError
 
 # Tables

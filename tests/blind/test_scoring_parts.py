@@ -7,11 +7,11 @@ import pytest
 from handmade import row, said, scored, truth
 from scipy.stats import norm
 
-from hdcal.blind.scores import reliability
 from hdcal.blind.scoring.detection import ALARM, fit
 from hdcal.blind.scoring.estimates import mean, median, share
 from hdcal.blind.scoring.judged import Judged
 from hdcal.blind.scoring.reliability import bin_of, errors
+from hdcal.blind.scoring.scores import reliability
 
 # Numbers with intervals
 

@@ -7,12 +7,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hdcal.blind.mechanism import Rig
-from hdcal.blind.paths import guide, sliding_cells, solid
-from hdcal.blind.programs import PROGRAMS, program_of
-from hdcal.blind.sensing import NOISES, charge_amplifier
-from hdcal.blind.virtual_rig import MECHANISMS, Bench, Switched, draw_bench, draw_noise
-from hdcal.rig.reading import read_case
+from hdcal.blind.virtual_rig.loadings import PROGRAMS, program_of
+from hdcal.blind.virtual_rig.mechanism import Rig
+from hdcal.blind.virtual_rig.paths import guide, sliding_cells, solid
+from hdcal.blind.virtual_rig.sensing import NOISES, charge_amplifier
+from hdcal.blind.virtual_rig.virtual_rig import (
+    MECHANISMS,
+    Bench,
+    Switched,
+    draw_bench,
+    draw_noise,
+)
+from hdcal.data.reading import read_case
 
 RICH, FLEET = PROGRAMS["rich"](), PROGRAMS["fleet"]()
 GEAR = """\
@@ -145,7 +151,7 @@ def test_noise_mechanisms_have_the_size_asked_for(name):
 
 def test_the_rig_knows_nothing_of_the_library():
     code = (
-        "import sys, hdcal.blind.mixes\n"
+        "import sys, hdcal.blind.virtual_rig.mixes\n"
         "found = {m.split('.')[1] for m in sys.modules if m.startswith('hdcal.')}\n"
         "assert not found & {'physics', 'inference', 'answers', 'views'}, found"
     )

@@ -7,7 +7,7 @@ import pytest
 from honest import EFFECTS, FAMILIES, PAIRS, Check, make_check, worded
 
 from hdcal.blind.label import Answer
-from hdcal.blind.scores import order_dependence, score
+from hdcal.blind.scoring.scores import order_dependence, score
 
 NO_TARGET = {"gap", "gap_holds"}
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bench import NOISE, judged, rich, simulated
+from diagnosis_cases import NOISE, judged, rich, simulated
 from rigs import make_case
 
-from hdcal.answers.diagnosis.adequacy import sign_odds
-from hdcal.answers.diagnosis.weigh import Weighed, doubted
-from hdcal.inference.evidence.noise import lattice_step
+from hdcal.diagnosis.adequacy import sign_odds
+from hdcal.diagnosis.model_posterior import Weighed, doubted
+from hdcal.evidence.noise_evidence import lattice_step
 
 DOUBTED = {"none": 0.1, "unknown": 0.1, "a": 0.6, "a+b": 0.2}
 

@@ -5,16 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from bench import judged, rich, simulated
+from diagnosis_cases import judged, rich, simulated
 from rigs import make_case, ramp
 
-from hdcal.answers.diagnosis import diagnose as module
-from hdcal.answers.diagnosis import next_test
-from hdcal.answers.diagnosis.programs import proposals
-from hdcal.answers.diagnosis.verdict import Verdict
-from hdcal.inference.evidence.thinning import shorten
+from hdcal.data.prior import Prior
+from hdcal.diagnosis import diagnose as module
+from hdcal.diagnosis import next_run as next_test
+from hdcal.diagnosis.candidate_runs import proposals
+from hdcal.diagnosis.verdict import Verdict
+from hdcal.evidence.row_means import shorten
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.prior import Prior
 
 CURVED = {"progressive_stiffening": {"slope": 0.1}}
 RING = 79.74877882378868  # N/mm, of the test gear at 207 GPa

@@ -6,15 +6,15 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from bench import judged, rich, simulated
+from diagnosis_cases import judged, rich, simulated
 from rigs import cycles, make_case, make_gear, make_records, ramp
 
 import hdcal
-from hdcal.answers.diagnosis.verdict import Verdict
-from hdcal.answers.diagnosis.weigh import NAMED
+from hdcal.data.prior import Prior
+from hdcal.diagnosis.model_posterior import NAMED
+from hdcal.diagnosis.verdict import Verdict
 from hdcal.physics.effect import Effect, parameter
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.prior import Prior
 
 DATASETS = Path(__file__).parents[2] / "datasets"
 CURVATURE = {name for name, effect in EFFECTS.items() if effect.family == "curvature"}

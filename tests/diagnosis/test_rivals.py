@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bench import NOISE, rich, simulated
+from diagnosis_cases import NOISE, rich, simulated
 from rigs import make_case
 
-from hdcal.answers.diagnosis.rivals import NONE, fit_each, own_form_closure
+from hdcal.blind.rival_methods import NONE, fit_each, own_form_closure
 from hdcal.physics.registry import EFFECTS
 
 SHOWN = {

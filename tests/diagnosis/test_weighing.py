@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdcal.answers.diagnosis.library import choose_library
-from hdcal.answers.diagnosis.weigh import Weighed, log_priors, verdict_word, weigh
+from hdcal.diagnosis.library import choose_library
+from hdcal.diagnosis.model_posterior import Weighed, log_priors, verdict_word, weigh
 from hdcal.errors import InputError
 from hdcal.physics.registry import EFFECTS
 

@@ -4,19 +4,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bench import simulated
+from diagnosis_cases import simulated
 from rigs import cycles
 from scipy import stats
 
-from hdcal.answers.diagnosis.weigh import log_priors, weigh
+from hdcal.data.priors import effect_priors
+from hdcal.diagnosis.model_posterior import log_priors, weigh
+from hdcal.evidence import prepare as ground
+from hdcal.evidence.assess import assess
+from hdcal.evidence.assessment import NONE
+from hdcal.evidence.whitened_rows import CORRELATIONS
 from hdcal.inference.distributions import frozen
-from hdcal.inference.evidence import ground
-from hdcal.inference.evidence.assess import assess
-from hdcal.inference.evidence.assessment import NONE
-from hdcal.inference.evidence.rows import CORRELATIONS
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.priors import effect_priors
 
 # Small, tight library of different looks: cheap, and evidences decide.
 NAMES = (

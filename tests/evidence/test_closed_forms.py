@@ -16,22 +16,22 @@ from dense import (
 )
 from scipy.special import logsumexp
 
-from hdcal.inference.evidence.closed import (
+from hdcal.evidence.amplitude_grids import SCALE_WEIGHTS, SCALES
+from hdcal.evidence.closed_form import (
     block_evidence,
     entry_evidence,
     plain_evidence,
 )
-from hdcal.inference.evidence.closed_pairs import Couples, couple_evidence
-from hdcal.inference.evidence.grids import SCALE_WEIGHTS, SCALES
-from hdcal.inference.evidence.lines import TOLERANCES, draw_lines, entries_of, join
-from hdcal.inference.evidence.rows import log_absorbed, whiten, whitening_jacobian
-from hdcal.inference.evidence.statistics import (
+from hdcal.evidence.closed_form_pairs import Couples, couple_evidence
+from hdcal.evidence.effect_lines import TOLERANCES, draw_lines, entries_of, join
+from hdcal.evidence.inner_products import (
     block_statistics,
     gram,
     ground,
     line_statistics,
     tolerant_statistics,
 )
+from hdcal.evidence.whitened_rows import log_absorbed, whiten, whitening_jacobian
 from hdcal.physics.registry import EFFECTS
 
 CORRELATIONS = (0.0, 0.4)

@@ -18,17 +18,17 @@ from rigs import make_case, make_gear, program, simulate
 from scipy import stats
 from scipy.special import logsumexp
 
-from hdcal.inference.evidence import lines as lines_module
-from hdcal.inference.evidence.curves import curves
-from hdcal.inference.evidence.ground import lay_out
-from hdcal.inference.evidence.lines import draw_lines
-from hdcal.inference.evidence.rows import beside_line
-from hdcal.inference.evidence.singles import assess_singles
+from hdcal.data.prior import Prior
+from hdcal.data.priors import effect_priors
+from hdcal.evidence import effect_lines as lines_module
+from hdcal.evidence.effect_curves import curves
+from hdcal.evidence.effect_lines import draw_lines
+from hdcal.evidence.prepare import lay_out
+from hdcal.evidence.single_evidence import assess_singles
+from hdcal.evidence.whitened_rows import beside_line
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.prior import Prior
-from hdcal.rig.priors import effect_priors
 
 BAR = 0.1
 TRUTH = {

@@ -12,11 +12,11 @@ import pytest
 from rigs import cycles, draw_truth, make_case, make_gear, posterior_draws, simulate
 from scipy import stats
 
+from hdcal.data.priors import effect_priors
 from hdcal.inference.density import member_base
 from hdcal.inference.problem import build_problem
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.priors import effect_priors
 
 # Draws that the truth is ranked among, thinned so that they are nearly independent.
 RANKED, BINS = 99, 10

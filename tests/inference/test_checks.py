@@ -5,7 +5,8 @@ import pytest
 import xarray as xr
 from rigs import cycles, make_case, make_gear, make_records, ramp
 
-from hdcal.answers.calibration import calibrate
+from hdcal.calibration.calibrate import calibrate
+from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import NotUsable
 from hdcal.inference.checks import (
     bound_check,
@@ -13,11 +14,10 @@ from hdcal.inference.checks import (
     rounding_check,
     sampling_checks,
 )
-from hdcal.inference.diagnoses import Diagnosis, diagnose_parameters, mixing
-from hdcal.inference.flat import sensitivity
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.flat_directions import sensitivity
 from hdcal.inference.problem import build_problem
 from hdcal.physics.registry import EFFECTS
-from hdcal.rig.priors import Prior, effect_priors
 
 RHAT, ESS, BFMI, DIVERGENT, DEPTH = range(5)
 

@@ -11,9 +11,9 @@ import pytest
 from rigs import make_case, make_gear, make_records
 from scipy import stats
 
-from hdcal.answers.calibration import calibrate
+from hdcal.calibration.calibrate import calibrate
+from hdcal.data.priors import Prior
 from hdcal.physics.theory import ring
-from hdcal.rig.priors import Prior
 
 MODULUS = 207e3
 K, OFFSET, SIGMA = (2.5, 0.5), (0.0, 5.0), (0.5, 1.2)

@@ -3,11 +3,11 @@
 import numpy as np
 from rigs import make_case, make_gear
 
-from hdcal.answers.calibration import calibrate
-from hdcal.answers.summary import K_by_theory
-from hdcal.rig.priors import Prior
-from hdcal.rig.reading import read_case
-from hdcal.rig.resources import datasets_folder
+from hdcal.calibration.calibrate import calibrate
+from hdcal.calibration.summary import K_by_theory
+from hdcal.data.priors import Prior
+from hdcal.data.reading import read_case
+from hdcal.data.resources import datasets_folder
 
 
 def width(values):

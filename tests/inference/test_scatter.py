@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from rigs import make_case, make_gear, make_records
 
-from hdcal.answers.calibration import calibrate, check_effect_priors
-from hdcal.answers.summary import summarise
+from hdcal.calibration.calibrate import calibrate, check_effect_priors
+from hdcal.calibration.summary import summarise
+from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
 from hdcal.inference.density import MEMBER_SD, MEMBERS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
-from hdcal.rig.priors import Prior, effect_priors, rig_priors
 
 SCATTER = [name for name, each in EFFECTS.items() if issubclass(each, Scatter)]
 scatter = pytest.mark.parametrize("name", SCATTER)

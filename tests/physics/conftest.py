@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from jax.flatten_util import ravel_pytree
 
+from hdcal.data.records import Geometry, Records
 from hdcal.physics.chain import Base, Reading
-from hdcal.rig.records import Geometry, Records
 
 EVERYTHING = frozenset(
     {

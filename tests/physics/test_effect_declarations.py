@@ -8,9 +8,9 @@ import numpy as np
 from effect_bench import BEYOND_RECORDS, everyone
 
 from hdcal import EFFECTS
+from hdcal.data.priors import effect_priors
+from hdcal.data.units import to_code
 from hdcal.physics.effect import parameters
-from hdcal.rig.priors import effect_priors
-from hdcal.rig.units import to_code
 
 DOCS = Path(__file__).parents[2] / "docs" / "effects"
 STAGES = ("deformation", "force", "sensor", "noise")

@@ -7,9 +7,9 @@ import pytest
 from effect_bench import everyone, typical
 
 from hdcal import EFFECTS
+from hdcal.data.units import to_code
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import parameters
-from hdcal.rig.units import to_code
 
 
 def rescaling(unit: str, scales: dict[str, float]) -> float:

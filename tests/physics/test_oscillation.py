@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hdcal import EFFECTS
+from hdcal.data.records import Geometry
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.dynamics import (
     FRICTION_SPEED,
@@ -20,7 +21,6 @@ from hdcal.physics.dynamics import (
 from hdcal.physics.forcing import Chirp, Sine, Step, Table
 from hdcal.physics.linear_response import linear_response
 from hdcal.physics.theory import ring
-from hdcal.rig.records import Geometry
 
 XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
 MASS, STIFFNESS, FORCE = 4e-5, 200.0, 80.0

@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from hdcal.data.records import Geometry
 from hdcal.physics.profile import peak_stress, ring_profile
 from hdcal.physics.theory import RING_SERIES, ring
-from hdcal.rig.records import Geometry
 
 GEAR = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
 E, OMEGA = 207e3, 0.4

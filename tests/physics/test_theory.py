@@ -9,8 +9,8 @@ import pytest
 from jax.flatten_util import ravel_pytree
 from scipy import integrate
 
+from hdcal.data.records import Geometry
 from hdcal.physics.theory import RING_SERIES, THEORIES, article, cup, ring
-from hdcal.rig.records import Geometry
 
 E = 210e3
 

@@ -7,10 +7,10 @@ from dataclasses import fields
 import numpy as np
 import xarray as xr
 
+from hdcal.data.case import Case, Gear
+from hdcal.data.priors import Prior
+from hdcal.data.records import Geometry, Records
 from hdcal.errors import Finding, InputError
-from hdcal.rig.case import Case, Gear
-from hdcal.rig.priors import Prior
-from hdcal.rig.records import Geometry, Records
 
 FORMAT = "hdcal.posterior/1"
 # The attribute that holds the digest of everything else.

@@ -12,10 +12,10 @@ import numpy as np
 import xarray as xr
 from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
 
-from hdcal.inference.diagnoses import Mixing
+from hdcal.data.priors import Prior
+from hdcal.inference.diagnostics import Mixing
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
-from hdcal.rig.priors import Prior
 
 MAX_RHAT = 1.01
 ESS_PER_CHAIN = 100

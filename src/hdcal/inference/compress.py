@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.rig.records import Array
+from hdcal.data.records import Array
 
 
 class Blocks(eqx.Module):

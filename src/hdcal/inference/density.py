@@ -7,20 +7,20 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Float, Key
 
+from hdcal.data.records import Array, Records
 from hdcal.inference import compress
+from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
-from hdcal.inference.gap import BASIS_SIZE, prior_sd
 from hdcal.inference.likelihood import log_probability
-from hdcal.inference.members import Linear, contrasts
+from hdcal.inference.member_offsets import Linear, contrasts
 from hdcal.inference.problem import Problem
-from hdcal.inference.sampled import Sampled
 from hdcal.physics.chain import (
     Base,
     linear_coefficients,
     predict_reading,
 )
 from hdcal.physics.effect import Effect, Noise, parameters
-from hdcal.rig.records import Array, Records
 
 # Float scalars and arrays by site name; what each one is depends on the name.
 Values = Mapping[str, Any]

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpyro.distributions as dist
 from scipy import stats
 
-from hdcal.rig.priors import Prior
+from hdcal.data.priors import Prior
 
 
 def distribution(prior: Prior, *, positive: bool = False) -> dist.Distribution:

@@ -13,11 +13,11 @@ from numpyro.handlers import seed, trace
 from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
-from hdcal.inference.gap import BASIS_SIZE
+from hdcal.data.records import Array
+from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
-from hdcal.inference.sampled import Sampled
-from hdcal.rig.records import Array
 
 Position = dict[str, Any]
 

@@ -5,8 +5,8 @@ import jax.numpy as jnp
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float, Key
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Noise
-from hdcal.rig.records import Array
 
 
 def log_interval(low, high):

@@ -12,13 +12,13 @@ import numpyro
 import numpyro.distributions as dist
 from jax.nn import log_sigmoid, softplus
 
+from hdcal.data.priors import Prior
 from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
+from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
-from hdcal.inference.gap import BASIS_SIZE, prior_sd
 from hdcal.inference.problem import Problem
-from hdcal.inference.sampled import Sampled
 from hdcal.physics.effect import parameters
-from hdcal.rig.priors import Prior
 
 
 def sample_site(name: str, prior: Prior):

@@ -13,16 +13,16 @@ import numpy as np
 import xarray as xr
 from arviz_base import from_dict
 
+from hdcal.data.case import Case, Theory
+from hdcal.data.priors import Prior
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import archive
 from hdcal.inference.checks import Check
 from hdcal.inference.density import pointwise_log_likelihood
-from hdcal.inference.diagnoses import Diagnosis
+from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.sample import Draws
 from hdcal.physics.effect import Effect
-from hdcal.rig.case import Case, Theory
-from hdcal.rig.priors import Prior
 
 FILE_NAME = "posterior.nc"
 _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")

@@ -6,19 +6,19 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Float
 
+from hdcal.data.case import Case, Theory
+from hdcal.data.priors import Prior
+from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
+from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import Blocks, compress, group_rows
+from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.discrepancy import Gap, build_gap
 from hdcal.inference.distributions import scaled
-from hdcal.inference.gap import Gap, build_gap
-from hdcal.inference.sampled import Sampled
-from hdcal.inference.scales import amplitude_units
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
-from hdcal.rig.case import Case, Theory
-from hdcal.rig.priors import Prior
-from hdcal.rig.records import Array, Records
 
 # Below this many rows the rounding likelihood is always exact: it is cheap there.
 _FEW_ROWS = 500

@@ -16,11 +16,12 @@ from jaxtyping import Key
 from numpyro.infer.hmc import hmc
 from numpyro.infer.util import constrain_fn
 
+from hdcal.data.records import Array
+from hdcal.errors import Finding, InputError
 from hdcal.inference.density import draw_members
+from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
-from hdcal.inference.sampled import Sampled
-from hdcal.rig.records import Array
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
@@ -180,3 +181,19 @@ def _run(problem, whitening, key, chains, warmup, draws, progress, target):
         if progress is not None:
             progress(done, total)
     return [np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)]
+
+
+def check_settings(chains: int, warmup: int, draws: int) -> None:
+    """Check that a run is long enough for its own checks.
+
+    Raises:
+        InputError: it is not.
+    """
+    least = {"chains": (chains, 2), "warmup": (warmup, 1), "draws": (draws, 4)}
+    findings = [
+        Finding(f"--{name}", f"{value} is too few", f"use {low} or more")
+        for name, (value, low) in least.items()
+        if value < low
+    ]
+    if findings:
+        raise InputError(findings)

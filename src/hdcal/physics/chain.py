@@ -10,9 +10,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.effect import Effect, Noise, Rows, Stage
 from hdcal.physics.theory import THEORIES
-from hdcal.rig.records import Array, Geometry, Records
 
 Value = Float[Array, ""] | Float[Array, " n"] | float
 

@@ -14,11 +14,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import RING_SERIES
-from hdcal.rig.records import Array, Geometry, Records
 
 Scalar = Float[Array, ""] | float
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import equinox as eqx
 from jaxtyping import Float
 
-from hdcal.rig.records import Array, Records
+from hdcal.data.records import Array, Records
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

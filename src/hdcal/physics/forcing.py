@@ -6,7 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from hdcal.rig.records import Array
+from hdcal.data.records import Array
 
 Scalar = Float[Array, ""] | float
 

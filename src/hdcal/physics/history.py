@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float, Int
 
-from hdcal.rig.records import Array
+from hdcal.data.records import Array
 
 
 def leaky_sum(

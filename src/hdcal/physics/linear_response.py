@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from hdcal.rig.records import Array
+from hdcal.data.records import Array
 
 Scalar = Float[Array, ""] | float
 # Below this |x| the functions of √x are summed as series, smooth through zero.

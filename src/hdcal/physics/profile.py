@@ -8,8 +8,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array, Geometry
 from hdcal.physics.theory import RING_SERIES, Scalar
-from hdcal.rig.records import Array, Geometry
 
 # Σ 1/(n²−1) over n = 2, 4, …: curvature under the load per coefficient A.
 _AT_LOAD = 0.5

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jax.scipy.special import ndtri
 from jaxtyping import Float, Int
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows
-from hdcal.rig.records import Array
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from hdcal.rig.records import Array, Geometry
+from hdcal.data.records import Array, Geometry
 
 Scalar = Float[Array, ""] | float
 Stiffness = Callable[[Geometry, Scalar], Scalar]

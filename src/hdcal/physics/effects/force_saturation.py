@@ -5,8 +5,8 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 # Below this x the series of tanh(√x)/√x, cut after x³, is exact in double precision.
 _SMALL = 1e-3

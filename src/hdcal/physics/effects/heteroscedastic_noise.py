@@ -5,8 +5,8 @@ from typing import ClassVar, Literal
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Noise, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 
 class HeteroscedasticNoise(Effect):

@@ -4,8 +4,8 @@ from typing import ClassVar, Literal
 
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 # Series of the inextensible elastic ring under two opposed loads, in ω/R.
 _FIRST, _SECOND = -1.543, 3.35

@@ -5,8 +5,8 @@ from typing import ClassVar, Literal
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Noise, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 # A fraction of exactly zero has no logarithm. This one is nothing in double precision
 # for readings up to 26 sds out, and the slope at zero stays right.

@@ -5,9 +5,9 @@ from typing import ClassVar, Literal
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import play
-from hdcal.rig.records import Array
 
 
 class PlasticYield(Effect):

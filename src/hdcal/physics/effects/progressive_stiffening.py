@@ -5,8 +5,8 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 # Rounding radius of |ω| at zero [mm], far below any reading.
 _CORNER = 1e-4

@@ -4,9 +4,9 @@ from typing import ClassVar
 
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Rows, Stage, parameter
 from hdcal.physics.scatter import Kind, Scatter
-from hdcal.rig.records import Array
 
 
 class SpecimenVariation(Scatter):

@@ -4,8 +4,8 @@ from typing import ClassVar
 
 from jaxtyping import Float
 
+from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.rig.records import Array
 
 
 class ThermalStiffness(Effect):

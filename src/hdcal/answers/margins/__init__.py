@@ -1,1 +1,0 @@
-"""Margins: what force a deformation needs, for how many of whom, how surely."""

@@ -1,0 +1,150 @@
+"""Open a blind check: everything is verified before a label is seen by anyone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from hdcal.blind.answers import Answers, frozen_names
+from hdcal.blind.closures import closures
+from hdcal.blind.document import write_scores
+from hdcal.blind.label import Answer
+from hdcal.blind.scoring.scores import JUDGED, score
+from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
+from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
+from hdcal.report.folder import check_target, whole_folder, write_whole
+from hdcal.report.plain import as_json
+
+OPENED_SCHEMA, RESULT_SCHEMA = "hdcal.blind-opened/1", "hdcal.blind-result/1"
+RESULT = "result"
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What an opened set says.
+
+    Attributes:
+        folder: where the result is.
+        result: scores, and whose answers they are of.
+        secret: the labels.
+        answers: of each diagnoser, in the order of the labels.
+        families: of the library's effects.
+    """
+
+    folder: Path
+    result: dict[str, Any]
+    secret: Sealed
+    answers: dict[str, list[Answer]]
+    families: dict[str, str]
+
+
+def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> Opening:
+    """Verify set and answers, decrypt the labels, score, and write the result.
+
+    Args:
+        folder: the set.
+        key: file with its key.
+        by: whose answers to score; all that are frozen when empty.
+
+    Raises:
+        InputError: answers are not frozen, or anything is not what was promised.
+    """
+    found = read_set(folder)
+    # Whoever is not scored today was blind all the same, and is recorded as such.
+    everyone = frozen_names(found) if not by else _present(found, by)
+    frozen = {name: Answers(found, name).frozen() for name in everyone}
+    hashes = {name: data["sha256"] for name, (data, _) in frozen.items()}
+    before = _read_opened(found)
+    first = hashes if before is None else before["answers"]
+    secret = _unsealed(found, key)
+    chosen = list(by or everyone)
+    answers = {name: frozen[name][1] for name in chosen}
+    families = dict(frozen[chosen[0]][0]["families"])
+    judged = JUDGED if JUDGED in answers else chosen[0]
+    result = {
+        "schema": RESULT_SCHEMA,
+        "set_commitment": found.manifest.commitment,
+        "mix": secret.mix,
+        "answers": {
+            name: {
+                "sha256": hashes[name],
+                "blind": frozen[name][0]["blind"] and first.get(name) == hashes[name],
+            }
+            for name in chosen
+        },
+        "scores": score(
+            secret.labels,
+            answers,
+            families,
+            closures(found, secret.labels, answers[judged]),
+            {label.case for label in secret.labels if label.mix == "prior"} or None,
+            judged,
+        ),
+    }
+    opening = Opening(found.folder / RESULT, result, secret, answers, families)
+    _write(found, opening, hashes if before is None else None)
+    return opening
+
+
+def _present(found: BlindSet, by: Sequence[str]) -> list[str]:
+    """Return who was asked for, and who else has frozen answers."""
+    files = found.folder.glob("answers-*.json")
+    others = {path.stem.removeprefix("answers-") for path in files}
+    return sorted({*by, *others})
+
+
+def _unsealed(found: BlindSet, key: Path) -> Sealed:
+    try:
+        secret = unseal(found.sealed(), _read_key(key))
+    except Broken as error:
+        remedy = "Name the key file that was written with this set"
+        raise refusal(key, str(error), remedy) from None
+    try:
+        check_labels(found.manifest, secret)
+    except Broken as error:
+        raise refusal(found.folder / "sealed.bin", str(error), GET_AGAIN) from None
+    return secret
+
+
+def _read_key(path: Path) -> bytes:
+    try:
+        return path.read_bytes().strip()
+    except OSError as error:
+        words = f"the key cannot be read ({error.strerror or error})"
+        raise refusal(path, words, "Name the key file of this set") from None
+
+
+def _read_opened(found: BlindSet) -> dict[str, Any] | None:
+    """Return the record of the first opening, None before it."""
+    path, remedy = found.opened, "Restore the file; it tells which answers were blind"
+    if not path.exists():
+        return None
+    data = read_json(path, OPENED_SCHEMA, remedy)
+    if not is_stamped(data) or not isinstance(data.get("answers"), dict):
+        raise refusal(path, "was edited: its hash does not fit", remedy)
+    if data.get("set_commitment") != found.manifest.commitment:
+        raise refusal(path, "tells of another set", remedy)
+    return data
+
+
+def _write(found: BlindSet, opening: Opening, hashes: dict[str, str] | None) -> None:
+    """Write the record of a first opening, then the result."""
+    check_target(opening.folder, force=True)
+    if hashes is not None:
+        record = {
+            "schema": OPENED_SCHEMA,
+            "set_commitment": found.manifest.commitment,
+            "answers": hashes,
+            "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        }
+        # Before any label reaches the disk: what is answered later is not blind.
+        write_whole(found.opened, as_json(stamped(record)))
+    with whole_folder(opening.folder, force=True) as building:
+        write_scores(opening.result["scores"], building)
+        about = {n: v for n, v in opening.result.items() if n != "scores"}
+        for name, data in (
+            ("opening.json", about),
+            ("labels.json", opening.secret.plain()),
+        ):
+            (building / name).write_text(as_json(data), "utf-8")

@@ -1,0 +1,1 @@
+"""The virtual rig of the blind check: other physics than the library's."""

@@ -1,0 +1,113 @@
+"""Mechanisms of load paths beside the gear's bending: stops, friction, oil, creep."""
+
+import numpy as np
+
+from hdcal.blind.virtual_rig.mechanics import FULL
+from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
+
+
+def second_stop(force, rig: Rig, size: float, shape: Shape):
+    """A second stop is touched and stiffens as its spots flatten; size: k₂/k."""
+    depth = rig.deformation - shape["onset"]
+    width = shape["round"]
+    depth = width * np.logaddexp(0.0, depth / width)
+    return size * rig.stiffness * FULL * (depth / FULL) ** shape["power"]
+
+
+def _stop(rng) -> Shape:
+    onset, power = rng.uniform(0.15, 0.42), rng.uniform(1.0, 1.3)
+    return {"onset": onset, "power": power, "round": rng.uniform(0.002, 0.02)}
+
+
+def guide(force, rig: Rig, size: float, shape: Shape):
+    """Friction of the guide, with a short elastic way before it slips; size [N].
+
+    Dahl (1968): dz = (1 − sgn(dx) z) dx / reach.
+    """
+    x, z = rig.deformation, np.zeros(len(force))
+    reach, last, before = shape["reach"], 0.0, 0.0
+    for row, (here, begins) in enumerate(zip(x, rig.history.run_starts, strict=True)):
+        last, before = (0.0, 0.0) if begins else (last, before)
+        way = here - before
+        target = np.sign(way)
+        last = target + (last - target) * np.exp(-abs(way) / reach) if way else last
+        z[row], before = last, here
+    return size * z
+
+
+def sliding_cells(force, rig: Rig, size: float, shape: Shape):
+    """Maxwell-slip cells of unequal strength; size: force when all of them slip [N]."""
+    reach, share = shape["reach"], shape["share"]
+    stretch, before = np.zeros(len(reach)), 0.0
+    total = np.zeros(len(force))
+    for row, (here, begins) in enumerate(
+        zip(rig.deformation, rig.history.run_starts, strict=True)
+    ):
+        if begins:
+            stretch, before = np.zeros(len(reach)), 0.0
+        stretch = np.clip(stretch + here - before, -reach, reach)
+        total[row], before = share @ (stretch / reach), here
+    return size * total
+
+
+def _cells(rng) -> Shape:
+    longest = np.exp(rng.uniform(np.log(0.08), np.log(0.35)))
+    reach = longest * np.sort(rng.uniform(0.05, 1.0, 9))
+    return {"reach": reach, "share": rng.dirichlet(np.full(9, 3.0))}
+
+
+def oil_film(force, rig: Rig, size: float, shape: Shape):
+    """Shear-thinning oil, F = c sgn(v) |v|ᵐ; size: force at 0.04 mm/s [N]."""
+    told = rig.history
+    step = np.diff(told.deformation, prepend=0.0)
+    seconds = np.diff(told.time, prepend=0.0)
+    seconds = np.where(told.run_starts | (seconds <= 0.0), np.inf, seconds)
+    speed = step / seconds / 0.04
+    return size * np.sign(speed) * np.abs(speed) ** shape["thinning"]
+
+
+def solid(force, rig: Rig, size: float, shape: Shape):
+    """Three Prony arms over a decade and a half; size: share that relaxes."""
+    told, lost = rig.history, np.zeros(len(force))
+    tau = shape["tau"] * np.array([0.2, 1.0, 5.0])
+    held, before, then = np.zeros(3), 0.0, 0.0
+    drive = rig.stiffness * rig.deformation
+    for row in range(len(force)):
+        if told.run_starts[row]:
+            held, before, then = np.zeros(3), 0.0, told.time[row]
+        decay = np.exp(-(told.time[row] - then) / tau)
+        held = held * decay + (drive[row] - before) * 0.5 * (1.0 + decay)
+        lost[row] = drive[row] - shape["share"] @ held
+        before, then = drive[row], told.time[row]
+    return -size * lost
+
+
+def _arms(rng) -> Shape:
+    tau = np.exp(rng.uniform(np.log(8.0), np.log(150.0)))
+    return {"tau": tau, "share": rng.dirichlet([1.5, 4.0, 1.5])}
+
+
+PATHS: dict[str, Mechanism] = {
+    "contact_onset": Mechanism("path", second_stop, 2.0, draw=_stop),
+    "coulomb_friction": Mechanism(
+        "path",
+        guide,
+        6.0,
+        frozenset({"unloading"}),
+        draw=lambda rng: {"reach": rng.uniform(0.002, 0.008)},
+        amplitude="coulomb_friction.force",
+    ),
+    "hysteresis": Mechanism(
+        "path", sliding_cells, 10.0, frozenset({"unloading"}), draw=_cells
+    ),
+    "viscous_damping": Mechanism(
+        "path",
+        oil_film,
+        5.0,
+        frozenset({"rates", "time", "unloading"}),
+        draw=lambda rng: {"thinning": rng.uniform(0.75, 1.0)},
+    ),
+    "relaxation": Mechanism(
+        "path", solid, 0.15, frozenset({"time", "holds"}), draw=_arms
+    ),
+}

@@ -1,0 +1,1 @@
+"""How stiff is this gear, and how sure is that?"""

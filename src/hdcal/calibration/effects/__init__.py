@@ -1,0 +1,1 @@
+"""Which effects can the model include?"""

@@ -1,0 +1,1 @@
+"""Figures of a calibration: bands, residuals and draws."""

@@ -1,0 +1,1 @@
+"""What do curve fits say, and what does the article claim?"""

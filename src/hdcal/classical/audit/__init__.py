@@ -1,0 +1,1 @@
+"""Does the article agree with its own numbers?"""

@@ -1,0 +1,105 @@
+"""Where words go: results on standard output, everything else beside it."""
+
+import contextlib
+import io
+import logging
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import asdict
+from typing import Any
+
+import click
+
+from hdcal.errors import Finding
+from hdcal.report.plain import as_json, printable
+
+
+class Console:
+    """The two streams of one command.
+
+    Args:
+        json: whether standard output carries one JSON object and nothing else.
+    """
+
+    def __init__(self, *, json: bool):
+        self.json = json
+
+    def prepare(self) -> None:
+        """Quiet the libraries, and let any text be printed on any terminal."""
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="backslashreplace")
+        if os.environ.get("HDCAL_DEBUG") == "1":
+            return
+        # Heard before jaxlib loads: its C++ log goes past Python's streams.
+        os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+        logging.getLogger("jax").setLevel(logging.ERROR)
+        logging.getLogger("absl").setLevel(logging.ERROR)
+        if not sys.warnoptions:
+            warnings.simplefilter("ignore")
+
+    def result(self, text: str) -> None:
+        """Print the result for people; with --json it moves to standard error."""
+        self._print(text, to_error=self.json)
+
+    def data(self, plain: dict) -> None:
+        """Print the one JSON object."""
+        self._print(as_json(plain).rstrip(), to_error=False)
+
+    def words(self, text: str) -> None:
+        """Print a remark."""
+        lines = "\n".join(printable(line) for line in text.splitlines())
+        self._print(f"hdcal: {lines}", to_error=True)
+
+    def findings(
+        self, findings: Iterable[Finding], show: Callable[[], None] | None = None
+    ) -> None:
+        """Print every finding, and as JSON where that was asked for.
+
+        Args:
+            findings: what is wrong.
+            show: prints them for people; by default each becomes one line.
+        """
+        listed = list(findings)
+        if show is not None:
+            show()
+        for finding in listed if show is None else ():
+            self.words(str(finding))
+        if self.json:
+            self.data({"status": "error", "findings": [asdict(f) for f in listed]})
+
+    def failure(self, status: str, text: str) -> None:
+        """Print why there is no result."""
+        self.words(text)
+        if self.json:
+            self.data({"status": status, "reasons": [text]})
+
+    def table(self, *parts: Any) -> None:
+        """Print rich's tables and texts as the result for people."""
+        from rich.console import Console as RichConsole
+
+        stream = sys.stderr if self.json else sys.stdout
+        # Outside a terminal rich would guess 80 columns and break the tables.
+        width = None if stream.isatty() else 110
+        rich = RichConsole(file=stream, width=width, highlight=False, emoji=False)
+        with rich.capture() as caught:
+            rich.print(*parts, sep="\n")
+        lines = (line.rstrip() for line in caught.get().splitlines())
+        self.result("\n".join(lines))
+
+    def _print(self, text: str, *, to_error: bool) -> None:
+        try:
+            print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
+        except BrokenPipeError:
+            # Nobody reads any more. Python would complain again when it flushes.
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def usage_error(error: click.UsageError) -> Finding:
+    """Return a mistake on the command line as a finding."""
+    command = error.ctx.command_path if error.ctx else "hdcal"
+    remedy = f"See {command} --help"
+    return Finding("command line", error.format_message().rstrip("."), remedy)

@@ -1,0 +1,80 @@
+"""What one calibration is about: a gear, how it was read, and the records."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from hdcal.data.priors import Prior
+from hdcal.data.records import Geometry, Records
+
+Theory = Literal["ring", "cup", "article"]
+
+
+@dataclass(frozen=True)
+class Gear:
+    """The gear file after reading; lengths in mm, temperatures in °C, forces in N.
+
+    Attributes:
+        name: free text; untrusted, escape it before showing it in HTML.
+        geometry: sizes, with load_height defaulting to length (the open rim).
+        material: name of the material's prior file.
+        theory: which stiffness formula K multiplies.
+        reading: whether the deformation column is radial or diametral.
+        reference_temperature: where E(T) = E0 [°C].
+        force_resolution: rounding step of the force reading [N], 0 = none given.
+        nominal_deformation: design deformation [mm] or None.
+        priors: K, E0, alpha, force_offset, deformation_offset, sigma, in code units
+            (MPa, 1/K, N, mm), material and overrides already merged. K is the
+            influence coefficient under `ring` unless `K_theory` says otherwise.
+        K_theory: the theory that the prior of K refers to.
+        source: the TOML as read, for provenance.
+        scale_priors: run_offset_sd, specimen_sd, gap_sd and gap_length, merged
+            in the same way.
+        effect_priors: overrides of the gear file only, keyed `effect.parameter`;
+            the names are not checked here, the effects live on a higher floor.
+        dynamic_priors: of the moving gear, merged in the same way; `mass` is among
+            them only when the gear file gives it, else `mass_ratio`.
+        density: of the material [N·s²/mm⁴], None where its file says nothing of it.
+    """
+
+    name: str
+    geometry: Geometry
+    material: str
+    theory: Theory
+    reading: Literal["radial", "diametral"]
+    reference_temperature: float
+    force_resolution: float
+    nominal_deformation: float | None
+    priors: dict[str, Prior]
+    K_theory: Theory = "ring"
+    source: dict = field(default_factory=dict)
+    scale_priors: dict[str, Prior] = field(default_factory=dict)
+    effect_priors: dict[str, Prior] = field(default_factory=dict)
+    dynamic_priors: dict[str, Prior] = field(default_factory=dict)
+    density: float | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Case:
+    """Records of one data file on one gear, with where they came from.
+
+    Attributes:
+        name: stem of the file, or name of the folder.
+        gear: the gear and its priors.
+        records: the rows.
+        run_labels: label of each run index.
+        specimen_labels: label of each specimen index.
+        data_sha256: hash of the data file's bytes.
+        notes: remarks for the log, such as ignored columns.
+    """
+
+    name: str
+    gear: Gear
+    records: Records
+    run_labels: tuple[str, ...]
+    specimen_labels: tuple[str, ...]
+    data_sha256: str
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        rows = len(self.records.force)
+        return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"

@@ -1,0 +1,123 @@
+"""The schema of the gear file, and its errors in the user's words."""
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from hdcal.data.case import Theory
+from hdcal.data.toml_file import TomlFile, nearest
+from hdcal.errors import Finding
+
+_STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+_Size = Annotated[float, Field(gt=0.0, le=1e5)]
+
+
+class GearTable(BaseModel):
+    """The table [gear]; lengths in mm."""
+
+    model_config = _STRICT
+    name: Annotated[str, Field(max_length=200)] = ""
+    wall_thickness_mm: _Size
+    radius_mm: _Size
+    length_mm: _Size
+    nominal_deformation_mm: _Size | None = None
+    load_height_mm: _Size | None = None
+    material: Annotated[str, Field(min_length=1, max_length=1000)] = "steel"
+    theory: Theory = "ring"
+
+
+class MeasurementTable(BaseModel):
+    """The table [measurement]."""
+
+    model_config = _STRICT
+    deformation: Literal["radial", "diametral"] = "radial"
+    reference_temperature_C: Annotated[float, Field(ge=-273.15, le=1e4)] = 20.0
+    force_resolution_N: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+
+
+class GearFile(BaseModel):
+    """A whole gear file; priors have a reader of their own."""
+
+    model_config = _STRICT
+    gear: GearTable
+    measurement: MeasurementTable = MeasurementTable()
+    priors: dict[str, Any] = {}
+
+
+def translate(error: dict, toml: TomlFile) -> Finding:
+    """One of pydantic's errors in the words of the gear file."""
+    key = ".".join(str(part) for part in error["loc"])
+    kind, value = error["type"], error["input"]
+    if kind == "extra_forbidden":
+        remedy = nearest(str(error["loc"][-1]), _known(error["loc"][:-1]))
+        return toml.finding("unknown key", remedy, key)
+    if kind == "missing":
+        return toml.finding("is missing", f"Add it: {_example(key)}", key)
+    if kind == "literal_error":
+        choices = {"gear.theory": list(get_args(Theory))}
+        known = choices.get(key, ["radial", "diametral"])
+        return toml.finding(
+            f"unknown choice {value!r:.60}", nearest(str(value), known), key
+        )
+    if kind in ("greater_than", "greater_than_equal") and "temperature" in key:
+        return toml.finding("is below absolute zero", "Write it in °C", key)
+    if kind == "greater_than":
+        remedy = "Write the size in the unit that the key names"
+        return toml.finding(f"{value} is not positive", remedy, key)
+    if kind == "less_than_equal":
+        words = f"{value:g} is larger than any rig"
+        return toml.finding(words, "Check the number and its unit", key)
+    words = error["msg"][:1].lower() + error["msg"][1:]
+    return toml.finding(words, f"Write it like {_example(key)}", key)
+
+
+def _known(place: Sequence[object]) -> list[str]:
+    tables: dict[str, type[BaseModel]] = {
+        "gear": GearTable,
+        "measurement": MeasurementTable,
+    }
+    model = tables.get(str(place[0]), GearFile) if place else GearFile
+    return list(model.model_fields)
+
+
+def _example(key: str) -> str:
+    name = key.rpartition(".")[2]
+    examples = {
+        "gear": "[gear]",
+        "measurement": "[measurement]",
+        "priors": "[priors]",
+        "name": 'name = "XB1-100-80"',
+        "material": 'material = "steel"',
+        "theory": 'theory = "ring"',
+        "deformation": 'deformation = "radial"',
+    }
+    return examples.get(name, f"{name} = … (a number)")
+
+
+def size_findings(toml: TomlFile) -> list[Finding]:
+    """Relations between sizes; checked on what is there, whatever else is wrong."""
+    table = toml.table.get("gear")
+    if not isinstance(table, dict):
+        return []
+    size = {
+        name: value
+        for name, value in table.items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+        if 0 < value <= 1e5
+    }
+    radius = size.get("radius_mm", math.inf)
+    findings = []
+    rules = (
+        ("wall_thickness_mm", radius, "the wall is not thinner than the radius"),
+        ("nominal_deformation_mm", radius, "the deformation is not below the radius"),
+    )
+    for name, limit, words in rules:
+        if size.get(name, 0.0) >= limit:
+            findings.append(toml.finding(words, "Check both sizes", f"gear.{name}"))
+    if size.get("load_height_mm", 0.0) > size.get("length_mm", math.inf):
+        words = "the load acts beyond the length of the gear"
+        remedy = "Measure the load height from the closed base"
+        findings.append(toml.finding(words, remedy, "gear.load_height_mm"))
+    return findings

@@ -1,0 +1,196 @@
+"""Direction, sense and rate of the loading, and what the loading can show."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.turning_points import (
+    HOLD_MOST,
+    HOLD_SHARE,
+    TURN_MOST,
+    TURN_SHARE,
+    envelope,
+    noise_sd,
+    resting,
+    turning_points,
+)
+
+# A movement counts as a half cycle, or as unloading, from this share of the range;
+# two speeds are clearly different from this ratio. Less rest than the third share,
+# in rows and in time, also comes about by chance at the top of a noisy sine.
+LARGE_MOVE = 0.1
+CLEAR_RATIO = 1.5
+LEAST_REST = 0.02
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How the deformation moved, row by row.
+
+    Attributes:
+        direction: +1 the row was reached by increasing deformation, -1 by
+            decreasing it, 0 the deformation was held; shape (n,).
+        sense: sign of the last movement, before any that of the first one,
+            +1 in a run that never moves; shape (n,).
+        rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
+        features: of `unloading`, `holds`, `rates`, `cycles` those present.
+    """
+
+    direction: np.ndarray
+    sense: np.ndarray
+    rate: np.ndarray
+    features: frozenset[str]
+
+
+@dataclass(frozen=True)
+class _Move:
+    """One movement between two reversals: rows [start, stop) of its run."""
+
+    start: int
+    stop: int
+    sign: int
+    travel: float
+    speed: float
+
+
+def derive_motion(
+    deformation: np.ndarray, run: np.ndarray, time: np.ndarray | None = None
+) -> Motion:
+    """Derive the motion inside each run.
+
+    Args:
+        deformation: in the order it was taken [mm], shape (n,).
+        run: index of the mounting, shape (n,).
+        time: not decreasing within a run [s], shape (n,); None when not measured.
+    """
+    size = len(deformation)
+    direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)
+    order = np.argsort(run, kind="stable")
+    cuts = np.flatnonzero(np.diff(run[order])) + 1
+    span = float(np.ptp(deformation)) if size else 0.0
+    moves: list[list[_Move]] = []
+    for rows in np.split(order, cuts):
+        clock = None if time is None else time[rows]
+        moves.append(_one_run(deformation[rows], clock, rows, direction, rate))
+        if moves[-1]:
+            sense[rows] = _sense(direction[rows], moves[-1][0].sign)
+    features = _features(moves, rate, span)
+    if any(moves) and _rests(direction, run, time):
+        features |= {"holds"}
+    return Motion(direction, sense, rate, features)
+
+
+def _one_run(
+    x: np.ndarray,
+    time: np.ndarray | None,
+    rows: np.ndarray,
+    direction: np.ndarray,
+    rate: np.ndarray,
+) -> list[_Move]:
+    """Fill in direction and rate of one run, and list its movements."""
+    span = float(np.ptp(x)) if x.size else 0.0
+    if span == 0.0:
+        return []
+    noise = noise_sd(x)
+    threshold = min(max(TURN_SHARE * span, 10 * noise), TURN_MOST * span)
+    tolerance = min(max(HOLD_SHARE * span, 8 * noise), HOLD_MOST * span)
+    turns, sign = turning_points(x, threshold)
+    moves = []
+    for start, stop in zip([0, *turns], [*turns, x.size - 1], strict=True):
+        # a reversal's row ends one movement and begins the next
+        part = slice(start, stop + 1)
+        rising = envelope(x[part], sign)
+        held = resting(rising, tolerance)
+        moving = ~held
+        # the first row of a hold was moved to, also from the hold before it
+        moving[1:] |= ~held[:-1] | (np.diff(rising) > tolerance)
+        own = slice(1 if start else 0, None)
+        direction[rows[part][own]] = np.where(moving, sign, 0)[own]
+        speed = 0.0
+        if time is not None:
+            window = max(0.01 * span, 4 * tolerance)
+            local = _speeds(rising, time[part], moving, window)
+            rate[rows[part][own]] = np.where(moving, sign * local, 0.0)[own]
+            speed = _typical(local[moving])
+        travel = float(rising[-1] - rising[0])
+        moves.append(_Move(start, stop + 1, sign, travel, speed))
+        sign = -sign
+    return moves
+
+
+def _speeds(
+    rising: np.ndarray, time: np.ndarray, moving: np.ndarray, window: float
+) -> np.ndarray:
+    """Speed of one movement over a window of deformation around each row."""
+    index = np.arange(rising.size)
+    left = np.searchsorted(rising, rising - window / 2, "left")
+    right = np.searchsorted(rising, rising + window / 2, "right") - 1
+    # never across a hold, and at least over the step that led to the row
+    block = np.cumsum(~moving)
+    starts = np.searchsorted(block, block, "left")
+    stops = np.searchsorted(block, block, "right") - 1
+    left = np.minimum(np.maximum(left, starts), np.maximum(index - 1, 0))
+    right = np.maximum(np.minimum(right, stops), index)
+    right[0] = max(int(right[0]), min(1, rising.size - 1))
+    elapsed = time[right] - time[left]
+    moved = rising[right] - rising[left]
+    speed = np.divide(moved, elapsed, out=np.zeros(rising.size), where=elapsed > 0)
+    return np.where(moving, speed, 0.0)
+
+
+def _typical(speeds: np.ndarray) -> float:
+    speeds = speeds[speeds > 0]
+    return float(np.median(speeds)) if speeds.size else 0.0
+
+
+def _sense(direction: np.ndarray, first: int) -> np.ndarray:
+    """Carry the last movement's sign through the holds."""
+    last = np.maximum.accumulate(
+        np.where(direction != 0, np.arange(direction.size), -1)
+    )
+    return np.where(last >= 0, direction[np.maximum(last, 0)], first)
+
+
+def _rests(direction: np.ndarray, run: np.ndarray, time: np.ndarray | None) -> bool:
+    held = direction == 0
+    if np.count_nonzero(held) < 2:
+        return False
+    if held.mean() >= LEAST_REST:
+        return True
+    if time is None:
+        return False
+    order = np.argsort(run, kind="stable")
+    steps = np.where(np.diff(run[order]) == 0, np.diff(time[order]), 0.0)
+    return bool(steps[held[order][1:]].sum() >= LEAST_REST * steps.sum() > 0)
+
+
+def _features(
+    moves: list[list[_Move]], rate: np.ndarray, span: float
+) -> frozenset[str]:
+    large = [[m for m in run if m.travel >= LARGE_MOVE * span] for run in moves]
+    signs = {move.sign for run in large for move in run}
+    found = set()
+    if signs == {1, -1}:
+        found.add("unloading")
+    if any(_pairs(run) >= 2 for run in large):
+        found.add("cycles")
+    if _two_speeds([move for run in large for move in run], rate):
+        found.add("rates")
+    return frozenset(found)
+
+
+def _pairs(run: list[_Move]) -> int:
+    up = sum(move.sign > 0 for move in run)
+    return min(up, len(run) - up)
+
+
+def _two_speeds(large: list[_Move], rate: np.ndarray) -> bool:
+    speeds = [move.speed for move in large if move.speed > 0]
+    if speeds and max(speeds) >= CLEAR_RATIO * min(speeds):
+        return True
+    # speeds within one movement, or a speed that changes all the time
+    moving = np.abs(rate[rate != 0])
+    if moving.size < 3:
+        return False
+    slow, fast = np.quantile(moving, [0.1, 0.9])
+    return bool(fast >= CLEAR_RATIO * slow)

@@ -1,0 +1,158 @@
+"""Prior tables: a family, its numbers, a unit and a source for every parameter."""
+
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior_entry import read_prior
+from hdcal.data.resources import priors_folder
+from hdcal.data.toml_file import TomlFile, nearest, read_toml
+from hdcal.errors import Finding, InputError
+
+__all__ = [
+    "DYNAMIC_UNITS",
+    "FAMILIES",
+    "MATERIAL_UNITS",
+    "MODEL_UNITS",
+    "SCALE_UNITS",
+    "Prior",
+    "dynamic_priors",
+    "effect_priors",
+    "material_names",
+    "material_priors",
+    "read_effect_priors",
+    "read_prior",
+    "read_priors",
+    "rig_priors",
+]
+
+_NO_MATERIALS = ("rig", "effects", "dynamics")
+
+# What a prior table may speak of: name -> its unit inside hdcal.
+MODEL_UNITS = {
+    "K": "1",
+    "E0": "MPa",
+    "alpha": "1/K",
+    "force_offset": "N",
+    "deformation_offset": "mm",
+    "sigma": "N",
+}
+SCALE_UNITS = {
+    "run_offset_sd": "N",
+    "specimen_sd": "1",
+    "gap_sd": "N",
+    "gap_length": "1",
+}
+# A gear file may speak of these; `mass` takes the place of the shipped mass_ratio.
+DYNAMIC_UNITS = {
+    "mass": "N*s^2/mm",
+    "damping_ratio": "1",
+    "initial_deformation": "mm",
+    "initial_velocity": "mm/s",
+    "deformation_sigma": "mm",
+}
+MATERIAL_UNITS = {
+    "E0": "MPa",
+    "alpha": "1/K",
+    "poisson": "1",
+    "density": "N*s^2/mm^4",
+    "cte": "1/K",
+    "yield_strength": "MPa",
+}
+
+
+def read_priors(
+    source: Traversable | Path, units: dict[str, str], file: str = ""
+) -> dict[str, Prior]:
+    """Read a prior file whose top-level tables are parameters.
+
+    Args:
+        source: the file.
+        units: name -> code unit of every parameter it may speak of.
+        file: how to name it in findings; its own name when empty.
+
+    Raises:
+        InputError: holds everything that is wrong with the file.
+    """
+    toml = read_toml(source, file or source.name)
+    found: dict[str, Prior] = {}
+    findings: list[Finding] = []
+    for key, entry in toml.table.items():
+        if key in ("name", "description"):
+            continue
+        if key not in units:
+            words = "unknown parameter"
+            findings.append(toml.finding(words, nearest(key, list(units)), key))
+            continue
+        prior, wrong = read_prior(entry, key, toml, units[key])
+        findings += wrong
+        if prior is not None:
+            found[key] = prior
+    if findings:
+        raise InputError(findings)
+    return found
+
+
+def rig_priors() -> dict[str, Prior]:
+    """Shipped priors of what is not the material: `MODEL_UNITS` and `SCALE_UNITS`."""
+    return read_priors(priors_folder() / "rig.toml", MODEL_UNITS | SCALE_UNITS)
+
+
+def dynamic_priors() -> dict[str, Prior]:
+    """Shipped priors of the moving gear: `DYNAMIC_UNITS`, mass as `mass_ratio`."""
+    units = {**DYNAMIC_UNITS, "mass_ratio": "1"}
+    return read_priors(priors_folder() / "dynamics.toml", units)
+
+
+def effect_priors() -> dict[str, Prior]:
+    """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
+    toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
+    found, findings = read_effect_priors(toml.table, "", toml)
+    if findings:
+        raise InputError(findings)
+    return found
+
+
+def read_effect_priors(
+    tables: dict, prefix: str, toml: TomlFile
+) -> tuple[dict[str, Prior], list[Finding]]:
+    """Read tables of effects; their names are the business of a higher floor.
+
+    Args:
+        tables: effect -> parameter -> entry.
+        prefix: dotted key of the tables, empty at the top.
+        toml: the file they stand in.
+    """
+    found: dict[str, Prior] = {}
+    findings: list[Finding] = []
+    for effect, parameters in tables.items():
+        key = ".".join(filter(None, (prefix, effect)))
+        if not isinstance(parameters, dict):
+            words, remedy = "is not a table of parameters", f"Write [{key}]"
+            findings.append(toml.finding(words, remedy, key))
+            continue
+        for parameter, entry in parameters.items():
+            prior, wrong = read_prior(entry, f"{key}.{parameter}", toml)
+            findings += wrong
+            if prior is not None:
+                found[f"{effect}.{parameter}"] = prior
+    return found, findings
+
+
+def material_names() -> list[str]:
+    """Materials that hdcal ships, in alphabetical order."""
+    files = (item.name for item in priors_folder().iterdir())
+    stems = (name.removesuffix(".toml") for name in files if name.endswith(".toml"))
+    return sorted(stem for stem in stems if stem not in _NO_MATERIALS)
+
+
+def material_priors(name: str) -> dict[str, Prior]:
+    """Priors and facts of a shipped material, keyed as `MATERIAL_UNITS`.
+
+    Raises:
+        InputError: no such material.
+    """
+    if name not in material_names():
+        remedy = nearest(name, material_names())
+        raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
+    return read_priors(priors_folder() / f"{name}.toml", MATERIAL_UNITS)

@@ -1,0 +1,1 @@
+"""Which sizes, which spring?"""

@@ -1,0 +1,278 @@
+"""What a design rests on: draws of the tested gear, or of what is believed of one.
+
+K is carried over: a gear of other sizes is taken to have the K of the tested one, so
+that its stiffness is that of the tested gear times a ratio of two formulas.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+import jax
+import numpy as np
+
+from hdcal.data.case import Gear, Theory
+from hdcal.data.priors import (
+    MATERIAL_UNITS,
+    Prior,
+    material_names,
+    material_priors,
+    read_priors,
+)
+from hdcal.data.records import Records
+from hdcal.data.toml_file import nearest
+from hdcal.errors import Finding, InputError
+from hdcal.inference.density import POSITIVE, Values
+from hdcal.inference.distributions import distribution, frozen, scaled
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.inference.residuals import misfits
+from hdcal.physics.chain import Reading
+from hdcal.physics.theory import THEORIES
+
+_FACTS = ("E0", "alpha", "poisson")
+CARRIED = (
+    "K is carried over from {gear} to other sizes. That holds for gears of the same "
+    "proportions of teeth, end and wall; the farther away, the less."
+)
+OF_THE_GEAR = (
+    "Deformation is that of the gear itself, radial and from its free shape; the rig's "
+    "zeros and its own compliance are left out. `hdcal predict` and `hdcal margin` say "
+    "what the rig reads at a deformation as read, which differs by these zeros."
+)
+_PRIOR_ONLY = (
+    "Prior only: no gear was measured. Every interval is what is believed before any "
+    "data, mostly of K."
+)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Draws that designs are computed from.
+
+    Attributes:
+        gear: sizes and material that the draws belong to.
+        theory: which stiffness K multiplies.
+        problem: structure.
+        values: draws by site, in code units: [draw, …].
+        facts: priors and facts of the material in use, as in its file.
+        material: its name.
+        kind: whether the draws are a posterior's or a prior's.
+        records: the tested rows, or None.
+        misfits: warnings of shapes that the calibrated model leaves over.
+    """
+
+    gear: Gear
+    theory: Theory
+    problem: Problem
+    values: Values
+    facts: dict[str, Prior]
+    material: str
+    kind: Literal["posterior", "prior"]
+    records: Records | None
+    misfits: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Number of draws."""
+        return len(self.values["K"])
+
+    @property
+    def nominal_deformation(self) -> float | None:
+        """Design deformation of the gear itself, radial [mm]; the file's is as read."""
+        read = self.gear.nominal_deformation
+        return None if read is None else read * self.problem.reading.radial_per_read
+
+    @property
+    def interval_kind(self) -> str:
+        """What an interval from these draws is called."""
+        known = {"posterior": "credible", "prior": "prior"}[self.kind]
+        return f"equal-tailed {known} interval"
+
+    @property
+    def known_as(self) -> str:
+        """What the gear of the draws is called."""
+        return {"posterior": "the tested gear", "prior": "the gear file"}[self.kind]
+
+    @property
+    def poisson(self) -> float:
+        """Poisson's ratio of the material in use [-]."""
+        own = self.material == self.gear.material
+        if own or "poisson" not in self.facts:
+            return float(self.gear.geometry.poisson)
+        return float(self.facts["poisson"].numbers[0])
+
+    @cached_property
+    def yield_strength(self) -> np.ndarray | None:
+        """Draws of the yield strength [MPa], or None where the material has none."""
+        prior = self.facts.get("yield_strength")
+        if prior is None:
+            return None
+        if prior.family == "fixed":
+            return np.full(self.size, float(prior.numbers[0]))
+        # Evenly over its distribution, in an order of its own.
+        places = (np.arange(self.size) + 0.5) / self.size
+        shuffled = np.random.default_rng(self.size).permutation(places)
+        return np.asarray(frozen(prior).ppf(shuffled))
+
+    @property
+    def assumptions(self) -> list[str]:
+        """Return what every answer from this basis takes for granted, in words."""
+        words = [CARRIED.format(gear=self.known_as), OF_THE_GEAR]
+        if self.kind == "prior":
+            words.insert(0, _PRIOR_ONLY)
+        if self.material != self.gear.material:
+            words.append(
+                f"Modulus and its loss with temperature are handbook values of "
+                f"{self.material}; K is taken not to depend on the material."
+            )
+        force = [e.name for e in self.problem.effects if e.stage == "force"]
+        if force:
+            words.append(
+                f"The calibrated {', '.join(force).replace('_', ' ')} is carried over "
+                "to other sizes as it is."
+            )
+        if self.problem.gap is not None:
+            words.append("The leftover discrepancy is taken to grow with stiffness.")
+        return words
+
+    def of_material(self, name: str, seed: int = 0) -> "Basis":
+        """Return the basis of the same gear made of another material.
+
+        Args:
+            name: a shipped material, or the path of a .toml file of one.
+            seed: of the draws of its modulus.
+
+        Raises:
+            InputError: there is no such material.
+        """
+        if name == self.material:
+            return self
+        facts = read_material(name)
+        keys = jax.random.split(jax.random.key(seed), 2)
+        new = {
+            site: _draw(facts[site], site, key, self.size)
+            for site, key in zip(("E0", "alpha"), keys, strict=True)
+        }
+        values = {**self.values, **new}
+        return replace(self, values=values, facts=facts, material=name)
+
+
+def basis_of(source: Posterior | Gear, *, draws: int = 4000, seed: int = 0) -> Basis:
+    """Return what designs are computed from.
+
+    Args:
+        source: a calibration, or a gear of which only priors are known.
+        draws: from the priors; a calibration has its own.
+        seed: of those draws.
+
+    Raises:
+        NotUsable: the calibration failed its checks.
+    """
+    if isinstance(source, Posterior):
+        source.require_usable()
+        gear = source.case.gear
+        values = {name: np.asarray(v) for name, v in source.draws.items()}
+        return Basis(
+            gear,
+            source.theory,
+            source.problem,
+            values,
+            _own_facts(gear),
+            gear.material,
+            "posterior",
+            source.case.records,
+            (*_unsettled(source), *misfits(source)),
+        )
+    ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
+    priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
+    keys = jax.random.split(jax.random.key(seed), len(priors))
+    values = {
+        name: _draw(prior, name, key, draws)
+        for key, (name, prior) in zip(keys, priors.items(), strict=True)
+    }
+    return Basis(
+        source,
+        source.theory,
+        _bare_problem(source),
+        values,
+        _own_facts(source),
+        source.material,
+        "prior",
+        None,
+    )
+
+
+def read_material(name: str) -> dict[str, Prior]:
+    """Return the facts of a material.
+
+    Args:
+        name: a shipped one, or the path of a .toml file.
+
+    Raises:
+        InputError: there is none, or the file lacks something.
+    """
+    if not name.endswith(".toml"):
+        if name not in material_names():
+            words = f"unknown material '{name[:60]}'"
+            remedy = nearest(name, material_names(), "Shipped are")
+            raise InputError([Finding("--material", words, remedy)])
+        return material_priors(name)
+    facts = read_priors(Path(name), MATERIAL_UNITS, name)
+    lacking = [need for need in _FACTS if need not in facts]
+    if lacking:
+        words = f"the material says nothing of {' and '.join(lacking)}"
+        raise InputError([Finding(name, words, "Write a table for each")])
+    return facts
+
+
+def _unsettled(posterior: Posterior) -> tuple[str, ...]:
+    """Return a warning where a diagnosis left other causes open."""
+    origin = posterior.settings.get("diagnosis")
+    if not isinstance(origin, dict) or len(origin["probabilities"]) < 2:
+        return ()
+    used = str(origin["hypothesis"]).replace("_", " ")
+    return (
+        f"The diagnosis did not settle the cause of the gap: this rests on {used} "
+        "alone. `hdcal margin` averages over all causes.",
+    )
+
+
+def _own_facts(gear: Gear) -> dict[str, Prior]:
+    # A material file of the user's stands beside a gear file that may be elsewhere
+    # by now; only its yield strength would be needed of it.
+    shipped = gear.material in material_names()
+    return material_priors(gear.material) if shipped else {}
+
+
+def _draw(prior: Prior, name: str, key, count: int) -> np.ndarray:
+    if prior.family == "fixed":
+        return np.full(count, float(prior.numbers[0]))
+    law = distribution(prior, positive=name in POSITIVE)
+    return np.asarray(law.sample(key, (count,)))
+
+
+def _formula(gear: Gear, theory: Theory) -> float:
+    return float(THEORIES[theory](gear.geometry, 1.0))
+
+
+def _bare_problem(gear: Gear) -> Problem:
+    """Return the structure of a force model that no data have met."""
+    half = gear.reading == "diametral"
+    return Problem(
+        priors={},
+        units={},
+        unit_stiffness=_formula(gear, gear.theory),
+        reading=Reading(0.5 if half else 1.0, gear.reference_temperature),
+        records=None,
+        blocks=None,
+        columns=None,
+        gap=None,
+        step=0.0,
+        effects=(),
+        rounded=False,
+        runs=0,
+        specimens=0,
+        integrated=frozenset(),
+    )

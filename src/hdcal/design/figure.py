@@ -1,0 +1,224 @@
+"""Figures of a design: spring against gear, force against limit, a ring's shape."""
+
+import jax
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from hdcal.data.records import Geometry
+from hdcal.design.candidate import spreads
+from hdcal.design.inverse_design import InverseDesign
+from hdcal.design.sizes import named
+from hdcal.design.wave_generator import WaveGenerator, gear_forces
+from hdcal.physics.profile import ring_profile
+from hdcal.physics.theory import RING_SERIES
+from hdcal.report.canvas import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    heading,
+    plain,
+    style,
+    temperature_colours,
+)
+
+_TAILS = (0.025, 0.5, 0.975)
+# Points along a curve, and along each side of a map.
+_FINE, _COARSE = 41, 21
+
+
+def generator_figure(found: WaveGenerator) -> Figure:
+    """Draw the balance of spring and gear, and the probability over the spring rate.
+
+    Args:
+        found: from `wave_generator`.
+    """
+    with style():
+        figure = Figure(figsize=(9.4, 4.2), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _balance(left, found)
+        _probability(right, found)
+    return figure
+
+
+def _balance(axes: Axes, found: WaveGenerator) -> None:
+    low, high = found.window
+    wide = high - low
+    along = np.linspace(max(low - 1.5 * wide, 0.02 * low), high + 1.5 * wide, _FINE)
+    ends = found.temperatures[[0, -1]] if len(found.temperatures) > 1 else None
+    levels = found.temperatures if ends is None else ends
+    forces = gear_forces(found.basis, found.gear, along, levels)
+    bands = np.quantile(forces, _TAILS, axis=2)
+    for index, colour in enumerate(temperature_colours(levels)):
+        lo, middle, hi = bands[:, :, index]
+        words = f"gear at {levels[index]:g} °C, 95 %"
+        axes.fill_between(along, lo, hi, color=colour, alpha=0.25, linewidth=0)
+        axes.plot(along, middle, color=colour, label=words)
+    spring = found.chosen
+    axes.plot(
+        along,
+        spring.rate * (spring.interference - along),
+        color=DARK,
+        linestyle="--",
+        label=f"spring of {spring.rate:.4g} N/mm",
+    )
+    axes.axvspan(low, high, color=GREEN, alpha=0.12, linewidth=0, label="window")
+    room = 0.1 * (bands.max() - bands.min())
+    axes.set_ylim(bands.min() - room, bands.max() + 4.0 * room)
+    axes.set_xlim(along[0], along[-1])
+    axes.set_xlabel("radial deformation of the gear [mm]")
+    axes.set_ylabel("force on each side [N]")
+    axes.legend(loc="upper right")
+    heading(axes, "Where spring and gear are in balance")
+
+
+def _probability(axes: Axes, found: WaveGenerator) -> None:
+    rates = [spring.rate for spring in found.springs]
+    together = [spring.together for spring in found.springs]
+    adjusted = [spring.adjusted for spring in found.springs]
+    axes.semilogx(rates, together, color=BLUE, label="one set point for every gear")
+    axes.semilogx(
+        rates, adjusted, color=ORANGE, linestyle="-.", label="each gear adjusted"
+    )
+    axes.axhline(found.required, color=RED, linewidth=0.9, linestyle=":")
+    axes.annotate(
+        f"required {found.required:g}",
+        (rates[-1], found.required),
+        xytext=(0, -4),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        color=RED,
+        fontsize=8.5,
+    )
+    chosen = found.chosen
+    axes.plot(chosen.rate, chosen.together, "o", color=DARK, zorder=5)
+    axes.set_ylim(min(0.0 if min(together) < 0.9 else min(together) - 0.01, 0.98), None)
+    axes.set_xlabel("spring rate [N/mm]")
+    axes.set_ylabel("probability inside the window")
+    axes.legend(loc="lower right")
+    heading(axes, "The softest spring that meets it")
+
+
+def inverse_figure(found: InverseDesign) -> Figure:
+    """Draw the force over the free sizes, the limit, and what was chosen.
+
+    Args:
+        found: from `inverse_design`, with at least one free size.
+    """
+    with style():
+        figure = Figure(figsize=(7.6, 4.4), layout="constrained")
+        axes = figure.subplots()
+        if len(found.bounds) == 1:
+            _along_one(axes, found)
+        else:
+            _over_two(figure, axes, found)
+    return figure
+
+
+def _spreads(found: InverseDesign, sizes: dict) -> np.ndarray:
+    """Return lower end, median, upper end and the kept force at sizes [N]."""
+    basis, tails = found.chosen.basis, np.array(_TAILS)
+    return spreads(basis, found.target, sizes, found.deformation, tails)
+
+
+def _along_one(axes: Axes, found: InverseDesign) -> None:
+    name, (low, high) = next(iter(found.bounds.items()))
+    along = np.linspace(low, high, _FINE)
+    table = _spreads(found, {name: along})
+    axes.fill_between(along, table[0], table[2], color=BLUE, alpha=0.25, linewidth=0)
+    axes.plot(along, table[1], color=BLUE, label="median and 95 % band")
+    words = f"not exceeded with probability {found.required:g}"
+    axes.plot(along, table[3], color=PURPLE, linestyle="--", label=words)
+    axes.axhline(found.limit_force, color=RED, linewidth=0.9, label="limit")
+    axes.plot(
+        found.chosen.sizes[name], found.chosen.force, "o", color=DARK, label="chosen"
+    )
+    axes.set_xlabel(f"{named(name)} [mm]")
+    axes.set_ylabel("force [N]")
+    axes.legend(loc="best")
+    heading(
+        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
+    )
+
+
+def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
+    (first, ends), (second, span) = list(found.bounds.items())[:2]
+    x, y = np.linspace(*ends, _COARSE), np.linspace(*span, _COARSE)
+    rest = {n: v for n, v in found.chosen.sizes.items() if n not in (first, second)}
+    a, b = (grid.ravel() for grid in np.meshgrid(x, y))
+    others = {name: np.full(len(a), value) for name, value in rest.items()}
+    kept = _spreads(found, {**others, first: a, second: b})[-1]
+    table = kept.reshape(len(y), len(x))
+    drawn = axes.contourf(x, y, table, 20, cmap="cividis")
+    figure.colorbar(drawn, ax=axes, label=f"force kept with {found.required:g} [N]")
+    axes.contour(x, y, table, [found.limit_force], colors=RED, linewidths=1.6)
+    geometry = found.basis.gear.geometry
+    own = [float(getattr(geometry, n.removesuffix("_mm"))) for n in (first, second)]
+    mark = {"markersize": 8, "markeredgecolor": "white", "linestyle": ""}
+    axes.plot(*own, "s", color=GREY, label="tested gear", **mark)
+    best = [found.chosen.sizes[n] for n in (first, second)]
+    axes.plot(*best, "o", color=DARK, label="chosen", **mark)
+    axes.plot([], [], color=RED, label=f"limit {found.limit_force:g} N")
+    axes.set_xlabel(f"{named(first)} [mm]")
+    axes.set_ylabel(f"{named(second)} [mm]")
+    axes.legend(loc="upper right", frameon=True, facecolor="white")
+    heading(
+        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
+    )
+
+
+def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Figure:
+    """Draw shape, moment and stress around a ring, and how fast the series gets there.
+
+    Args:
+        geometry: sizes [mm].
+        modulus: Young's modulus [MPa].
+        deformation: radial displacement under each load [mm].
+    """
+    angle = np.linspace(0.0, np.pi, 181)
+    shape = jax.jit(ring_profile, static_argnames="terms")
+    full = shape(geometry, modulus, deformation, angle)
+    few = shape(geometry, modulus, deformation, angle, terms=3)
+    degrees = np.degrees(angle)
+    panels = (
+        ("Displacement", "[mm]", (("radial w", "radial"), ("along v", "tangential"))),
+        ("Bending moment", "[N·mm]", (("M", "moment"),)),
+        ("Hoop stress, outer surface", "[MPa]", (("σ", "stress"),)),
+    )
+    with style():
+        figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+        axes = figure.subplots(2, 2).ravel()
+        for place, (title, unit, curves) in zip(axes[:3], panels, strict=True):
+            for (words, field), colour in zip(curves, (BLUE, ORANGE), strict=False):
+                place.plot(degrees, getattr(full, field), color=colour, label=words)
+                place.plot(
+                    degrees, getattr(few, field), ":", color=colour, linewidth=1.2
+                )
+            place.plot([], [], ":", color=GREY, label="first 3 terms")
+            place.set_xticks([0, 45, 90, 135, 180])
+            place.set_xlabel("angle from a load [°]")
+            place.set_ylabel(unit)
+            place.legend(loc="best")
+            heading(place, title)
+        _truncation(axes[3])
+    return figure
+
+
+def _truncation(axes: Axes) -> None:
+    n = 2.0 * np.arange(1, 201)
+    counts = np.array([1, 2, 3, 5, 10, 20, 50, 100, 200])
+    for part, whole, colour, words in (
+        (1.0 / (n**2 - 1.0) ** 2, RING_SERIES, BLUE, "displacement"),
+        (1.0 / (n**2 - 1.0), 0.5, ORANGE, "moment and stress"),
+    ):
+        missing = 1.0 - np.cumsum(part)[counts - 1] / whole
+        axes.loglog(counts, missing, "o-", color=colour, markersize=4, label=words)
+    axes.set_xlabel("terms of the series")
+    axes.set_ylabel("missing under the load, relative")
+    axes.legend(loc="best")
+    heading(axes, "What a truncated series misses")

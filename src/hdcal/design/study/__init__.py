@@ -1,0 +1,1 @@
+"""How does the force depend on the sizes?"""

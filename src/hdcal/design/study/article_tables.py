@@ -1,0 +1,119 @@
+"""The article's Tables 3 and 4, each row beside values that hold together.
+
+Source: "Study on Flexible Gear Deformation in Harmonic Drive Gear".
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.classical.audit.article import (
+    DEFORMATION,
+    GEAR,
+    INFLUENCE,
+    MODULUS,
+    TABLE_3,
+    TABLE_4,
+)
+from hdcal.data.records import Geometry
+from hdcal.design.design_draws import Basis, basis_of
+from hdcal.design.sizes import stiffness_factor
+from hdcal.design.study.study import force_quantiles
+from hdcal.errors import Finding, InputError
+from hdcal.inference.posterior import Posterior
+from hdcal.physics.theory import article, ring
+
+SCHEMA = "hdcal.article/1"
+
+
+@dataclass(frozen=True)
+class ArticleRow:
+    """One row of the article, and what belongs in its place.
+
+    Attributes:
+        table: 3 or 4.
+        deformation_mm: ω.
+        wall_thickness_mm: δ.
+        radius_mm: R.
+        original_N: the article's "theoretical" force.
+        revised_N: the same times its K = 0.13.
+        measured_N: its own reading, where it has one.
+        article_N: its plotted slope 1625.19 N/mm, scaled by δ³/R³ as its formula says.
+        article_revised_N: that times 0.13.
+        ring_N: the ring's force, the series dividing and the length counted; K = 1.
+        calibrated_N: median, lo and hi with the K of a calibration, or None.
+    """
+
+    table: int
+    deformation_mm: float
+    wall_thickness_mm: float
+    radius_mm: float
+    original_N: float
+    revised_N: float
+    measured_N: float | None
+    article_N: float
+    article_revised_N: float
+    ring_N: float
+    calibrated_N: dict[str, float] | None
+
+
+def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
+    """Return Tables 3 and 4 of the article beside consistent values.
+
+    Args:
+        posterior: a calibration of the article's gear, for the calibrated forces.
+
+    Raises:
+        NotUsable: the calibration failed its checks.
+        InputError: it is of another gear.
+    """
+    basis = None if posterior is None else basis_of(posterior)
+    if basis is not None:
+        _check_gear(basis)
+    own = float(GEAR.wall_thickness), float(GEAR.radius)
+    rows = [(3, at, *own, *forces) for at, *forces in TABLE_3]
+    rows += [
+        (4, DEFORMATION, wall, radius, *forces, None)
+        for (wall, radius), forces in TABLE_4.items()
+    ]
+    return tuple(_row(basis, *row) for row in rows)
+
+
+def _row(
+    basis: Basis | None, table, at, wall, radius, original, revised, measured
+) -> ArticleRow:
+    geometry = Geometry(wall, radius, GEAR.length, GEAR.load_height, GEAR.poisson)
+    plotted = float(article(geometry, MODULUS)) * at
+    return ArticleRow(
+        table=table,
+        deformation_mm=at,
+        wall_thickness_mm=wall,
+        radius_mm=radius,
+        original_N=original,
+        revised_N=revised,
+        measured_N=measured,
+        article_N=plotted,
+        article_revised_N=INFLUENCE * plotted,
+        ring_N=float(ring(geometry, MODULUS)) * at,
+        calibrated_N=None if basis is None else _calibrated(basis, wall, radius, at),
+    )
+
+
+def _calibrated(basis: Basis, wall, radius, at) -> dict[str, float]:
+    own = basis.gear.geometry
+    geometry = Geometry(wall, radius, own.length, own.load_height, own.poisson)
+    factor = np.array([float(stiffness_factor(basis, geometry))])
+    warm = np.array([basis.gear.reference_temperature])
+    shares = np.array([0.5, 0.025, 0.975])
+    found = force_quantiles(basis, factor, np.array([at]), warm, shares)[:, 0]
+    return dict(zip(("median", "lo", "hi"), map(float, found), strict=True))
+
+
+def _check_gear(basis: Basis) -> None:
+    sizes = ("wall_thickness", "radius", "length")
+    theirs = [float(getattr(GEAR, name)) for name in sizes]
+    ours = [float(getattr(basis.gear.geometry, name)) for name in sizes]
+    if not np.allclose(ours, theirs):
+        words = "is a calibration of a gear of other sizes than the article's"
+        remedy = "Calibrate datasets/xb1-100-80, or leave the run out"
+        raise InputError([Finding(basis.gear.name, words, remedy)])

@@ -1,0 +1,187 @@
+"""An elastic wave generator: the spring that holds a gear inside a window."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Gear
+from hdcal.design.checks import place_findings, probability_findings
+from hdcal.design.design_draws import Basis, basis_of
+from hdcal.design.next_gear import NextGear, next_gear
+from hdcal.design.sizes import beyond_tested, with_reference
+from hdcal.design.springs import Spring, judge_all, set_points, softest
+from hdcal.design.study.study import all_forces
+from hdcal.errors import Finding, InputError, attempt
+from hdcal.inference.posterior import Posterior
+
+# Default range of the spring rate, relative to the gear's own stiffness.
+RATE_RANGE = (0.01, 100.0)
+# Points of the window at which the force has to grow with deformation.
+_ALONG = 9
+
+
+@dataclass(frozen=True)
+class WaveGenerator:
+    """The elastic wave generator that meets a window, and how it was judged.
+
+    Attributes:
+        basis: what the draws belong to.
+        gear: whom the window is for.
+        window: lo and hi of the deformation [mm].
+        temperatures: at which it has to hold [°C].
+        required: probability that is asked for.
+        setting_sd: scatter of x as built [mm].
+        springs: every rate that was looked at, softest first.
+        chosen: the softest that meets the requirement.
+        forces: F at lo, in the middle and at hi at each temperature [N]: [3, T, draw].
+        error: of each draw's set point as built [mm], shape (draw,).
+        warnings: what is extrapolated, in words.
+    """
+
+    basis: Basis
+    gear: NextGear
+    window: tuple[float, float]
+    temperatures: np.ndarray
+    required: float
+    setting_sd: float
+    springs: tuple[Spring, ...]
+    chosen: Spring
+    forces: np.ndarray
+    error: np.ndarray
+    warnings: tuple[str, ...]
+
+    def intervals(self, level: int | None = None) -> np.ndarray:
+        """Return where x holds each gear in the window [mm], shape (2, draw).
+
+        Args:
+            level: of the temperatures; by default at all of them.
+        """
+        forces = self.forces if level is None else self.forces[:, level : level + 1]
+        return set_points(self.chosen.rate, self.window, forces)
+
+
+def wave_generator(
+    source: Posterior | Gear,
+    window: tuple[float, float],
+    *,
+    temperatures: Sequence[float] | None = None,
+    probability: float = 0.99,
+    tolerances: Mapping[str, float] | None = None,
+    setting_sd: float = 0.0,
+    rates: tuple[float, float] | None = None,
+    seed: int = 0,
+) -> WaveGenerator:
+    """Find the softest spring with one set point that keeps gears in a window.
+
+    Args:
+        source: a calibration; or a gear, for what its priors say.
+        window: least deformation (below: backlash) and largest (above: teeth jam),
+            radial, of the gear [mm].
+        temperatures: at all of which a gear has to stay inside [°C]; by default the
+            reference one.
+        probability: with which the next gear has to stay inside.
+        tolerances: ± of sizes [mm] by name, see `next_gear`.
+        setting_sd: sd of the set point as built [mm].
+        rates: spring rates to look at [N/mm]; by default 0.01 to 100 times the
+            stiffness of the gear.
+        seed: of scatter and setting.
+
+    Returns:
+        The generator. Probabilities are averages over the draws.
+
+    Raises:
+        NotUsable: the calibration failed its checks.
+        InputError: bad input, or no spring rate meets the requirement.
+    """
+    basis = basis_of(source, seed=seed)
+    levels = with_reference(basis, temperatures)
+    findings = _findings(basis, window, levels, probability, setting_sd, rates)
+    gear = attempt(findings, next_gear, basis, tolerances, seed)
+    if findings or gear is None:
+        raise InputError(findings)
+    along = np.linspace(*window, _ALONG)
+    forces = gear_forces(basis, gear, along, levels)
+    _check_growing(forces)
+    error = setting_sd * np.random.default_rng([seed, 1]).normal(size=basis.size)
+    if rates is None:
+        middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
+        rates = (RATE_RANGE[0] * middle, RATE_RANGE[1] * middle)
+    springs = judge_all(rates, window, forces, error)
+    chosen = softest(springs, window, forces, error, probability)
+    if chosen is None:
+        raise InputError([_unmet(springs, window, probability)])
+    return WaveGenerator(
+        basis,
+        gear,
+        window,
+        levels,
+        probability,
+        setting_sd,
+        tuple(sorted({*springs, chosen}, key=lambda spring: spring.rate)),
+        chosen,
+        forces[[0, _ALONG // 2, -1]],
+        error,
+        (*beyond_tested(basis, np.array(window), levels), *basis.misfits),
+    )
+
+
+def gear_forces(basis: Basis, gear: NextGear, deformation, temperatures) -> np.ndarray:
+    """Return the force of each draw's gear [N]: [deformation, temperature, draw]."""
+    factor = np.asarray(gear.factor(basis, basis.gear.geometry))
+    shape = len(deformation), len(temperatures)
+    at = np.repeat(deformation, shape[1])
+    warm = np.tile(temperatures, shape[0])
+    # Each draw has a factor of its own: it goes where the draws' K goes.
+    values = {**basis.values, "K": np.asarray(basis.values["K"]) * factor}
+    forces = all_forces(basis.problem, values, np.ones(len(at)), at, warm)
+    return np.asarray(forces).reshape(*shape, basis.size)
+
+
+def _unmet(springs: list[Spring], window, required: float) -> Finding:
+    best = max(springs, key=lambda spring: spring.together)
+    words = (
+        f"no spring rate between {springs[0].rate:.4g} and {springs[-1].rate:.4g} N/mm "
+        f"meets {window[0]:g} … {window[1]:g} mm with probability {required:g}: the "
+        f"best is {best.rate:.4g} N/mm with {best.together:.4g}"
+    )
+    alone = max(springs, key=lambda spring: spring.adjusted)
+    remedy = "Widen the window, narrow the temperatures or build the set point closer"
+    if alone.adjusted >= required:
+        each = f"{alone.rate:.4g} N/mm reaches {alone.adjusted:.4g}"
+        remedy += f"; adjusted gear by gear, {each}"
+    return Finding("--window", words, remedy)
+
+
+def _check_growing(forces: np.ndarray) -> None:
+    share = float(np.mean(np.all(np.diff(forces, axis=0) > 0.0, axis=(0, 1))))
+    if share < 1.0:
+        words = (
+            f"in {1.0 - share:.2g} of the draws the force does not grow with "
+            "deformation inside the window, so that a spring may snap through"
+        )
+        remedy = "Name a window inside what was tested, or calibrate without the effect"
+        raise InputError([Finding("--window", words, remedy)])
+
+
+def _findings(
+    basis, window, temperatures, probability, setting_sd, rates
+) -> list[Finding]:
+    findings = []
+    low, high = window
+    if not low < high:
+        words = f"{low:g}:{high:g} is empty"
+        findings.append(Finding("--window", words, "Write LO:HI, e.g. 0.38:0.42"))
+    findings += probability_findings(basis, probability)
+    if not 0.0 <= setting_sd < np.inf:
+        words = f"{setting_sd:g} is no standard deviation"
+        findings.append(Finding("--setting-sd", words, "Give it in mm"))
+    if rates is not None and not 0.0 < rates[0] < rates[1] < np.inf:
+        words = f"{rates[0]:g}:{rates[1]:g} is no range of spring rates"
+        findings.append(Finding("--spring-rate", words, "Write LO:HI in N/mm"))
+    radius = float(basis.gear.geometry.radius)
+    place = place_findings(basis, np.asarray(window, float), temperatures, radius)
+    return findings + [
+        Finding("--window", f.problem, f.remedy) if f.file == "--deformation" else f
+        for f in place
+    ]

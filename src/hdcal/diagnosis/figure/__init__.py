@@ -1,0 +1,1 @@
+"""Figures of a diagnosis: where, which and how far."""

@@ -1,0 +1,135 @@
+"""K as a product of physical factors: what one curve can and cannot split."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.diagnosis.verdict import Budget, BudgetPart
+from hdcal.evidence.assessment import Assessment, design_of
+from hdcal.evidence.design_matrix import fit_design
+from hdcal.evidence.prepare import _log_moments as log_moments
+from hdcal.physics.theory import THEORIES
+from hdcal.report.parameters import Interval
+
+_Z = 1.6448536269514722
+# Sizes of the causes, each with its source of size.
+WALL_SD_MM, RADIUS_SD_MM, HEIGHT_SD_MM = 0.0133, 0.05, 3.0
+# Below this sd of its log a factor is a number that was given, not one to be freed.
+_GIVEN = 1e-6
+_NOTE = (
+    "Only the product is measured: the parts are prior belief divided among causes in "
+    "proportion to how uncertain each was."
+)
+
+
+def budget(found: Assessment, case: Case, names: Sequence[str] = ()) -> Budget:
+    """Split K into factors by prior and likelihood in log space.
+
+    log K = Σ log f_i with log f_i ~ N(m_i, s_i²): given the measured log K each part
+    takes up the surprise in proportion to its variance. K is that of the ring formula
+    at the prior's mean modulus, whatever the gear's theory: the parts are what the
+    ring formula leaves out.
+
+    Args:
+        found: for the fitted stiffness.
+        case: the gear.
+        names: effects beside which the stiffness is fitted.
+    """
+    causes = _causes(case)
+    log_k, log_k_sd = _measured(found, names)
+    mean = np.array([m for _, m, _, _ in causes])
+    sd = np.array([s for _, _, s, _ in causes])
+    whole = np.sum(sd**2) + log_k_sd**2
+    surprise = log_k - mean.sum()
+    after = mean + sd**2 / whole * surprise
+    after_sd = np.sqrt(sd**2 - sd**4 / whole)
+    parts = tuple(
+        BudgetPart(
+            name,
+            _factor(after[i], after_sd[i]),
+            _factor(mean[i], sd[i]),
+            "data" if after_sd[i] < 0.5 * sd[i] else "prior",
+            split_by if sd[i] > _GIVEN else "nothing: it is fixed, not free",
+        )
+        for i, (name, _, _, split_by) in enumerate(causes)
+    )
+    note = _NOTE + _own_theory(found, case, log_k)
+    if abs(surprise) > 3.0 * np.sqrt(whole):
+        note += (
+            " The product lies further from 1 than these causes reach together: check "
+            "whether the reading is diametral (a factor of 2) and the units."
+        )
+    return Budget(_factor(log_k, log_k_sd), "ring", parts, note)
+
+
+def _own_theory(found: Assessment, case: Case, log_k: float) -> str:
+    """Say what K is by the gear's own formula, where that is not the ring's."""
+    theory = case.gear.theory
+    if theory == "ring":
+        return ""
+    own = np.exp(log_k) * found.setting.ring / found.setting.nominal
+    return f" By the gear's own theory ({theory}) K is {own:.3g}."
+
+
+def _factor(mean: float, sd: float) -> Interval:
+    low, middle, high = np.exp(mean + sd * np.array([-_Z, 0.0, _Z]))
+    return Interval(float(middle), float(low), float(high))
+
+
+def _measured(found: Assessment, names: Sequence[str]) -> tuple[float, float]:
+    """Return log K by the ring formula at the prior's mean modulus, and its sd."""
+    setting = found.setting
+    design = design_of(found, names)
+    fit = fit_design(setting.rows, design, setting.noise_sd, 0.0)
+    # The first coefficient is the deviation of log stiffness, in prior sds.
+    log_stiffness = setting.log_stiffness + setting.log_stiffness_sd * fit.mean[0]
+    sd = setting.log_stiffness_sd * np.sqrt(fit.covariance[0, 0])
+    return float(log_stiffness - np.log(setting.ring)), float(sd)
+
+
+def _causes(case: Case) -> list[tuple[str, float, float, str]]:
+    """Return name, mean and sd of the log factor, and what would split it off."""
+    geometry = case.gear.geometry
+    _, modulus_sd = log_moments(case.gear.priors["E0"])
+    wall, radius = float(geometry.wall_thickness), float(geometry.radius)
+    lower = replace(geometry, load_height=float(geometry.load_height) - HEIGHT_SD_MM)
+    at_rim = float(THEORIES["cup"](geometry, 1.0))
+    lever = abs(np.log(float(THEORIES["cup"](lower, 1.0)) / at_rim))
+    tooth = np.log(np.array([1.3, 2.5]))
+    return [
+        (
+            "tooth band",
+            float(tooth.mean()),
+            float(np.diff(tooth)[0] / (2.0 * _Z)),
+            "press a blank without teeth",
+        ),
+        (
+            "closed end",
+            0.3,
+            0.3,
+            "press the same gear at two heights from its base",
+        ),
+        ("load height", 0.0, float(lever), "measure the height of the load"),
+        (
+            "rig compliance",
+            float(np.log(0.93)),
+            0.045,
+            "press a rigid block in place of the gear",
+        ),
+        (
+            "wall thickness",
+            0.0,
+            3.0 * WALL_SD_MM / wall,
+            "measure the wall at several places",
+        ),
+        (
+            "radius to the mid-line",
+            float(np.log1p(0.03)),
+            float(np.hypot(0.025, 3.0 * RADIUS_SD_MM / radius)),
+            "measure the outer diameter and the wall",
+        ),
+        ("modulus", 0.0, modulus_sd, "test a strip of the same material"),
+        ("gauge gain", 0.0, 0.005, "load the sensor with known weights"),
+    ]

@@ -1,0 +1,287 @@
+"""The answer of a diagnosis, as typed values; views turn them into files and words."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.records import Records
+from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.report.parameters import Interval
+
+Word = Literal["none", "named", "ambiguous", "unknown"]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Whether model and measurement part, and by how much.
+
+    Attributes:
+        detected: the simultaneous gate at 5 % is passed.
+        probability: posterior probability that anything is missing (1 − P(none)).
+        rms_N: root mean square of the gap at the tested rows, 90 % interval; NaN
+            where none is detected.
+        noise_sd_N: of a reading, without the gap.
+        share_of_full_scale: rms over the largest tested force [-].
+        autocorrelation: posterior mean of the noise's AR(1) coefficient [-].
+        rounding_N: step of rounded readings, where nothing else is detected.
+    """
+
+    detected: bool
+    probability: float
+    rms_N: Interval
+    noise_sd_N: float
+    share_of_full_scale: float
+    autocorrelation: float
+    rounding_N: float | None = None
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One pre-declared cell of the rows and the mean residual in it.
+
+    Attributes:
+        covariate: deformation, temperature, time, angle, direction, run, specimen
+            or a product such as `direction × deformation`.
+        label: for people, such as "0.36 … 0.54 mm" or "unloading".
+        start: lower end in `unit`; NaN for labels.
+        stop: upper end; NaN for labels.
+        unit: mm, °C, s, rad or "".
+        rows: number of rows.
+        bias_N: mean reading minus calibrated model.
+        half_width_N: of the simultaneous 95 % band of a model without gap.
+        z: bias over its standard error under no gap.
+        share: of the squared gap that lies in this cell [-].
+    """
+
+    covariate: str
+    label: str
+    start: float
+    stop: float
+    unit: str
+    rows: int
+    bias_N: float
+    half_width_N: float
+    z: float
+    share: float
+
+    @property
+    def hot(self) -> bool:
+        """Whether the bias leaves the simultaneous band."""
+        return abs(self.bias_N) > self.half_width_N
+
+
+@dataclass(frozen=True)
+class Share:
+    """Part of the gap's variance along one covariate, 90 % interval."""
+
+    covariate: str
+    share: Interval
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the gap lies.
+
+    Attributes:
+        p_value: family-wise, of the simultaneous gate.
+        statistics: largest |z| over the cells and of the noise's shape, by name.
+        cells: every pre-declared cell.
+        shares: of the gap's variance by covariate; empty when no gap is detected.
+        residual_N: reading minus calibrated base model, shape (n,).
+        gap_N: smooth part of it (posterior mean), shape (n,).
+        records: the rows that were looked at: the case's own, or means of neighbours.
+    """
+
+    p_value: float
+    statistics: dict[str, float]
+    cells: tuple[Cell, ...]
+    shares: tuple[Share, ...]
+    residual_N: np.ndarray
+    gap_N: np.ndarray
+    records: Records
+
+    @property
+    def regions(self) -> tuple[Cell, ...]:
+        """Return the hot cells, largest |z| first."""
+        return tuple(sorted((c for c in self.cells if c.hot), key=lambda c: -abs(c.z)))
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Size of the named effect, 90 % credible interval."""
+
+    effect: str
+    parameter: str
+    unit: str
+    size: Interval
+
+
+@dataclass(frozen=True)
+class Which:
+    """Which unmodelled effect causes the gap.
+
+    Attributes:
+        verdict: none, named, ambiguous or unknown.
+        effect: top effect by inclusion; None for none and unknown.
+        second_effect: another with inclusion of 90 % or more.
+        set: effects of the smallest set of hypotheses with 90 %, most probable first.
+        probabilities: of all hypotheses; sum to 1.
+        inclusion: of each effect over singles and pairs.
+        log_evidence: of each hypothesis, relative to none [nat].
+        amplitude: of `effect`; None without one.
+        not_testable: effect → features that the records lack.
+        not_excited: effects that this program cannot show at a physical size.
+        inseparable: pairs of effects that this program can never tell apart.
+        sensitivity: top inclusion for amplitude priors ⅓ and 3 times as wide.
+        stability: share of block-bootstrap samples with the same top hypothesis.
+    """
+
+    verdict: Word
+    effect: str | None
+    second_effect: str | None
+    set: tuple[str, ...]
+    probabilities: dict[str, float]
+    inclusion: dict[str, float]
+    log_evidence: dict[str, float]
+    amplitude: Amplitude | None
+    not_testable: dict[str, tuple[str, ...]]
+    not_excited: tuple[str, ...]
+    inseparable: tuple[tuple[str, str], ...]
+    sensitivity: dict[str, float]
+    stability: float | None
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One rung of the ladder from the nominal model to the noise floor."""
+
+    model: str
+    rms_N: float
+
+
+@dataclass(frozen=True)
+class Shrink:
+    """How far the gap shrinks once the effect is added.
+
+    Attributes:
+        ladder: nominal, calibrated, with the effect, with the remainder, noise.
+        closed: share of the gap closed on blocks it was not fitted to, 90 % interval.
+        held_out: what was left out, such as `leave-one-half-cycle-out`.
+        extrapolated_closed: with the upper third of the deformation left out.
+        placebo_closed: by a free spline of as many parameters.
+        remainder_N: rms of what is left after the effect, 90 % interval.
+        reason: why `closed` is missing.
+        bars: closed share of each member of the set, by effect.
+    """
+
+    ladder: tuple[Rung, ...]
+    closed: Interval | None
+    held_out: str
+    extrapolated_closed: float | None
+    placebo_closed: float | None
+    remainder_N: Interval | None
+    reason: str
+    bars: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class NextRun:
+    """One run that a rig can do and what it would tell.
+
+    Attributes:
+        run: what to do, in words.
+        separates: effects whose ranking it would settle, most of all first.
+        information_nats: expected information about which effect it is.
+        cost: in words, such as "one ramp".
+    """
+
+    run: str
+    separates: tuple[str, ...]
+    information_nats: float
+    cost: str
+
+
+@dataclass(frozen=True)
+class BudgetPart:
+    """One physical reason why K is not 1.
+
+    Attributes:
+        name: for people.
+        factor: posterior of the factor, 90 % interval [-].
+        prior: the same before the data.
+        driven_by: prior or data.
+        split_by: the extra run or measurement that would tell it from the others.
+    """
+
+    name: str
+    factor: Interval
+    prior: Interval
+    driven_by: Literal["prior", "data"]
+    split_by: str
+
+
+@dataclass(frozen=True)
+class Budget:
+    """K as a product of physical factors; one curve gives only the product.
+
+    Attributes:
+        K: at the prior's mean modulus, beside the named effects.
+        formula: theory whose K this is.
+        parts: whose product it is.
+        note: in words.
+    """
+
+    K: Interval
+    formula: str
+    parts: tuple[BudgetPart, ...]
+    note: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Where, which, how far, and what to do next.
+
+    Attributes:
+        case: the case diagnosed.
+        gap: whether there is a gap.
+        where: where it lies.
+        which: what causes it.
+        shrink: how far it shrinks.
+        next_test: runs that would tell more, best first.
+        budget: of the scale factor K.
+        posteriors: calibrated corrected models by effect (joined with +), with the
+            probability that weighs their bands; empty with `quick`.
+        library: names of the effects that were considered.
+        notes: remarks, such as rows thinned.
+        reasons: why the result must not be used; empty when it may.
+        averaged_rows: rows in each mean that was diagnosed; 1 is single rows.
+        no_run: why `next_test` is empty.
+    """
+
+    case: Case
+    gap: Gap
+    where: Where
+    which: Which
+    shrink: Shrink
+    next_test: tuple[NextRun, ...]
+    budget: Budget
+    posteriors: dict[str, tuple[float, Posterior]]
+    library: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
+    averaged_rows: int = 1
+    no_run: str = ""
+
+    @property
+    def status(self) -> Literal["ok", "failed"]:
+        """Return whether the result may be used."""
+        return "failed" if self.reasons else "ok"
+
+
+def member_files(verdict: Verdict) -> dict[str, str]:
+    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
+    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
+    files = {name: f"posterior-{name}.nc" for name in ranked}
+    return files | dict.fromkeys(ranked[:1], FILE_NAME)

@@ -1,0 +1,18 @@
+"""What the one sampler can take: a problem with priors and a declared density."""
+
+import equinox as eqx
+
+from hdcal.data.priors import Prior
+
+
+class Sampled(eqx.Module):
+    """A pytree of data and priors whose density `inference.model.model` declares.
+
+    Another kind of problem subclasses this and registers its declaration with
+    `model`; sampler, whitening and checks then serve it as they are.
+
+    Attributes:
+        priors: by site name, in code units.
+    """
+
+    priors: eqx.AbstractVar[dict[str, Prior]]

@@ -1,1 +1,0 @@
-"""Inference of mass, damping and stiffness from a gear that was seen to move."""

@@ -1,0 +1,128 @@
+"""What the calibrated model leaves over, and whether it has a shape."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from hdcal.inference.density import predict_rows
+from hdcal.inference.distributions import frozen
+from hdcal.inference.flat_directions import member_columns, sensitivity
+from hdcal.inference.posterior import Posterior, gap_columns
+from hdcal.inference.residual_shapes import (
+    Structure,
+    Whitened,
+    find_structure,
+    shapes_of,
+)
+
+# Draws that the fitted reading is averaged over: its error is then a tenth of the
+# posterior's own.
+_DRAWS = 200
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Measured against fitted, row by row; the fit is the posterior mean reading.
+
+    Attributes:
+        deformation: as read [mm].
+        temperature: of the specimen [°C].
+        direction: sign of the last movement.
+        run: index of the run.
+        measured: force as read [N].
+        fitted: mean reading [N].
+        residual: measured − fitted [N].
+        standardised: residual over the noise sd [-].
+        structure: shapes that noise would rarely show.
+    """
+
+    deformation: np.ndarray
+    temperature: np.ndarray
+    direction: np.ndarray
+    run: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+    residual: np.ndarray
+    standardised: np.ndarray
+    structure: tuple[Structure, ...]
+
+
+def residuals(posterior: Posterior) -> Residuals:
+    """Return the residuals of a calibration and the shapes found in them."""
+    problem, records = posterior.problem, posterior.case.records
+    centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
+    columns = gap_columns(problem, posterior.case)
+    _, noise = predict_rows(problem, centre, records, columns)
+    fitted = _fit(problem, _thinned(posterior.draws), records, columns)
+    residual = np.asarray(records.force) - np.asarray(fitted)
+    sd = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    return Residuals(
+        deformation=np.asarray(records.deformation),
+        temperature=np.asarray(records.temperature),
+        direction=np.asarray(records.sense),
+        run=np.asarray(records.run),
+        measured=np.asarray(records.force),
+        fitted=np.asarray(fitted),
+        residual=residual,
+        standardised=residual / sd,
+        structure=find_structure(_whiten(posterior, centre, columns, residual, sd), sd),
+    )
+
+
+def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    every = max(len(draws["K"]) // _DRAWS, 1)
+    return {name: values[::every] for name, values in draws.items()}
+
+
+@jax.jit
+def _fit(problem, values, records, columns):
+    """Return the posterior mean of each row's mean reading [N], draw after draw."""
+
+    def add(total, value):
+        return total + predict_rows(problem, value, records, columns)[0], None
+
+    total, _ = jax.lax.scan(add, jnp.zeros(len(records.force)), values)
+    return total / len(values["K"])
+
+
+def _whiten(posterior: Posterior, centre, columns, residual, sd) -> Whitened:
+    """Bring residuals, sensitivities and shapes to noise and prior sds."""
+    problem, records = posterior.problem, posterior.case.records
+    members, place = member_columns(problem, centre, records, columns)
+    table, pull = [members], [-place]
+    for name, slope in sensitivity(problem, centre, records, columns).items():
+        law = frozen(posterior.priors[name])
+        table.append(slope[:, None] * law.std())
+        pull.append(np.array([(law.mean() - centre[name]) / law.std()]))
+    below = np.concatenate(pull)
+    shapes = shapes_of(records, posterior.case.gear.reference_temperature)
+    return Whitened(
+        residual=np.concatenate([residual / sd, below]),
+        absorbed=np.vstack(
+            [np.concatenate(table, axis=1) / sd[:, None], np.eye(len(below))]
+        ),
+        shapes={
+            name: (np.concatenate([column / sd, np.zeros(len(below))]), up, down)
+            for name, (column, up, down) in shapes.items()
+        },
+    )
+
+
+def misfits(posterior: Posterior) -> tuple[str, ...]:
+    """Return a warning for each shape that a straight model left in the residuals.
+
+    For answers that take the model's shape for right. With a leftover discrepancy in
+    the model there is none to warn of.
+
+    Args:
+        posterior: from `calibrate`.
+    """
+    if posterior.problem.gap is not None:
+        return ()
+    return tuple(
+        "This takes the model's shape for right, but its residuals have one. "
+        f"{shape.words.rstrip('.')}. Diagnose, or calibrate --with-gap."
+        for shape in residuals(posterior).structure
+    )

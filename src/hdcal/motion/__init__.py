@@ -1,0 +1,1 @@
+"""How does a gear move under a force, and what did its motion tell?"""

@@ -1,0 +1,266 @@
+"""Calibrate mass, damping and stiffness against a gear that was seen to move."""
+
+import time
+from dataclasses import replace
+
+import jax
+import numpy as np
+from scipy import stats
+
+from hdcal.data.case import Case, Theory
+from hdcal.errors import Finding, InputError
+from hdcal.inference import laplace
+from hdcal.inference.checks import (
+    Check,
+    bound_check,
+    conflict_check,
+    identification_checks,
+    sampling_checks,
+)
+from hdcal.inference.density import log_prior
+from hdcal.inference.diagnostics import diagnose_parameters, mixing
+from hdcal.inference.dynamic_posterior import DynamicPosterior, build_dynamic_tree
+from hdcal.inference.dynamic_problem import (
+    DynamicProblem,
+    build_dynamic,
+    dynamic_site_priors,
+    predict_motion,
+)
+from hdcal.inference.dynamic_start import scan
+from hdcal.inference.flat_directions import dead_parameters, flat_directions
+from hdcal.inference.posterior import versions
+from hdcal.inference.prior_draws import draw_priors
+from hdcal.inference.sample import Draws, Progress, check_settings, sample
+
+FEWEST_ROWS = 20
+# Largest spread of temperature over a record that counts as one temperature [K].
+_ONE_TEMPERATURE = 5.0
+_PEAKS = 3
+# A second peak of the density lower by less than this [nat] was wrongly left out.
+_RIVAL = 7.0
+# Peaks nearer than this, in posterior sds of the first, are one.
+_SAME = 5.0
+_LAGS, _WHITE = 20, 1e-3
+_DERIVED = ("stiffness", "damping", "natural_frequency")
+
+
+def calibrate_dynamic(
+    case: Case,
+    *,
+    theory: Theory | None = None,
+    chains: int = 4,
+    warmup: int = 1000,
+    draws: int = 1000,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> DynamicPosterior:
+    """Calibrate m ÿ + c ẏ + k y = F(t) against a measured time series.
+
+    The force is the input: as read, without error, linear between the rows. The
+    deformation is the output: y plus a zero of its own plus white noise. K and E₀
+    have the priors of the calibration at rest.
+
+    Args:
+        case: from `read_case`; one run at one temperature, with time.
+        theory: overrides the gear's theory.
+        chains: independent chains, two or more.
+        warmup: iterations of adaptation per chain.
+        draws: draws kept per chain.
+        seed: of `jax.random.key`; the same seed gives the same draws.
+        progress: called with (iterations done, iterations in all).
+
+    Returns:
+        The posterior; it may have failed its checks, see `Posterior.usable`.
+
+    Raises:
+        InputError: the record is no time series that the model can be held against.
+    """
+    check_settings(chains, warmup, draws)
+    check_motion(case)
+    began = time.perf_counter()
+    theory = theory or case.gear.theory
+    priors = dynamic_site_priors(case, theory)
+    problem = build_dynamic(case, priors, theory)
+    of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
+    whitening, rival = highest_peak(problem, of_fit)
+    size = {"chains": chains, "warmup": warmup, "draws": draws}
+    found = sample(problem, whitening, of_draws, progress=progress, **size)
+    settings = {
+        "kind": DynamicPosterior.kind,
+        "seed": seed,
+        **size,
+        "with_gap": False,
+        "target_acceptance": found.target_acceptance,
+        "versions": versions(),
+    }
+    posterior = _assemble(
+        case, theory, priors, problem, found, rival, of_prior, settings
+    )
+    seconds = round(time.perf_counter() - began, 3)
+    return replace(posterior, settings={**settings, "seconds": seconds})
+
+
+def _assemble(
+    case: Case,
+    theory: Theory,
+    priors,
+    problem,
+    found: Draws,
+    rival: Check,
+    key,
+    settings,
+) -> DynamicPosterior:
+    sampled = {name: p for name, p in priors.items() if p.family != "fixed"}
+    scalars = {name: found.values[name] for name in sampled}
+    tree = build_dynamic_tree(case, problem, found, draw_priors(sampled, key))
+    of_prior = np.asarray(_log_prior(problem, found.values))
+    of_data = tree["log_likelihood"]["deformation"].to_numpy().sum(-1)
+    diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
+    derived = mixing({name: found.values[name] for name in _DERIVED})
+    checks = (
+        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses | derived),
+        rival,
+        whiteness_check(problem, found),
+        sampling_rate_check(problem, found),
+        conflict_check(scalars, sampled),
+        bound_check(scalars, sampled),
+        *_identification(problem, found),
+    )
+    return DynamicPosterior(case, theory, (), priors, tree, diagnoses, checks, settings)
+
+
+def check_motion(case: Case) -> None:
+    """Refuse records that are no time series of one moving gear.
+
+    Raises:
+        InputError: with everything that is wrong.
+    """
+    records, findings = case.records, []
+
+    def find(problem: str, remedy: str) -> None:
+        findings.append(Finding(case.name, problem, remedy))
+
+    rows = len(records.force)
+    if "time" not in records.known:
+        find("no column holds the time", "A moving gear needs one, such as time_s")
+    elif len(case.run_labels) > 1 or len(case.specimen_labels) > 1:
+        find("holds several runs or gears", "Calibrate one run of one gear at a time")
+    elif np.any(np.diff(records.time) <= 0.0):
+        row = int(np.argmax(np.diff(records.time) <= 0.0)) + 2
+        find(
+            f"reading {row} is not later than the one before", "Give each its own time"
+        )
+    if rows < FEWEST_ROWS:
+        find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
+    if np.ptp(records.temperature) > _ONE_TEMPERATURE:
+        words = f"the temperature runs over {np.ptp(records.temperature):.3g} K"
+        find(words, f"Keep it within {_ONE_TEMPERATURE:g} K, or split the record")
+    if np.any(records.force_sd > 0.0):
+        find("gives an sd of the force", "The force is taken as exact: leave it out")
+    if findings:
+        raise InputError(findings)
+
+
+def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
+    """Climb from every peak of the scan; return the highest, and say how lonely it is.
+
+    Chains start around one peak and never cross to another, so that no R-hat could
+    tell of it.
+    """
+    fits = [laplace.fit(problem, key, start) for start in scan(problem, _PEAKS)]
+    fits = fits or [laplace.fit(problem, key)]
+    level = [float(_potential(problem, fit.centre)) for fit in fits]
+    order = np.argsort(level)
+    best = fits[order[0]]
+    name = "one natural frequency explains the data"
+    inverse = np.linalg.inv(best.factor)
+    for index in order[1:]:
+        apart = [np.ravel(fits[index].centre[n] - best.centre[n]) for n in best.centre]
+        if np.linalg.norm(inverse @ np.concatenate(apart)) < _SAME:
+            continue
+        drop = level[index] - level[order[0]]
+        words = f"the next one is {drop:.0f} nat worse, {_RIVAL:g} are needed"
+        good = drop >= _RIVAL
+        return best, Check(name, "passed" if good else "failed", words)
+    return best, Check(name, "passed", "the search from several ends in one place")
+
+
+_potential = jax.jit(laplace.potential)
+_predict = jax.jit(predict_motion)
+
+
+@jax.jit
+def _slopes(problem: DynamicProblem, values, part):
+    def mean(moved):
+        return predict_motion(problem, {**values, **moved})
+
+    return jax.jacfwd(mean)(part)
+
+
+@jax.jit
+def _log_prior(problem: DynamicProblem, values):
+    def one(each):
+        return log_prior(problem, each)
+
+    return jax.vmap(jax.vmap(one))(values)
+
+
+def centre(found: Draws) -> dict[str, np.ndarray]:
+    """Return the draw of the highest posterior density."""
+    place = np.unravel_index(np.argmin(found.potential), found.potential.shape)
+    return {name: values[place] for name, values in found.values.items()}
+
+
+def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
+    """Warn where what is left over is no white noise: intervals are then too narrow.
+
+    The test is Ljung and Box's over twenty lags (fewer in short records).
+    """
+    name = "residuals are noise"
+    values = centre(found)
+    left = np.asarray(problem.deformation - _predict(problem, values))
+    left = left - left.mean()
+    rows = len(left)
+    lags = np.arange(1, min(_LAGS, rows // 4) + 1)
+    power = max(float(left @ left), np.finfo(float).tiny)
+    share = np.array([left[lag:] @ left[:-lag] for lag in lags]) / power
+    statistic = rows * (rows + 2) * np.sum(share**2 / (rows - lags))
+    p = float(stats.chi2.sf(statistic, len(lags)))
+    if p >= _WHITE:
+        return Check(
+            name, "passed", f"no correlation over {len(lags)} rows (p = {p:.2g})"
+        )
+    words = (
+        "what is left over is correlated from row to row "
+        f"(p = {p:.1g}): the linear model does not hold, the intervals are too narrow"
+    )
+    return Check(name, "warning", words)
+
+
+def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
+    """Warn where rows are too far apart for a force that is linear between them."""
+    name = "rows follow the vibration"
+    frequency = float(np.median(found.values["natural_frequency"]))
+    per_period = 1.0 / (frequency * float(np.median(np.diff(problem.time))))
+    words = f"{per_period:.1f} rows per period of {frequency:.4g} Hz"
+    if per_period >= 6.0:
+        return Check(name, "passed", words)
+    remedy = "the force between rows is guessed as straight; sample faster"
+    return Check(name, "warning", f"{words}: {remedy}")
+
+
+def _identification(problem: DynamicProblem, found: Draws) -> tuple[Check, ...]:
+    values = centre(found)
+    names = [
+        name
+        for name, prior in problem.priors.items()
+        if prior.family != "fixed" and name != "deformation_sigma"
+    ]
+    part = {name: values[name] for name in names}
+    slopes = {
+        name: np.asarray(slope) / float(values["deformation_sigma"])
+        for name, slope in _slopes(problem, values, part).items()
+    }
+    dead = dead_parameters(slopes, problem)
+    alive = {name: slope for name, slope in slopes.items() if name not in dead}
+    return identification_checks(dead, flat_directions(alive, problem))

@@ -1,0 +1,1 @@
+"""How does a calibrated gear move under a force?"""

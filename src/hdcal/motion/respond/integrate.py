@@ -1,0 +1,141 @@
+"""The gears of a posterior, each integrated on its own."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from hdcal.data.prior import Prior
+from hdcal.errors import Finding, InputError
+from hdcal.inference.density import POSITIVE
+from hdcal.inference.distributions import distribution
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.dynamic_problem import mass_prior
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import case_reading
+from hdcal.motion.respond.request import Request
+from hdcal.physics.chain import Base, Reading
+from hdcal.physics.dynamics import (
+    Oscillator,
+    damping_ratio,
+    integrate,
+    natural_frequency,
+)
+from hdcal.physics.effect import Effect, parameters
+
+# Draws integrated side by side: all wait for the slowest.
+_CHUNK = 250
+
+
+def thinned(draws: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
+    """Return so many draws, taken evenly from all chains."""
+    total = len(draws["K"])
+    rows = np.linspace(0, total - 1, min(count, total)).astype(int)
+    return {name: values[rows] for name, values in draws.items()}
+
+
+def unseen(posterior: Posterior, values: dict, mass, seed: int):
+    """Return mass and damping ratio of each draw, from data or from their priors."""
+    if isinstance(posterior, DynamicPosterior):
+        return values["mass"], values["damping_ratio"]
+    count, gear = len(values["K"]), posterior.case.gear
+    of_mass, of_ratio = jax.random.split(jax.random.key(seed))
+    if mass is not None:
+        moved = np.full(count, float(mass))
+    else:
+        radial = case_reading(posterior.case).radial_per_read
+        moved = _draw(mass_prior(gear, radial), "mass", of_mass, count)
+    ratio = gear.dynamic_priors.get("damping_ratio")
+    if ratio is None:
+        words = "this older result holds no prior of the damping"
+        raise InputError([Finding(posterior.case.name, words, "Calibrate again")])
+    return moved, _draw(ratio, "damping_ratio", of_ratio, count)
+
+
+def _draw(prior: Prior, name: str, key, count: int) -> np.ndarray:
+    if prior.family == "fixed":
+        return np.full(count, float(prior.numbers[0]))
+    law = distribution(prior, positive=name in POSITIVE)
+    return np.asarray(law.sample(key, (count,)))
+
+
+def _with_values(effect: type[Effect], values) -> Effect:
+    own = {name: values[f"{effect.name}.{name}"] for name in parameters(effect)}
+    return effect(**own)
+
+
+@partial(jax.jit, static_argnames=("kept", "with_damping"))
+def _each(kept, with_damping, reading, values, temperature, damping, force, times):
+    """Return states, facts and whether each draw of a batch came through."""
+
+    def one(value):
+        effects = tuple(
+            effect(
+                **{name: value[f"{effect.name}.{name}"] for name in parameters(effect)}
+            )
+            for effect in kept
+        )
+        stiffness = value["stiffness"] / reading.radial_per_read
+        base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
+        mass = value["_mass"]
+        still = Oscillator(mass, 0.0, base, effects, reading, temperature)
+        k = still.stiffness
+        c = damping if with_damping else 2.0 * value["_ratio"] * jnp.sqrt(k * mass)
+        gear = replace(still, damping=c)
+        states, done = integrate(gear, force, times)
+        return states, _facts(mass, c, k), done
+
+    return jax.vmap(one)(values)
+
+
+def _facts(mass, damping, stiffness) -> dict[str, Any]:
+    frequency = natural_frequency(mass, stiffness)
+    ratio = damping_ratio(mass, damping, stiffness)
+    return {
+        "mass_kg": 1e3 * mass,
+        "damping_N_s_per_mm": damping + 0.0 * mass,
+        "damping_ratio": ratio,
+        "stiffness_N_per_mm": stiffness,
+        "natural_frequency_Hz": frequency,
+        "damped_frequency_Hz": frequency * jnp.sqrt(jnp.maximum(1.0 - ratio**2, 0.0)),
+    }
+
+
+def integrate_all(
+    kept, reading: Reading, values: dict, temperature: float, damping, request: Request
+):
+    """Integrate every draw.
+
+    Args:
+        kept: effects taken along.
+        reading: how the rig reads.
+        values: of the draws, with `_mass` and `_ratio`.
+        temperature: of the gear [°C].
+        damping: given [N·s/mm], or None for that of the ratio.
+        request: force and times.
+
+    Returns:
+        Deformation and speed (draw, time, 2), facts by name (draw,), and which draws
+        came through.
+    """
+    parts = []
+    for start in range(0, len(values["K"]), _CHUNK):
+        chunk = {n: v[start : start + _CHUNK] for n, v in values.items() if v.ndim == 1}
+        given = 0.0 if damping is None else float(damping)
+        part = _each(
+            kept,
+            damping is not None,
+            reading,
+            chunk,
+            temperature,
+            given,
+            request.force,
+            request.times,
+        )
+        parts.append(jax.device_get(part))
+    states = np.concatenate([part[0] for part in parts])
+    facts = {n: np.concatenate([p[1][n] for p in parts]) for n in parts[0][1]}
+    return states, facts, np.concatenate([part[2] for part in parts])

@@ -1,0 +1,228 @@
+"""How a calibrated gear moves under a force, with credible bands.
+
+Where only the gear at rest was calibrated, data speak of the stiffness; mass and
+damping are drawn from their priors, and the answer says so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import numpy as np
+
+from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
+from hdcal.motion.respond.remarks import drivers, remarks, tested_rows
+from hdcal.motion.respond.request import Drive, Request, make_request
+from hdcal.physics.dynamics import acting, natural_frequency
+from hdcal.report.parameters import INTERVAL, interval
+
+_MOST_DRAWS = 10_000
+# More take minutes, and a band that long past its start says nothing new.
+_MOST_SWINGS = 20_000
+
+
+@dataclass(frozen=True)
+class Response:
+    """The motion under a force; one entry per time.
+
+    Attributes:
+        time_s: times.
+        force_N: on the gear.
+        deformation_lo_mm: lower end of the pointwise band of the deformation, as
+            read, from the unloaded gear.
+        deformation_median_mm: its median; no single gear need move like that.
+        deformation_hi_mm: its upper end.
+        tested: the whole band lies within the deformations and the temperature that
+            were calibrated.
+        estimates: mass_kg, damping_N_s_per_mm, damping_ratio, stiffness_N_per_mm,
+            natural_frequency_Hz, damped_frequency_Hz, peak_mm: each with median, lo,
+            hi and driven_by (data, prior or given).
+        request: what was asked.
+        temperature_C: of the gear.
+        draws: number of gears integrated.
+        effects: effects that were taken along.
+        left_out: effects of the calibration that were not.
+        remarks: what the reader must know, in sentences.
+    """
+
+    time_s: np.ndarray
+    force_N: np.ndarray
+    deformation_lo_mm: np.ndarray
+    deformation_median_mm: np.ndarray
+    deformation_hi_mm: np.ndarray
+    tested: np.ndarray
+    estimates: dict[str, dict]
+    request: Request
+    temperature_C: float
+    draws: int
+    effects: tuple[str, ...]
+    left_out: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns in the order of response.csv."""
+        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
+        names += ("deformation_hi_mm", "tested")
+        return {name: getattr(self, name) for name in names}
+
+
+def respond(
+    posterior: Posterior,
+    force: Drive,
+    *,
+    amplitude: float = 80.0,
+    frequency: float | Sequence[float] | None = None,
+    duration: float | None = None,
+    temperature: float | None = None,
+    mass: float | None = None,
+    damping: float | None = None,
+    points: int = 1001,
+    draws: int = 500,
+    seed: int = 0,
+) -> Response:
+    """Predict the deformation over time under a force on the gear.
+
+    Motion begins at rest, from the unloaded gear.
+
+    Args:
+        posterior: from `calibrate` or `calibrate_dynamic`.
+        force: `step`, `sine`, `chirp`, or a pair of times [s] and forces [N].
+        amplitude: of a named shape [N].
+        frequency: of a sine, or first and last of a chirp [Hz].
+        duration: of a named shape [s]; 0.5 by default.
+        temperature: of the gear [°C]; by default the tested one nearest to the
+            reference.
+        mass: moved mass, if known [N·s²/mm]; 1 kg = 1e-3 N·s²/mm.
+        damping: c, if known [N·s/mm].
+        points: number of times.
+        draws: gears integrated, at most those of the posterior.
+        seed: of the draws of mass and damping from their priors.
+
+    Raises:
+        NotUsable: the posterior failed its checks, or a motion could not be
+            integrated.
+        InputError: what was asked makes no sense.
+    """
+    posterior.require_usable()
+    request = _checked(
+        partial(make_request, force, amplitude, frequency, duration, points),
+        _problems(posterior, temperature, mass, damping, draws),
+    )
+    at = _temperature(posterior) if temperature is None else float(temperature)
+    values = thinned(posterior.draws, draws)
+    moved, ratio = unseen(posterior, values, mass, seed)
+    kept, left = acting(without_scatter(posterior.effects))
+    reading = case_reading(posterior.case)
+    whole = {**values, "_mass": moved, "_ratio": ratio}
+    _check_reach(posterior, request, values, moved)
+    states, facts, done = integrate_all(kept, reading, whole, at, damping, request)
+    lo, middle, hi = _band(states[..., 0], done)
+    facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
+    estimates = {
+        name: {**interval(facts[name]), "driven_by": driver}
+        for name, driver in drivers(posterior, mass, damping).items()
+    }
+    tested = tested_rows(posterior, at, lo, hi)
+    return Response(
+        request.times,
+        np.asarray(jax.vmap(request.force)(request.times)),
+        lo,
+        middle,
+        hi,
+        tested,
+        estimates,
+        request,
+        at,
+        len(done),
+        tuple(effect.name for effect in kept),
+        tuple(effect.name for effect in left),
+        remarks(posterior, request.times, estimates, kept, left, tested),
+    )
+
+
+def _temperature(posterior: Posterior) -> float:
+    """Return the tested temperature nearest to the reference [°C]."""
+    tested = posterior.case.records.temperature
+    reference = posterior.case.gear.reference_temperature
+    return float(np.clip(reference, np.min(tested), np.max(tested)))
+
+
+def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
+    """Return the ends and the middle of the band at every time [mm].
+
+    Raises:
+        NotUsable: a motion was not integrated to its end.
+    """
+    if not done.all():
+        raise NotUsable(
+            f"{np.count_nonzero(~done)} of {len(done)} motions could not be "
+            "integrated: ask for a shorter duration"
+        )
+    tail = (1.0 - INTERVAL) / 2.0
+    return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
+
+
+def _checked(make, findings: list[Finding]) -> Request:
+    """Return the request; raise with its findings and the others at once."""
+    try:
+        request = make()
+    except InputError as error:
+        raise InputError([*error.findings, *findings]) from None
+    if findings:
+        raise InputError(findings)
+    return request
+
+
+def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
+    findings = []
+
+    def find(name: str, problem: str, remedy: str) -> None:
+        findings.append(Finding(name, problem, remedy))
+
+    if mass is not None and not (np.isfinite(mass) and mass > 0.0):
+        find("--mass-kg", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
+    if damping is not None and not (np.isfinite(damping) and damping >= 0.0):
+        words = f"{damping:g} N·s/mm is no damping"
+        find("--damping", words, "Give zero or more")
+    if isinstance(posterior, DynamicPosterior):
+        for name, value in (("--mass-kg", mass), ("--damping", damping)):
+            if value is not None:
+                words = "this calibration of the moving gear knows it already"
+                find(name, words, "Leave it out")
+    if not 20 <= draws <= _MOST_DRAWS:
+        find("--draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
+    if temperature is not None:
+        gear = posterior.case.gear
+        rise = abs(temperature - gear.reference_temperature)
+        if not np.isfinite(temperature) or temperature < -273.15:
+            find("--temperature", "is below absolute zero", "Give it in °C")
+        elif np.median(posterior.draws["alpha"]) * rise >= 0.5:
+            words = "the linear law E(T) would lose half of Young's modulus"
+            find("--temperature", words, "Give it in °C")
+    return findings
+
+
+def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> None:
+    """Refuse what is a slip of the unit: to fold the gear, or to swing for hours."""
+    findings = []
+    limit = (
+        posterior.case.gear.geometry.radius
+        / case_reading(posterior.case).radial_per_read
+    )
+    static = float(request.force.largest()) / np.median(values["stiffness"])
+    if static >= limit:
+        words = f"would deform the gear by {static:.3g} mm even at rest"
+        findings.append(Finding("--force", words, "Give the force in N"))
+    seconds = float(request.times[-1] - request.times[0])
+    swings = seconds * float(np.max(natural_frequency(mass, values["stiffness"])))
+    if swings > _MOST_SWINGS:
+        words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
+        remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
+        findings.append(Finding("--duration", words, remedy))
+    if findings:
+        raise InputError(findings)

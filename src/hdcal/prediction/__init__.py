@@ -1,0 +1,1 @@
+"""How much force: the one engine behind every answer about forces."""

@@ -1,0 +1,1 @@
+"""Which force, at these deformations?"""

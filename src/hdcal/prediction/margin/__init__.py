@@ -1,0 +1,1 @@
+"""What force does a deformation need, for how many of whom, how surely?"""

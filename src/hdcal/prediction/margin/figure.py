@@ -1,0 +1,213 @@
+"""The figures of a margin: bounds beside the capacity, and what they hang on."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from hdcal.prediction.margin.document import bound_name, input_label, member_word
+from hdcal.prediction.margin.result import Margin
+from hdcal.report.canvas import (
+    BLUE,
+    DARK,
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    heading,
+    plain,
+    style,
+)
+
+_DRIVEN = {"data": BLUE, "prior": ORANGE, "given": GREEN}
+_DRIVEN_WORDS = {
+    "data": "from the data",
+    "prior": "from the prior only",
+    "given": "from the tolerances given",
+}
+
+
+def margin_figure(found: Margin, name: str) -> Figure:
+    """Draw the force needed with its bounds, over temperature where there are several.
+
+    Args:
+        found: from `margin`.
+        name: of the gear.
+    """
+    several = len(found.levels) > 1
+    with style():
+        height = 6.0 if several else 2.9
+        figure = Figure(figsize=(7.6, height), layout="constrained")
+        ratios = [1.0, 1.5] if several else [1.0]
+        panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)
+        _draw_spans(panels[0, 0], found)
+        at = f"{found.deformation_mm:g} mm"
+        warm = f"{found.worst.temperature_C:g} °C"
+        worst = f", worst temperature {warm}" if several else f", {warm}"
+        heading(panels[0, 0], f"{plain(name)}: force needed at {at}{worst}")
+        if several:
+            _draw_window(panels[1, 0], found)
+    return figure
+
+
+def _draw_spans(axes: Axes, found: Margin) -> None:
+    level = found.worst
+    rows = [
+        ("mean, 95 % credible", level.force_N, 0.75),
+        (f"one {member_word(found)},\n95 % predictive", level.member_N, 0.35),
+    ]
+    for place, (_, span, strength) in enumerate(rows):
+        axes.plot(
+            [span.lo, span.hi],
+            [place, place],
+            color=BLUE,
+            alpha=strength,
+            linewidth=11.0,
+            solid_capstyle="butt",
+        )
+        axes.plot(span.median, place, "o", color="white", markersize=4.5)
+    ends = [level.lower_bound_N, level.upper_bound_N]
+    axes.plot(ends, [2, 2], color=DARK, linewidth=1.2)
+    for end, mark in zip(ends, "<>", strict=True):
+        axes.plot(end, 2, mark, color=DARK, markersize=7)
+        axes.annotate(
+            f"{end:.1f} N",
+            (end, 2),
+            (0, -15),
+            textcoords="offset points",
+            ha="center",
+            fontsize=8.5,
+        )
+    words = [row[0] for row in rows] + [f"{bound_name(found)} bounds,\none-sided each"]
+    axes.set_yticks(range(3), words)
+    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    axes.set_ylim(2.75, -0.6)
+    axes.grid(False, axis="y")
+    axes.set_xlabel("force [N]")
+    axes.margins(x=0.1)
+    if found.limit_force_N is not None:
+        axes.axvline(found.limit_force_N, color=RED, linewidth=1.4)
+        axes.annotate(
+            f"capacity {found.limit_force_N:g} N",
+            (found.limit_force_N, 0.5),
+            xytext=(-4, 0),
+            textcoords="offset points",
+            color=RED,
+            ha="right",
+            va="center",
+            fontsize=8.5,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+        )
+
+
+def _draw_window(axes: Axes, found: Margin) -> None:
+    heading(axes, "Over temperature")
+    warm = np.array([level.temperature_C for level in found.levels])
+
+    def ends(name: str) -> tuple[np.ndarray, np.ndarray]:
+        spans = [getattr(level, name) for level in found.levels]
+        return np.array([s.lo for s in spans]), np.array([s.hi for s in spans])
+
+    axes.fill_between(warm, *ends("member_N"), color=BLUE, alpha=0.18, linewidth=0)
+    axes.fill_between(warm, *ends("force_N"), color=BLUE, alpha=0.45, linewidth=0)
+    for name in ("lower_bound_N", "upper_bound_N"):
+        line = [getattr(level, name) for level in found.levels]
+        axes.plot(warm, line, color=DARK, linewidth=1.2)
+    untested = np.array([not level.tested for level in found.levels])
+    axes.plot(
+        warm[untested],
+        np.array([level.force_N.median for level in found.levels])[untested],
+        "o",
+        markerfacecolor="white",
+        markeredgecolor=BLUE,
+        markersize=5,
+    )
+    handles = [
+        Line2D([], [], color=DARK, linewidth=1.2),
+        Patch(color=BLUE, alpha=0.5, linewidth=0),
+        Patch(color=BLUE, alpha=0.2, linewidth=0),
+    ]
+    texts = [f"{bound_name(found)} bounds", "mean, 95 %", f"one {member_word(found)}"]
+    if untested.any():
+        handles.append(
+            Line2D(
+                [], [], marker="o", color=BLUE, linestyle="", markerfacecolor="white"
+            )
+        )
+        texts.append("not tested: extrapolated")
+    if found.limit_force_N is not None:
+        axes.axhline(found.limit_force_N, color=RED, linewidth=1.4)
+        handles.append(Line2D([], [], color=RED))
+        texts.append("capacity")
+    axes.set_xlabel("temperature [°C]")
+    axes.set_ylabel("force [N]")
+    axes.margins(y=0.12)
+    under = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
+    axes.legend(handles, texts, ncols=3, **under)
+
+
+def tornado_figure(found: Margin) -> Figure:
+    """Draw the shares of the variance, and how far one per cent moves the bound."""
+    rows = max(len(found.shares), len(found.gradients))
+    with style():
+        figure = Figure(figsize=(7.6, 1.5 + 0.34 * rows), layout="constrained")
+        left, right = figure.subplots(1, 2)
+        _draw_shares(left, found)
+        _draw_gradients(right, found)
+    return figure
+
+
+def _draw_shares(axes: Axes, found: Margin) -> None:
+    heading(axes, f"What one {member_word(found)} scatters by")
+    ranked = sorted(found.shares, key=lambda share: -share.total)
+    for place, share in enumerate(ranked):
+        colour = _DRIVEN[share.driven_by]
+        total, first = (min(max(s, 0.0), 1.0) for s in (share.total, share.first))
+        axes.barh(place, total, 0.66, color=colour, alpha=0.35)
+        axes.barh(place, first, 0.66, color=colour)
+        axes.annotate(
+            f"{100.0 * total:.0f} %",
+            (total, place),
+            (3, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=8.5,
+        )
+    axes.set_yticks(range(len(ranked)), [input_label(share.name) for share in ranked])
+    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    axes.set_ylim(len(ranked) - 0.4, -0.6)
+    axes.set_xlim(0.0, 1.18)
+    axes.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
+    axes.set_xlabel("share of the variance (Sobol)")
+    axes.grid(False, axis="y")
+    seen = dict.fromkeys(share.driven_by for share in ranked)
+    handles = [Patch(color=_DRIVEN[d], linewidth=0) for d in seen]
+    handles.append(Patch(color=GREY, alpha=0.35, linewidth=0))
+    texts = [*(_DRIVEN_WORDS[d] for d in seen), "pale: with interactions"]
+    axes.legend(handles, texts, loc="lower right", fontsize=7.5)
+
+
+def _draw_gradients(axes: Axes, found: Margin) -> None:
+    heading(axes, "Upper bound, for + 1 % of")
+    ranked = sorted(found.gradients, key=lambda slope: -abs(slope.bound_N_per_percent))
+    values = [slope.bound_N_per_percent for slope in ranked]
+    colours = [RED if value > 0.0 else BLUE for value in values]
+    axes.barh(range(len(ranked)), values, 0.66, color=colours, alpha=0.75)
+    for place, value in enumerate(values):
+        axes.annotate(
+            f"{value:+.2f} N",
+            (value, place),
+            (3 if value > 0.0 else -3, 0),
+            textcoords="offset points",
+            va="center",
+            ha="left" if value > 0.0 else "right",
+            fontsize=8.5,
+        )
+    axes.axvline(0.0, color=DARK, linewidth=0.8)
+    axes.set_yticks(range(len(ranked)), [input_label(slope.name) for slope in ranked])
+    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    axes.set_ylim(len(ranked) - 0.4, -0.6)
+    axes.margins(x=0.4)
+    axes.set_xlabel("change [N]")
+    axes.grid(False, axis="y")

@@ -1,0 +1,132 @@
+"""The answer of `margin`: what each number in it is."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from hdcal.prediction.bands.bands import Direction
+from hdcal.prediction.forces import Quantity
+from hdcal.prediction.margin.deformation_reached import Reached
+from hdcal.prediction.margin.gradients import Gradient
+from hdcal.prediction.margin.variance_shares import Share
+from hdcal.prediction.population import Population
+from hdcal.report.parameters import Interval
+
+INTERVAL = 0.95
+
+
+@dataclass(frozen=True)
+class Exceedance:
+    """How probable it is that a member needs more than the capacity.
+
+    Attributes:
+        probability: of one future member, all that is unknown averaged over.
+        lo: lower end of the 95 % interval of the share of the population.
+        hi: its upper end.
+        at_confidence: share that is not exceeded with the stated confidence.
+        beta: reliability index −Φ⁻¹(P) of the probability.
+        beta_lo: of `hi`.
+        beta_hi: of `lo`.
+        beta_at_confidence: of `at_confidence`.
+    """
+
+    probability: float
+    lo: float
+    hi: float
+    at_confidence: float
+    beta: float
+    beta_lo: float
+    beta_hi: float
+    beta_at_confidence: float
+
+
+@dataclass(frozen=True)
+class Level:
+    """The force at one temperature, or at the worst one of a window.
+
+    Attributes:
+        temperature_C: of the specimen.
+        tested: the data hold this deformation, temperature and direction.
+        force_N: mean of the population, with its 95 % credible interval.
+        member_N: of one future member, with its 95 % predictive interval.
+        lower_bound_N: exceeded by the share `content`, with the stated confidence.
+        upper_bound_N: not exceeded by that share, with that confidence.
+        capacity_N: smallest that meets the required probability, with confidence.
+        capacity_predictive_N: the same for the predictive probability.
+        exceedance: of the given capacity, or None.
+    """
+
+    temperature_C: float
+    tested: bool
+    force_N: Interval
+    member_N: Interval
+    lower_bound_N: float
+    upper_bound_N: float
+    capacity_N: float
+    capacity_predictive_N: float
+    exceedance: Exceedance | None
+
+
+@dataclass(frozen=True)
+class ModelBound:
+    """What one of several models alone would say.
+
+    Attributes:
+        model: effects of the model, joined with +; `none` or `unknown` without any.
+        probability: its weight.
+        lower_bound_N: at the worst temperature.
+        upper_bound_N: likewise.
+        probability_exceeded: predictive, at the worst temperature, or None.
+    """
+
+    model: str
+    probability: float
+    lower_bound_N: float
+    upper_bound_N: float
+    probability_exceeded: float | None
+
+
+@dataclass(frozen=True)
+class Margin:
+    """The force needed at a deformation, and the margin of a capacity.
+
+    Attributes:
+        deformation_mm: as read.
+        direction: of the movement.
+        quantity: reading of the rig, or load on the gear.
+        population: readings, mountings or specimens.
+        population_words: the same in a sentence.
+        basis: A-basis, B-basis, or empty.
+        content: share of the population within each bound, one-sided.
+        confidence: of each bound.
+        required_probability: that the capacities are to meet.
+        limit_force_N: capacity asked about, or None.
+        tolerances_mm: ± of the sizes, by name.
+        levels: one per temperature.
+        worst: over all temperatures at once.
+        reached: deformation reached by a given force, or None.
+        models: each model's own bounds, if there are several.
+        gradients: of the upper bound.
+        shares: of the variance of one future member's force.
+        extrapolated: what lies outside the data, in sentences.
+        remarks: what else to know, in sentences.
+    """
+
+    deformation_mm: float
+    direction: Direction
+    quantity: Quantity
+    population: Population
+    population_words: str
+    basis: str
+    content: float
+    confidence: float
+    required_probability: float
+    limit_force_N: float | None
+    tolerances_mm: Mapping[str, float]
+    levels: tuple[Level, ...]
+    worst: Level
+    reached: Reached | None
+    models: tuple[ModelBound, ...]
+    gradients: tuple[Gradient, ...]
+    shares: tuple[Share, ...]
+    extrapolated: tuple[str, ...]
+    remarks: tuple[str, ...]

@@ -1,0 +1,186 @@
+"""Forces of a population, given the parameters: a mixture of normals, rounded.
+
+Of the kinds of scatter those that add up are normal and exact; those that do not
+(specimen, tolerances) are nodes of the mixture. Probabilities and quantiles of it are
+exact, far into the tails, and differentiable.
+"""
+
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.scipy.special import erfc, ndtri
+from jax.scipy.stats import norm
+from jaxtyping import Float
+
+from hdcal.data.records import Array
+
+# Below this step, in sds, rounding only adds its variance: error 1e-10.
+_FINE = 0.02
+# What does not scatter at all still needs a width [N]: far below any reading.
+_LEAST_SD = 1e-9
+_MOST_STEPS = 80
+# Steps of the solution below this share of the least sd are none [-].
+_CLOSE = 1e-8
+
+
+class Mixture(eqx.Module):
+    """Normal components; leading axes, such as the draws, are a batch.
+
+    Attributes:
+        weight: of each component, sum 1.
+        mean: [N].
+        sd: [N].
+        step: width of the rounding, uniform over it [N].
+        rounded: whether there is any.
+    """
+
+    weight: Float[Array, "*b k"]
+    mean: Float[Array, "*b k"]
+    sd: Float[Array, "*b k"]
+    step: Float[Array, ""] | float = 0.0
+    rounded: bool = eqx.field(static=True, default=False)
+
+    def below(self, force: Float[Array, "*b"]) -> Float[Array, "*b"]:
+        """Return the share of the population whose force is at most this."""
+        return self._share(force[..., None] - self.mean)
+
+    def above(self, force: Float[Array, "*b"]) -> Float[Array, "*b"]:
+        """Return the share that exceeds a force, exact where it is tiny."""
+        return self._share(self.mean - force[..., None])
+
+    def centre(self) -> Float[Array, "*b"]:
+        """Return the mean force [N]."""
+        return jnp.sum(self.weight * self.mean, axis=-1)
+
+    def _share(self, room):
+        sd = jnp.maximum(self.sd, _LEAST_SD)
+        if not self.rounded:
+            return jnp.sum(self.weight * _phi(room / sd), axis=-1)
+        rounds = self.step > _FINE * sd
+        smooth = _phi(room / jnp.sqrt(sd**2 + self.step**2 / 12.0))
+        # The mean of Φ over the step, through its integral.
+        step = jnp.where(rounds, self.step, sd)
+        high, low = (room + 0.5 * step) / sd, (room - 0.5 * step) / sd
+        coarse = (_integral(high) - _integral(low)) * sd / step
+        # At a distance the integrals are nearly equal numbers; the share is then all.
+        coarse = jnp.where(low > 8.0, 1.0, coarse)
+        return jnp.sum(self.weight * jnp.where(rounds, coarse, smooth), axis=-1)
+
+    def quantile(self, share: Float[Array, "*b"] | float) -> Float[Array, "*b"]:
+        """Return the force that this share does not exceed [N].
+
+        Newton's steps inside a bracket. The last step is taken with the derivatives
+        left in, which makes those of the result exact (implicit function theorem).
+        """
+        share = jnp.broadcast_to(jnp.asarray(share), self.mean.shape[:-1])
+        still = jax.lax.stop_gradient
+        fixed, share = jax.tree.map(still, self), still(share)
+        place = still(_solve(fixed, share))
+        _, slope = _side(fixed, place, share)
+        miss = jnp.where(
+            share > 0.5, (1.0 - share) - self.above(place), self.below(place) - share
+        )
+        return place - miss / still(slope)
+
+
+def _phi(z):
+    return 0.5 * erfc(-z / np.sqrt(2.0))
+
+
+def _integral(z):
+    return z * _phi(z) + norm.pdf(z)
+
+
+def _side(mixture: Mixture, force, share):
+    """Return the share on the side where it is the smaller, and the density."""
+    upper = share > 0.5
+    flipped = jnp.where(upper, -1.0, 1.0)[..., None]
+
+    def tail(at):
+        return mixture._share(flipped * (at[..., None] - mixture.mean))
+
+    value, slope = jax.jvp(tail, (force,), (jnp.ones_like(force),))
+    return value, jnp.maximum(jnp.abs(slope), 1e-300)
+
+
+def _solve(mixture: Mixture, share):
+    sd = jnp.maximum(mixture.sd, _LEAST_SD)
+    score = ndtri(share)
+    # The quantile of a mixture lies among those of its components.
+    each = mixture.mean + score[..., None] * sd
+    counts, half = mixture.weight > 0.0, 0.5 * mixture.step
+    low = jnp.min(jnp.where(counts, each, np.inf), axis=-1) - half
+    high = jnp.max(jnp.where(counts, each, -np.inf), axis=-1) + half
+    close = _CLOSE * jnp.min(sd, axis=-1)
+    centre = mixture.centre()
+    moment = mixture.weight * (sd**2 + (mixture.mean - centre[..., None]) ** 2)
+    spread = jnp.sqrt(jnp.sum(moment, axis=-1) + mixture.step**2 / 12.0)
+    tail_score = -jnp.abs(score)
+
+    def step(state):
+        low, high, place, _, count = state
+        tail, density = _side(mixture, place, share)
+        # A nearly normal mixture is nearly straight in its scores.
+        found = ndtri(jnp.clip(tail, 1e-300, 1.0 - 1e-16))
+        miss = jnp.where(share > 0.5, tail_score - found, found - tail_score)
+        short = miss < 0.0
+        low, high = jnp.where(short, place, low), jnp.where(short, high, place)
+        new = place - miss * norm.pdf(found) / density
+        new = jnp.where((new > low) & (new < high), new, 0.5 * (low + high))
+        moved = jnp.max(jnp.minimum(jnp.abs(new - place), high - low) / close)
+        return low, high, new, moved, count + 1
+
+    def going(state):
+        *_, moved, count = state
+        return (moved > 1.0) & (count < _MOST_STEPS)
+
+    place = jnp.clip(centre + score * spread, low, high)
+    start = low - close, high + close, place, jnp.asarray(np.inf), 0
+    return jax.lax.while_loop(going, step, start)[2]
+
+
+def pooled(parts: Sequence[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
+    """Return the mixture over draws, each with its weight: the predictive law.
+
+    Args:
+        parts: weights of the draws, and their mixtures with one batch axis.
+    """
+    weights, means, sds = [], [], []
+    for share, part in parts:
+        shape = part.mean.shape
+        weights.append((share[:, None] * jnp.broadcast_to(part.weight, shape)).ravel())
+        means.append(part.mean.ravel())
+        sds.append(jnp.broadcast_to(part.sd, shape).ravel())
+    first = parts[0][1]
+    weight, mean, sd = map(jnp.concatenate, (weights, means, sds))
+    return Mixture(weight, mean, sd, first.step, first.rounded)
+
+
+def weighted_quantile(
+    values: np.ndarray, weights: np.ndarray, share: float
+) -> tuple[float, np.ndarray]:
+    """Return a quantile over draws, and how much of each draw is in it.
+
+    Args:
+        values: shape (d,).
+        weights: of the draws, shape (d,).
+        share: of the weight below.
+
+    Returns:
+        The quantile between two neighbouring draws, and weights with Σ = 1 that
+        give it from the values; also the derivative of it by each value.
+    """
+    order = np.argsort(values, kind="stable")
+    sorted_weights = weights[order]
+    places = (np.cumsum(sorted_weights) - 0.5 * sorted_weights) / np.sum(weights)
+    upper = int(np.clip(np.searchsorted(places, share), 1, len(values) - 1))
+    span = places[upper] - places[upper - 1]
+    part = np.clip((share - places[upper - 1]) / span, 0.0, 1.0)
+    used = np.zeros(len(values))
+    used[order[upper]] += part
+    used[order[upper - 1]] += 1.0 - part
+    chosen = used > 0.0
+    return float(used[chosen] @ values[chosen]), used

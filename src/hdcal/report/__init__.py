@@ -1,0 +1,1 @@
+"""How every answer is shown: page, terminal, JSON and result folder."""

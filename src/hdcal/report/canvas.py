@@ -1,0 +1,131 @@
+"""How every figure looks, and how it becomes a file."""
+
+import io
+import logging
+import math
+import warnings
+from functools import cache
+from typing import Any, Literal
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.font_manager import fontManager
+
+from hdcal.report.plain import printable
+
+# Okabe and Ito's colours, told apart by every kind of colour vision.
+BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#E69F00", "#009E73", "#CC79A7"
+GREY, DARK, RED = "#8a8a8a", "#222222", "#b00020"
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#D55E00")
+FAILED = "FAILED — do not use"
+_MARK_LENGTH = 7.1
+# More points than this tell the eye nothing and make files of many megabytes.
+MOST_POINTS = 4000
+
+# Where installed, these write what the default font lacks, such as Chinese.
+_FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
+_STYLE: dict[Any, Any] = {
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-5, 7),
+    "axes.edgecolor": "#555555",
+    "axes.grid": True,
+    "axes.labelsize": 10,
+    "axes.spines.right": False,
+    "axes.spines.top": False,
+    "axes.titlesize": 10,
+    "axes.unicode_minus": True,
+    "figure.facecolor": "white",
+    "font.size": 9.5,
+    "grid.color": "#e6e6e6",
+    "grid.linewidth": 0.8,
+    "hatch.linewidth": 0.6,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "path.simplify": True,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "hdcal",
+    "text.usetex": False,
+}
+
+
+def style():
+    """Return a context in which figures are drawn and rendered."""
+    return mpl.rc_context({**_STYLE, "font.family": _families()})
+
+
+@cache
+def _families() -> list[str]:
+    installed = {font.name for font in fontManager.ttflist}
+    return ["DejaVu Sans", *(name for name in _FONTS if name in installed)]
+
+
+def plain(text: str, length: int = 80) -> str:
+    """Return a text from a file as one that matplotlib takes literally."""
+    shown = printable(text)
+    if len(shown) > length:
+        shown = shown[: length - 1] + "…"
+    # An even number of dollar signs would start a formula.
+    return shown.replace("$", r"\$")
+
+
+def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> bytes:
+    """Return a figure as the bytes of a file; the same figure, the same bytes."""
+    target = io.BytesIO()
+    metadata: dict[str, Any] = {"Title": printable(title)} if title else {}
+    if kind == "svg":
+        metadata["Date"] = None
+    level = logging.getLogger("matplotlib").level
+    with style(), warnings.catch_warnings():
+        # A name may hold letters that no font here has: they become boxes.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        logging.getLogger("matplotlib").setLevel(logging.ERROR)
+        try:
+            figure.savefig(target, format=kind, dpi=160, metadata=metadata)
+        finally:
+            logging.getLogger("matplotlib").setLevel(level)
+    return target.getvalue()
+
+
+def watermark(figure: Figure) -> None:
+    """Write across a figure that its result must not be used."""
+    # The words are some 7 inches long and half an inch high: all of them must show.
+    rise = (0.95 * figure.get_figheight() - 0.6) / _MARK_LENGTH
+    lean = min(28.0, math.degrees(math.asin(min(max(rise, 0.0), 1.0))))
+    figure.text(
+        0.5,
+        0.5,
+        FAILED,
+        color=RED,
+        alpha=0.35,
+        fontsize=44,
+        fontweight="bold",
+        rotation=lean,
+        ha="center",
+        va="center",
+        zorder=100,
+    )
+
+
+def heading(axes: Axes, text: str) -> None:
+    """Write a small heading above a panel, at its left edge."""
+    axes.set_title(text, loc="left", fontweight="bold", color=DARK)
+
+
+def thinned(size: int) -> np.ndarray:
+    """Return the rows to draw: all of them, or an even-handed choice, in order."""
+    if size <= MOST_POINTS:
+        return np.arange(size)
+    chosen = np.random.default_rng(0).choice(size, MOST_POINTS, replace=False)
+    return np.sort(chosen)
+
+
+def temperature_colours(levels: np.ndarray) -> list[str]:
+    """Return one colour per temperature, cold to hot; a single one is blue."""
+    if len(levels) == 1:
+        return [BLUE]
+    # Both ends of the map are too near to black and to white.
+    places = np.interp(levels, [np.min(levels), np.max(levels)], [0.12, 0.86])
+    return [to_hex(colour) for colour in mpl.colormaps["plasma"](places)]

@@ -1,0 +1,26 @@
+"""Columns as the text of a CSV file."""
+
+import csv
+import io
+from collections.abc import Mapping
+
+import numpy as np
+
+
+def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
+    """Return columns as the text of a CSV file."""
+    target = io.StringIO()
+    writer = csv.writer(target, lineterminator="\n")
+    writer.writerow(columns)
+    texts = [[_cell(value) for value in column.tolist()] for column in columns.values()]
+    writer.writerows(zip(*texts, strict=True))
+    return target.getvalue()
+
+
+def _cell(value) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        # A millionth of a newton is far below any reading.
+        return "" if value != value else f"{value:.9g}"
+    return str(value)

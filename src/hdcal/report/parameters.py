@@ -1,0 +1,121 @@
+"""Parameters of a posterior, with their intervals, in the units of people."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.posterior import Posterior
+from hdcal.physics.effect import parameters
+
+INTERVAL = 0.95
+
+
+# Name -> (unit for people, factor from code units).
+UNITS: dict[str, tuple[str, float]] = {
+    "K": ("1", 1.0),
+    "E0": ("GPa", 1e-3),
+    "alpha": ("1/K", 1.0),
+    "force_offset": ("N", 1.0),
+    "deformation_offset": ("mm", 1.0),
+    "sigma": ("N", 1.0),
+    "run_offset_sd": ("N", 1.0),
+    "specimen_sd": ("1", 1.0),
+    "gap_sd": ("N", 1.0),
+    "gap_length": ("1", 1.0),
+    "mass": ("kg", 1e3),
+    "damping_ratio": ("1", 1.0),
+    "initial_deformation": ("mm", 1.0),
+    "initial_velocity": ("mm/s", 1.0),
+    "deformation_sigma": ("mm", 1.0),
+}
+
+
+def interval(values: np.ndarray) -> dict[str, float]:
+    """Return median and equal-tailed 95 % credible interval."""
+    tail = (1.0 - INTERVAL) / 2.0
+    lo, median, hi = np.quantile(values, [tail, 0.5, 1.0 - tail])
+    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
+
+
+def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
+    """Return the unit in which a parameter is shown, and its factor."""
+    if name in UNITS:
+        return UNITS[name]
+    effect_name, field = name.split(".")
+    effect = next(e for e in posterior.effects if e.name == effect_name)
+    return parameters(effect)[field].unit, 1.0
+
+
+def parameter_entry(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:
+    """Return a parameter as an entry of a summary; fixed ones have no diagnosis."""
+    unit, factor = unit_of(posterior, name)
+    entry = {"unit": unit, **interval(posterior.draws[name] * factor)}
+    if found is None:  # fixed by the gear file
+        return {
+            **entry,
+            "rhat": None,
+            "ess_bulk": None,
+            "ess_tail": None,
+            "driven_by": "prior",
+            "contraction": 0.0,
+        }
+    numbers = {name: _finite(value) for name, value in vars(found).items()}
+    return {**entry, **numbers}
+
+
+def _finite(value):
+    # JSON has no NaN: a statistic that could not be computed is null.
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def flat_directions(posterior: Posterior) -> list[str]:
+    """Return the sentences about what the data cannot tell apart."""
+    return [check.words for check in posterior.checks if check.outcome == "note"]
+
+
+def parameter_entries(posterior: Posterior) -> dict[str, dict]:
+    """Return every parameter's entry by name, those that were fixed last."""
+    names = [*posterior.diagnoses]
+    names += [n for n in posterior.priors if n in posterior.draws and n not in names]
+    return {
+        name: parameter_entry(posterior, name, posterior.diagnoses.get(name))
+        for name in names
+    }
+
+
+def warnings_of(posterior: Posterior) -> list[str]:
+    """Return the warnings of the checks as sentences."""
+    return [
+        check.words[:1].upper() + check.words[1:]
+        for check in posterior.checks
+        if check.outcome == "warning"
+    ]
+
+
+def sampling_entry(posterior: Posterior) -> dict:
+    """Return how the draws were come by."""
+    stats = posterior.tree["sample_stats"].to_dataset()
+    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
+    settings = {name: posterior.settings[name] for name in names}
+    return settings | {"divergences": int(stats["diverging"].sum())}
+
+
+def data_entry(posterior: Posterior) -> dict:
+    """Return which data it was."""
+    case = posterior.case
+    return {
+        "name": case.name,
+        "rows": len(case.records.force),
+        "sha256": case.data_sha256,
+        "notes": list(case.notes),
+    }
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An equal-tailed interval with its median; which probability, says its owner."""
+
+    median: float
+    lo: float
+    hi: float

@@ -1,0 +1,143 @@
+"""Numbers, priors and names in the form in which people read them."""
+
+import math
+
+from hdcal.data.prior import FAMILIES, Prior
+from hdcal.report.parameters import UNITS
+
+LABELS = {
+    "K": "influence coefficient K",
+    "E0": "Young's modulus E₀",
+    "alpha": "loss of modulus per kelvin α",
+    "force_offset": "force offset b",
+    "deformation_offset": "deformation offset ω₀",
+    "sigma": "reading noise σ",
+    "run_offset_sd": "spread of zeros between runs",
+    "specimen_sd": "spread of stiffness between gears",
+    "gap_sd": "size of the leftover discrepancy",
+    "gap_length": "length of the leftover discrepancy",
+    "mass": "moved mass m",
+    "damping_ratio": "damping ratio ζ",
+    "initial_deformation": "deformation at the first row",
+    "initial_velocity": "speed at the first row",
+    "deformation_sigma": "noise of the deformation reading",
+}
+_FAMILY_WORDS = {
+    "fixed": "exactly {0}",
+    "normal": "{0} ± {1}",
+    "lognormal": "{0}, a factor of {1} either way",
+    "half_normal": "0 to about {0}",
+    "uniform": "anything from {0} to {1}",
+    "beta": "beta({0}, {1})",
+}
+# Those of the families' numbers that carry no unit.
+_PURE = {"log_sd", "a", "b"}
+
+
+def number(value: float | None, width: float | None = None) -> str:
+    """Return a number with the digits that its uncertainty leaves meaningful.
+
+    Args:
+        value: what to write; None is a dash.
+        width: its interval's width; three digits of it are kept.
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    if not width or not math.isfinite(width):
+        return f"{value:.4g}"
+    place = _place(width)
+    if abs(value) >= 1e6 or place < -8:
+        digits = max(2, _place(value) - place + 2)
+        return f"{value:.{digits}e}"
+    return f"{value:.{max(0, 2 - place)}f}"
+
+
+def _place(value: float) -> int:
+    """Return the power of ten of a number's first digit."""
+    return math.floor(math.log10(abs(value))) if value else 0
+
+
+def estimate(entry: dict) -> tuple[str, str]:
+    """Return median and interval of a summary entry as two texts."""
+    lo, hi = entry["lo"], entry["hi"]
+    width = None if lo is None or hi is None else hi - lo
+    span = f"{number(lo, width)} … {number(hi, width)}"
+    return number(entry["median"], width), span
+
+
+def unit(name: str) -> str:
+    """Return a unit as it is written behind a number."""
+    return {"1": "", "degC": "°C", "C": "°C"}.get(name, name)
+
+
+def with_unit(text: str, name: str) -> str:
+    """Return a number's text with its unit behind it."""
+    return f"{text} {unit(name)}".rstrip()
+
+
+def prior_words(name: str, prior: Prior) -> str:
+    """Return a prior in words, in the units of the summary."""
+    shown, factor = UNITS.get(name, (prior.unit, 1.0))
+    texts = []
+    for part, value in zip(FAMILIES[prior.family], prior.numbers, strict=True):
+        plain = float(value) * (1.0 if part in _PURE else factor)
+        if part == "log_sd":
+            plain = math.exp(plain)
+        texts.append(f"{plain:.3g}" if part == "log_sd" else f"{plain:.4g}")
+    return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
+
+
+def label(name: str) -> str:
+    """Return what a parameter is called on paper."""
+    effect, dot, parameter = name.partition(".")
+    if dot:
+        return f"{effect}: {parameter}".replace("_", " ")
+    return LABELS.get(name, name.replace("_", " "))
+
+
+_HYPOTHESES = {"none": "no gap", "unknown": "something outside the library"}
+
+
+def hypothesis(name: str) -> str:
+    """Return a hypothesis as people say it: `a+b` is a and b."""
+    return " and ".join(_HYPOTHESES.get(part, label(part)) for part in name.split("+"))
+
+
+def likely(probabilities: dict[str, float], share: float = 0.9) -> list[str]:
+    """Return the fewest hypotheses that hold a share of the probability."""
+    ranked = sorted(probabilities, key=lambda name: -(probabilities[name] or 0.0))
+    total, chosen = 0.0, []
+    for name in ranked:
+        if total >= share:
+            break
+        total += probabilities[name] or 0.0
+        chosen.append(name)
+    return chosen
+
+
+def percent(share: float | None) -> str:
+    """Return a share or probability; never a certainty that nobody has."""
+    if share is None:
+        return "–"
+    if 0.995 <= share < 1.0 + 1e-9:
+        return "> 99 %"
+    if 0.0 <= share < 0.005:
+        return "< 1 %"
+    return f"{round(100.0 * share)} %"
+
+
+def percent_span(entry: dict) -> str:
+    """Return a share with its interval."""
+    low, high = entry["lo"], entry["hi"]
+    if low is None or high is None:
+        return percent(entry["median"])
+    ends = f"{percent(low).removesuffix(' %')} … {percent(high)}"
+    return f"{percent(entry['median'])} ({ends})"
+
+
+def newton(value: float | None) -> str:
+    """Return a force with two digits, or all those before the point."""
+    if value is None:
+        return "– N"
+    rounded = float(f"{value:.2g}")
+    return f"{value:.0f} N" if abs(rounded) >= 10.0 else f"{rounded:g} N"

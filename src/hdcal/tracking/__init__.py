@@ -1,0 +1,1 @@
+"""Is the stiffness changing, reading by reading?"""

@@ -1,0 +1,76 @@
+"""Readings as JSON lines in, answers as JSON lines out, one for each."""
+
+import json
+from collections.abc import Iterator
+from typing import Any, BinaryIO
+
+from hdcal.tracking.tracker import SCHEMA, Tracker
+
+# A longer line is no reading; the rest of it is thrown away unread.
+_LONGEST = 1 << 16
+_NUMBERS = {"deformation_mm": "deformation", "force_N": "force"}
+_OPTIONAL = {"temperature_C": "temperature", "time_s": "time"}
+
+
+def answers(tracker: Tracker, lines: BinaryIO) -> Iterator[dict]:
+    """Yield the answer to every line that is not blank, good or bad.
+
+    A bad line is answered by what is wrong with it; nothing is learned from it, and
+    the stream goes on. Rows count all lines that are answered.
+
+    Args:
+        tracker: that takes the readings.
+        lines: JSON objects with `deformation_mm` and `force_N`, and where known
+            `temperature_C`, `time_s` and `run`.
+    """
+    for line in _lines(lines):
+        try:
+            yield tracker.update(**read_line(line))
+        except ValueError as error:
+            found = {"schema": SCHEMA, "status": "error", "row": tracker.skip()}
+            yield {**found, "error": str(error)}
+
+
+def read_line(line: bytes) -> dict[str, Any]:
+    """Return the arguments of `Tracker.update` from a line.
+
+    Raises:
+        ValueError: it is no JSON object with the numbers of a reading.
+    """
+    if len(line) > _LONGEST:
+        raise ValueError(f"the line is longer than {_LONGEST} bytes")
+    try:
+        plain = json.loads(line)
+    except (ValueError, RecursionError):
+        raise ValueError("the line is no JSON") from None
+    if not isinstance(plain, dict):
+        raise ValueError('the line is no object such as {"deformation_mm": 0.1, …}')
+    missing = [name for name in _NUMBERS if plain.get(name) is None]
+    if missing:
+        raise ValueError(f"{' and '.join(missing)} missing")
+    found: dict[str, Any] = {}
+    for name, argument in (_NUMBERS | _OPTIONAL).items():
+        value = plain.get(name)
+        if value is None:
+            continue
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ValueError(f"{name} is no number")
+        try:
+            found[argument] = float(value)
+        except OverflowError:
+            raise ValueError(f"{name} is too large") from None
+    run = plain.get("run")
+    if run is not None:
+        if not isinstance(run, str | int) or isinstance(run, bool):
+            raise ValueError("run is no label")
+        found["run"] = str(run)
+    return found
+
+
+def _lines(stream: BinaryIO) -> Iterator[bytes]:
+    while line := stream.readline(_LONGEST + 1):
+        rest = line
+        while len(rest) > _LONGEST and not rest.endswith(b"\n"):
+            rest = stream.readline(_LONGEST + 1)
+        if line.strip():
+            yield line

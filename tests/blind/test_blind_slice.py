@@ -1,0 +1,45 @@
+"""A small seeded slice of the blind check: hdcal beats those who know less."""
+
+import numpy as np
+import pytest
+
+from hdcal.blind.answer import answer_set
+from hdcal.blind.open import open_set
+from hdcal.blind.sealed_set import write_set
+from hdcal.blind.virtual_rig.mixes import GEAR_TOML, draw_cases
+from hdcal.physics.registry import EFFECTS
+
+# Cases of every size, drawn as the diagnosis expects; enough for scores, not for rates.
+CASES, SEED = 16, 20
+
+
+@pytest.fixture(scope="module")
+def scores(tmp_path_factory) -> dict:
+    folder = tmp_path_factory.mktemp("slice") / "set"
+    key = folder.with_suffix(".key")
+    drawn = draw_cases("prior", CASES, SEED)
+    write_set(folder, drawn, GEAR_TOML, key, mix="prior", seed=SEED)
+    for name in ("hdcal", "bic", "r2", "none"):
+        answer_set(folder, by=name)
+    return open_set(folder, key).result["scores"]
+
+
+def guess(label) -> float:
+    """Return the log score of who only knows how cases are drawn."""
+    many = len(EFFECTS)
+    chance = {"null": 0.5, "outside": 0.1, "effect": 0.37 / many}
+    return np.log(chance.get(label.kind, 0.03 * 2.0 / many**2))
+
+
+def test_its_log_score_is_best(scores):
+    """Better than the rivals', and than knowing how the cases were drawn."""
+    found = {name: each["value"] for name, each in scores["log_score"].items()}
+    assert max(found, key=lambda name: found[name]) == "hdcal"
+    known = [guess(label) for _, label in draw_cases("prior", CASES, SEED)]
+    assert found["hdcal"] > np.mean(known) + 0.5
+
+
+def test_it_names_nothing_where_nothing_is(scores):
+    rows = {row["key"]: row for row in scores["bar"]}
+    assert rows["named_on_null"]["n"] >= 4
+    assert rows["named_on_null"]["value"] == 0.0

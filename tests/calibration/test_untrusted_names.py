@@ -1,0 +1,93 @@
+"""A name from a file is only text, in the page and in the figures."""
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from markupsafe import escape
+
+from hdcal.calibration.document import calibration_report
+from hdcal.calibration.figure.bands import calibration_figure
+from hdcal.calibration.figure.residuals import residual_figure
+from hdcal.calibration.summary import summarise
+from hdcal.data.prior import Prior
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.residuals import residuals
+from hdcal.prediction.bands.bands import default_bands
+from hdcal.report.canvas import render
+from hdcal.report.draws_figure import prior_figure, sampler_figure
+from hdcal.report.plain import as_json
+
+NAMES = [
+    "<script>alert(1)</script>",
+    "\"><img src=x onerror='alert(1)'>",
+    "]]></title>&amp;--><!--",
+    "$x^{$ \\frac{1}",
+    "a\x00b\x1b[31m\x07\u202e",
+    "谐波减速器 🦾",
+    "{{ 7 * 7 }}{% raw %}",
+    "n" * 200,
+]
+
+
+@pytest.fixture(scope="module")
+def posterior(calibrated) -> Posterior:
+    """The posterior of a result folder, read back."""
+    return Posterior.load(calibrated[1])
+
+
+def renamed(posterior: Posterior, name: str) -> Posterior:
+    """Return the posterior with a name in every place that a file can name."""
+    case = posterior.case
+    gear = replace(case.gear, name=name, material=name)
+    case = replace(case, name=name, gear=gear, notes=(name,), run_labels=(name,))
+    old = posterior.priors["K"]
+    prior = Prior(old.family, old.numbers, old.unit, name)
+    return replace(posterior, case=case, priors={**posterior.priors, "K": prior})
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_only_text(name: str, posterior: Posterior):
+    posterior = renamed(posterior, name)
+    left = residuals(posterior)
+    drawn = {
+        "calibration": calibration_figure(posterior, default_bands(posterior), left),
+        "residuals": residual_figure(posterior, left),
+        "priors": prior_figure(posterior),
+        "sampler": sampler_figure(posterior),
+    }
+    images = {}
+    for what, figure in drawn.items():
+        images[what] = render(figure, "svg", name)
+        tree = ElementTree.fromstring(images[what])
+        tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
+        assert not tags & {"script", "img", "foreignObject", "a"}
+        render(figure, "png", name)
+    page = calibration_report(posterior, summarise(posterior, left), images, name)
+    assert "<script" not in page and "<img src=x" not in page and "<!--" not in page
+    assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
+    assert page.count("<title>") == page.count("</title>") == 1
+    as_json(summarise(posterior, left))
+
+
+def test_the_same_draws_give_the_same_bytes(posterior: Posterior):
+    left, bands = residuals(posterior), default_bands(posterior)
+
+    def draw(kind):
+        figure = calibration_figure(posterior, bands, left)
+        return render(figure, kind, "title")
+
+    assert draw("svg") == draw("svg")
+    assert draw("png") == draw("png")
+
+
+def test_the_data_of_the_report_are_those_of_the_case(
+    posterior: Posterior, calibrated: tuple[object, Path]
+):
+    page = (calibrated[1] / "report.html").read_text("utf-8")
+    assert posterior.case.data_sha256 in page
+    assert posterior.case.gear.name in page
+    shown = [p for name, p in posterior.priors.items() if name in posterior.draws]
+    for prior in shown:
+        assert str(escape(prior.source)) in page

@@ -1,0 +1,195 @@
+"""Everything that is wrong is said at once, in words, with the right exit code."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from commands import MAIN, XB1, Hdcal
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        ["calibrate", "--help"],
+        ["predict", "-h"],
+        ["respond", "-h"],
+        ["effects", "-h"],
+        ["diagnose", "-h"],
+        ["fit", "-h"],
+        ["audit", "-h"],
+        ["track", "-h"],
+        ["blind", "-h"],
+        ["blind", "make", "-h"],
+        ["blind", "answer", "-h"],
+        ["blind", "open", "-h"],
+    ],
+)
+def test_help_is_given_without_heavy_imports(arguments):
+    script = (
+        "import atexit, sys; from hdcal.__main__ import main;"
+        "heavy = {'jax', 'numpy', 'pandas', 'matplotlib', 'rich', 'jinja2'};"
+        "atexit.register(lambda: print('loaded', *sorted(heavy & sys.modules.keys())));"
+        "main()"
+    )
+    command = [sys.executable, "-c", script, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.startswith("Usage: hdcal")
+    assert done.stdout.splitlines()[-1] == "loaded"
+
+
+def test_the_version_is_that_of_the_package(hdcal: Hdcal):
+    from importlib.metadata import version
+
+    assert hdcal("--version").stdout == f"hdcal {version('hdcal')}\n"
+
+
+def test_effects_lists_the_whole_library(here: Hdcal):
+    from hdcal.physics.registry import EFFECTS
+
+    done = here("effects", "--json")
+    listed = json.loads(done.stdout)["effects"]
+    assert [effect["name"] for effect in listed] == list(EFFECTS)
+    assert all(p["unit"] and p["meaning"] for e in listed for p in e["parameters"])
+    words = here("effects").stdout
+    assert all(name in words for name in EFFECTS)
+
+
+def test_check_says_what_was_read(here: Hdcal):
+    done = here("check", XB1, "--json")
+    found = json.loads(done.stdout)
+    assert done.returncode == 0
+    assert found["data"]["rows"] == 14
+    assert found["data"]["direction"] == {"loading": 14, "holding": 0, "unloading": 0}
+    assert found["effects"]["not_testable"]["coulomb_friction"] == ["unloading"]
+    words = here("check", XB1).stdout
+    assert "14 loading" in words and "0.02 … 0.54 mm" in words
+
+
+def test_bad_input_gives_every_finding_and_no_traceback(here: Hdcal, case: Path):
+    rows = (case / "data.csv").read_text().splitlines()
+    rows[3], rows[5] = "0.1,many", "inf,23.52"
+    (case / "data.csv").write_text("\n".join(rows))
+    gear = (case / "gear.toml").read_text().replace("radius_mm", "radius_m")
+    (case / "gear.toml").write_text(gear)
+    before = set(case.parent.rglob("*"))
+    for command in ("check", "calibrate"):
+        done = here(command, case)
+        assert done.returncode == 2
+        assert done.stdout == ""
+        lines = done.stderr.splitlines()
+        assert all(line.startswith("hdcal: ") for line in lines)
+        assert any("row 4" in line and "data.csv" in line for line in lines)
+        assert any("row 6" in line for line in lines)
+        assert any("radius_mm" in line for line in lines)
+    assert set(case.parent.rglob("*")) == before
+
+
+def test_findings_come_as_json_too(hdcal: Hdcal, tmp_path: Path):
+    # In a process of its own: nothing of any library may get between.
+    done = hdcal("check", tmp_path / "none.csv", "--json")
+    said = json.loads(done.stdout)
+    assert done.returncode == 2
+    assert said["status"] == "error"
+    keys = {"file", "row", "column", "problem", "remedy"}
+    assert said["findings"] and all(f.keys() == keys for f in said["findings"])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["calibrat"],
+        ["calibrate"],
+        ["calibrate", XB1, "--chains", "many"],
+        ["calibrate", XB1, "--draws", "0"],
+        ["calibrate", XB1, "--seed", "-1"],
+        ["calibrate", XB1, "--theory", "rings"],
+        ["calibrate", XB1, "--chains", "1"],
+        ["calibrate", XB1, "--column", "force"],
+        ["calibrate", XB1, "--column", "force=a[N]", "--column", "force=b[N]"],
+        ["calibrate", XB1, "--effect", "coulomb_friction"],
+        ["diagnose"],
+        ["diagnose", XB1, "--jobs", "0"],
+        ["diagnose", XB1, "--seed", "x"],
+        ["predict", XB1],
+        ["predict", XB1, "--deformation", "0:1"],
+        ["predict", XB1, "--deformation", "0:1:0"],
+        ["predict", XB1, "--deformation", "0:1:1000000000"],
+        ["predict", XB1, "--deformation", "nan"],
+        ["predict", XB1, "--deformation", "0.1", "--temperature", "warm"],
+        ["predict", XB1, "--deformation", "0.1"],
+        ["predict", XB1 / "data.csv", "--deformation", "0.1"],
+    ],
+)
+def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Path):
+    done = here(*arguments)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr and not done.stdout
+    assert not any(tmp_path.iterdir())
+    as_json = here(*arguments, "--json")
+    assert as_json.returncode == 2
+    assert json.loads(as_json.stdout)["status"] == "error"
+
+
+def test_an_unknown_effect_is_told_its_nearest(here: Hdcal, tmp_path: Path):
+    done = here("calibrate", XB1, "--effect", "outlier")
+    assert done.returncode == 2
+    assert "did you mean 'outliers'?" in done.stderr.lower()
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_result_that_cannot_be_written_is_refused_at_once(
+    here: Hdcal, tmp_path: Path
+):
+    (tmp_path / "file").write_text("mine")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "notes.txt").write_text("mine")
+    for out in ("file", "file/run", "folder", "none/run", "x" * 300, ""):
+        # Far too many draws to finish: the refusal has to come before them.
+        many = ["--draws", "1000000", "--out", out, "--force"]
+        done = here("calibrate", XB1, *many)
+        assert done.returncode == 2, out
+        assert len(done.stderr.splitlines()) == 1
+    assert sorted(p.name for p in tmp_path.rglob("*")) == [
+        "file",
+        "folder",
+        "notes.txt",
+    ]
+
+
+def test_a_text_from_a_file_cannot_steer_the_terminal(here: Hdcal, case: Path):
+    gear = (case / "gear.toml").read_text()
+    (case / "gear.toml").write_text(gear.replace("XB1-100-80", r"XB1\u001b[31m\u202e"))
+    done = here("check", case)
+    assert done.returncode == 0
+    assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
+
+
+def test_a_reader_that_goes_away_is_no_error():
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([*MAIN, "effects"], stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_a_defect_of_hdcal_is_one_line():
+    script = (
+        "import hdcal.data.reading as r; from hdcal.__main__ import main\n"
+        "def broken(*_, **__): raise ValueError('one\\ntwo')\n"
+        "r.read_case = broken; main()"
+    )
+    command = [sys.executable, "-c", script, "check", str(XB1)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert "internal error (ValueError: one two); please report it" in done.stderr
+    environment = {**os.environ, "HDCAL_DEBUG": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert "Traceback" in done.stderr

@@ -1,0 +1,197 @@
+"""A bad table is refused with every finding at its row and column."""
+
+import pytest
+
+from hdcal.data.reading import read_case
+from hdcal.data.source_bytes import LONGEST_LINE
+from hdcal.errors import InputError
+
+H = "deformation_mm,force_N\n"
+GOOD = "0,0\n.1,2\n.2,4\n.3,6\n.4,8\n.5,10\n"
+T = "deformation_mm,force_N,time_s\n"
+FIVE = "0,0,{}\n1,1,{}\n2,2,{}\n3,3,{}\n4,4,{}\n"
+R = "deformation_mm,force_N,run\n"
+
+
+def timed(*times):
+    return T + FIVE.format(*times)
+
+
+# content, (row, column, words) of every finding
+CASES = {
+    "empty": ("", [(None, None, "empty")]),
+    "only blanks": ("\n \n\t\n", [(None, None, "empty")]),
+    "only a header": (H, [(None, None, "0 rows")]),
+    "four rows": (H + "0,0\n1,1\n2,2\n3,3\n", [(None, None, "4 rows")]),
+    "no header": (GOOD, [(1, None, "headers should be")]),
+    "no force": ("deformation_mm\n0\n1\n2\n3\n4\n", [(1, "force", "no column")]),
+    "neither": ("a,b\n" + GOOD, [(1, "deformation", "no c"), (1, "force", "no c")]),
+    "unit unknown": ("deformation_mm,force_psi\n" + GOOD, [(1, "force_psi", "psi")]),
+    "unit missing": ("deformation_mm,force\n" + GOOD, [(1, "force", "no unit")]),
+    "unit case": (
+        "deformation_MM,force_N\n" + GOOD,
+        [(1, "deformation_MM", "mean mm")],
+    ),
+    "optional unit": (
+        "deformation_mm,force_N,temperature_X\n" + FIVE.format(*"12345"),
+        [(1, "temperature_X", "unknown unit")],
+    ),
+    "two forces": (
+        "deformation_mm,force_N,force_kN\n" + FIVE.format(*"12345"),
+        [(1, "force_kN", "two columns")],
+    ),
+    "duplicate header": (
+        "deformation_mm,force_N,force_N\n" + FIVE.format(*"12345"),
+        [(1, "force_N", "two columns")],
+    ),
+    "word": (H + GOOD.replace("4\n", "four\n"), [(4, "force_N", "'four'")]),
+    "bool": (H + GOOD.replace("4\n", "True\n"), [(4, "force_N", "not a number")]),
+    "hex": (H + GOOD.replace("4\n", "0x10\n"), [(4, "force_N", "not a number")]),
+    "underscore": (H + GOOD.replace("4\n", "1_0\n"), [(4, "force_N", "not a number")]),
+    "escape": (H + GOOD.replace("4\n", "\x1b[2J\n"), [(4, "force_N", "not a number")]),
+    "nan": (H + GOOD.replace("4\n", "nan\n"), [(4, "force_N", "not a finite")]),
+    "NA": (H + GOOD.replace("4\n", "NA\n"), [(4, "force_N", "'NA'")]),
+    "inf": (H + GOOD.replace("4\n", "-inf\n"), [(4, "force_N", "not a finite")]),
+    "overflow": (H + GOOD.replace("4\n", "1e999\n"), [(4, "force_N", "too large")]),
+    "enormous": (H + GOOD.replace("4\n", "1e200\n"), [(4, "force_N", "beyond any")]),
+    "cell empty": (H + GOOD.replace(".2,4", ".2,"), [(4, "force_N", "empty")]),
+    "too few cells": (H + GOOD.replace(".2,4", ".2"), [(4, None, "1 cells")]),
+    "too many cells": (H + GOOD.replace(".2,4", ".2,4,5"), [(4, None, "3 cells")]),
+    "decimal comma": (
+        H + GOOD.replace(".2,4", "0,2,4,0"),
+        [(4, None, "semicolons")],
+    ),
+    "mixed decimals": (
+        "deformation_mm;force_N\n0,0;0\n0,1;1,5\n0,2;2.5\n0,3;3\n0,4;4\n",
+        [(4, "force_N", "decimal point among")],
+    ),
+    "open quote": (H + GOOD.replace(".2,4", '".2,4'), [(4, None, "not closed")]),
+    "open header": ('"deformation_mm,force_N\n' + GOOD, [(1, None, "not closed")]),
+    "constant": (H + "1,1\n" * 5, [(None, "deformation_mm", "constant")]),
+    "time back": (timed(0, 1, 2, 1, 3), [(5, "time_s", "goes back")]),
+    "time back in a run": (
+        T.replace("\n", ",run\n") + "0,0,0,a\n1,1,5,a\n2,2,0,b\n3,3,6,b\n4,4,4,a\n",
+        [(6, "time_s", "goes back")],
+    ),
+    "too cold": (
+        timed(20, 20, -300, 20, 20).replace("time_s", "temperature_C"),
+        [(4, "temperature_C", "absolute zero")],
+    ),
+    "too cold in kelvin": (
+        timed(20, 20, -1, 20, 20).replace("time_s", "temperature_K"),
+        [(4, "temperature_K", "absolute zero")],
+    ),
+    "negative sd": (
+        timed(1, 1, -1, 1, 1).replace("time_s", "force_sd_N"),
+        [(4, "force_sd_N", "negative")],
+    ),
+    "empty label": (
+        R + FIVE.format("a", "a", " ", "b", "b"),
+        [(4, "run", "label is empty")],
+    ),
+    "unit slip": (H + GOOD.replace(".5", "500"), [(7, "deformation_mm", "radius")]),
+    "NUL": (H.encode() + b"0,0\n\0\1\n", [(None, None, "binary")]),
+    "png": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", [(None, None, "binary")]),
+    "workbook": (b"PK\x03\x04junk", [(None, None, "workbook")]),
+    "latin-1": ((H + GOOD).encode() + b"\xb5,1\n", [(8, None, "UTF-8")]),
+    "half UTF-16": (b"\xff\xfea\0b", [(None, None, "UTF-16")]),
+    "long line": (
+        H.encode() + b"1" * (LONGEST_LINE + 300_000),
+        [(2, None, "1 MiB")],
+    ),
+    "long cell": (H + GOOD + "9" * 200_000 + ",1\n", [(8, "deformation_mm", "large")]),
+    "five at once": (
+        "deformation_mm,force_psi,time_s,temperature_C\n"
+        "0,0,0,20\nx,1,1,20\n2,2,0.5,-400\n3,3\n4,4,9,inf\n5,5,10,20\n",
+        [
+            (5, None, "2 cells"),
+            (1, "force_psi", "unknown unit"),
+            (3, "deformation_mm", "'x'"),
+            (6, "temperature_C", "'inf'"),
+            (4, "temperature_C", "absolute zero"),
+            (4, "time_s", "goes back"),
+        ],
+    ),
+}
+
+
+def findings_of(*args, **options):
+    with pytest.raises(InputError) as caught:
+        read_case(*args, **options)
+    return caught.value.findings
+
+
+def check(findings, expected):
+    found = {(f.row, f.column): f"{f.problem}. {f.remedy}" for f in findings}
+    assert len(findings) == len(expected), [str(f) for f in findings]
+    for row, column, words in expected:
+        assert words in found[row, column]
+    assert all(f.remedy and "\n" not in str(f) for f in findings)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bad_table(folder, name):
+    content, expected = CASES[name]
+    raw = content if isinstance(content, bytes) else content.encode()
+    (folder / "data.csv").write_bytes(raw)
+    findings = findings_of(folder)
+    check(findings, expected)
+    assert {f.file for f in findings} == {str(folder / "data.csv")}
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        ({"force": "Load[N]"}, [(1, "Load", "not there")]),
+        ({"force": "force_N[psi]"}, [(1, "force_N", "'psi'")]),
+        ({"force": "extra"}, [(1, "extra", "[UNIT]")]),
+        ({"forse": "force_N[N]"}, [(None, None, "mean force")]),
+        ({"time": "force_N[s]"}, [(1, "force_N", "both as force and as time")]),
+        ({"time": "twin[s]"}, [(1, "twin", "fits 2 columns")]),
+    ],
+)
+def test_bad_mapping(folder, columns, expected):
+    content = "deformation_mm,force_N,extra,twin,twin\n"
+    content += "".join(f"{i},{i},{i},{i},{i}\n" for i in range(6))
+    (folder / "data.csv").write_text(content)
+    check(findings_of(folder, columns=columns), expected)
+
+
+def test_many_bad_cells_are_counted_after_twenty(folder):
+    (folder / "data.csv").write_text(H + "0,0\n" + "1,x\n" * 1000 + "1\n" * 30)
+    findings = findings_of(folder)
+    assert sum(f.problem.startswith("'x'") for f in findings) == 20
+    assert [f.problem for f in findings if f.row is None] == [
+        "and 10 more rows like these",
+        "and 980 more cells that are no numbers",
+    ]
+
+
+def test_blank_lines_do_not_shift_the_row_numbers(folder):
+    (folder / "data.csv").write_text("\n" + H + "0,0\n\n\n1,1\n2,oops\n3,3\n4,4\n5,5\n")
+    check(findings_of(folder), [(7, "force_N", "'oops'")])
+
+
+def test_missing_files_are_reported_together(tmp_path):
+    findings = findings_of(tmp_path / "a.csv", tmp_path / "b.toml")
+    assert [f.problem for f in findings] == ["does not exist"] * 2
+
+
+def test_a_folder_in_place_of_a_file(folder):
+    (folder / "data.csv").unlink()
+    (folder / "data.csv").mkdir()
+    check(findings_of(folder), [(None, None, "is a folder")])
+
+
+def test_an_odd_name(tmp_path):
+    gear = tmp_path / "gear.toml"
+    findings = findings_of("no\0where.csv", gear)
+    assert len(findings) == 2
+
+
+def test_no_gear_says_what_to_do(folder):
+    (folder / "gear.toml").unlink()
+    (folder / "data.csv").write_text(H)
+    findings = findings_of(folder / "data.csv")
+    assert len(findings) == 2
+    assert "--gear" in findings[1].remedy

@@ -1,0 +1,149 @@
+"""Direction, rate and features of the loading survive reading noise."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hdcal.data.loading import derive_motion
+from hdcal.data.turning_points import resting, turning_points
+
+
+def motion(deformation, time=None, run=None):
+    x = np.asarray(deformation, float)
+    run = np.zeros(x.size, int) if run is None else np.asarray(run)
+    return derive_motion(x, run, None if time is None else np.asarray(time, float))
+
+
+def slow_turning_points(x, threshold):
+    """The definition, row by row."""
+    found, sign, first, best, low, high = [], 0, 0, 0, 0, 0
+    for row in range(len(x)):
+        if sign == 0:
+            low = row if x[row] < x[low] else low
+            high = row if x[row] > x[high] else high
+            if x[high] - x[low] >= threshold:
+                sign = first = 1 if high > low else -1
+                best = row
+        elif sign * (x[row] - x[best]) > 0:
+            best = row
+        elif sign * (x[best] - x[row]) >= threshold:
+            found.append(best)
+            sign, best = -sign, row
+    return found, first
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.integers(-20, 20), min_size=1, max_size=60),
+    st.sampled_from([0.5, 1.0, 3.0, 10.0]),
+)
+def test_turning_points_as_by_definition(values, threshold):
+    x = np.array(values, float)
+    rows, first = turning_points(x, threshold)
+    assert (rows.tolist(), first) == slow_turning_points(x, threshold)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.integers(0, 4), min_size=1, max_size=60), st.sampled_from([0.5, 3]))
+def test_resting_as_by_definition(steps, tolerance):
+    level = np.cumsum(np.array(steps, float))
+    for row, rests in enumerate(resting(level, tolerance)):
+        near = np.count_nonzero(np.abs(level - level[row]) <= tolerance / 2)
+        wide = np.count_nonzero(np.abs(level - level[row]) <= 2 * tolerance)
+        assert rests == (near >= 2 and wide < 1.5 * near)
+
+
+def test_a_ramp_by_hand():
+    found = motion([0.02, 0.06, 0.10, 0.2, 0.3], time=[0, 1, 2, 4, 6])
+    assert found.direction.tolist() == [1] * 5
+    assert found.rate == pytest.approx([0.04, 0.04, 0.04, 0.05, 0.05])
+    assert found.features == frozenset()
+
+
+def test_load_hold_unload():
+    found = motion([0, 1, 2, 2, 2, 1, 0, 0, 0, 1, 2], time=np.arange(11) * 2)
+    assert found.direction.tolist() == [1, 1, 1, 0, 0, -1, -1, 0, 0, 1, 1]
+    assert found.sense.tolist() == [1, 1, 1, 1, 1, -1, -1, -1, -1, 1, 1]
+    assert found.rate.tolist() == [0.5, 0.5, 0.5, 0, 0, -0.5, -0.5, 0, 0, 0.5, 0.5]
+    assert found.features == {"unloading", "holds"}
+
+
+def test_a_hold_before_the_first_movement():
+    found = motion([5, 5, 5, 4, 3, 2])
+    assert found.direction.tolist() == [0, 0, 0, -1, -1, -1]
+    assert found.sense.tolist() == [-1] * 6
+
+
+def test_a_staircase_of_double_readings():
+    found = motion(np.repeat(np.arange(6.0), 2))
+    assert found.direction.tolist() == [0, 0] + [1, 0] * 5
+    assert found.features == {"holds"}
+
+
+def test_what_never_moves():
+    found = motion([1.0, 1.0, 1.0])
+    assert found.direction.tolist() == [0, 0, 0]
+    assert found.sense.tolist() == [1, 1, 1]
+    assert found.features == frozenset()
+
+
+def test_runs_are_separate():
+    found = motion([0, 5, 1, 4, 2, 3], run=[0, 1, 0, 1, 0, 1])
+    assert found.direction.tolist() == [1, -1, 1, -1, 1, -1]
+    assert found.features == {"unloading"}
+
+
+def test_loading_through_zero():
+    found = motion([0, -1, -2, -1, 0, 1, 2, 1, 0])
+    assert found.direction.tolist() == [-1, -1, -1, 1, 1, 1, 1, -1, -1]
+
+
+SHAPES = {
+    "ramp": (lambda u: u, 0, set()),
+    "triangle": (lambda u: 1 - np.abs((8 * u) % 2 - 1), 7, {"unloading", "cycles"}),
+    "sine": (
+        lambda u: np.sin(8 * np.pi * u),
+        8,
+        {"unloading", "cycles", "rates"},
+    ),
+    "one cycle with holds": (
+        lambda u: np.interp(u, [0, 0.2, 0.5, 0.7, 1], [0, 1, 1, 0, 0]),
+        1,
+        {"unloading", "holds"},
+    ),
+    "two speeds": (
+        lambda u: np.interp(u, [0, 0.4, 0.8, 0.9, 1], [0, 1, 0, 1, 0]),
+        3,
+        {"unloading", "cycles", "rates"},
+    ),
+}
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3, 1e-2])
+@pytest.mark.parametrize("rows", [400, 20_000])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_features_through_noise(shape, rows, noise):
+    curve, reversals, features = SHAPES[shape]
+    u = np.arange(rows) / rows
+    rng = np.random.default_rng(7)
+    found = motion(curve(u) + noise * rng.normal(size=rows), time=u * 60)
+    assert np.count_nonzero(np.diff(found.sense)) == reversals
+    assert found.features == features
+    slope = np.sign(np.diff(curve(u)))
+    agree = found.direction[1:] == slope
+    assert agree.mean() > 0.9
+
+
+def test_the_rate_through_noise():
+    rows = 20_000
+    u = np.arange(rows) / rows
+    noisy = 0.5 * u + 1e-4 * np.random.default_rng(0).normal(size=rows)
+    found = motion(noisy, time=100 * u)
+    assert np.median(found.rate) == pytest.approx(0.005, rel=0.02)
+    assert np.quantile(np.abs(found.rate / 0.005 - 1), 0.95) < 0.2
+
+
+def test_equal_times_give_no_rate():
+    found = motion([0, 1, 2, 3], time=[0, 0, 0, 0])
+    assert found.rate.tolist() == [0, 0, 0, 0]

@@ -1,0 +1,53 @@
+"""Every shipped prior is complete, sourced, and of a plausible size."""
+
+import pytest
+
+from hdcal.data.priors import (
+    FAMILIES,
+    MODEL_UNITS,
+    SCALE_UNITS,
+    effect_priors,
+    material_names,
+    material_priors,
+    rig_priors,
+)
+from hdcal.errors import InputError
+
+
+def test_materials_by_name():
+    assert set(material_names()) == {
+        "40CrNiMoA", "4340", "30CrMnSiA", "35CrMnSiA", "maraging300", "17-4PH",
+        "15-5PH", "Ti-6Al-4V", "PEEK", "PA66-dry", "PA66-conditioned", "steel",
+    }  # fmt: skip
+    with pytest.raises(InputError, match="Did you mean 'maraging300'"):
+        material_priors("maraging-300")
+
+
+@pytest.mark.parametrize("name", material_names())
+def test_a_material_is_plausible(name):
+    found = material_priors(name)
+    modulus, loss = found["E0"], found["alpha"]
+    assert 1e3 < modulus.numbers[0] < 3e5
+    assert modulus.unit == "MPa"
+    assert 1e-4 < loss.numbers[0] < 1e-2
+    assert loss.unit == "1/K"
+    assert 0.2 < found["poisson"].numbers[0] < 0.45
+    assert 1e-9 < found["density"].numbers[0] < 1e-8
+    assert 5e-6 < found["cte"].numbers[0] < 2e-4
+    for prior in found.values():
+        assert prior.source.endswith("handbook value, deliberately wide")
+        assert len(prior.numbers) == len(FAMILIES[prior.family])
+
+
+def test_the_rig():
+    found = rig_priors()
+    assert set(found) == set(MODEL_UNITS | SCALE_UNITS) - {"E0", "alpha"}
+    assert found["K"].numbers == (2.0, 0.46)
+    assert all(prior.source for prior in found.values())
+
+
+def test_the_effects():
+    found = effect_priors()
+    assert found["outliers.fraction"].numbers == (1.0, 13.0)
+    assert found["thermal_zero_drift.slope"].unit == "N/K"
+    assert all(prior.source.startswith("typical size: ") for prior in found.values())

@@ -1,0 +1,214 @@
+"""A good table is read as what it says, whatever program wrote it."""
+
+import codecs
+import hashlib
+
+import numpy as np
+import pytest
+
+from hdcal.data.reading import read_case
+
+ROWS = [(0.0, 1.5), (0.1, 20.0), (0.2, 41.25), (0.3, 60.5), (0.4, 82.0), (0.5, 101.0)]
+
+
+def text(separator=",", decimal=".", end="\n", header="deformation_mm{}force_N"):
+    lines = [header.format(separator)]
+    lines += [
+        separator.join(str(cell).replace(".", decimal) for cell in r) for r in ROWS
+    ]
+    return end.join(lines) + end
+
+
+def read(folder, content, **options):
+    raw = content if isinstance(content, bytes) else content.encode()
+    (folder / "data.csv").write_bytes(raw)
+    return read_case(folder, **options)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        text(),
+        text(";"),
+        text("\t"),
+        text(";", ","),
+        text("\t", ","),
+        text(end="\r\n"),
+        text(end="\r"),
+        text(end="\n\n"),
+        text(", "),
+        text(" ; ", ","),
+        text().rstrip("\n"),
+        text() + "\n\n \n,\n",
+        "\n" + text(),
+        codecs.BOM_UTF8 + text().encode(),
+        text().encode("utf-16"),
+        codecs.BOM_UTF16_BE + text("\t", end="\r\n").encode("utf-16-be"),
+        text(header='"deformation_mm"{}"force_N"'),
+        text(header="Deformation_mm{} FORCE_N "),
+        text().replace("20.0", '"20.0"').replace("60.5", "+6.05e1"),
+    ],
+)
+def test_every_spelling_of_the_same_table(folder, content):
+    records = read(folder, content).records
+    assert np.array_equal(records.deformation, [row[0] for row in ROWS])
+    assert np.array_equal(records.force, [row[1] for row in ROWS])
+    assert records.force.dtype == np.float64
+
+
+@pytest.mark.parametrize(
+    ("header", "name", "first", "second"),
+    [
+        ("deformation_um,force_N", "deformation", 0.0, 1e-4),
+        ("deformation_µm,force_N", "deformation", 0.0, 1e-4),
+        ("deformation_in,force_N", "deformation", 0.0, 2.54),
+        ("deformation_m,force_N", "deformation", 0.0, 100.0),
+        ("deformation_mm,force_kN", "force", 1500.0, 2e4),
+        ("deformation_mm,force_kgf", "force", 14.709975, 196.133),
+        ("deformation_mm,force_lbf", "force", 6.672333, 88.964432),
+    ],
+)
+def test_units_of_required_columns(folder, header, name, first, second):
+    gear = folder / "gear.toml"
+    gear.write_text(gear.read_text().replace("40.0", "4e4"))
+    records = read(folder, text(header=header)).records
+    assert getattr(records, name)[:2] == pytest.approx([first, second], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("header", "name", "value"),
+    [
+        ("temperature_C", "temperature", 30.0),
+        ("temperature_K", "temperature", -243.15),
+        ("temperature_F", "temperature", -10 / 9),
+        ("time_s", "time", 30.0),
+        ("time_ms", "time", 0.03),
+        ("time_min", "time", 1800.0),
+        ("angle_deg", "angle", np.pi / 6),
+        ("angle_rad", "angle", 30.0),
+        ("force_sd_N", "force_sd", 30.0),
+        ("force_sd_kgf", "force_sd", 294.1995),
+    ],
+)
+def test_optional_columns_convert_and_become_known(folder, header, name, value):
+    lines = text().splitlines()
+    lines = [f"{lines[0]},{header}", *(f"{line},30" for line in lines[1:])]
+    records = read(folder, "\n".join(lines)).records
+    assert getattr(records, name) == pytest.approx(np.full(6, value))
+    assert name in records.known
+
+
+def test_absent_covariates_are_neutral(folder):
+    gear = folder / "gear.toml"
+    gear.write_text(gear.read_text() + "reference_temperature_C = 23.5\n")
+    records = read_case(folder).records
+    assert np.array_equal(records.temperature, np.full(6, 23.5))
+    for name in ("time", "angle", "rate", "force_sd", "run", "specimen"):
+        assert not getattr(records, name).any()
+    assert records.known == frozenset()
+
+
+def test_labels_become_indices_in_order_of_appearance(folder):
+    content = "deformation_mm;force_N;run;specimen\n" + "".join(
+        f"0.{i};{i}.5;{run};{gear}\n"
+        for i, (run, gear) in enumerate(zip("BBAACC", "xxyyxx", strict=True))
+    )
+    case = read(folder, content)
+    assert case.run_labels == ("B", "A", "C")
+    assert case.specimen_labels == ("x", "y")
+    assert case.records.run.tolist() == [0, 0, 1, 1, 2, 2]
+    assert case.records.specimen.tolist() == [0, 0, 1, 1, 0, 0]
+    assert case.records.known >= {"run", "runs", "specimen"}
+    assert "specimens" not in case.records.known
+
+
+def test_one_run_label_on_two_specimens_is_two_runs(folder):
+    content = "deformation_mm;force_N;run;specimen;time_s\n" + "".join(
+        f"0.{i % 3};{i}.5;1;{gear};{i % 3}\n" for i, gear in enumerate("xxxyyy")
+    )
+    case = read(folder, content)
+    assert case.run_labels == ("x/1", "y/1")
+    assert case.records.run.tolist() == [0, 0, 0, 1, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("header", "mapped"),
+    [
+        ("Load", "Load[kgf]"),
+        ("Load", "Load [ kgf ]"),
+        ("Load[kgf]", "Load[kgf]"),
+        ("Load [kgf]", "Load[kgf]"),
+        ("Load_kgf", "Load_kgf"),
+        ('"Load, measured"', "Load, measured[kgf]"),
+    ],
+)
+def test_a_mapped_column(folder, header, mapped):
+    content = text(header=f"deformation_mm{{}}{header}")
+    case = read(folder, content, columns={"force": mapped})
+    assert case.records.force[1] == pytest.approx(196.133)
+    assert case.notes == ()
+
+
+def test_a_mapping_wins_over_a_name(folder):
+    content = "deformation_mm,force_N,raw,which\n" + "".join(
+        f"{i},{i},{2 * i},a\n" for i in range(6)
+    )
+    case = read(folder, content, columns={"force": "raw[N]", "run": "which"})
+    assert case.records.force[5] == 10.0
+    assert case.run_labels == ("a",)
+    assert case.notes == ("columns not used: 'force_N'",)
+
+
+def test_notes_name_what_was_left_out(folder):
+    content = "deformation_mm,force_N,operator\n" + "".join(
+        f"{i / 10},{i}.98,me\n\n" for i in range(6)
+    )
+    gear = folder / "gear.toml"
+    gear.write_text(gear.read_text() + "force_resolution_N = 0.98\n")
+    notes = read(folder, content).notes
+    assert notes == (
+        "columns not used: 'operator'",
+        "5 empty lines between the readings were skipped",
+        "5 of 6 forces are not multiples of 0.98 N",
+    )
+
+
+def test_the_articles_table():
+    from hdcal.data.resources import datasets_folder
+
+    case = read_case(str(datasets_folder() / "xb1-100-80"))
+    assert case.name == "xb1-100-80"
+    assert case.records.force.size == 14
+    x, y = case.records.deformation, case.records.force
+    slope = (x @ y) / (x @ x)
+    spread = np.sqrt(np.sum((y - slope * x) ** 2) / 13)
+    assert (slope, spread) == (
+        pytest.approx(198.02, abs=5e-3),
+        pytest.approx(2.727, abs=5e-4),
+    )
+    assert case.notes == ("2 of 14 forces are not multiples of 0.98 N",)
+    assert np.array_equal(case.records.direction, np.ones(14))
+    assert case.gear.geometry.load_height == 62.0
+
+
+def test_the_load_cell_of_nist():
+    from hdcal.data.resources import datasets_folder
+
+    case = read_case(str(datasets_folder() / "nist-pontius"))
+    assert case.records.run.tolist() == [0] * 20 + [1] * 20
+    slope = np.polyfit(case.records.deformation, case.records.force, 1)[0]
+    g = case.gear.geometry
+    series = (np.pi**2 - 8) / 16
+    shape = g.length * g.wall_thickness**3 / g.radius**3
+    nominal = np.pi * case.gear.priors["E0"].numbers[0] * shape / (24 * series)
+    assert slope == pytest.approx(nominal, rel=2e-3)
+
+
+def test_file_and_folder_give_the_same_case(folder):
+    from_folder = read_case(folder)
+    from_file = read_case(folder / "data.csv", folder / "gear.toml")
+    assert from_folder.name == folder.name
+    assert from_file.name == "data"
+    raw = (folder / "data.csv").read_bytes()
+    assert from_folder.data_sha256 == hashlib.sha256(raw).hexdigest()
+    assert from_file.data_sha256 == from_folder.data_sha256

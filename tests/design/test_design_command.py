@@ -1,0 +1,226 @@
+"""`hdcal design` and `hdcal study` answer in words, JSON, files and a page."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from browser import PHONE, look
+from commands import XB1, Done, Hdcal
+
+from hdcal.design.inverse_design import inverse_design
+from hdcal.design.result_folder import write_generator, write_inverse, write_study
+from hdcal.design.study.study import study
+from hdcal.design.wave_generator import wave_generator
+from hdcal.inference.checks import Check
+from hdcal.inference.posterior import Posterior
+
+WALL = "wall_thickness_mm=0.5:0.8"
+FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
+
+
+@pytest.fixture(scope="module")
+def run(calibrated: tuple[Done, Path]) -> Path:
+    """The folder of a calibration."""
+    return calibrated[1]
+
+
+@pytest.fixture(scope="module")
+def folders(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A result of each kind, with a gear whose name is not to be trusted."""
+    base = tmp_path_factory.mktemp("designs")
+    posterior = Posterior.load(run)
+    name = "<script>alert(1)</script> $x^{$ 谐波"
+    gear = replace(posterior.case.gear, name=name)
+    posterior = replace(posterior, case=replace(posterior.case, gear=gear))
+    sizes = {"wall_thickness_mm": (0.5, 0.8), "radius_mm": (38.0, 45.0)}
+    write_generator(wave_generator(posterior, (0.38, 0.42)), base / "generator")
+    among = ["40CrNiMoA", "Ti-6Al-4V"]
+    write_inverse(inverse_design(posterior, sizes, 70.0, materials=among), base / "inv")
+    vary = {"wall_thickness_mm": [0.6, 0.7], "radius_mm": [38, 40, 42]}
+    write_study(study(posterior, vary, materials=among), base / "study")
+    return {name: base / name for name in ("generator", "inv", "study")}
+
+
+def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
+    asked = ["design", run, "--window", "0.38:0.42", "--temperature=-20:80", "--json"]
+    done = here(*asked, "--tolerance", "wall_thickness_mm=0.02")
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    folder = tmp_path / "xb1-100-80-design"
+    files = {path.name for path in folder.iterdir()}
+    assert files == {"design.json", "report.html", *FIGURES}
+    assert json.loads((folder / "design.json").read_text("utf-8")) == said
+    assert (said["schema"], said["kind"]) == ("hdcal.design/1", "wave_generator")
+    assert said["spring"]["probability"] >= 0.99
+    assert said["interval_kind"] == "equal-tailed predictive interval"
+    assert [row["temperature_C"] for row in said["at_temperature"]] == [-20, 20, 80]
+    assert "tested were 20 °C" in said["warnings"][0]
+    assert "K is carried over" in done.stderr and "one tested gear" in done.stderr
+    force = said["set_point"]["force_N"]
+    assert force["lo"] < 0.4 * 209 < force["hi"]
+
+
+def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
+    out = tmp_path / "made"
+    done = here(
+        *("design", run, "--limit-force", "0.07 kN", "--vary", WALL),
+        *("--limit-stress", "0.3 GPa", "--out", out),
+    )
+    assert done.returncode == 0, done.stderr
+    said = json.loads((out / "design.json").read_text("utf-8"))
+    assert said["asked"]["limit_force_N"] == 70.0
+    assert said["asked"]["limit_stress_MPa"] == 300.0
+    assert said["design"]["force_N"]["kept"] == pytest.approx(70.0, rel=1e-5)
+    assert 0.6 < said["design"]["sizes_mm"]["wall_thickness"] < 0.68
+    assert "keeps 70 N at 0.4 mm" in done.stdout
+    again = here("design", run, "--window", "0.3:0.5", "--out", out)
+    assert again.returncode == 2 and "exists already" in again.stderr
+
+
+def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
+    vary = ["--vary", "wall_thickness_mm=0.6:0.76:5", "--vary", "radius_mm=35,40,45"]
+    done = here("study", run, *vary)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "xb1-100-80-study"
+    names = {path.name for path in folder.iterdir()}
+    assert names == {"study.csv", "study.json", "study.svg", "study.png", "report.html"}
+    with (folder / "study.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 15
+    own = next(
+        r for r in rows if (r["wall_thickness_mm"], r["radius_mm"]) == ("0.68", "40")
+    )
+    force = [float(own[f"force_{part}_N"]) for part in ("lo", "median", "hi")]
+    draws = Posterior.load(run).draws["stiffness"] * 0.4
+    assert force[1] == pytest.approx(sorted(draws)[len(draws) // 2], rel=1e-3)
+    assert force[0] < force[1] < force[2]
+    told = json.loads((folder / "study.json").read_text("utf-8"))
+    assert told["interval_kind"] == "equal-tailed credible interval"
+    assert "0.68          40" in done.stdout
+
+
+def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
+    out = tmp_path / "prior"
+    gear = XB1 / "gear.toml"
+    done = here("study", "--gear", gear, "--vary", "radius_mm=38,42", "--out", out)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("PRIOR ONLY")
+    told = json.loads((out / "study.json").read_text("utf-8"))
+    assert told["basis"] == "prior"
+    assert told["interval_kind"] == "equal-tailed prior interval"
+    page = (out / "report.html").read_text("utf-8")
+    assert "No gear was measured." in page
+
+
+def test_the_article_needs_no_run_but_takes_one(run: Path, here: Hdcal):
+    rows = json.loads(here("study", "--article", "--json").stdout)["rows"]
+    assert [row["table"] for row in rows] == [3] * 5 + [4] * 5
+    assert all(row["calibrated_N"] is None for row in rows)
+    rows = json.loads(here("study", run, "--article", "--json").stdout)["rows"]
+    own = rows[6]["calibrated_N"]
+    # 92.08 N in Table 4, 78.4 N in its own Table 2.
+    assert rows[6]["revised_N"] == 92.08
+    assert own["lo"] < 83.76 < own["hi"] < 92.08
+    refused = here("study", "--article", "--vary", "radius_mm=38", "--out", "x")
+    assert refused.returncode == 2 and refused.stderr.count("no meaning") == 2
+
+
+def test_a_failed_calibration_gives_no_design(run: Path, here: Hdcal, tmp_path: Path):
+    posterior = Posterior.load(run)
+    bad = Check("R-hat", "failed", "it is 1.2")
+    posterior = replace(posterior, checks=(bad,))
+    (tmp_path / "failed").mkdir()
+    posterior.save(tmp_path / "failed" / "posterior.nc")
+    for asked in (
+        ["design", "failed", "--window", "0.38:0.42"],
+        ["design", "failed", "--limit-force", "70", "--vary", WALL],
+        ["study", "failed", "--vary", "radius_mm=38,40"],
+        ["study", "failed", "--article"],
+    ):
+        done = here(*asked)
+        assert done.returncode == 1
+        assert "must not be used" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["failed"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (["design", "RUN"], ["nothing is asked"]),
+        (["design", "RUN", "--window", "0.3:0.5", "--limit-force", "7"], ["both ask"]),
+        (["design", "--window", "0.3:0.5"], ["RUN: is missing"]),
+        (["design", "RUN", "--gear", "g.toml", "--window", ".3:.5"], ["given both"]),
+        (["design", "RUN", "--window", "0.4:0.3"], ["0.4:0.3 is empty"]),
+        (["design", "RUN", "--window", "0.4"], ["'0.4' is not LO:HI"]),
+        (
+            ["design", "RUN", "--window", ".3:.5", "--vary", WALL],
+            ["--vary: has no meaning with --window"],
+        ),
+        (
+            ["design", "RUN", "--limit-force", "70 mm", "--vary", "wall_tickness=1:x"],
+            ["'70 mm' is not a force", "Did you mean 'wall_thickness_mm'", "LO:HI"],
+        ),
+        (
+            [
+                "design",
+                "RUN",
+                "--limit-force",
+                "7",
+                "--vary",
+                "wall_thickness_mm=.5:.6",
+            ],
+            ["no wall thickness between 0.5 and 0.6 mm meets 7 N at 0.4 mm"],
+        ),
+        (
+            ["design", "nowhere", "--limit-force", "x", "--vary", WALL],
+            ["there is no such file", "'x' is no number"],
+        ),
+        (["study", "RUN"], ["nothing is varied"]),
+        (["study", "RUN", "--vary", "radius=1,2"], ["Did you mean 'radius_mm'"]),
+        (["study", "RUN", "--vary", "radius_mm=a"], ["neither start:stop:count"]),
+        (["study", "RUN", "--vary", "radius_mm"], ["is not NAME=…"]),
+        (
+            ["study", "RUN", "--vary", "radius_mm=38", "--vary", "radius_mm=39"],
+            ["given twice"],
+        ),
+        (
+            ["study", "RUN", "--vary", "wall_thickness_mm=60", "--material", "stel"],
+            ["not thinner than the radius", "Did you mean 'steel'"],
+        ),
+        (
+            ["study", "RUN", "--vary", "radius_mm=38", "--deformation", "3 N"],
+            ["is not a length"],
+        ),
+    ],
+)
+def test_bad_input_is_told_and_nothing_written(
+    run: Path, here: Hdcal, tmp_path: Path, asked: list[str], words: list[str]
+):
+    done = here(*(run if text == "RUN" else text for text in asked))
+    assert done.returncode == 2, done.stdout
+    assert all(part in done.stderr for part in words), done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_are_only_text(folders: dict[str, Path]):
+    for folder in folders.values():
+        page = (folder / "report.html").read_text("utf-8")
+        assert "<script" not in page
+        assert "&lt;script&gt;alert(1)" in page
+        for image in folder.glob("*.svg"):
+            tags = {e.tag.rpartition("}")[2] for e in ElementTree.parse(image).iter()}
+            assert not tags & {"script", "foreignObject", "a"}
+
+
+@pytest.mark.parametrize("kind", ["generator", "inv", "study"])
+def test_the_page_can_be_read_in_a_browser(folders, kind: str, tmp_path: Path):
+    seen = look(folders[kind] / "report.html", tmp_path)
+    assert not seen.complaints and not seen.requests
+    for place in ("phone", "desk", "paper"):
+        assert not seen.frames[place]["past"]
+        assert all(image["natural"] > 0 for image in seen.frames[place]["images"])
+    assert seen.frames["phone"]["width"] <= PHONE

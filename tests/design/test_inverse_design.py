@@ -1,0 +1,168 @@
+"""The sizes found keep the limits with the least change, where algebra says."""
+
+import numpy as np
+import pytest
+from designs import bent, known
+
+from hdcal.design import inverse_design as module
+from hdcal.design.inverse_design import inverse_design
+from hdcal.design.nearest_point import nearest_kept
+from hdcal.errors import InputError
+from hdcal.physics.profile import peak_stress
+
+WALL, RADIUS = {"wall_thickness_mm": (0.4, 0.9)}, {"radius_mm": (32.0, 50.0)}
+
+
+@pytest.fixture
+def given(monkeypatch):
+    """Let a basis stand in for a calibration."""
+
+    def use(basis):
+        monkeypatch.setattr(module, "basis_of", lambda source, seed: basis)
+        return basis
+
+    return use
+
+
+def kept_force(basis, probability=0.99, at=0.4):
+    stiffness = basis.values["K"] * basis.values["E0"] * basis.problem.unit_stiffness
+    rank = int(np.ceil(probability * basis.size)) - 1
+    return float(np.sort(stiffness * at)[rank])
+
+
+def test_one_size_is_the_cube_root(given):
+    basis = given(known(2000))
+    found = inverse_design(basis.gear, WALL, 60.0)
+    wall = 0.68 * (60.0 / kept_force(basis)) ** (1.0 / 3.0)
+    assert found.chosen.sizes["wall_thickness_mm"] == pytest.approx(wall, rel=1e-7)
+    assert found.chosen.force == pytest.approx(60.0, rel=1e-6)
+    assert 0.99 <= found.chosen.kept < 0.991
+    assert found.tested.force == pytest.approx(kept_force(basis), rel=1e-12)
+    assert found.elasticities["wall_thickness_mm"] == pytest.approx(3.0)
+    assert found.elasticities["radius_mm"] == pytest.approx(-3.0)
+
+
+def test_of_several_sizes_each_changes_as_much_as_it_counts(given):
+    """Least Σ (ln x/x₀)² on 3 ln δ − 3 ln R + ln L = const is along (3, −3, 1)."""
+    basis = given(known(2000))
+    free = WALL | RADIUS | {"length_mm": (63.0, 90.0)}
+    found = inverse_design(basis.gear, free, 60.0)
+    steps = np.log(np.array(list(found.chosen.sizes.values())) / [0.68, 40.0, 70.0])
+    needed = np.log(60.0 / kept_force(basis))
+    expected = needed * np.array([3.0, -3.0, 1.0]) / 19.0
+    np.testing.assert_allclose(steps, expected, rtol=1e-5)
+    assert found.chosen.change == pytest.approx(abs(needed) / np.sqrt(19.0), rel=1e-6)
+
+
+def test_a_bound_passes_the_rest_on(given):
+    basis = given(known(2000))
+    free = {"wall_thickness_mm": (0.66, 0.9)} | RADIUS
+    sizes = inverse_design(basis.gear, free, 60.0).chosen.sizes
+    assert sizes["wall_thickness_mm"] == pytest.approx(0.66, rel=1e-9)
+    left = np.log(60.0 / kept_force(basis)) - 3.0 * np.log(0.66 / 0.68)
+    assert sizes["radius_mm"] == pytest.approx(40.0 * np.exp(-left / 3.0), rel=1e-6)
+
+
+def test_with_an_effect_it_is_still_the_best_of_a_fine_grid(given):
+    basis = given(bent(400))
+    found = inverse_design(basis.gear, WALL | RADIUS, 60.0, probability=0.95)
+    assert found.chosen.kept >= 0.95
+    # The effect changes every draw's force by a factor that knows no size.
+    needed = np.log(60.0 / found.tested.force)
+    assert found.chosen.change == pytest.approx(abs(needed) / np.sqrt(18.0), rel=1e-5)
+
+
+def test_nothing_changes_where_the_limit_is_kept_already(given):
+    basis = given(known(2000))
+    found = inverse_design(basis.gear, WALL | RADIUS, 500.0)
+    assert found.chosen.change == 0.0
+    assert found.chosen.kept == 1.0
+
+
+def test_cold_is_what_counts(given):
+    basis = given(known(2000))
+    mild = inverse_design(basis.gear, WALL, 60.0, temperatures=[20.0])
+    cold = inverse_design(basis.gear, WALL, 60.0, temperatures=[-40.0, 80.0])
+    ratio = (
+        cold.chosen.sizes["wall_thickness_mm"] / mild.chosen.sizes["wall_thickness_mm"]
+    )
+    assert ratio == pytest.approx((1.0 + 60.0 * 3e-4) ** (-1.0 / 3.0), rel=1e-3)
+
+
+def test_stress_limits_too(given):
+    """The force alone would have a thicker wall than the stress allows."""
+    basis = given(known(2000))
+    free = inverse_design(basis.gear, WALL | RADIUS, 60.0)
+    assert free.chosen.utilisation < 0.2
+    limit = 0.9 * float(np.median(free.chosen.stresses))
+    tight = inverse_design(basis.gear, WALL | RADIUS, 60.0, limit_stress=limit)
+    assert tight.chosen.utilisation == pytest.approx(1.0, rel=1e-5)
+    assert tight.chosen.change > free.chosen.change
+    sizes = tight.drawing
+    assert float(peak_stress(sizes, 207e3, 0.4)) == pytest.approx(limit, rel=1e-6)
+
+
+def test_materials_are_chosen_among(given):
+    basis = given(known(2000))
+    among = ["40CrNiMoA", "Ti-6Al-4V"]
+    found = inverse_design(basis.gear, WALL, 60.0, materials=among)
+    assert [one.basis.material for one in found.candidates] == among
+    assert all(one.met for one in found.candidates)
+    # Titanium is soft enough at the tested sizes; no size has to change.
+    assert found.chosen.basis.material == "Ti-6Al-4V"
+    assert found.chosen.change == 0.0
+    assert any("handbook" in words for words in found.chosen.basis.assumptions)
+
+
+def test_not_even_the_best_is_told_with_its_numbers(given):
+    basis = given(known(2000))
+    with pytest.raises(InputError) as refused:
+        inverse_design(basis.gear, {"wall_thickness_mm": (0.65, 0.8)}, 40.0)
+    words = str(refused.value)
+    assert "no wall thickness between 0.65 and 0.8 mm meets 40 N at 0.4 mm" in words
+    best = kept_force(basis) * (0.65 / 0.68) ** 3
+    assert f"the best (wall thickness 0.65 mm) gives {best:.4g} N" in words
+
+
+def test_the_solver_keeps_what_it_has_when_it_cannot_do_better():
+    bounds = np.array([[-1.0, 1.0], [-1.0, 1.0]])
+    slopes = np.array([[1.0, 0.0], [0.0, 1.0]])
+
+    def excess(z):
+        return slopes @ z + np.array([0.5, 2.0])
+
+    found = nearest_kept(excess, lambda z: slopes, np.zeros(2), bounds)
+    # The second limit cannot be kept: as near to it as the bounds allow.
+    assert found[1] == pytest.approx(-1.0)
+    with_room = nearest_kept(
+        lambda z: excess(z) - np.array([0.0, 1.5]),
+        lambda z: slopes,
+        np.zeros(2),
+        bounds,
+    )
+    np.testing.assert_allclose(with_room, [-0.5, -0.5], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("vary", "changed", "words"),
+    [
+        ({}, {}, "nothing may change"),
+        ({"wal_thickness_mm": (0.5, 0.6)}, {}, "Did you mean 'wall_thickness_mm'"),
+        ({"wall_thickness_mm": (0.6, 0.5)}, {}, "0.6:0.5 is empty"),
+        ({"wall_thickness_mm": (-0.1, 0.5)}, {}, "is no size"),
+        ({"wall_thickness_mm": (0.5, 50.0)}, {}, "not thinner than the radius"),
+        ({"load_height_mm": (50.0, 60.0)}, {}, "changes nothing under the theory"),
+        (WALL, {"limit_force": -1.0}, "-1 is no limit"),
+        (WALL, {"limit_force": np.nan}, "nan is no limit"),
+        (WALL, {"limit_stress": 0.0}, "0 is no limit"),
+        (WALL, {"deformation": 50.0}, "50 mm on a radius of 40 mm"),
+        (WALL, {"probability": 0.0}, "is not between 0 and 1"),
+        (WALL, {"materials": ["stel"]}, "Did you mean 'steel'"),
+    ],
+)
+def test_bad_input_is_refused(given, vary, changed, words):
+    basis = given(known(2000))
+    asked = {"limit_force": 60.0, **changed}
+    with pytest.raises(InputError) as refused:
+        inverse_design(basis.gear, vary, **asked)
+    assert words in str(refused.value)

@@ -1,0 +1,137 @@
+"""A study holds every combination with its band, and says what it stands on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigs import make_gear
+from scipy.stats import lognorm
+
+from hdcal.data.prior import Prior
+from hdcal.design.study.article_tables import TABLE_4, article_rows
+from hdcal.design.study.study import study
+from hdcal.errors import InputError
+from hdcal.physics.theory import cup, ring
+
+GEAR = make_gear(
+    K=Prior("lognormal", (2.2, 0.1)),
+    E0=Prior("fixed", (207e3,)),
+    alpha=Prior("fixed", (3e-4,)),
+)
+
+
+def test_every_combination_is_there_in_order():
+    found = study(GEAR, {"wall_thickness_mm": [0.6, 0.7], "radius_mm": [35, 40, 45]})
+    assert found.columns["wall_thickness_mm"].tolist() == [0.6] * 3 + [0.7] * 3
+    assert found.columns["radius_mm"].tolist() == [35, 40, 45] * 2
+    assert set(found.columns["deformation_mm"]) == {0.4}
+    assert set(found.columns["temperature_C"]) == {20.0}
+    assert found.varied == ("wall_thickness_mm", "radius_mm")
+
+
+def test_bands_are_those_of_the_prior_it_was_given():
+    found = study(GEAR, {"wall_thickness_mm": [0.6, 0.68], "temperature_C": [20, 80]})
+    law = lognorm(0.1, scale=2.2)
+    for row in range(4):
+        wall, warm = (
+            found.columns[name][row] for name in ("wall_thickness_mm", "temperature_C")
+        )
+        sizes = replace(GEAR.geometry, wall_thickness=wall)
+        unit = float(ring(sizes, 207e3)) * (1.0 - 3e-4 * (warm - 20.0)) * 0.4
+        for name, share in (("median", 0.5), ("lo", 0.025), ("hi", 0.975)):
+            force = found.columns[f"force_{name}_N"][row]
+            # 4000 draws: the tails of the prior to about 1 %.
+            assert force == pytest.approx(unit * law.ppf(share), rel=0.012)
+    assert found.interval_kind == "equal-tailed prior interval"
+    assert found.assumptions[0].startswith("Prior only")
+
+
+def test_the_cup_knows_height_and_poissons_ratio():
+    gear = replace(GEAR, theory="cup", K_theory="cup")
+    heights = [50.0, 62.0, 70.0]
+    force = study(gear, {"load_height_mm": heights}).columns["force_median_N"]
+    stiffness = [
+        float(cup(replace(GEAR.geometry, load_height=h), 207e3)) for h in heights
+    ]
+    np.testing.assert_allclose(force / force[0], np.array(stiffness) / stiffness[0])
+    other = study(gear, {}, materials=["40CrNiMoA", "PEEK"])
+    ratio = np.divide(*other.columns["force_median_N"])
+    sizes = replace(GEAR.geometry, poisson=0.39)
+    stiff = float(cup(GEAR.geometry, 207e3)) / float(cup(sizes, 3.8e3))
+    assert ratio == pytest.approx(stiff, rel=0.02)
+
+
+def test_what_is_far_or_beyond_is_said():
+    near = study(GEAR, {"wall_thickness_mm": [0.6, 0.7]})
+    assert not near.warnings
+    far = study(GEAR, {"wall_thickness_mm": [0.4, 0.7]})
+    assert "0.4 is far from the gear's 0.68" in far.warnings[0]
+    assert all("carried over" in " ".join(s.assumptions) for s in (near, far))
+
+
+@pytest.mark.parametrize(
+    ("vary", "changed", "words"),
+    [
+        ({"wall_tickness_mm": [0.6]}, {}, "Did you mean 'wall_thickness_mm'"),
+        ({"wall_thickness_mm": [0.6, -1.0]}, {}, "-1 is no size"),
+        ({"wall_thickness_mm": [0.6, np.inf]}, {}, "inf is no size"),
+        ({"wall_thickness_mm": [50.0]}, {}, "not thinner than the radius"),
+        ({"deformation_mm": [0.2, 0.0]}, {}, "not positive"),
+        ({"deformation_mm": [45.0]}, {}, "45 mm on a radius of 40 mm"),
+        ({"radius_mm": [30.0]}, {"deformation": 31.0}, "on a radius of 30 mm"),
+        ({"load_height_mm": [50.0]}, {}, "changes nothing under the theory 'ring'"),
+        ({"radius_mm": np.linspace(30, 40, 10**6)}, {}, "more than 100000"),
+        ({}, {"materials": ["40CrNiMo"]}, "Did you mean '40CrNiMoA'"),
+        ({}, {"materials": ["steel", "steel"]}, "one of them twice"),
+        ({}, {"temperature": -300.0}, "below absolute zero"),
+        ({}, {"interval": 1.0}, "is not between 0 and 1"),
+    ],
+)
+def test_bad_input_is_refused(vary, changed, words):
+    with pytest.raises(InputError) as refused:
+        study(GEAR, vary, **changed)
+    assert words in str(refused.value)
+
+
+def test_without_a_nominal_deformation_it_asks_for_one():
+    with pytest.raises(InputError, match="names no nominal deformation"):
+        study(replace(GEAR, nominal_deformation=None), {"radius_mm": [40.0]})
+
+
+def test_too_many_axes_are_refused():
+    names = ("wall_thickness_mm", "radius_mm", "length_mm")
+    vary = {name: [0.9, 1.0] for name in ("deformation_mm", "temperature_C")}
+    for name in names:
+        own = getattr(GEAR.geometry, name.removesuffix("_mm"))
+        vary[name] = [0.9 * own, own]
+    with pytest.raises(InputError, match="5 sizes at a time"):
+        study(GEAR, vary)
+
+
+def test_the_articles_tables_stand_beside_what_holds_together():
+    rows = article_rows()
+    third = [row for row in rows if row.table == 3]
+    assert [row.original_N for row in third] == [
+        162.52,
+        487.56,
+        812.60,
+        1137.64,
+        1462.68,
+    ]
+    # Its rule is its slope times the deformation, to its last digit.
+    for row in third:
+        assert row.article_N == pytest.approx(row.original_N, rel=2e-5)
+        assert row.ring_N == pytest.approx(80.905 * row.deformation_mm, rel=1e-5)
+    fourth = {(r.wall_thickness_mm, r.radius_mm): r for r in rows if r.table == 4}
+    assert list(fourth) == list(TABLE_4)
+    own = fourth[0.68, 40.0]
+    assert own.original_N / 0.4 == pytest.approx(1770.8, abs=0.05)
+    assert own.article_N == pytest.approx(650.08, abs=0.01)
+    assert own.article_revised_N == pytest.approx(84.5, abs=0.05)
+    for (wall, radius), row in fourth.items():
+        cubes = (wall / 0.68) ** 3 * (40.0 / radius) ** 3
+        assert row.ring_N == pytest.approx(own.ring_N * cubes, rel=1e-12)
+        assert row.revised_N == pytest.approx(0.13 * row.original_N, abs=0.006)
+    # The article's own column does not follow the cubes of its formula.
+    printed = fourth[0.76, 40.0].original_N / own.original_N
+    assert printed != pytest.approx((0.76 / 0.68) ** 3, rel=0.04)

@@ -1,0 +1,219 @@
+"""The spring found is the softest that holds, and its probabilities are true."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from designs import bent, known
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from hdcal.design import wave_generator as module
+from hdcal.design.next_gear import next_gear
+from hdcal.design.springs import best_common, judge, set_points
+from hdcal.design.summary import summarise_generator
+from hdcal.design.wave_generator import gear_forces, wave_generator
+from hdcal.errors import InputError
+
+WINDOW = (0.38, 0.42)
+
+
+@pytest.fixture
+def given(monkeypatch):
+    """Let a basis stand in for a calibration."""
+
+    def use(basis):
+        monkeypatch.setattr(module, "basis_of", lambda source, seed: basis)
+        return basis
+
+    return use
+
+
+def springs_of(stiffness):
+    """Return the forces of straight gears: [end of the window, temperature, draw]."""
+    return np.array(WINDOW)[:, None, None] * stiffness[None, None, :]
+
+
+def test_counting_intervals_is_solving_the_balance():
+    basis = bent(40)
+    gear = next_gear(basis, {"wall_thickness_mm": 0.02})
+    levels = np.array([-20.0, 80.0])
+    forces = gear_forces(basis, gear, np.array(WINDOW), levels)
+    rate, x = 500.0, 0.56
+    low, high = set_points(rate, WINDOW, forces)
+    for draw in range(basis.size):
+        own = replace(
+            basis, values={k: v[draw : draw + 1] for k, v in basis.values.items()}
+        )
+        shifts = {k: v[draw : draw + 1] for k, v in gear.shifts.items()}
+        alone = replace(gear, deviation=gear.deviation[:1], shifts=shifts)
+
+        def left(at, level, own=own, alone=alone):
+            force = gear_forces(own, alone, np.array([at]), np.array([level]))
+            return rate * (x - at) - force[0, 0, 0]
+
+        rests = [brentq(left, 1e-3, x, args=(level,), xtol=1e-10) for level in levels]
+        inside = WINDOW[0] <= min(rests) and max(rests) <= WINDOW[1]
+        assert inside == (low[draw] <= x <= high[draw])
+        if draw > 8:
+            break
+
+
+def test_the_best_common_point_lies_in_most_intervals():
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        low = random.normal(size=30)
+        high = low + random.normal(0.5, 1.0, size=30)
+
+        def count(x, low=low, high=high):
+            return np.count_nonzero((low <= x) & (x <= high))
+
+        # The best count is met at one of the intervals' own starts.
+        assert count(best_common(low, high)) == max(map(count, low))
+    assert best_common(np.array([0.0, 1.0]), np.array([3.0, 5.0])) == 2.0
+    assert np.isfinite(best_common(np.array([1.0]), np.array([0.0])))
+
+
+@pytest.mark.parametrize("rate", [0.01, 20.0, 200.0, 1e5])
+def test_the_probability_is_that_of_normal_gears(rate):
+    """Straight gears of stiffness N(200, 10): inside when s lies between two lines."""
+    draws = 200_000
+    stiffness = np.random.default_rng(0).normal(200.0, 10.0, draws)
+    spring = judge(rate, WINDOW, springs_of(stiffness), np.zeros(draws))
+    x = spring.interference
+    # ω ≥ lo ⇔ s ≤ c (x − lo)/lo, ω ≤ hi ⇔ s ≥ c (x − hi)/hi.
+    most, least = (rate * (x - end) / end for end in WINDOW)
+    law = norm(200.0, 10.0)
+    true = law.cdf(most) - law.cdf(least)
+    error = np.sqrt(true * (1.0 - true) / draws)
+    assert spring.together == pytest.approx(true, abs=4.0 * error + 1e-12)
+    assert spring.no_backlash == pytest.approx(law.cdf(most), abs=4e-3)
+
+    # No other set point is better than the one that was chosen.
+    def at(x):
+        return law.cdf(rate * (x / WINDOW[0] - 1.0)) - law.cdf(
+            rate * (x / WINDOW[1] - 1.0)
+        )
+
+    others = x + np.linspace(-0.2, 0.2, 401) * (WINDOW[1] - WINDOW[0] + 20.0 / rate)
+    assert np.max(at(others)) <= true + 3e-3
+    if rate == 0.01:  # force control: one force for all gears
+        assert true == pytest.approx(0.682, abs=0.01)
+    if rate == 1e5:  # displacement control
+        assert spring.together == 1.0
+
+
+def test_choosing_on_the_same_draws_flatters_little():
+    """With 4000 draws the chosen point's true probability is what was counted."""
+    law, gaps = norm(200.0, 10.0), []
+    for seed in range(40):
+        stiffness = law.rvs(4000, random_state=seed)
+        spring = judge(100.0, WINDOW, springs_of(stiffness), np.zeros(4000))
+        most, least = (100.0 * (spring.interference / end - 1.0) for end in WINDOW)
+        gaps.append(spring.together - (law.cdf(most) - law.cdf(least)))
+    error = np.sqrt(0.8 * 0.2 / 4000)
+    assert np.mean(gaps) < error
+    # The same count with 40 draws is flattered, and would be seen.
+    stiffness = law.rvs(40, random_state=0)
+    spring = judge(100.0, WINDOW, springs_of(stiffness), np.zeros(40))
+    most, least = (100.0 * (spring.interference / end - 1.0) for end in WINDOW)
+    assert spring.together - (law.cdf(most) - law.cdf(least)) > 3.0 * error
+
+
+def test_the_softest_that_meets_it_is_found(given):
+    basis = given(known(2000))
+    found = wave_generator(basis.gear, WINDOW, temperatures=[-20.0, 80.0])
+    assert found.temperatures.tolist() == [-20.0, 20.0, 80.0]
+    assert found.chosen.together >= 0.99
+    softer = [s for s in found.springs if s.rate < found.chosen.rate]
+    assert softer and all(s.together < 0.99 for s in softer)
+    rates = [s.rate for s in found.springs]
+    assert rates == sorted(rates)
+    # Without errors of its own a stiffer spring is never worse.
+    chances = [s.together for s in found.springs]
+    assert np.all(np.diff(chances) > -1e-9)
+
+
+def test_a_spring_set_badly_has_a_best_rate(given):
+    basis = given(known(2000))
+    found = wave_generator(basis.gear, WINDOW, setting_sd=0.012, probability=0.8)
+    chances = [s.together for s in found.springs]
+    best = int(np.argmax(chances))
+    assert 0 < best < len(chances) - 1
+    assert chances[-1] < max(chances) - 0.02
+    # Rigid, the set point is the deformation: normal, 0.02 mm to both ends.
+    inside = 1.0 - 2.0 * norm.sf(0.02 / 0.012)
+    assert chances[-1] == pytest.approx(inside, abs=0.03)
+
+
+def test_the_adjusting_range_is_that_of_the_gears(given):
+    basis = given(known(20_000))
+    found = wave_generator(basis.gear, WINDOW, rates=(100.0, 10_000.0))
+    told = summarise_generator(found)
+    low, high = told["adjusted"]["interference_mm"]
+    stiffness = basis.values["K"] * 207e3 * basis.problem.unit_stiffness
+    own = 0.4 + 0.4 * stiffness / found.chosen.rate
+    assert low == pytest.approx(np.quantile(own, 0.005), rel=1e-9)
+    assert high == pytest.approx(np.quantile(own, 0.995), rel=1e-9)
+    force, more = told["adjusted"]["preload_N"]
+    assert more / force == pytest.approx(np.exp(2 * 2.576 * 0.05), rel=0.02)
+    assert told["adjusted"]["probability"] == 1.0
+    rest = told["set_point"]["force_N"]["median"]
+    assert rest == pytest.approx(0.4 * np.median(stiffness))
+
+
+def test_impossible_requirements_say_what_the_best_is(given):
+    basis = given(known(2000))
+    with pytest.raises(InputError) as refused:
+        wave_generator(basis.gear, (0.399, 0.401), rates=(1.0, 50.0))
+    words = str(refused.value)
+    assert "no spring rate between 1 and 50 N/mm meets 0.399 … 0.401 mm" in words
+    assert "the best is 50 N/mm with 0." in words
+    assert "adjusted gear by gear" in words
+
+
+def test_a_force_that_falls_is_refused(given):
+    basis = bent(1000)
+    slope = np.full(1000, -2.0)
+    values = {**basis.values, "progressive_stiffening.slope": slope}
+    given(replace(basis, values=values))
+    with pytest.raises(InputError, match="does not grow with deformation"):
+        wave_generator(basis.gear, WINDOW)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"window": (0.42, 0.38)}, "0.42:0.38 is empty"),
+        ({"window": (0.4, 0.4)}, "0.4:0.4 is empty"),
+        ({"window": (np.nan, 0.4)}, "nan:0.4 is empty"),
+        ({"window": (-0.1, 0.4)}, "not positive"),
+        ({"window": (0.4, 400.0)}, "on a radius of 40 mm"),
+        ({"probability": 1.0}, "is not between 0 and 1"),
+        ({"probability": 0.9999}, "cannot be told from 2000 draws"),
+        ({"setting_sd": -1.0}, "no standard deviation"),
+        ({"rates": (5.0, 2.0)}, "no range of spring rates"),
+        ({"temperatures": [-300.0]}, "below absolute zero"),
+        ({"temperatures": [3000.0]}, "half of Young's modulus"),
+        ({"tolerances": {"wall": 0.1}}, "unknown key 'wall'"),
+    ],
+)
+def test_bad_input_is_refused(given, changed, words):
+    basis = given(known(2000))
+    asked = {"window": WINDOW, **changed}
+    with pytest.raises(InputError) as refused:
+        wave_generator(basis.gear, **asked)
+    assert words in str(refused.value)
+
+
+def test_everything_wrong_is_said_at_once(given):
+    basis = given(known(2000))
+    with pytest.raises(InputError) as refused:
+        wave_generator(
+            basis.gear,
+            (0.4, 0.3),
+            probability=2.0,
+            temperatures=[-300.0],
+            tolerances={"wall": 1.0},
+        )
+    assert len(refused.value.findings) == 4

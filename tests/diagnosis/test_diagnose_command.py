@@ -1,0 +1,195 @@
+"""`hdcal diagnose` answers for one case or many, and writes all of it or nothing."""
+
+import json
+import operator
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+
+import jsonschema
+import pytest
+from commands import XB1, Hdcal
+from test_verdict_json import schema
+from verdicts import KINDS
+
+from hdcal.diagnosis.many_cases import run_all
+from hdcal.errors import Finding, InputError
+
+FILES = {
+    "report.html",
+    "verdict.json",
+    *("where.svg", "which.svg", "shrink.svg"),
+    *("where.png", "which.png", "shrink.png"),
+}
+
+
+def pretend(case, *, library, quick=False, seed=0, progress=None):
+    """Return the verdict that a case's name asks for."""
+    if case.name == "defect":
+        raise ValueError("broken")
+    if case.name == "refused":
+        raise InputError([Finding(case.name, "is refused", "Take another")])
+    verdict = KINDS.get(case.name, KINDS["named"])()
+    named = replace(verdict.case, name=case.name)
+    return replace(verdict, case=named, library=tuple(library))
+
+
+def choose(spec, registry):
+    """Return the library without one effect."""
+    missing = set((spec or "").removeprefix("minus:").split(",")) - {""}
+    if missing - registry.keys():
+        raise InputError([Finding("--library", "names no effect", "See hdcal effects")])
+    return {name: effect for name, effect in registry.items() if name not in missing}
+
+
+@pytest.fixture
+def diagnose(monkeypatch: pytest.MonkeyPatch, here: Hdcal) -> Hdcal:
+    """Run `hdcal diagnose` with make-believe verdicts."""
+    for name, function in (("diagnose", pretend), ("library", choose)):
+        module = ModuleType(name)
+        setattr(module, "choose_library" if name == "library" else name, function)
+        monkeypatch.setitem(sys.modules, f"hdcal.diagnosis.{name}", module)
+    return lambda *arguments: here("diagnose", *arguments)
+
+
+@pytest.fixture
+def cases(tmp_path: Path) -> dict[str, Path]:
+    """Cases whose names say what comes out."""
+    folders = {}
+    for name in [*KINDS, "defect", "refused"]:
+        folders[name] = tmp_path / "cases" / name
+        folders[name].mkdir(parents=True)
+        for file in ("data.csv", "gear.toml"):
+            (folders[name] / file).write_bytes((XB1 / file).read_bytes())
+    return folders
+
+
+def names(folder: Path) -> set[str]:
+    """Return what lies in a folder."""
+    return {path.name for path in folder.iterdir()}
+
+
+def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
+    done = diagnose(cases["named"], "--out", "run", "--json", "--seed", "3")
+    assert done.returncode == 0, done.stderr
+    assert names(tmp_path / "run") == FILES
+    found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
+    jsonschema.validate(found, schema())
+    assert json.loads(done.stdout) == found
+    assert found["seed"] == 3 and not found["quick"]
+    assert "Most likely cause: hysteresis (96 %)" in done.stderr
+    assert "What this cannot say" in done.stderr and "report.html" in done.stderr
+
+
+def test_the_folder_is_named_after_the_case(diagnose, cases, tmp_path: Path):
+    assert diagnose(cases["none"], "--no-report").returncode == 0
+    assert names(tmp_path / "none-diagnosis") == {"verdict.json"}
+
+
+def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
+    (tmp_path / "a.csv").write_bytes((XB1 / "data.csv").read_bytes())
+    (tmp_path / "gear.toml").write_bytes((XB1 / "gear.toml").read_bytes())
+    asked = [cases["named"], cases["none"], "a.csv", "--json", "--out", "all"]
+    done = diagnose(*asked, "--report")
+    assert done.returncode == 0, done.stderr
+    assert names(tmp_path / "all") == {"named", "none", "a"}
+    assert all(names(folder) == FILES for folder in (tmp_path / "all").iterdir())
+    asked.append("--no-report")
+    said = json.loads(done.stdout)["cases"]
+    assert list(said) == ["named", "none", "a"]
+    assert said["none"]["which"]["verdict"] == "none"
+    assert "2 named, 1 none" in done.stderr
+    # An older result of many cases may be replaced, but nothing else.
+    assert diagnose(*asked).returncode == 2
+    assert diagnose(*asked, "--force").returncode == 0
+    (tmp_path / "all" / "named" / "notes.txt").write_text("mine")
+    refused = diagnose(*asked, "--force")
+    assert refused.returncode == 2 and "'named'" in refused.stderr
+
+
+def test_a_failed_case_is_written_and_told_by_the_exit_code(
+    diagnose, cases, tmp_path: Path
+):
+    done = diagnose(cases["failed"], cases["none"], "--out", "all")
+    assert done.returncode == 1
+    assert "FAILED" in done.stdout
+    page = (tmp_path / "all" / "failed" / "report.html").read_text("utf-8")
+    assert "FAILED — do not use this result" in page
+    assert "FAILED — do not use" in (tmp_path / "all/failed/where.svg").read_text()
+    alone = diagnose(cases["failed"], "--out", "alone", "--no-report")
+    assert alone.returncode == 1
+    assert "FAILED: this result must not be used." in alone.stdout
+    assert "Most likely" not in alone.stdout
+
+
+def test_everything_wrong_with_any_case_is_said_at_once(
+    diagnose, cases, tmp_path: Path
+):
+    (cases["none"] / "data.csv").write_text("deformation_mm\n1\n")
+    (cases["named"] / "gear.toml").write_text("[gear]\nname = 1\n")
+    (tmp_path / "file").touch()
+    before = set(tmp_path.rglob("*"))
+    done = diagnose(
+        *(cases["none"], cases["named"], cases["unknown"], "missing.csv"),
+        *("--library", "minus:nothing", "--out", "file/below"),
+    )
+    assert done.returncode == 2 and not done.stdout
+    for words in ("none/data.csv", "named/gear.toml", "missing.csv", "--library"):
+        assert words in done.stderr
+    assert "file/below" in done.stderr
+    assert set(tmp_path.rglob("*")) == before
+
+
+def test_two_cases_of_one_name_are_refused(diagnose, cases, tmp_path: Path):
+    done = diagnose(cases["none"], cases["named"], cases["none"])
+    assert done.returncode == 2
+    assert "a second case is called 'none'" in done.stderr
+    assert names(tmp_path) == {"cases"}
+
+
+@pytest.mark.parametrize(("name", "code"), [("refused", 2), ("defect", 1)])
+def test_one_case_that_breaks_leaves_nothing(
+    diagnose, cases, tmp_path: Path, name: str, code: int
+):
+    done = diagnose(cases["none"], cases[name], "--no-report")
+    assert done.returncode == code
+    assert name in done.stderr and "Traceback" not in done.stderr
+    assert names(tmp_path) == {"cases"}
+
+
+def test_the_library_can_do_without_an_effect(diagnose, cases, tmp_path: Path):
+    given = ["--library", "minus:outliers", "--no-report", "--out", "run"]
+    assert diagnose(cases["named"], *given).returncode == 0
+    found = json.loads((tmp_path / "run" / "verdict.json").read_text())
+    assert "outliers" not in found["library"] and "coulomb_friction" in found["library"]
+
+
+def test_with_many_cases_reports_have_to_be_asked_for(
+    diagnose, monkeypatch, cases, tmp_path: Path
+):
+    monkeypatch.setattr(sys.modules["hdcal.diagnosis.command"], "MANY", 1)
+    given = [cases["named"], cases["none"], "--out"]
+    done = diagnose(*given, "plain")
+    assert "no reports without --report" in done.stderr
+    assert names(tmp_path / "plain" / "none") == {"verdict.json"}
+    assert diagnose(*given, "full", "--report").returncode == 0
+    assert names(tmp_path / "full" / "none") == FILES
+
+
+def test_several_processes_give_the_same_in_the_same_order():
+    tasks = [(2, power) for power in range(6)]
+    told: list[tuple[int, int]] = []
+
+    def tell(done: int, total: int) -> None:
+        told.append((done, total))
+
+    expected = [2**power for power in range(6)]
+    assert run_all(operator.pow, tasks, 1) == expected
+    assert run_all(operator.pow, tasks, 2, tell) == expected
+    assert told == [(done, 6) for done in range(1, 7)]
+
+
+def test_an_error_in_another_process_comes_back():
+    with pytest.raises(ZeroDivisionError):
+        run_all(operator.truediv, [(1, 1), (1, 0), (1, 2)], 2)

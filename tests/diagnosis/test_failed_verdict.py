@@ -1,0 +1,54 @@
+"""A verdict without a single number is still written, and says that it failed."""
+
+import json
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from test_verdict_json import schema
+from verdicts import KINDS
+
+from hdcal.data.case import Case
+from hdcal.diagnosis.result_folder import write_verdict
+from hdcal.diagnosis.terminal import closing_words, overview
+from hdcal.diagnosis.verdict import Verdict
+
+
+def hollow(value):
+    """Return a value with NaN instead of every number in it."""
+    if isinstance(value, float | np.ndarray):
+        return value * np.nan
+    if isinstance(value, dict):
+        return {key: hollow(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return tuple(map(hollow, value))
+    if is_dataclass(value) and not isinstance(value, Case):
+        parts = {f.name: hollow(getattr(value, f.name)) for f in fields(value)}
+        return replace(value, **parts)
+    return value
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_without_numbers_everything_is_written(kind: str, tmp_path: Path):
+    verdict = hollow(KINDS[kind]())
+    assert isinstance(verdict, Verdict)
+    assert np.isnan(verdict.where.cells[0].bias_N)
+    # Words of an answer can do without numbers too, should it ever come to that.
+    for reasons in ((), ("nothing was finite",)):
+        folder = tmp_path / str(len(reasons))
+        folder.mkdir()
+        found = write_verdict(replace(verdict, reasons=reasons), folder)
+        jsonschema.validate(json.loads((folder / "verdict.json").read_text()), schema())
+        assert all(path.stat().st_size > 100 for path in folder.iterdir())
+        assert list(closing_words(found, "there"))
+        assert list(overview({kind: found}, "there"))
+
+
+def test_without_cells_or_rungs_everything_is_written(tmp_path: Path):
+    verdict = KINDS["none"]()
+    where = replace(verdict.where, cells=())
+    shrink = replace(verdict.shrink, ladder=())
+    write_verdict(replace(verdict, where=where, shrink=shrink), tmp_path)
+    assert "No gap is seen" in (tmp_path / "report.html").read_text("utf-8")

@@ -1,0 +1,65 @@
+"""A name in a case is only text in the report, figures and words of its verdict."""
+
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+from test_untrusted_names import NAMES
+from verdicts import named
+
+from hdcal.diagnosis.document import verdict_report
+from hdcal.diagnosis.figure.closure import shrink_figure
+from hdcal.diagnosis.figure.where import where_figure
+from hdcal.diagnosis.figure.which import which_figure
+from hdcal.diagnosis.terminal import closing_words, overview
+from hdcal.diagnosis.verdict_json import verdict_json
+from hdcal.report.canvas import render
+
+FIGURES = {"where": where_figure, "which": which_figure, "shrink": shrink_figure}
+
+
+def renamed(name: str):
+    """Return a verdict with a name in every place that a file can name."""
+    verdict = named()
+    gear = replace(verdict.case.gear, name=name, material=name)
+    case = replace(verdict.case, name=name, gear=gear, notes=(name,))
+    cells = tuple(
+        replace(cell, label=name, covariate="run") if not cell.unit else cell
+        for cell in verdict.where.cells
+    )
+    where = replace(verdict.where, cells=cells)
+    return replace(verdict, case=case, where=where, notes=(name,), reasons=(name,))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_only_text(name: str):
+    verdict = renamed(name)
+    found = verdict_json(verdict)
+    images = {}
+    for what in FIGURES:
+        figure = FIGURES[what](verdict)
+        images[what] = render(figure, "svg", name)
+        tree = ElementTree.fromstring(images[what])
+        tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
+        assert not tags & {"script", "img", "foreignObject", "a"}
+    page = verdict_report(verdict, found, images, name)
+    assert "<script" not in page and "<img src=x" not in page and "<!--" not in page
+    assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
+    assert page.count("<title>") == page.count("</title>") == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_cannot_steer_the_terminal(name: str):
+    found = verdict_json(replace(renamed(name), reasons=()))
+    terminal = Console(record=True, width=110, highlight=False, quiet=False)
+    with terminal.capture() as caught:
+        terminal.print(*closing_words(found, name), *overview({name: found}, name))
+    assert not set(caught.get()) & {"\x00", "\x1b", "\x07", "\u202e"}
+
+
+def test_the_same_verdict_gives_the_same_bytes():
+    for what in FIGURES:
+        draw = FIGURES[what]
+        for kind in ("svg", "png"):
+            assert render(draw(named()), kind) == render(draw(named()), kind)

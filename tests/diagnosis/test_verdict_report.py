@@ -1,0 +1,51 @@
+"""The report of a diagnosis says what its numbers mean, and why one is missing."""
+
+from dataclasses import replace
+
+from rich.table import Table
+from verdicts import KINDS, named
+
+from hdcal.diagnosis.document import verdict_report
+from hdcal.diagnosis.terminal import overview
+from hdcal.diagnosis.verdict import Verdict
+from hdcal.diagnosis.verdict_json import verdict_json
+
+
+def page(verdict: Verdict) -> str:
+    """Return the text of the report, its figures empty."""
+    images = {name: b"" for name in ("where", "which", "shrink")}
+    return verdict_report(verdict, verdict_json(verdict), images)
+
+
+def test_k_is_said_with_its_formula():
+    assert "K by the ring formula, at the prior&#39;s mean modulus, is 1.87" in page(
+        named()
+    )
+
+
+def test_without_a_run_the_true_reason_stands():
+    words = page(replace(named(), next_test=(), no_run="fewer than two are left"))
+    assert "No run is proposed: fewer than two are left." in words
+    assert "left out of this ranking" not in words
+    assert "left out of this ranking" in page(named())
+
+
+def test_what_is_not_seen_has_a_dash_for_its_size():
+    words = page(KINDS["none"]())
+    assert "0 … 0 N" not in words and "of full scale" not in words
+    assert "of what is not seen there is no size" in words
+    table, *_ = overview({"a": verdict_json(KINDS["none"]())}, "there")
+    assert isinstance(table, Table)
+    assert [str(cell) for cell in table.columns[4].cells] == ["–"]
+
+
+def test_rounding_is_told_apart_from_the_gate():
+    gap = replace(named().gap, rounding_N=2.0)
+    words = page(replace(named(), gap=gap))
+    assert "in steps of 2 N; nothing else is seen" in words
+
+
+def test_the_noise_of_means_is_called_so():
+    assert "standard deviation of a mean of 3 readings" in page(
+        replace(named(), averaged_rows=3)
+    )

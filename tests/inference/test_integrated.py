@@ -1,0 +1,337 @@
+"""Compression and integrating out are shortcuts to the dense normal density."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.priors import effect_priors, material_priors, rig_priors
+from hdcal.inference import compress, density
+from hdcal.inference.discrepancy import prior_sd
+from hdcal.inference.likelihood import log_probability
+from hdcal.inference.member_offsets import Linear, contrasts
+from hdcal.inference.problem import build_problem
+from hdcal.physics.chain import (
+    Base,
+    linear_coefficients,
+    linear_columns,
+    predict_reading,
+)
+
+SHIPPED = effect_priors()
+log_likelihood = jax.jit(density.log_likelihood)
+predict_rows = jax.jit(density.predict_rows)
+pointwise = jax.jit(density.pointwise_log_likelihood)
+
+
+def labelled(program, seed, *, known, runs=1, specimens=1, sds=(0.0,)):
+    """Return the program with labels, stated sds and some force."""
+    rng = np.random.default_rng(seed)
+    rows = len(program.deformation)
+    return dataclasses.replace(
+        program,
+        deformation=program.deformation + rng.normal(0.0, 0.01, rows),
+        run=np.arange(rows) % runs,
+        specimen=np.sort(np.arange(rows) % specimens),
+        force_sd=rng.choice(sds, rows),
+        force=200.0 * program.deformation + rng.normal(0.0, 2.0, rows),
+        known=frozenset(known),
+    )
+
+
+def case_of(records, gear, *, resolution=0.0):
+    material = material_priors("40CrNiMoA")
+    rig = rig_priors()
+    names = ("K", "force_offset", "deformation_offset", "sigma")
+    scales = ("run_offset_sd", "specimen_sd", "gap_sd", "gap_length")
+    priors = {name: rig[name] for name in names}
+    priors |= {name: material[name] for name in ("E0", "alpha")}
+    return Case(
+        name="case",
+        gear=Gear(
+            "gear",
+            gear,
+            "40CrNiMoA",
+            "ring",
+            "diametral",
+            20.0,
+            resolution,
+            None,
+            priors,
+            scale_priors={name: rig[name] for name in scales},
+        ),
+        records=records,
+        run_labels=tuple(map(str, range(int(records.run.max()) + 1))),
+        specimen_labels=tuple(map(str, range(int(records.specimen.max()) + 1))),
+        data_sha256="",
+    )
+
+
+def random_values(seed):
+    rng = np.random.default_rng(seed)
+    return {
+        "K": rng.uniform(3.0, 7.0),
+        "E0": rng.normal(207e3, 3e3),
+        "alpha": rng.uniform(0.0, 1e-3),
+        "force_offset": rng.normal(0.0, 3.0),
+        "deformation_offset": rng.normal(0.0, 0.01),
+        "sigma": rng.uniform(0.3, 2.0),
+        "run_offset_sd": rng.uniform(0.5, 4.0),
+        "specimen_sd": rng.uniform(0.02, 0.2),
+        "gap_sd": rng.uniform(0.5, 4.0),
+        "gap_length": rng.uniform(0.1, 1.0),
+    }
+
+
+# --- compression -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("rows", "runs", "specimens", "sds"),
+    [
+        (180, 1, 1, (0.0,)),
+        (180, 3, 2, (0.0, 0.7)),
+        (3, 1, 1, (0.2,)),
+        (9, 4, 2, (0.5,)),
+    ],
+)
+def test_compressed_is_row_by_row(program, rows, runs, specimens, sds, seed, reading):
+    rng = np.random.default_rng(seed)
+    some = jax.tree.map(lambda leaf: leaf[:rows], program)
+    records = labelled(some, seed, known=(), runs=runs, specimens=specimens, sds=sds)
+    slope, offset = rng.uniform(100.0, 300.0, specimens), rng.normal(0.0, 3.0, runs)
+    alpha, zero, sigma, step = 4e-4, 0.01, 0.8, 0.5
+
+    def base(run, specimen):
+        return Base(slope[specimen], alpha, zero, offset[run], sigma)
+
+    distinct, group = compress.group_rows(
+        records.run, records.specimen, records.force_sd
+    )
+    np.testing.assert_array_equal(
+        distinct[group],
+        np.stack([records.run, records.specimen, records.force_sd], axis=1),
+    )
+    columns = linear_columns(records, reading)
+    blocks = compress.compress(columns, records.force, distinct, group)
+    assert blocks.count.sum() == rows
+    coefficients = linear_coefficients(base(blocks.run, blocks.specimen), reading)
+    coefficients = jnp.broadcast_to(coefficients, (len(distinct), 4))
+    found = compress.log_likelihood(blocks, coefficients, sigma, step)
+
+    own = base(records.run, records.specimen)
+    mean, noise = predict_reading(own, (), records, reading)
+    sd = np.sqrt(noise.sd[0] ** 2 + step**2 / 12.0)
+    slow = stats.norm.logpdf(records.force, mean, sd).sum()
+    assert float(found) == pytest.approx(slow, rel=1e-11)
+
+
+def test_a_compressed_problem_is_its_rows(program, gear):
+    records = labelled(program, 5, known={"force_sd"}, sds=(0.1, 0.4))
+    problem = build_problem(case_of(records, gear), SHIPPED)
+    assert problem.records is None
+    values = random_values(1)
+    rows = dataclasses.replace(problem, records=records, blocks=None)
+    mean, noise = predict_rows(rows, values, records, None)
+    slow = log_probability(records.force, mean, noise, 0.0, rounded=False).sum()
+    assert float(log_likelihood(problem, values)) == pytest.approx(
+        float(slow), rel=1e-11
+    )
+    assert float(log_likelihood(rows, values)) == pytest.approx(float(slow), rel=1e-11)
+
+
+# --- integrating out ---------------------------------------------------------------
+
+
+def random_linear(seed, rows, weights):
+    rng = np.random.default_rng(seed)
+    sd = rng.uniform(0.3, 2.0, rows)
+    return Linear(
+        residual=jnp.asarray(rng.normal(0.0, 2.0, rows)),
+        design=jnp.asarray(rng.normal(size=(rows, weights))),
+        sd=jnp.asarray(sd),
+        scale=jnp.asarray(rng.uniform(0.1, 3.0, weights)),
+        log_volume=jnp.asarray(np.log(sd).sum()),
+        count=rows,
+    )
+
+
+def dense(linear):
+    """Return design, prior covariance and noise covariance as dense matrices."""
+    return (
+        np.asarray(linear.design),
+        np.diag(np.asarray(linear.scale) ** 2),
+        np.diag(np.asarray(linear.sd) ** 2),
+    )
+
+
+@pytest.mark.parametrize(("rows", "weights"), [(30, 4), (5, 12), (1, 1)])
+def test_the_integral_is_the_dense_density(rows, weights):
+    linear = random_linear(rows, rows, weights)
+    design, prior, noise = dense(linear)
+    slow = stats.multivariate_normal(
+        np.zeros(rows), design @ prior @ design.T + noise
+    ).logpdf(linear.residual)
+    assert float(linear.log_likelihood()) == pytest.approx(slow, rel=1e-11)
+
+
+@pytest.mark.parametrize(("rows", "weights"), [(30, 4), (3, 5)])
+def test_draws_are_conditional(rows, weights):
+    linear = random_linear(rows + 1, rows, weights)
+    design, prior, noise = dense(linear)
+    gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + noise)
+    mean = gain @ np.asarray(linear.residual)
+    covariance = prior - gain @ design @ prior
+    count = 40_000
+    keys = jax.random.split(jax.random.key(rows), count)
+    drawn = np.asarray(jax.jit(jax.vmap(linear.draw))(keys))
+    root = np.linalg.cholesky(covariance)
+    standard = np.linalg.solve(root, (drawn - mean).T)
+    bound = 5.0 / np.sqrt(count)
+    assert np.max(np.abs(standard.mean(axis=1))) < bound
+    spread = standard @ standard.T / count - np.eye(weights)
+    assert np.max(np.abs(spread)) < bound * np.sqrt(2.0)
+
+
+def test_contrasts_are_deviations():
+    for count in (2, 3, 7):
+        basis = np.asarray(contrasts(count))
+        assert basis.shape == (count, count - 1)
+        np.testing.assert_allclose(basis.sum(axis=0), 0.0, atol=1e-14)
+        centring = np.eye(count) - 1.0 / count
+        np.testing.assert_allclose(basis @ basis.T, centring, atol=1e-14)
+
+
+def dense_log_likelihood(problem, case, values):
+    """The dense normal density of all readings, members in the covariance."""
+    records = case.records
+    mean, noise = predict_rows(problem, values, records, None)
+    rows = len(records.force)
+    covariance = np.diag(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    if "run" in problem.integrated:
+        centring = np.eye(problem.runs) - 1.0 / problem.runs
+        covariance += (
+            values["run_offset_sd"] ** 2 * centring[records.run][:, records.run]
+        )
+    if "specimen" in problem.integrated:
+        # A specimen's share of the stiffness scales all but the zero of the force.
+        elastic = np.asarray(mean) - values["force_offset"]
+        centring = np.eye(problem.specimens) - 1.0 / problem.specimens
+        own = centring[records.specimen][:, records.specimen]
+        covariance += values["specimen_sd"] ** 2 * np.outer(elastic, elastic) * own
+    if "gap" in problem.integrated:
+        basis = np.asarray(problem.gap.columns(records.deformation))
+        sd = np.asarray(prior_sd(values["gap_sd"], values["gap_length"]))
+        covariance += (basis * sd**2) @ basis.T
+    law = stats.multivariate_normal(np.zeros(rows), covariance)
+    return law.logpdf(records.force - np.asarray(mean))
+
+
+STRUCTURES = {
+    "runs": ({"run"}, False),
+    "specimens": ({"specimen"}, False),
+    "gap": (set(), True),
+    "runs and gap": ({"run", "force_sd"}, True),
+    "all": ({"run", "specimen", "force_sd"}, True),
+}
+
+
+@pytest.fixture(params=sorted(STRUCTURES))
+def structured(request, program, gear):
+    known, with_gap = STRUCTURES[request.param]
+    records = labelled(
+        program,
+        11,
+        known=known,
+        runs=4 if "run" in known else 1,
+        specimens=3 if "specimen" in known else 1,
+        sds=(0.1, 0.6) if "force_sd" in known else (0.0,),
+    )
+    case = case_of(records, gear, resolution=0.3)
+    problem = build_problem(case, SHIPPED, with_gap=with_gap)
+    return case, problem
+
+
+def rows_form(problem, case):
+    """Return the same problem with its rows kept."""
+    columns = None
+    if problem.gap is not None:
+        columns = problem.gap.columns(case.records.deformation)
+    return dataclasses.replace(
+        problem, records=case.records, blocks=None, columns=columns
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_blocks_rows_and_dense_agree(structured, seed):
+    case, problem = structured
+    values = random_values(seed)
+    assert problem.blocks is not None
+    assert problem.integrated
+    slow = dense_log_likelihood(problem, case, values)
+    found = float(log_likelihood(problem, values))
+    assert found == pytest.approx(slow, rel=1e-10)
+    if "specimen" not in problem.integrated:
+        rows = float(log_likelihood(rows_form(problem, case), values))
+        assert rows == pytest.approx(slow, rel=1e-10)
+
+
+def test_drawn_members_explain_the_data(structured):
+    """Given the members the readings scatter by σ, and deviations sum to zero."""
+    case, problem = structured
+    values = random_values(0)
+    drawn = jax.jit(density.draw_members)(problem, values, jax.random.key(0))
+    names = {
+        "run": "run_offset",
+        "specimen": "specimen_deviation",
+        "gap": "gap_weights",
+    }
+    assert set(drawn) == {names[kind] for kind in problem.integrated}
+    for name in set(drawn) - {"gap_weights"}:
+        assert abs(float(drawn[name].sum())) < 1e-9
+    # Bayes: p(y) = p(y | w) p(w) / p(w | y), with the two latter from dense algebra.
+    linear = jax.jit(density.linear_part)(problem, values)
+    weights = members_of(problem, drawn)
+    design, prior, noise = dense(linear)
+    precision = np.linalg.inv(noise)
+    posterior = np.linalg.inv(design.T @ precision @ design + np.linalg.inv(prior))
+    mean = posterior @ design.T @ precision @ np.asarray(linear.residual)
+    own = slow_given_members(problem, case, values, drawn)
+    bayes = (
+        own
+        + stats.norm.logpdf(weights, 0.0, np.asarray(linear.scale)).sum()
+        - log_normal(weights - mean, posterior)
+    )
+    whole = float(log_likelihood(problem, values))
+    assert whole == pytest.approx(bayes, rel=1e-7)
+
+
+def log_normal(error, covariance):
+    root = np.linalg.cholesky(covariance)
+    score = np.linalg.solve(root, error)
+    return stats.norm.logpdf(score).sum() - np.log(np.diag(root)).sum()
+
+
+def members_of(problem, drawn):
+    """Return the weights behind drawn members, in the order of the design."""
+    parts = []
+    if "run" in problem.integrated:
+        parts.append(contrasts(problem.runs).T @ drawn["run_offset"])
+    if "specimen" in problem.integrated:
+        own = drawn["specimen_deviation"]
+        parts.append(contrasts(problem.specimens).T @ own)
+    if "gap" in problem.integrated:
+        parts.append(drawn["gap_weights"])
+    return np.concatenate(parts)
+
+
+def slow_given_members(problem, case, values, drawn):
+    """Return the log density of all readings when the members are known."""
+    rows = rows_form(problem, case)
+    given = pointwise(rows, {**values, **drawn}, case.records, rows.columns)
+    return float(given.sum())

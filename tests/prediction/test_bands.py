@@ -1,0 +1,168 @@
+"""Bands: what they hold, where they are tested, and what they refuse."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from rigs import cycles, make_case, make_gear, make_records
+
+from hdcal.calibration.calibrate import calibrate
+from hdcal.errors import InputError, NotUsable
+from hdcal.inference.checks import Check
+from hdcal.prediction.bands import bands
+from hdcal.prediction.bands.bands import default_bands, predict
+
+
+def reading(records, seed=0):
+    noise = np.random.default_rng(seed).normal(0.0, 0.4, len(records.force))
+    rise = np.asarray(records.temperature) - 20.0
+    slope = 205.0 * (1.0 - 3e-4 * rise)
+    friction = 2.0 * np.asarray(records.sense)
+    return slope * np.asarray(records.deformation) - 1.0 + friction + noise
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    records = cycles(96)
+    case = make_case(replace(records, force=reading(records)))
+    return calibrate(case, effects=["coulomb_friction"], warmup=500, draws=500)
+
+
+def test_bands_follow_deformation_temperature_and_direction(rubbing):
+    up = predict(rubbing, [0.1, 0.4], [20.0, 80.0], "up")
+    down = predict(rubbing, [0.1, 0.4], [20.0, 80.0], "down")
+    assert list(up.deformation_mm) == [0.1, 0.4, 0.1, 0.4]
+    assert list(up.temperature_C) == [20.0, 20.0, 80.0, 80.0]
+    loop = up.physics_median_N - down.physics_median_N
+    assert loop == pytest.approx(4.0, abs=0.5)
+    drop = up.physics_median_N[1] - up.physics_median_N[3]
+    assert drop == pytest.approx(205 * 0.4 * 3e-4 * 60, abs=0.5)
+    true = 205.0 * 0.4 - 1.0 + 2.0
+    assert up.physics_lo_N[1] < true < up.physics_hi_N[1]
+
+
+def test_bands_are_ordered_and_a_new_reading_is_wider(rubbing):
+    found = predict(rubbing, np.linspace(0.0, 0.5, 21))
+    assert np.all(found.physics_lo_N < found.physics_median_N)
+    assert np.all(found.physics_median_N < found.physics_hi_N)
+    assert np.all(found.new_measurement_lo_N < found.physics_lo_N)
+    assert np.all(found.new_measurement_hi_N > found.physics_hi_N)
+    assert np.all(np.isnan(found.with_gap_median_N))
+
+
+def test_a_new_reading_covers_new_data(rubbing):
+    records = cycles(960)
+    rows = (np.asarray(records.sense) > 0) & (records.temperature == 20.0)
+    found = predict(rubbing, np.asarray(records.deformation)[rows], [20.0])
+    fresh = reading(records, seed=9)[rows]
+    hits = (found.new_measurement_lo_N < fresh) & (fresh < found.new_measurement_hi_N)
+    assert 0.88 < hits.mean() <= 1.0
+
+
+def test_tested_means_inside_the_data(rubbing):
+    found = predict(rubbing, [0.01, 0.3, 0.6], [20.0, 90.0])
+    assert list(found.tested) == [False, True, False, False, False, False]
+    loading_only = make_records(np.linspace(0.0, 0.5, 9))
+    assert not bands._tested(
+        loading_only, np.array([0.3]), np.array([20.0]), np.array([-1.0])
+    )
+
+
+def test_blocks_do_not_show(rubbing, monkeypatch):
+    grid = np.linspace(0.0, 0.5, 50)
+    whole = predict(rubbing, grid)
+    monkeypatch.setattr(bands, "_BLOCK", 7)
+    pieces = predict(rubbing, grid)
+    assert pieces.physics_lo_N == pytest.approx(whole.physics_lo_N, abs=1e-12)
+
+
+def test_the_same_seed_gives_the_same_bands(rubbing):
+    first, second, third = (predict(rubbing, [0.3], seed=s) for s in (1, 1, 2))
+    assert first.new_measurement_lo_N == second.new_measurement_lo_N
+    assert first.new_measurement_lo_N != third.new_measurement_lo_N
+
+
+def test_default_bands_reach_a_tenth_beyond_each_way_tested(rubbing):
+    found = default_bands(rubbing)
+    assert set(found.direction) == {"up", "down"}
+    assert set(found.temperature_C) == {20.0, 50.0, 80.0}
+    assert found.deformation_mm.max() == pytest.approx(1.1 * 0.54)
+    assert found.tested.any()
+    assert not found.tested.all()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"deformation": []},
+        {"deformation": [np.nan]},
+        {"deformation": [0.1], "temperature": [-300.0]},
+        {"deformation": [0.1], "temperature": []},
+        {"deformation": [0.1], "direction": "sideways"},
+        {"deformation": [0.1], "interval": 1.0},
+    ],
+)
+def test_bad_grids_are_refused(rubbing, arguments):
+    with pytest.raises(InputError):
+        predict(rubbing, **arguments)
+
+
+def test_a_failed_posterior_predicts_nothing(rubbing):
+    failed = replace(rubbing, checks=(Check("made to fail", "failed", "on purpose"),))
+    with pytest.raises(NotUsable, match="made to fail"):
+        predict(failed, [0.1])
+    assert not default_bands(failed).usable.any()
+
+
+def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
+    deformation = np.linspace(0.02, 0.54, 60)
+    bent = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
+    force = bent + np.random.default_rng(1).normal(0.0, 0.3, 60)
+    case = make_case(make_records(deformation, force))
+    plain, gap = (
+        calibrate(case, with_gap=g, warmup=500, draws=500) for g in (False, True)
+    )
+    found = predict(gap, [0.28, 0.60])
+    inside, outside = found.with_gap_hi_N - found.with_gap_lo_N
+    assert outside > 2.0 * inside
+    assert (
+        found.with_gap_lo_N[0]
+        < np.interp(0.28, deformation, bent)
+        < (found.with_gap_hi_N[0])
+    )
+    # Orthogonal to the base: the slope stays where least squares put it.
+    shift = np.median(gap.draws["stiffness"]) - np.median(plain.draws["stiffness"])
+    assert abs(shift) < plain.draws["stiffness"].std()
+
+
+def test_the_gap_is_the_same_at_every_temperature():
+    """Tested at one temperature away from the reference, it must not tilt at others."""
+    deformation = np.linspace(0.02, 0.54, 60)
+    force = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
+    force = force + np.random.default_rng(1).normal(0.0, 0.3, 60)
+    warm = np.full(60, 60.06)
+    records = make_records(deformation, force, temperature=warm, known={"temperature"})
+    posterior = calibrate(make_case(records), with_gap=True, warmup=500, draws=500)
+    found = predict(posterior, [0.1, 0.28, 0.5], [60.06, 20.0, 100.0])
+    leftover = (found.with_gap_median_N - found.physics_median_N).reshape(3, 3)
+    assert leftover[1] == pytest.approx(leftover[0], abs=0.2)
+    assert leftover[2] == pytest.approx(leftover[0], abs=0.2)
+    assert abs(leftover[0, 1]) > 1.0
+    # The grid of the folder keeps the tested temperature itself, not a rounded one.
+    assert default_bands(posterior).tested.any()
+
+
+def test_a_new_run_and_specimen_are_less_certain_than_the_tested():
+    rng = np.random.default_rng(4)
+    run = np.repeat(np.arange(4), 30)
+    deformation = np.tile(np.linspace(0.02, 0.54, 30), 4)
+    offsets = np.array([0.0, 3.0, -2.0, 1.0])
+    force = 205.0 * deformation + offsets[run] + rng.normal(0.0, 0.3, 120)
+    records = make_records(deformation, force, run=run, known={"run", "runs"})
+    posterior = calibrate(make_case(records, make_gear()), warmup=500, draws=500)
+    found = predict(posterior, [0.3])
+    width = found.new_measurement_hi_N - found.new_measurement_lo_N
+    assert width > 2.0 * 1.96 * 2.0
+    fitted = posterior.draws["run_offset"].mean(axis=0)
+    assert fitted == pytest.approx(offsets - offsets.mean(), abs=0.3)
+    assert posterior.draws["run_offset"].sum(axis=1) == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,229 @@
+"""`hdcal margin` answers in words, as JSON and as a folder, and refuses in words."""
+
+import json
+import re
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import h5py
+import jsonschema
+import pytest
+from commands import Hdcal
+from posteriors import batch, single, stiffer
+from verdicts import ambiguous, failed
+
+from hdcal.diagnosis.result_folder import write_verdict
+from hdcal.inference.posterior import Posterior
+from hdcal.prediction.causes import ORIGIN, read_models
+
+FILES = {"margin.json", "report.html"} | {
+    f"{name}.{kind}" for name in ("margin", "tornado") for kind in ("svg", "png")
+}
+ASK = ["--deformation", "0.4"]
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Result folders: one gear, six gears, and a diagnosis that is not settled."""
+    place = tmp_path_factory.mktemp("runs")
+    for name in ("one", "six", "ambiguous", "named", "failed"):
+        (place / name).mkdir()
+    single(size=400).save(place / "one" / "posterior.nc")
+    gears = batch(6, 400)
+    gears.save(place / "six" / "posterior.nc")
+    models = {"progressive_stiffening": (0.6, gears)}
+    models |= {"seating_slack": (0.4, stiffer(gears, 1.05))}
+    for name, kept in (("ambiguous", 2), ("named", 1)):
+        chosen = dict(list(models.items())[:kept])
+        verdict = replace(ambiguous(), posteriors=chosen)
+        write_verdict(verdict, place / name, report=False)
+    write_verdict(failed(), place / "failed", report=False)
+    return place
+
+
+def schema() -> dict:
+    path = files("hdcal.report") / "schemas" / "margin-1.schema.json"
+    return json.loads(path.read_text("utf-8"))
+
+
+def test_the_folder_is_whole_and_what_json_prints(here: Hdcal, runs: Path, tmp_path):
+    asked = ["--limit-force", "120", "--temperature", "-20:80", "--given-force", "80"]
+    done = here("margin", runs / "six", *ASK, *asked, "--out", "result", "--json")
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "result"
+    assert {path.name for path in folder.iterdir()} == FILES
+    found = json.loads((folder / "margin.json").read_text("utf-8"))
+    assert json.loads(done.stdout) == found
+    jsonschema.validate(found, schema())
+    assert found["population"] == "specimens" and found["basis"] == "A-basis"
+    assert len(found["levels"]) == 11 and found["worst"]["temperature_C"] == -20.0
+    page = (folder / "report.html").read_text("utf-8")
+    assert not re.search(r"https?://|<script|<link", page)
+    assert "Whose forces these are" in page and "extrapolated" in page
+    assert "A-basis value" in done.stderr and "Outside what was tested" in done.stderr
+    refused = here("margin", runs / "six", *ASK, "--out", "result")
+    assert refused.returncode == 2 and "exists already" in refused.stderr
+    again = here("margin", runs / "six", *ASK, "--out", "result", "--force")
+    assert again.returncode == 0
+
+
+@pytest.mark.parametrize("key", schema()["required"])
+def test_the_schema_misses_every_key_that_is_left_out(key: str):
+    jsonschema.Draft202012Validator.check_schema(schema())
+    with pytest.raises(jsonschema.ValidationError, match=f"'{key}' is a required"):
+        jsonschema.validate({n: 0 for n in schema()["required"] if n != key}, schema())
+
+
+def test_without_a_folder_there_are_words_only(here: Hdcal, runs: Path, tmp_path):
+    done = here("margin", runs / "one", *ASK, "--limit-force", "84")
+    assert done.returncode == 0, done.stderr
+    assert list(tmp_path.iterdir()) == []
+    words = " ".join(done.stdout.split())
+    assert "At 0.4 mm the mean force" in words
+    assert "this one gear in the tested mounting" in words
+    assert "Another gear or another mounting may need a force outside" in words
+    assert "basis" not in words and "reliability index" in words
+
+
+def test_an_unsettled_diagnosis_is_averaged_over(here: Hdcal, runs: Path):
+    assert (runs / "ambiguous" / "posterior-seating_slack.nc").is_file()
+    done = here("margin", runs / "ambiguous", *ASK, "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert [model["probability"] for model in found["models"]] == [0.6, 0.4]
+    low, high = (model["upper_bound_N"] for model in found["models"])
+    assert low < found["worst"]["upper_bound_N"] < high
+    assert "average over the causes" in done.stderr
+    verdict = json.loads((runs / "ambiguous" / "verdict.json").read_text())
+    assert [refit["file"] for refit in verdict["refits"]] == [
+        "posterior.nc",
+        "posterior-seating_slack.nc",
+    ]
+    settled = json.loads(here("margin", runs / "named", *ASK, "--json").stdout)
+    assert settled["models"] == []
+
+
+def test_a_failed_diagnosis_gives_no_margin(here: Hdcal, runs: Path):
+    done = here("margin", runs / "failed", *ASK)
+    assert done.returncode == 1
+    assert "this diagnosis failed and must not be used" in done.stderr
+    assert done.stdout == ""
+
+
+def copied(folder: Path, target: Path) -> Path:
+    target.mkdir()
+    for path in folder.iterdir():
+        (target / path.name).write_bytes(path.read_bytes())
+    return target
+
+
+def edit_weights(folder: Path) -> None:
+    file = folder / "verdict.json"
+    found = json.loads(file.read_text())
+    found["refits"][0]["probability"], found["refits"][1]["probability"] = 0.9, 0.1
+    file.write_text(json.dumps(found))
+
+
+def drop_model(folder: Path) -> None:
+    file = folder / "verdict.json"
+    found = json.loads(file.read_text())
+    del found["refits"][1]
+    file.write_text(json.dumps(found))
+
+
+def lose_model(folder: Path) -> None:
+    (folder / "posterior-seating_slack.nc").unlink()
+
+
+def edit_draw(folder: Path) -> None:
+    with h5py.File(folder / "posterior-seating_slack.nc", "r+") as file:
+        file["posterior/K"][0, 0] *= 1.01
+
+
+def swap_models(folder: Path) -> None:
+    first, second = folder / "posterior.nc", folder / "posterior-seating_slack.nc"
+    one, two = first.read_bytes(), second.read_bytes()
+    first.write_bytes(two)
+    second.write_bytes(one)
+
+
+def other_version(folder: Path) -> None:
+    file = folder / "verdict.json"
+    file.write_text(file.read_text().replace("hdcal.verdict/1", "hdcal.verdict/7"))
+
+
+def no_verdict(folder: Path) -> None:
+    (folder / "verdict.json").write_text("[]")
+
+
+def quick_only(folder: Path) -> None:
+    file = folder / "verdict.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"refits": []}))
+
+
+DAMAGES = {
+    edit_weights: "one of them was changed",
+    drop_model: "one of them was changed",
+    lose_model: "there is no such file",
+    edit_draw: "was changed after hdcal wrote it",
+    swap_models: "one of them was changed",
+    other_version: "hdcal.verdict/7, and this hdcal reads",
+    no_verdict: "is not a verdict that hdcal wrote",
+    quick_only: "holds no calibrated model",
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_a_folder_that_was_changed_is_refused(here: Hdcal, runs, tmp_path, damage):
+    folder = copied(runs / "ambiguous", tmp_path / "run")
+    assert len(read_models(folder)) == 2
+    damage(folder)
+    done = here("margin", folder, *ASK, "--out", "result", "--json")
+    assert done.returncode == 2, done.stderr
+    assert DAMAGES[damage] in done.stderr
+    assert json.loads(done.stdout)["status"] == "error"
+    assert not (tmp_path / "result").exists()
+
+
+def test_the_models_know_what_they_belong_to(runs: Path):
+    origin = Posterior.load(runs / "ambiguous").settings[ORIGIN]
+    assert origin["hypothesis"] == "progressive_stiffening"
+    assert origin["probabilities"]["seating_slack"] == 0.4
+
+
+BAD = {
+    "a missing folder": (["nowhere", *ASK], "nowhere"),
+    "limit in mN": (["{one}", *ASK, "--limit-force", "120000"], "Give it in N"),
+    "deformation in um": (["{one}", "--deformation", "400"], "Give it in mm"),
+    "an empty window": (["{one}", *ASK, "--temperature", "80:-20"], "an empty window"),
+    "no window": (["{one}", *ASK, "--temperature", "warm"], "--temperature"),
+    "half a window": (["{one}", *ASK, "--temperature", "20:"], "--temperature"),
+    "content in %": (["{one}", *ASK, "--content", "99"], "between 0 and 1"),
+    "impossible": (["{one}", *ASK, "--required-probability", "1"], "between 0 and 1"),
+    "of one gear": (["{one}", *ASK, "--population", "specimens"], "one gear"),
+    "no tolerance": (["{one}", *ASK, "--tolerance", "thin"], "is not NAME="),
+    "twice": (
+        ["{one}", *ASK, *["--tolerance", "radius_mm=0.1"] * 2],
+        "is given twice",
+    ),
+    "no number": (["{one}", "--deformation", "much"], "not a valid float"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_input_is_said_and_nothing_is_written(here: Hdcal, runs, tmp_path, name):
+    arguments, words = BAD[name]
+    given = [text.format(one=runs / "one") for text in arguments]
+    done = here("margin", *given, "--out", "result")
+    assert done.returncode == 2, done.stderr
+    assert words in " ".join(done.stderr.split())
+    assert done.stdout == "" and list(tmp_path.iterdir()) == []
+
+
+def test_everything_bad_on_the_line_is_said_at_once(here: Hdcal, runs: Path):
+    asked = ["--temperature", "80:20", "--tolerance", "thin", "--out", "a/b/c"]
+    done = here("margin", "nowhere", *ASK, *asked)
+    assert done.returncode == 2
+    for words in ("--temperature", "--tolerance", "a/b/c", "nowhere"):
+        assert words in done.stderr

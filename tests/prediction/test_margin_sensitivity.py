@@ -1,0 +1,127 @@
+"""What a margin hangs on: exact gradients, and shares that know the answer."""
+
+import jax
+import numpy as np
+import pytest
+from posteriors import batch, plain_draws, ramp_case, single, stiffer, written_posterior
+from rigs import make_gear
+
+import hdcal
+from hdcal.prediction.margin.gradients import design_point, gradients, mixture_at
+from hdcal.prediction.margin.margin import _outlook
+from hdcal.prediction.margin.variance_shares import shares
+from hdcal.prediction.mixture import Mixture, weighted_quantile
+
+CONTENT, CONFIDENCE, WARM = 0.99, 0.95, 40.0
+QUANTILE = jax.jit(Mixture.quantile)
+
+
+def bound(outlook, tolerances, point, origin) -> float:
+    """Compute the upper bound of another gear from scratch."""
+    mixture = mixture_at(outlook, WARM, tolerances, point, origin)
+    found = np.asarray(QUANTILE(mixture, CONTENT))
+    return weighted_quantile(found, np.ones(len(found)), CONFIDENCE)[0]
+
+
+def check(posterior, population: str, tolerances: dict) -> None:
+    outlook = _outlook(posterior, 0.4, "up", population, "reading", tolerances, 0)
+    origin = design_point(outlook)
+    mixture = outlook.mixture(WARM)
+    quantiles = np.asarray(QUANTILE(mixture, CONTENT))
+    found = gradients(
+        [(1.0, outlook)],
+        WARM,
+        tolerances,
+        quantiles,
+        np.ones(len(quantiles)),
+        CONTENT,
+        CONFIDENCE,
+    )
+    assert {slope.name for slope in found} == set(origin)
+    for slope in found:
+        step = 1e-5 * slope.value
+        ends = [
+            bound(outlook, tolerances, {**origin, slope.name: slope.value + by}, origin)
+            for by in (step, -step)
+        ]
+        difference = (ends[0] - ends[1]) / (2.0 * step)
+        assert slope.bound_N == pytest.approx(difference, rel=1e-6), slope.name
+        per_cent = slope.bound_N * slope.value / 100.0
+        assert slope.bound_N_per_percent == pytest.approx(per_cent)
+
+
+def test_gradients_of_one_rounded_gear_agree_with_differences():
+    check(single(make_gear(resolution=0.98), 300), "readings", {})
+
+
+def test_gradients_of_a_cup_with_tolerances_agree_with_differences():
+    sizes = {"wall_thickness": 0.02, "load_height": 2.0}
+    check(single(make_gear(theory="cup"), 200), "readings", sizes)
+
+
+@pytest.mark.slow
+def test_gradients_of_many_gears_through_a_bent_force_agree_with_differences():
+    gears = batch(6, 200)
+    draws = {**gears.draws, "force_saturation.curvature": np.full(200, 2e-5)}
+    bent = written_posterior(gears.case, draws, effects=["force_saturation"])
+    check(bent, "specimens", {"radius": 0.05})
+
+
+def test_the_ring_has_the_exponents_of_its_formula():
+    found = hdcal.margin(single(size=300), 0.4)
+    by_name = {slope.name: slope for slope in found.gradients}
+    percent = {n: s.force_N * s.value for n, s in by_name.items()}
+    load = percent["K"]
+    for name, power in (("wall_thickness_mm", 3), ("radius_mm", -3), ("length_mm", 1)):
+        assert percent[name] == pytest.approx(power * load, rel=1e-9)
+    assert percent["E0_GPa"] == pytest.approx(load, rel=1e-9)
+    assert "load_height_mm" not in by_name
+
+
+def test_shares_of_a_sum_are_its_variances():
+    """All inputs add up here, so that the shares are known."""
+    case = ramp_case()
+    draws = plain_draws(case, 2000) | {
+        "sigma": np.full(2000, 0.8),
+        "deformation_offset": np.zeros(2000),
+    }
+    posterior = written_posterior(case, draws)
+    outlook = _outlook(posterior, 0.4, "up", "readings", "reading", {}, 0)
+    found = {s.name: s for s in shares([(1.0, outlook)], 60.0, {})}
+    at = 0.4 * draws["stiffness"] * (1.0 - 3e-4 * 40.0) + draws["force_offset"]
+    parts = {
+        "calibration": np.var(at),
+        "noise": 0.64,
+        "alpha": np.var(0.4 * 205.0 * 40.0 * draws["alpha"]),
+    }
+    total = sum(parts.values())
+    for name, part in parts.items():
+        assert found[name].first == pytest.approx(part / total, abs=0.02)
+        assert found[name].total == pytest.approx(part / total, abs=0.02)
+    assert {s.name: s.driven_by for s in found.values()} == {
+        "calibration": "data",
+        "alpha": "prior",
+        "noise": "data",
+    }
+
+
+def test_every_source_has_its_share():
+    gears = batch(6, 400)
+    asked = {"tolerances": {"wall_thickness_mm": 0.02}, "temperature": 60.0}
+    models = [(0.6, gears), (0.4, stiffer(gears, 1.05))]
+    found = hdcal.margin(models, 0.6, **asked).shares
+    names = {"calibration", "cause", "alpha", "noise", "mounting", "gear"}
+    assert {s.name for s in found} == names | {"wall_thickness", "leftover"}
+    assert {s.driven_by for s in found if s.name == "wall_thickness"} == {"given"}
+    assert sum(share.first for share in found) < 1.05
+    assert sum(share.total for share in found) > 0.95
+    assert all(share.total > share.first - 0.05 for share in found)
+    # Gears differ by 5 %, their walls by 5 % too: both matter, the noise does not.
+    large = {s.name for s in found if s.total > 0.1}
+    assert {"gear", "wall_thickness"} <= large and "noise" not in large
+
+
+def test_a_single_source_has_all_of_it():
+    """At the reference temperature the load hangs on the calibration alone."""
+    (only,) = hdcal.margin(single(size=400), 0.4, quantity="load").shares
+    assert (only.name, only.first, only.total) == ("calibration", 1.0, 1.0)

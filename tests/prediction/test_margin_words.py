@@ -1,0 +1,46 @@
+"""A margin says first whether the capacity does."""
+
+import pytest
+from posteriors import single
+
+import hdcal
+from hdcal.prediction.margin.document import answer, chance
+
+
+@pytest.fixture(scope="module")
+def posterior():
+    return single(size=400)
+
+
+def verdict(posterior, limit: float) -> str:
+    found = hdcal.margin(posterior, 0.4, limit_force=limit)
+    (said,) = (words for words in answer(found) if words.startswith("A capacity of"))
+    return said
+
+
+def test_enough_not_surely_and_not(posterior):
+    level = hdcal.margin(posterior, 0.4).worst
+    sure, expected = level.capacity_N, level.capacity_predictive_N
+    assert expected < sure
+    assert "is enough for 99 % of readings" in verdict(posterior, sure + 0.1)
+    between = verdict(posterior, 0.5 * (sure + expected))
+    assert "expected to be enough" in between and "but not with 95 %" in between
+    assert "is NOT enough" in verdict(posterior, expected - 0.1)
+
+
+def test_a_probability_has_no_more_digits_than_it_can_have():
+    assert chance(0.990173) == "99.0 %"
+    assert chance(0.999966) == "more than 99.9 %"
+    assert chance(0.98) == "98 %"
+
+
+def test_the_stated_probability_belongs_to_its_index(posterior):
+    """Also where a few draws make all of it, and the interval of the share none."""
+    at = hdcal.margin(posterior, 0.4, quantity="load").worst.force_N
+    rare = at.hi + 0.02 * (at.hi - at.median)
+    found = hdcal.margin(posterior, 0.4, quantity="load", limit_force=rare)
+    risk = found.worst.exceedance
+    assert risk.hi < 1e-12 < risk.probability
+    (said,) = (words for words in answer(found) if words.startswith("One future"))
+    assert f"a probability of {chance(risk.probability)}" in said
+    assert f"{risk.beta:.2f}" in said

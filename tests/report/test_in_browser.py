@@ -1,0 +1,116 @@
+"""Both reports can be read in a real browser: on a screen, a phone and paper."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from browser import DESK, PAPER, PHONE, Seen, look, print_pages
+from commands import Done
+from verdicts import KINDS, named
+
+from hdcal.diagnosis.result_folder import write_verdict
+from hdcal.inference.posterior import Posterior
+
+WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}
+Calibrated = tuple[Done, Path]
+REPORTS = ["calibration", "diagnosis", "quick", "ambiguous", "failed"]
+
+
+@pytest.fixture(scope="module")
+def reports(calibrated: Calibrated, tmp_path_factory) -> dict[str, Path]:
+    """Every kind of report, on disk."""
+    folder = tmp_path_factory.mktemp("reports")
+    posterior = Posterior.load(calibrated[1])
+    verdicts = {
+        "diagnosis": replace(named(), posteriors={"hysteresis": (0.94, posterior)}),
+        "quick": KINDS["none"](),
+        "ambiguous": KINDS["ambiguous"](),
+        "failed": KINDS["failed"](),
+    }
+    for name, verdict in verdicts.items():
+        (folder / name).mkdir()
+        write_verdict(verdict, folder / name, command=f"hdcal diagnose {name}")
+    pages = {name: folder / name / "report.html" for name in verdicts}
+    return {"calibration": calibrated[1] / "report.html", **pages}
+
+
+@pytest.fixture(scope="module", params=REPORTS)
+def report(request, reports: dict[str, Path]) -> Path:
+    """One report after the other."""
+    return reports[request.param]
+
+
+@pytest.fixture(scope="module")
+def seen(report: Path, tmp_path_factory) -> Seen:
+    """The report as the browser sees it."""
+    return look(report, tmp_path_factory.mktemp("browser"))
+
+
+@pytest.mark.parametrize("place", WIDTHS)
+def test_every_figure_shows(seen: Seen, place: str):
+    frame = seen.frames[place]
+    assert len(frame["images"]) >= 3
+    for image in frame["images"]:
+        assert image["natural"] > 0
+        room = min(WIDTHS[place], image["natural"])
+        assert 0.5 * room < image["width"] <= room
+        assert image["height"] > 50
+    assert frame["text"] > 1000
+
+
+@pytest.mark.parametrize("place", WIDTHS)
+def test_nothing_is_wider_than_the_page(seen: Seen, place: str):
+    frame = seen.frames[place]
+    assert frame["width"] <= WIDTHS[place], frame["past"]
+    assert not frame["past"]
+
+
+def test_the_browser_has_nothing_to_complain_of(seen: Seen):
+    assert not seen.complaints
+
+
+def test_nothing_is_asked_of_the_network(seen: Seen):
+    assert not seen.requests
+
+
+def test_it_can_be_printed(report: Path, tmp_path: Path):
+    assert 2 <= print_pages(report, tmp_path) <= 15
+
+
+def planted(report: Path, tmp_path: Path, words: str) -> Seen:
+    """Return what is seen of a report with something planted at its end."""
+    page = report.read_text("utf-8")
+    assert page.count("</body>") == 1
+    (tmp_path / "page.html").write_text(page.replace("</body>", words + "</body>"))
+    return look(tmp_path / "page.html", tmp_path)
+
+
+@pytest.mark.parametrize("scheme", ["http", "https"])
+def test_a_planted_request_is_caught(reports, tmp_path: Path, scheme: str):
+    words = f'<img src="{scheme}://example.invalid/x.png" alt="">'
+    seen = planted(reports["quick"], tmp_path, words)
+    assert any("example.invalid" in request for request in seen.requests)
+    assert any(image["natural"] == 0 for image in seen.frames["desk"]["images"])
+
+
+def test_a_planted_error_is_caught(reports, tmp_path: Path):
+    seen = planted(reports["quick"], tmp_path, "<script>undefined.planted</script>")
+    assert any("planted" in line for line in seen.complaints)
+
+
+def test_a_planted_overflow_is_caught(reports, tmp_path: Path):
+    words = '<p style="width: 1000px">planted</p>'
+    seen = planted(reports["quick"], tmp_path, words)
+    assert seen.frames["phone"]["width"] > PHONE
+    assert seen.frames["paper"]["width"] > PAPER
+    assert any("planted" in node for node in seen.frames["phone"]["past"])
+    assert not seen.frames["desk"]["past"]
+
+
+def test_a_planted_wide_table_is_caught_on_paper_only(reports, tmp_path: Path):
+    # On a phone such a table scrolls by itself; paper cannot.
+    words = '<div class="wide"><table><td style="min-width: 900px">x</td></table></div>'
+    seen = planted(reports["quick"], tmp_path, words)
+    assert not seen.frames["phone"]["past"]
+    assert seen.frames["phone"]["width"] <= PHONE
+    assert seen.frames["paper"]["past"]

@@ -1,0 +1,84 @@
+"""The command line as a user runs it, and one result that many tests look at."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+XB1 = ROOT / "datasets" / "xb1-100-80"
+MAIN = [sys.executable, "-m", "hdcal"]
+# Enough to pass the checks on fourteen rows, and not more.
+SHORT = ["--warmup", "300", "--draws", "500"]
+
+Done = subprocess.CompletedProcess[str]
+Hdcal = Callable[..., Done]
+
+
+@pytest.fixture(scope="session")
+def hdcal() -> Hdcal:
+    """Run hdcal in a process of its own."""
+
+    def run(*arguments: object, **options) -> Done:
+        return subprocess.run(
+            [*MAIN, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            env={**os.environ, **options.pop("env", {})},
+            timeout=300,
+            **options,
+        )
+
+    return run
+
+
+@pytest.fixture
+def here(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+) -> Iterator[Hdcal]:
+    """Run hdcal in this process: for what ends before anything is compiled."""
+    from hdcal.__main__ import main
+
+    # A file is no folder for a cache: JAX' own settings stay as they are.
+    monkeypatch.setenv("HDCAL_CACHE_DIR", __file__)
+    monkeypatch.chdir(tmp_path)
+    before = signal.getsignal(signal.SIGTERM)
+
+    def run(*arguments: object) -> Done:
+        given = [str(argument) for argument in arguments]
+        with pytest.raises(SystemExit) as ended:
+            main(given)
+        said = capsys.readouterr()
+        code = ended.value.code
+        assert isinstance(code, int)
+        return subprocess.CompletedProcess(given, code, said.out, said.err)
+
+    yield run
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.fixture(scope="session")
+def calibrated(
+    hdcal: Hdcal, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Done, Path]:
+    """A finished calibration of the bundled gear, and its folder."""
+    folder = tmp_path_factory.mktemp("calibrated") / "result"
+    done = hdcal("calibrate", XB1, *SHORT, "--json", "--out", folder)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done, folder
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """A small case on disk, to be spoiled by the tests."""
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for name in ("data.csv", "gear.toml"):
+        (folder / name).write_bytes((XB1 / name).read_bytes())
+    return folder

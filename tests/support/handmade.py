@@ -1,0 +1,28 @@
+"""Labels and answers in a few words, for examples that a hand can reckon."""
+
+from hdcal.blind.label import Answer, Label
+from hdcal.blind.scoring.scores import score
+
+KINDS = {"slack": "rig", "friction": "rig", "drift": "time"}
+
+
+def truth(case="a", kind="effect", names=("slack",), r=1.0, **more) -> Label:
+    plain = {"program": "rich", "rows": 100, "noise": "iid", "correlation": 0.0}
+    return Label(case, kind, names, r=r, sigma=1.0, **{**plain, **more})
+
+
+def said(case="a", verdict="named", effect="slack", chances=None, **more) -> Answer:
+    chances = chances or {effect or "none": 1.0}
+    inclusion = {n: p for n, p in chances.items() if n not in ("none", "unknown")}
+    plain = {"inclusion": inclusion, "detected": True, "set": tuple(chances)}
+    return Answer(
+        case, verdict, effect, None, probabilities=chances, **{**plain, **more}
+    )
+
+
+def scored(labels, answers, **more) -> dict:
+    return score(labels, {"hdcal": answers}, KINDS, **more)
+
+
+def row(found: dict, key: str) -> dict:
+    return next(row for row in found["bar"] if row["key"] == key)

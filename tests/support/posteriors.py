@@ -1,0 +1,149 @@
+"""Posteriors that nobody sampled: draws written down, for what only reads them."""
+
+from dataclasses import replace
+
+import numpy as np
+from arviz_base import from_dict
+from rigs import make_case, make_records
+
+from hdcal.calibration.calibrate import choose_effects
+from hdcal.data.case import Case
+from hdcal.data.priors import effect_priors
+from hdcal.inference import archive
+from hdcal.inference.checks import Check
+from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.posterior import Posterior, versions
+from hdcal.inference.problem import build_problem, problem_priors
+
+CHAINS = 2
+BY_PRIOR = ("alpha", "E0", "gap_length")
+
+
+def written_posterior(
+    case: Case, draws: dict, *, effects=(), with_gap: bool = False
+) -> Posterior:
+    """Return a usable posterior with these draws [draw, …] in two chains."""
+    chosen = choose_effects(effects)
+    priors = problem_priors(case, chosen, effect_priors(), case.gear.theory)
+    shaped = {
+        name: np.asarray(v, float).reshape(CHAINS, -1, *np.shape(v)[1:])
+        for name, v in draws.items()
+    }
+    size = shaped["K"].shape[1]
+    stats = {"diverging": np.zeros((CHAINS, size), bool)}
+    stats["n_steps"] = np.full((CHAINS, size), 7)
+    tree = from_dict(
+        {
+            "posterior": shaped,
+            "prior": {name: v[:1] for name, v in shaped.items() if v.ndim == 2},
+            "sample_stats": stats,
+            "observed_data": {"force": np.asarray(case.records.force)},
+            "constant_data": archive.covariates(case.records),
+        },
+        dims={
+            "force": ["row"],
+            **{name: ["row"] for name in archive.UNITS},
+            "run_offset": ["run_label"],
+            "specimen_deviation": ["specimen_label"],
+            "gap_weights": ["basis"],
+        },
+        coords={
+            "run_label": list(case.run_labels),
+            "specimen_label": list(case.specimen_labels),
+        },
+    )
+    diagnoses = {
+        name: Diagnosis(
+            rhat=1.0,
+            ess_bulk=1000.0,
+            ess_tail=1000.0,
+            prior_sensitivity=0.0,
+            likelihood_sensitivity=0.1,
+            contraction=0.0 if name in BY_PRIOR else 0.9,
+            driven_by="prior" if name in BY_PRIOR else "data",
+        )
+        for name, values in shaped.items()
+        if values.ndim == 2 and name in priors
+    }
+    settings = {
+        "seed": 0,
+        "chains": CHAINS,
+        "warmup": 1,
+        "draws": size,
+        "with_gap": with_gap,
+        "target_acceptance": 0.8,
+        "versions": versions(),
+        "seconds": 0.0,
+    }
+    checks = (Check("written down", "passed", "for a test"),)
+    theory = case.gear.theory
+    return Posterior(case, theory, chosen, priors, tree, diagnoses, checks, settings)
+
+
+def plain_draws(case: Case, size: int = 2000, seed: int = 0) -> dict:
+    """Return draws about 205 N/mm, stiffness and zero tied together."""
+    rng = np.random.default_rng(seed)
+    problem = build_problem(case, effect_priors())
+    E0 = rng.normal(207e3, 3e3, size)
+    stiffness = rng.normal(205.0, 1.5, size)
+    unit = float(problem.unit_stiffness) * problem.reading.radial_per_read
+    return {
+        "E0": E0,
+        "K": stiffness / (E0 * unit),
+        "alpha": rng.normal(3e-4, 0.4e-4, size),
+        "force_offset": -1.0 - 0.25 * (stiffness - 205.0) + rng.normal(0, 0.2, size),
+        "deformation_offset": rng.normal(0.0, 1e-3, size),
+        "sigma": 0.6 * np.exp(rng.normal(0.0, 0.15, size)),
+        "stiffness": stiffness,
+    }
+
+
+def ramp_case(gear=None, rows: int = 30, **columns) -> Case:
+    """Return a ramp to 0.54 mm on one gear, with noise."""
+    deformation = np.linspace(0.02, 0.54, rows)
+    noise = np.random.default_rng(5).normal(0.0, 0.6, rows)
+    records = make_records(deformation, 205.0 * deformation - 1.0 + noise, **columns)
+    return make_case(records, gear)
+
+
+def single(gear=None, size: int = 2000) -> Posterior:
+    """Return a posterior of one gear in one mounting."""
+    case = ramp_case(gear)
+    return written_posterior(case, plain_draws(case, size))
+
+
+def batch(count: int = 6, size: int = 2000) -> Posterior:
+    """Return a posterior of several gears, each in a mounting of its own."""
+    label = np.repeat(np.arange(count), 10)
+    known = {"run", "specimen", "runs", "specimens"}
+    case = ramp_case(rows=10 * count, run=label, specimen=label, known=known)
+    rng = np.random.default_rng(1)
+    spread = 0.05 * np.sqrt((count - 1) / rng.chisquare(count - 1, size))
+    deviation = rng.normal(size=(size, count)) * spread[:, None]
+    offset = rng.normal(size=(size, count))
+    draws = plain_draws(case, size) | {
+        "specimen_sd": spread,
+        "specimen_deviation": deviation - deviation.mean(axis=1, keepdims=True),
+        "run_offset_sd": np.abs(rng.normal(1.0, 0.2, size)),
+        "run_offset": offset - offset.mean(axis=1, keepdims=True),
+    }
+    return written_posterior(case, draws)
+
+
+def with_leftover(size: int = 2000) -> Posterior:
+    """Return a posterior of one gear with a leftover discrepancy of a newton."""
+    case, rng = ramp_case(), np.random.default_rng(2)
+    draws = plain_draws(case, size) | {
+        "gap_sd": np.abs(rng.normal(1.5, 0.3, size)),
+        "gap_length": 0.3 * np.exp(rng.normal(0.0, 0.2, size)),
+        "gap_weights": rng.normal(0.0, 0.5, (size, 20)) / (1.0 + np.arange(20.0)) ** 2,
+    }
+    return written_posterior(case, draws, with_gap=True)
+
+
+def stiffer(posterior: Posterior, factor: float) -> Posterior:
+    """Return the same with every stiffness multiplied."""
+    tree = posterior.tree.copy(deep=True)
+    for name in ("K", "stiffness"):
+        tree["posterior"][name] = tree["posterior"][name] * factor
+    return replace(posterior, tree=tree)
