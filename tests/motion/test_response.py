@@ -1,5 +1,7 @@
 """The response of a calibrated gear: right for every draw, honest about its priors."""
 
+from inspect import signature
+
 import numpy as np
 import pytest
 from moving import TRUTH, motion, still_posterior
@@ -121,8 +123,9 @@ def test_nothing_follows_from_a_failed_calibration():
     ],
 )
 def test_what_makes_no_sense_is_refused(force, options, words):
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=words) as caught:
         respond(still_posterior(), force, **options)
+    assert {f.file for f in caught.value.findings} <= {*signature(respond).parameters}
 
 
 def test_every_fault_is_told_at_once():

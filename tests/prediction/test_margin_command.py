@@ -15,7 +15,7 @@ from verdicts import ambiguous, failed
 
 from hdcal.diagnosis.result_folder import write_verdict
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.causes import ORIGIN, read_models
+from hdcal.prediction.engine.causes import ORIGIN, read_models
 
 FILES = {"margin.json", "report.html"} | {
     f"{name}.{kind}" for name in ("margin", "tornado") for kind in ("svg", "png")

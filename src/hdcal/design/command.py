@@ -8,6 +8,7 @@ import click
 
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.findings import options_named
 from hdcal.cli.options import force_option, json_option, seed_option
 from hdcal.cli.quantities import (
     names_in,
@@ -22,6 +23,13 @@ from hdcal.errors import Finding, InputError, attempt
 
 _OF_WINDOW = ("setting_sd", "spring_rate")
 _OF_LIMIT = ("deformation", "vary", "material", "limit_stress")
+# Parameters of the library that an option has another name for.
+_OTHER_NAMES = {
+    "materials": "--material",
+    "rates": "--spring-rate",
+    "temperatures": "--temperature",
+    "tolerances": "--tolerance",
+}
 
 
 @click.command(short_help="Wave generator for a window, or sizes for a limit.")
@@ -96,8 +104,8 @@ def design(console: Console, run, gear, out, force, **given):
     """
     keep_compilations()
     from hdcal.design.checks import name_findings
-    from hdcal.design.sizes import SIZES
     from hdcal.design.sources import open_source
+    from hdcal.prediction.engine.sizes import SIZES
     from hdcal.report.folder import check_target
 
     findings = _one_question(given)
@@ -177,10 +185,11 @@ def _design(console: Console, source, asked, spring: bool, target, force) -> int
     from hdcal.design.wave_generator import wave_generator
 
     made = {"command": shlex.join(["hdcal", *sys.argv[1:]]), "force": force}
-    if spring:
-        told = write_generator(wave_generator(source, **asked), target, **made)
-    else:
-        told = write_inverse(inverse_design(source, **asked), target, **made)
+    with options_named(**_OTHER_NAMES):
+        if spring:
+            told = write_generator(wave_generator(source, **asked), target, **made)
+        else:
+            told = write_inverse(inverse_design(source, **asked), target, **made)
     console.table(*closing_words(told, str(target)))
     if console.json:
         console.data(told)

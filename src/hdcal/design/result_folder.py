@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdcal.design.design_draws import Basis
+from hdcal.design.design_draws import DesignDraws
 from hdcal.design.document import generator_words, inverse_words, study_words
 from hdcal.design.figure import generator_figure, inverse_figure, profile_figure
 from hdcal.design.inverse_design import InverseDesign
@@ -121,5 +121,5 @@ def _cell(value) -> str:
     return f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
-def _modulus(basis: Basis) -> float:
+def _modulus(basis: DesignDraws) -> float:
     return float(np.median(np.asarray(basis.values["E0"])))

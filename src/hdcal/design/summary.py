@@ -6,7 +6,7 @@ from dataclasses import asdict
 import numpy as np
 
 from hdcal.design.candidate import Candidate
-from hdcal.design.design_draws import Basis
+from hdcal.design.design_draws import DesignDraws
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.study.article_tables import SCHEMA as ARTICLE_SCHEMA
 from hdcal.design.study.article_tables import ArticleRow
@@ -19,7 +19,7 @@ from hdcal.report.parameters import INTERVAL, interval
 SCHEMA = "hdcal.design/1"
 
 
-def _origin(basis: Basis) -> dict:
+def _origin(basis: DesignDraws) -> dict:
     return {
         "gear": {
             "name": basis.gear.name,
@@ -152,7 +152,7 @@ def _stress(found: WaveGenerator) -> dict:
     return {"deformation_mm": found.window[1], **stress_entry(basis, draws)}
 
 
-def stress_entry(basis: Basis, draws: np.ndarray) -> dict:
+def stress_entry(basis: DesignDraws, draws: np.ndarray) -> dict:
     """Return hoop bending stress and yield utilisation as intervals.
 
     Args:

@@ -12,8 +12,8 @@ from hdcal.diagnosis.verdict import Verdict, member_files
 from hdcal.diagnosis.verdict_json import verdict_json
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import residuals
-from hdcal.prediction.averaged_bands import averaged_bands
-from hdcal.prediction.causes import ORIGIN
+from hdcal.prediction.bands.bands import default_bands
+from hdcal.prediction.engine.causes import ORIGIN
 from hdcal.report.canvas import render
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.plain import as_json
@@ -45,7 +45,7 @@ def write_verdict(
     (folder / "verdict.json").write_text(as_json(found), "utf-8")
     refit, bands = corrected(verdict), None
     if refit is not None:
-        bands = averaged_bands(list(verdict.posteriors.values()))
+        bands = default_bands(list(verdict.posteriors.values()))
         _save_models(verdict, folder)
         (folder / "bands.csv").write_text(
             columns_csv(bands.columns()), "utf-8", newline=""

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from hdcal.diagnosis.verdict import Cell, Verdict, Where, Which, member_files
 from hdcal.diagnosis.words import answer, limits
 from hdcal.inference.posterior import versions
-from hdcal.prediction.causes import SCHEMA
+from hdcal.prediction.engine.causes import SCHEMA
 from hdcal.report.plain import as_plain
 
 INTERVAL = 0.9

@@ -12,7 +12,7 @@ from hdcal.inference.density import build_effects
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.chain import Base, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.prediction.forces import grid_records
+from hdcal.prediction.engine.forces import grid_records
 from hdcal.tracking.linear_core import match
 from hdcal.tracking.particles import Mean, ParticleCore, conditional
 from hdcal.tracking.stream_prior import Beginning

@@ -7,6 +7,7 @@ import click
 
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.findings import options_named
 from hdcal.cli.options import force_option, json_option, read_grid, seed_option
 from hdcal.cli.quantities import (
     names_in,
@@ -97,7 +98,8 @@ def _study(console: Console, source, asked, target, force) -> int:
     from hdcal.design.terminal import closing_words
 
     command = shlex.join(["hdcal", *sys.argv[1:]])
-    found = run_study(source, **asked)
+    with options_named(materials="--material"):
+        found = run_study(source, **asked)
     told = write_study(found, target, command=command, force=force)
     console.table(*closing_words(told, str(target)))
     if console.json:

@@ -8,6 +8,7 @@ import click
 
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.findings import options_named
 from hdcal.cli.options import (
     json_option,
     read_columns,
@@ -129,15 +130,16 @@ def _respond(console: Console, run, force, tones, target, replace, asked) -> int
 
     posterior = load_any(run)
     mass, amplitude = asked.pop("mass_kg"), asked.pop("amplitude")
-    response = ask(
-        posterior,
-        force,
-        amplitude=80.0 if amplitude is None else amplitude,
-        frequency=tones,
-        # 1 kg = 1e-3 N·s²/mm.
-        mass=None if mass is None else 1e-3 * mass,
-        **asked,
-    )
+    with options_named(mass="--mass-kg"):
+        response = ask(
+            posterior,
+            force,
+            amplitude=80.0 if amplitude is None else amplitude,
+            frequency=tones,
+            # 1 kg = 1e-3 N·s²/mm.
+            mass=None if mass is None else 1e-3 * mass,
+            **asked,
+        )
     command = shlex.join(["hdcal", *sys.argv[1:]])
     summary = write_response(
         response, posterior, target, command=command, force=replace

@@ -5,9 +5,7 @@ import numpy as np
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.dynamics import FRICTION_SPEED
-
-# How far beyond the data still counts as tested [K]: thermometers are no better.
-_NEAR_K = 1.0
+from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
 
 
 def drivers(posterior: Posterior, mass, damping) -> dict[str, str]:
@@ -49,9 +47,8 @@ def tested_rows(posterior: Posterior, temperature: float, lo, hi) -> np.ndarray:
     zero = float(np.median(posterior.draws["deformation_offset"]))
     low = min(0.0, float(np.min(records.deformation)) - zero)
     high = float(np.max(records.deformation)) - zero
-    cold, warm = np.min(records.temperature), np.max(records.temperature)
-    inside = (lo >= low - 1e-9) & (hi <= high + 1e-9)
-    return inside & bool(cold - _NEAR_K <= temperature <= warm + _NEAR_K)
+    inside = (lo >= low - NEAR_MM) & (hi <= high + NEAR_MM)
+    return inside & temperature_is_tested(records, temperature)
 
 
 def remarks(
@@ -67,17 +64,7 @@ def remarks(
         left: effects left out.
         tested: from `tested_rows`.
     """
-    said = []
-    if not isinstance(posterior, DynamicPosterior):
-        both = {"mass": "mass_kg", "damping": "damping_N_s_per_mm"}
-        unseen = [n for n, e in both.items() if estimates[e]["driven_by"] == "prior"]
-        if unseen:
-            listed = " and ".join(unseen)
-            said.append(
-                f"The gear was calibrated at rest, which says nothing of its {listed}: "
-                "there the prior is the answer. Measure a vibration and use hdcal "
-                "calibrate --dynamic, or weigh what moves and say --mass-kg."
-            )
+    said = _unseen(posterior, estimates)
     outside = np.count_nonzero(~tested)
     if outside:
         said.append(
@@ -108,3 +95,19 @@ def remarks(
     if len(posterior.case.specimen_labels) > 1:
         said.append("The stiffness is the mean of the tested gears, not of a new one.")
     return tuple(said)
+
+
+def _unseen(posterior: Posterior, estimates: dict) -> list[str]:
+    """Say what a gear at rest tells nothing of."""
+    if isinstance(posterior, DynamicPosterior):
+        return []
+    both = {"mass": "mass_kg", "damping": "damping_N_s_per_mm"}
+    unseen = [n for n, e in both.items() if estimates[e]["driven_by"] == "prior"]
+    if not unseen:
+        return []
+    listed = " and ".join(unseen)
+    return [
+        f"The gear was calibrated at rest, which says nothing of its {listed}: "
+        "there the prior is the answer. Measure a vibration and use hdcal "
+        "calibrate --dynamic, or weigh what moves and say --mass-kg."
+    ]

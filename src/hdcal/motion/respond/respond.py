@@ -6,12 +6,11 @@ damping are drawn from their priors, and the answer says so.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
 
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, InputError, NotUsable, attempt
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
@@ -19,6 +18,7 @@ from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
 from hdcal.motion.respond.remarks import drivers, remarks, tested_rows
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.physics.dynamics import acting, natural_frequency
+from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.report.parameters import INTERVAL, interval
 
 _MOST_DRAWS = 10_000
@@ -109,18 +109,27 @@ def respond(
         InputError: what was asked makes no sense.
     """
     posterior.require_usable()
-    request = _checked(
-        partial(make_request, force, amplitude, frequency, duration, points),
-        _problems(posterior, temperature, mass, damping, draws),
-    )
-    at = _temperature(posterior) if temperature is None else float(temperature)
+    findings: list[Finding] = []
+    asked = force, amplitude, frequency, duration, points
+    request = attempt(findings, make_request, *asked)
+    findings += _problems(posterior, temperature, mass, damping, draws)
+    if findings or request is None:
+        raise InputError(findings)
+    at = usual_temperature(posterior.case) if temperature is None else temperature
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
+    _check_reach(posterior, request, values, moved)
+    values |= {"_mass": moved, "_ratio": ratio}
+    return _integrated(posterior, request, values, float(at), mass, damping)
+
+
+def _integrated(
+    posterior: Posterior, request: Request, values: dict, at: float, mass, damping
+) -> Response:
+    """Return the response of every draw at a temperature [°C]."""
     kept, left = acting(without_scatter(posterior.effects))
     reading = case_reading(posterior.case)
-    whole = {**values, "_mass": moved, "_ratio": ratio}
-    _check_reach(posterior, request, values, moved)
-    states, facts, done = integrate_all(kept, reading, whole, at, damping, request)
+    states, facts, done = integrate_all(kept, reading, values, at, damping, request)
     lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
     estimates = {
@@ -145,13 +154,6 @@ def respond(
     )
 
 
-def _temperature(posterior: Posterior) -> float:
-    """Return the tested temperature nearest to the reference [°C]."""
-    tested = posterior.case.records.temperature
-    reference = posterior.case.gear.reference_temperature
-    return float(np.clip(reference, np.min(tested), np.max(tested)))
-
-
 def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
     """Return the ends and the middle of the band at every time [mm].
 
@@ -167,17 +169,6 @@ def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
     return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
 
 
-def _checked(make, findings: list[Finding]) -> Request:
-    """Return the request; raise with its findings and the others at once."""
-    try:
-        request = make()
-    except InputError as error:
-        raise InputError([*error.findings, *findings]) from None
-    if findings:
-        raise InputError(findings)
-    return request
-
-
 def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
     findings = []
 
@@ -185,44 +176,37 @@ def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
         findings.append(Finding(name, problem, remedy))
 
     if mass is not None and not (np.isfinite(mass) and mass > 0.0):
-        find("--mass-kg", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
+        find("mass", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
     if damping is not None and not (np.isfinite(damping) and damping >= 0.0):
         words = f"{damping:g} N·s/mm is no damping"
-        find("--damping", words, "Give zero or more")
+        find("damping", words, "Give zero or more")
     if isinstance(posterior, DynamicPosterior):
-        for name, value in (("--mass-kg", mass), ("--damping", damping)):
+        for name, value in (("mass", mass), ("damping", damping)):
             if value is not None:
                 words = "this calibration of the moving gear knows it already"
                 find(name, words, "Leave it out")
     if not 20 <= draws <= _MOST_DRAWS:
-        find("--draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
+        find("draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
     if temperature is not None:
-        gear = posterior.case.gear
-        rise = abs(temperature - gear.reference_temperature)
-        if not np.isfinite(temperature) or temperature < -273.15:
-            find("--temperature", "is below absolute zero", "Give it in °C")
-        elif np.median(posterior.draws["alpha"]) * rise >= 0.5:
-            words = "the linear law E(T) would lose half of Young's modulus"
-            find("--temperature", words, "Give it in °C")
+        gear, values = posterior.case.gear, posterior.draws
+        findings += temperature_findings(gear, values, np.array([temperature]))
     return findings
 
 
 def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> None:
     """Refuse what is a slip of the unit: to fold the gear, or to swing for hours."""
     findings = []
-    limit = (
-        posterior.case.gear.geometry.radius
-        / case_reading(posterior.case).radial_per_read
-    )
+    per_read = case_reading(posterior.case).radial_per_read
+    limit = posterior.case.gear.geometry.radius / per_read
     static = float(request.force.largest()) / np.median(values["stiffness"])
     if static >= limit:
         words = f"would deform the gear by {static:.3g} mm even at rest"
-        findings.append(Finding("--force", words, "Give the force in N"))
+        findings.append(Finding("force", words, "Give the force in N"))
     seconds = float(request.times[-1] - request.times[0])
     swings = seconds * float(np.max(natural_frequency(mass, values["stiffness"])))
     if swings > _MOST_SWINGS:
         words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
         remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
-        findings.append(Finding("--duration", words, remedy))
+        findings.append(Finding("duration", words, remedy))
     if findings:
         raise InputError(findings)

@@ -4,6 +4,7 @@ import click
 
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.findings import options_named
 from hdcal.cli.options import (
     direction_option,
     force_option,
@@ -50,7 +51,8 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     from hdcal.report.csv_table import columns_csv
 
     posterior = Posterior.load(run)
-    bands = bands_of(posterior, along, warmth, direction)
+    with options_named():
+        bands = bands_of(posterior, along, warmth, direction)
     untested = int((~bands.tested).sum())
     if untested:
         size = len(bands.tested)

@@ -7,6 +7,7 @@ import click
 
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.findings import options_named
 from hdcal.cli.options import (
     direction_option,
     force_option,
@@ -104,7 +105,7 @@ def margin(console: Console, run, temperature, tolerances, out, force, **asked):
 
 def _margin(console: Console, run, window, sizes, asked, findings, out, force) -> int:
     keep_compilations()
-    from hdcal.prediction.causes import read_models
+    from hdcal.prediction.engine.causes import read_models
     from hdcal.prediction.margin.margin import margin as bounds_of
     from hdcal.prediction.margin.result_folder import margin_json, write_margin
     from hdcal.prediction.margin.terminal import closing_words
@@ -115,7 +116,8 @@ def _margin(console: Console, run, window, sizes, asked, findings, out, force) -
         raise InputError([*findings, *error.findings]) from error
     if findings:
         raise InputError(findings)
-    found = bounds_of(models, temperature=window, tolerances=sizes, **asked)
+    with options_named():
+        found = bounds_of(models, temperature=window, tolerances=sizes, **asked)
     posterior = max(models, key=lambda model: model[0])[1]
     plain = margin_json(found, posterior, seed=asked["seed"])
     if out is not None:

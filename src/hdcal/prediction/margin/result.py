@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from hdcal.prediction.bands.bands import Direction
-from hdcal.prediction.forces import Quantity
-from hdcal.prediction.margin.deformation_reached import Reached
+from hdcal.prediction.engine.conditions import Direction
+from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.population import Population
+from hdcal.prediction.margin.deformation_reached import DeformationReached
 from hdcal.prediction.margin.gradients import Gradient
-from hdcal.prediction.margin.variance_shares import Share
-from hdcal.prediction.population import Population
+from hdcal.prediction.margin.variance_shares import VarianceShare
 from hdcal.report.parameters import Interval
 
 INTERVAL = 0.95
@@ -124,9 +124,9 @@ class Margin:
     tolerances_mm: Mapping[str, float]
     levels: tuple[Level, ...]
     worst: Level
-    reached: Reached | None
+    reached: DeformationReached | None
     models: tuple[ModelBound, ...]
     gradients: tuple[Gradient, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[VarianceShare, ...]
     extrapolated: tuple[str, ...]
     remarks: tuple[str, ...]

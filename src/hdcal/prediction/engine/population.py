@@ -1,12 +1,51 @@
-"""Whose forces a bound is about: readings, mountings or gears."""
+"""Whose force is asked for: of readings, mountings or gears, as read or as load."""
 
 from typing import Literal, get_args
 
+import equinox as eqx
+import numpy as np
+
 from hdcal.errors import Finding
 from hdcal.inference.problem import Problem
+from hdcal.prediction.engine.forces import Quantity
 
 Population = Literal["readings", "mountings", "specimens"]
 POPULATIONS: tuple[Population, ...] = get_args(Population)
+
+
+class Whose(eqx.Module):
+    """Whose force is asked for.
+
+    Attributes:
+        population: the members that differ from each other.
+        quantity: which force of theirs.
+        rounded: whether it is read in steps.
+    """
+
+    population: Population = eqx.field(static=True)
+    quantity: Quantity = eqx.field(static=True)
+    rounded: bool = eqx.field(static=True)
+
+    def tested_gears(self, problem: Problem) -> int:
+        """Return how many gears tell of a new one; 0 where the gear is a tested one."""
+        return problem.specimens if self.population == "specimens" else 0
+
+    def tested_mountings(self, problem: Problem) -> int:
+        """Return how many mountings tell of a new one's zero; 0 where it has none."""
+        new = self.population != "readings" and self.quantity == "reading"
+        return problem.runs if new else 0
+
+
+def new_member_sd(sd, tested: int):
+    """Return the sd of a new member from the mean of the tested ones.
+
+    A new one also carries the distance of that mean from the population's.
+
+    Args:
+        sd: between members, of each draw.
+        tested: number of tested members.
+    """
+    return sd * np.sqrt(1.0 + 1.0 / tested)
 
 
 def widest(problem: Problem) -> Population:
@@ -22,7 +61,7 @@ def check_population(asked: str | None, problem: Problem) -> list[Finding]:
         return []
     if asked not in POPULATIONS:
         words = f"'{asked}' is unknown"
-        return [Finding("--population", words, f"Use one of {', '.join(POPULATIONS)}")]
+        return [Finding("population", words, f"Use one of {', '.join(POPULATIONS)}")]
     what, count = {
         "mountings": ("mounting (run)", problem.runs),
         "specimens": ("gear (specimen)", problem.specimens),
@@ -30,8 +69,8 @@ def check_population(asked: str | None, problem: Problem) -> list[Finding]:
     if count >= 2:
         return []
     words = f"the data hold one {what}, which says nothing of how much others differ"
-    remedy = f"Measure two or more, or ask for --population {widest(problem)}"
-    return [Finding("--population", words, remedy)]
+    remedy = f"Measure two or more, or ask about {widest(problem)}"
+    return [Finding("population", words, remedy)]
 
 
 def population_words(population: Population, problem: Problem) -> str:
