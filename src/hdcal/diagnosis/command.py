@@ -7,7 +7,6 @@ from hdcal.cli.console import Console
 from hdcal.cli.options import (
     force_option,
     json_option,
-    read_columns,
     reading_options,
     seed_option,
 )
@@ -64,7 +63,8 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     except InputError as error:
         findings += error.findings
     try:
-        found = read_cases(cases, gear, read_columns(columns), theory)
+        console.wrong.__exit__(None, None, None)
+        found = read_cases(cases, gear, columns, theory)
         # Of many cases the folder is no single one's.
         name = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
         target = name if out is None else out

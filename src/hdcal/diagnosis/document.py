@@ -6,7 +6,8 @@ from hdcal.calibration.summary import summarise
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import held_out, one_reading
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import data_rows, gear_rows, parameter_row, render_page
+from hdcal.report.page import parameter_row, render_page
+from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
     hypothesis,

@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
+from hdcal.report.answer import Real
 
 INTERVAL = 0.95
 
@@ -29,6 +30,20 @@ UNITS: dict[str, tuple[str, float]] = {
     "initial_velocity": ("mm/s", 1.0),
     "deformation_sigma": ("mm", 1.0),
 }
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An equal-tailed interval with its median; which probability, says its owner."""
+
+    median: Real
+    lo: Real
+    hi: Real
+
+
+def credible_interval(values: np.ndarray) -> Interval:
+    """Return median and equal-tailed 95 % credible interval."""
+    return Interval(**interval(values))
 
 
 def interval(values: np.ndarray) -> dict[str, float]:
@@ -110,12 +125,3 @@ def data_entry(posterior: Posterior) -> dict:
         "sha256": case.data_sha256,
         "notes": list(case.notes),
     }
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An equal-tailed interval with its median; which probability, says its owner."""
-
-    median: float
-    lo: float
-    hi: float

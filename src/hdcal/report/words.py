@@ -1,9 +1,10 @@
 """Numbers, priors and names in the form in which people read them."""
 
 import math
+from collections.abc import Mapping
 
 from hdcal.data.prior import FAMILIES, Prior
-from hdcal.report.parameters import UNITS
+from hdcal.report.parameters import UNITS, Interval
 
 LABELS = {
     "K": "influence coefficient K",
@@ -57,12 +58,13 @@ def _place(value: float) -> int:
     return math.floor(math.log10(abs(value))) if value else 0
 
 
-def estimate(entry: dict) -> tuple[str, str]:
-    """Return median and interval of a summary entry as two texts."""
-    lo, hi = entry["lo"], entry["hi"]
-    width = None if lo is None or hi is None else hi - lo
-    span = f"{number(lo, width)} … {number(hi, width)}"
-    return number(entry["median"], width), span
+def estimate(entry: Interval | Mapping) -> tuple[str, str]:
+    """Return median and interval as two texts."""
+    if not isinstance(entry, Interval):
+        entry = Interval(*(entry[name] for name in ("median", "lo", "hi")))
+    width = None if entry.lo is None or entry.hi is None else entry.hi - entry.lo
+    span = f"{number(entry.lo, width)} … {number(entry.hi, width)}"
+    return number(entry.median, width), span
 
 
 def unit(name: str) -> str:
