@@ -25,13 +25,14 @@ _COLOURS = {"good": "green", "caution": "yellow", "bad": "red", "neutral": ""}
 
 
 def terminal_lines(
-    document: Document, folder: str | None = None
+    document: Document, folder: str | None = None, opened: str = "report.html"
 ) -> Iterator[RenderableType]:
     """Yield a document for a terminal; figures and long sections are left out.
 
     Args:
         document: what to show; its texts may come from anywhere.
         folder: where the whole result lies, or None.
+        opened: what to open in it first; empty where that depends.
     """
     title = f"{document.name}: {document.subtitle}"
     yield RichText(printable(title), "bold")
@@ -49,7 +50,8 @@ def terminal_lines(
         yield from _titled(notice.title, notice.sentences, _COLOURS[notice.tone])
     yield from _titled("What to do next", document.next_steps)
     if folder is not None:
-        yield RichText(f"\nThe result: {printable(folder)}  (open report.html)")
+        how = f"  (open {opened})" if opened else ""
+        yield RichText(f"\nThe result: {printable(folder)}{how}")
 
 
 def _titled(title: str, said: Sequence[str], colour: str = "") -> Iterator:
