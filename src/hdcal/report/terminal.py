@@ -82,12 +82,14 @@ def _block(block: Block) -> Iterator[RenderableType]:
 
 def _table(table: Table) -> RichTable:
     made = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in table.columns:
+    shown = [i for i, title in enumerate(table.columns) if title not in table.spare]
+    for title in (table.columns[i] for i in shown):
         right = title in table.numbers
-        made.add_column(title, justify="right" if right else "left", no_wrap=right)
+        whole = right or title in table.names
+        made.add_column(title, justify="right" if right else "left", no_wrap=whole)
     for index, row in enumerate(table.rows):
         style = "bold" if index in table.strong else ""
-        made.add_row(*map(_cell, row), style=style)
+        made.add_row(*(_cell(row[i]) for i in shown), style=style)
     return made
 
 

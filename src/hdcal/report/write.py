@@ -3,10 +3,8 @@
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from hdcal.report.answer import Answer
-from hdcal.report.canvas import render
+from hdcal.report.canvas import Figure, render
 from hdcal.report.document import Document
 from hdcal.report.folder import whole_folder
 from hdcal.report.html import html_page
