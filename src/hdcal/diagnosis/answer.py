@@ -23,6 +23,7 @@ from hdcal.report.answer import (
     Words,
 )
 from hdcal.report.parameters import Interval
+from hdcal.report.posterior_answer import CalibratedGear
 
 _PAIR = "^[A-Za-z_][A-Za-z0-9_]*(\\+[A-Za-z_][A-Za-z0-9_]*)?$"
 Chances = Annotated[
@@ -111,15 +112,6 @@ class Refit:
 
 
 @dataclass(frozen=True)
-class DiagnosedGear:
-    """Which gear it was."""
-
-    name: str
-    material: str
-    theory: Literal["ring", "cup", "article"]
-
-
-@dataclass(frozen=True)
 class DiagnosedData:
     """Which data they were; `averaged_rows` in each mean that was diagnosed."""
 
@@ -181,7 +173,7 @@ class VerdictAnswer(Answer):
     seed: Count
     quick: bool
     versions: Annotated[dict[str, str], Promise(required=["hdcal"])]
-    gear: DiagnosedGear
+    gear: CalibratedGear
     data: DiagnosedData
 
 

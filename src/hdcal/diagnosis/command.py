@@ -48,7 +48,7 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     """
     one_thread_for_algebra()
     from hdcal.diagnosis.library import choose_library
-    from hdcal.diagnosis.many_cases import diagnose_all, read_cases
+    from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
     from hdcal.physics.registry import EFFECTS
     from hdcal.report.folder import whole_folder
 
@@ -62,9 +62,7 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
             out = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
         console.check_target(out, force)
     keep_compilations()
-    for case in found:
-        for note in case.notes:
-            console.words(note if len(found) == 1 else f"{case.name}: {note}")
+    tell_notes(console, found)
     if settings["report"] is None:
         settings["report"] = len(found) <= MANY
         if not settings["report"]:

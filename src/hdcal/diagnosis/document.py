@@ -1,39 +1,31 @@
 """The report of a diagnosis; the sentences of its answer are in `words`."""
 
-from collections.abc import Iterator, Sequence
-
-from hdcal.calibration.summary import summarise
 from hdcal.data.case import Case
-from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer, VerdictsAnswer
-from hdcal.diagnosis.verdict import Gap, Shrink
-from hdcal.diagnosis.words import held_out, one_reading, verdict_word
+from hdcal.diagnosis.answer import VerdictAnswer, VerdictsAnswer
+from hdcal.diagnosis.sections import shrink_section, where_section, which_section
+from hdcal.diagnosis.words import verdict_word
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
-    Block,
     Document,
     Facts,
     Picture,
     Section,
     Sentences,
     Table,
-    Tag,
     Text,
 )
-from hdcal.report.page import parameter_row
+from hdcal.report.parameters import parameter_estimates
+from hdcal.report.posterior_sections import driver_tag, parameter_table
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
     hypothesis,
     known,
-    likely,
     newton,
     number,
-    or_zero,
     percent,
-    percent_span,
 )
 
-_MOST_ROWS = 12
 _FAILED = (
     "The diagnosis did not pass its checks, so it gives no answer, and every number "
     "and figure on this page may be wrong."
@@ -66,9 +58,9 @@ def verdict_document(
         answers=found.answer[1 : len(found.answer) - (found.next_step is not None)],
         next_steps=[] if found.next_step is None else [found.next_step],
         sections=[
-            _where(found),
-            _which(found),
-            _shrink(found.shrink),
+            where_section(found),
+            which_section(found),
+            shrink_section(found.shrink),
             _next_runs(found),
             _budget(found),
             _corrected(found, refit),
@@ -114,158 +106,6 @@ def _overview_row(name: str, found: VerdictAnswer) -> list[str]:
     ]
 
 
-def _where(found: VerdictAnswer) -> Section:
-    facts = Table(["", "found", "meaning"], _gap_rows(found), frozenset({"found"}))
-    caption = (
-        "Bars: mean of measured minus calibrated force in ranges chosen before "
-        "looking. Blue shade: how far noise alone would move them, in 95 % of all "
-        "programs for all ranges together. Red on amber: off. Thin line: the gap. In "
-        "the running sums noise stays in the grey band, a gap keeps its course."
-    )
-    shows = "Measured minus calibrated force over everything that was measured"
-    picture = Picture("where", shows, caption, tall=True)
-    shares = ", ".join(
-        f"{percent_span(each.share)} with {each.covariate}"
-        for each in found.where.shares
-    )
-    varies = [Text(f"The gap varies {shares}.")] if shares else []
-    regions = _regions(found.where.regions)
-    return Section("Where the gap lies", [facts, picture, *regions, *varies])
-
-
-def _gap_rows(found: VerdictAnswer) -> list[tuple[str, str, str]]:
-    gap, p = found.gap, found.where.p_value
-    chance = f"p = {number(p)}"
-    words = "a gap is seen" if gap.detected else "no gap is seen"
-    seen = ("seen", chance, f"{words}; how often noise alone looks like this")
-    if known(gap.rounding_N):
-        steps = f"in steps of {newton(gap.rounding_N)}"
-        seen = ("seen", "rounding", f"{steps}; nothing else is seen ({chance})")
-    noise = f"standard deviation of {one_reading(found)}"
-    return [
-        seen,
-        ("probability", percent(gap.probability), "that anything is missing"),
-        *_size_rows(gap),
-        ("noise", newton(gap.noise_sd_N), noise),
-    ]
-
-
-def _size_rows(gap: Gap) -> list[tuple[str, str, str]]:
-    if not known(gap.rms_N.median):
-        return [("size", "–", "of what is not seen there is no size")]
-    middle, span = estimate(gap.rms_N)
-    share = percent(gap.share_of_full_scale)
-    return [
-        ("size", f"{middle} N", f"root mean square; 90 % interval {span} N"),
-        ("of full scale", share, "size over the largest force tested"),
-    ]
-
-
-def _regions(regions: Sequence[CellAnswer]) -> Iterator[Block]:
-    if not regions:
-        yield Text("No range is off by more than noise alone would make it.")
-        return
-    numbers = ("rows", "measured − model [N]", "in standard errors", "share of the gap")
-    rows = [_region_row(cell) for cell in regions[:_MOST_ROWS]]
-    yield Table(["off", "in", *numbers], rows, frozenset(numbers))
-    hidden = len(regions) - _MOST_ROWS
-    if hidden > 0:
-        yield Text(f"{hidden} more are in verdict.json.", soft=True)
-
-
-def _region_row(cell: CellAnswer) -> list[str]:
-    bias = cell.bias_N
-    width = bias.hi - bias.lo if known(bias.hi) else None
-    return [
-        cell.covariate,
-        cell.label,
-        str(cell.rows),
-        number(bias.median, width),
-        number(cell.z, 10.0),
-        percent(cell.share),
-    ]
-
-
-def _which(found: VerdictAnswer) -> Section:
-    which = found.which
-    chances, evidence = which.probabilities, which.log_evidence
-    together = likely(chances)
-    ranked = sorted(chances, key=lambda name: -or_zero(chances[name]))[:_MOST_ROWS]
-    rows = [
-        [hypothesis(name), percent(chances[name]), number(evidence.get(name), 10.0)]
-        for name in ranked
-    ]
-    numbers = ("probability", "log evidence over no gap")
-    strong = frozenset(i for i, name in enumerate(ranked) if name in together)
-    table = Table(["hypothesis", *numbers], rows, frozenset(numbers), strong=strong)
-    others = len(chances) - _MOST_ROWS
-    rest = f"{others} less probable ones are in verdict.json. " if others > 0 else ""
-    note = (
-        f"Bold: the fewest that make up 90 %. {rest}Log evidence in nats: three are a "
-        "factor of twenty."
-    )
-    caption = (
-        "Every hypothesis was weighed against the same data. “Something outside the "
-        "library” is a free shape; it wins where no effect fits."
-    )
-    picture = Picture("which", "Probability of each hypothesis", caption)
-    robust = list(_robustness(found))
-    more = [Sentences(robust)] if robust else []
-    blocks = [picture, table, Text(note, soft=True), *more]
-    return Section("Which effect causes it", blocks)
-
-
-def _robustness(found: VerdictAnswer) -> Iterator[str]:
-    which = found.which
-    if which.sensitivity:
-        texts = [
-            f"{percent(value)} ({name.replace('_', ' ')})"
-            for name, value in which.sensitivity.items()
-        ]
-        yield (
-            "With other beliefs about the size of effects, the first cause would have "
-            f"{', '.join(texts)}."
-        )
-    if known(which.stability):
-        share = percent(which.stability)
-        yield f"With other readings of the same kind, the ranking's top stays: {share}."
-
-
-def _shrink(shrink: Shrink) -> Section:
-    caption = (
-        "Left: what each model leaves over (root mean square). Right: how much of the "
-        "gap is closed on readings that were not used in fitting. A free curve with as "
-        "many parameters is the placebo: an effect should do better, above all where "
-        "the largest deformations are held out."
-    )
-    shows = (
-        "Root mean square of measured minus model, from the nominal model to the noise"
-    )
-    picture = Picture("shrink", shows, caption)
-    closed = (
-        Text(f"Not computed: {shrink.reason}.")
-        if shrink.closed is None
-        else Facts(list(_closed_rows(shrink)))
-    )
-    return Section("How far the gap shrinks", [picture, closed])
-
-
-def _closed_rows(shrink: Shrink) -> Iterator[tuple[str, str]]:
-    if shrink.closed is not None:
-        yield f"closed on {held_out(shrink)}", percent_span(shrink.closed)
-    if known(shrink.extrapolated_closed):
-        share = percent(shrink.extrapolated_closed)
-        yield "with the largest deformations held out", share
-    if known(shrink.placebo_closed):
-        share = percent(shrink.placebo_closed)
-        yield "by a free curve instead (placebo)", share
-    for name, share in shrink.bars.items():
-        yield f"by {hypothesis(name)}", percent(share)
-    if shrink.remainder_N is not None:
-        middle, span = estimate(shrink.remainder_N)
-        yield "left after it", f"{middle} N, 90 % interval {span} N"
-
-
 def _next_runs(found: VerdictAnswer) -> Section:
     heading = "Runs that would tell more, if the cause is in the library"
     if not found.next_test:
@@ -302,7 +142,7 @@ def _budget(found: VerdictAnswer) -> Section:
             part.name,
             *estimate(part.factor),
             " : ".join(estimate(part.prior)),
-            Tag(part.driven_by, "good" if part.driven_by == "data" else "caution"),
+            driver_tag(part.driven_by),
             part.split_by,
         ]
         for part in budget.parts
@@ -334,50 +174,10 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
     blocks = [
         Text(words),
         Picture("bands", shows, caption),
-        _parameters(posterior),
+        parameter_table(parameter_estimates(posterior)),
         Text(note, soft=True),
     ]
     return Section(heading, blocks)
-
-
-def _parameters(posterior: Posterior) -> Table:
-    rows = []
-    for name, entry in summarise(posterior)["parameters"].items():
-        r = parameter_row(name, entry)
-        tone = "good" if r["driven_by"] == "data" else "caution"
-        rows.append(
-            [
-                r["label"],
-                r["median"],
-                r["span"],
-                r["unit"],
-                Tag(r["driven_by"], tone),
-                r["contraction"],
-                r["rhat"],
-                " / ".join(r["ess"]),
-            ]
-        )
-    numbers = (
-        "median",
-        "95 % interval",
-        "gained from data",
-        "R-hat",
-        "ESS bulk / tail",
-    )
-    return Table(
-        [
-            "parameter",
-            "median",
-            "95 % interval",
-            "unit",
-            "driven by",
-            "gained from data",
-            "R-hat",
-            "ESS bulk / tail",
-        ],
-        rows,
-        frozenset(numbers),
-    )
 
 
 def _provenance(

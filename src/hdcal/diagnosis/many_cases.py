@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from hdcal.calibration.calibrate import check_effect_priors
+from hdcal.cli.console import Console
 from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
@@ -38,6 +39,13 @@ def _read(path: str, gear, columns, theory) -> Case:
     case = read_case(path, gear, columns=columns, theory=theory)
     check_effect_priors(case)
     return case
+
+
+def tell_notes(console: Console, cases: Sequence[Case]) -> None:
+    """Print what was noted while the cases were read."""
+    for case in cases:
+        for note in case.notes:
+            console.words(note if len(cases) == 1 else f"{case.name}: {note}")
 
 
 def diagnose_all(

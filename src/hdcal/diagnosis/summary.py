@@ -6,7 +6,6 @@ from hdcal.diagnosis.answer import (
     AmplitudeAnswer,
     CellAnswer,
     DiagnosedData,
-    DiagnosedGear,
     NotTestable,
     Refit,
     VerdictAnswer,
@@ -18,6 +17,7 @@ from hdcal.diagnosis.verdict import Cell, Verdict, Where, Which, member_files
 from hdcal.diagnosis.words import answer, count_words, headline, limits, next_step
 from hdcal.inference.posterior import versions
 from hdcal.report.parameters import Interval
+from hdcal.report.posterior_answer import CalibratedGear
 
 INTERVAL = 0.9
 
@@ -57,7 +57,7 @@ def verdict_answer(
         seed=seed,
         quick=quick,
         versions=versions(),
-        gear=DiagnosedGear(gear.name, gear.material, gear.theory),
+        gear=CalibratedGear(gear.name, gear.material, gear.theory),
         data=DiagnosedData(
             name=case.name,
             rows=len(case.records.force),

@@ -86,7 +86,9 @@ def _table(table: Table) -> RichTable:
     for title in (table.columns[i] for i in shown):
         right = title in table.numbers
         whole = right or title in table.names
-        made.add_column(title, justify="right" if right else "left", no_wrap=whole)
+        made.add_column(
+            RichText(title), justify="right" if right else "left", no_wrap=whole
+        )
     for index, row in enumerate(table.rows):
         style = "bold" if index in table.strong else ""
         made.add_row(*(_cell(row[i]) for i in shown), style=style)
