@@ -11,9 +11,9 @@ from verdicts import KINDS
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.document import overview_document, verdict_document
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
 from hdcal.diagnosis.result_folder import write_verdict
-from hdcal.diagnosis.summary import verdicts_answer
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.report.answer import json_schema
 from hdcal.report.terminal import terminal_lines

@@ -8,11 +8,12 @@ from hostile_names import NAMES
 from rich.console import Console
 from verdicts import named
 
-from hdcal.diagnosis.document import overview_document, verdict_document
+from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.figure.closure import shrink_figure
 from hdcal.diagnosis.figure.where import where_figure
 from hdcal.diagnosis.figure.which import which_figure
-from hdcal.diagnosis.summary import verdict_answer, verdicts_answer
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.report.canvas import render
 from hdcal.report.html import html_page
 from hdcal.report.terminal import terminal_lines

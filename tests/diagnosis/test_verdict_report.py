@@ -4,8 +4,9 @@ from dataclasses import replace
 
 from verdicts import KINDS, named
 
-from hdcal.diagnosis.document import overview_document, verdict_document
-from hdcal.diagnosis.summary import verdict_answer, verdicts_answer
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.report.document import Table
 from hdcal.report.html import html_page

@@ -49,6 +49,7 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     one_thread_for_algebra()
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
+    from hdcal.diagnosis.overview import document_and_answer
     from hdcal.physics.registry import EFFECTS
     from hdcal.report.folder import whole_folder
 
@@ -70,16 +71,7 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     assert out is not None
     with whole_folder(out, force=force) as folder:
         answers = diagnose_all(found, folder, command=console.command, **settings)
-    return _show(console, answers, out, settings["report"])
-
-
-def _show(console: Console, answers: dict, out: str, report: bool) -> int:
-    from hdcal.diagnosis.document import overview_document, verdict_document
-    from hdcal.diagnosis.summary import verdicts_answer
-
-    if len(answers) > 1:
-        together = verdicts_answer(answers)
-        return console.answer(overview_document(together), together, out, "")
-    (found,) = answers.values()
-    opened = "report.html" if report else "verdict.json"
-    return console.answer(verdict_document(found), found, out, opened)
+    opened = "report.html" if settings["report"] else "verdict.json"
+    return console.answer(
+        *document_and_answer(answers), out, opened if len(answers) == 1 else ""
+    )

@@ -1,9 +1,8 @@
 """The report of a diagnosis; the sentences of its answer are in `words`."""
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.answer import VerdictAnswer, VerdictsAnswer
+from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.sections import shrink_section, where_section, which_section
-from hdcal.diagnosis.words import verdict_word
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
     Document,
@@ -20,10 +19,7 @@ from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
     hypothesis,
-    known,
-    newton,
     number,
-    percent,
 )
 
 _FAILED = (
@@ -72,38 +68,6 @@ def verdict_document(
         failed=found.reasons,
         failed_words=_FAILED,
     )
-
-
-def overview_document(found: VerdictsAnswer) -> Document:
-    """Return one table with a row for each of many cases."""
-    numbers = ("probability", "gap", "closed")
-    rows = [_overview_row(name, one) for name, one in found.cases.items()]
-    table = Table(["case", "verdict", "cause", *numbers], rows, frozenset(numbers))
-    return Document(
-        name=f"{len(rows)} cases",
-        kind="diagnoses",
-        subtitle="diagnosed one by one",
-        headline=f"{found.headline}.",
-        sections=[Section("Verdicts", [table], brief=True)],
-    )
-
-
-def _overview_row(name: str, found: VerdictAnswer) -> list[str]:
-    which, closed = found.which, found.shrink.closed
-    size = found.gap.rms_N.median
-    if found.status != "ok":
-        return [name, verdict_word(found), "", "", "", ""]
-    word = which.verdict
-    cause = word if which.effect is None else which.effect
-    chance = which.inclusion.get(cause, which.probabilities.get(cause))
-    return [
-        name,
-        word,
-        "–" if word == "none" else hypothesis(cause),
-        percent(chance),
-        newton(size) if known(size) else "–",
-        "–" if closed is None else percent(closed.median),
-    ]
 
 
 def _next_runs(found: VerdictAnswer) -> Section:

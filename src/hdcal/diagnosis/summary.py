@@ -9,12 +9,11 @@ from hdcal.diagnosis.answer import (
     NotTestable,
     Refit,
     VerdictAnswer,
-    VerdictsAnswer,
     WhereAnswer,
     WhichAnswer,
 )
 from hdcal.diagnosis.verdict import Cell, Verdict, Where, Which, member_files
-from hdcal.diagnosis.words import answer, count_words, headline, limits, next_step
+from hdcal.diagnosis.words import answer, headline, limits, next_step
 from hdcal.inference.posterior import versions
 from hdcal.report.parameters import Interval
 from hdcal.report.posterior_answer import CalibratedGear
@@ -74,18 +73,6 @@ def verdict_answer(
         next_step=next_step(found),
         answer=tuple(answer(found)),
         limits=tuple(limits(found)),
-    )
-
-
-def verdicts_answer(found: dict[str, VerdictAnswer]) -> VerdictsAnswer:
-    """Return the answer about many cases, by the names of the cases."""
-    failed = [name for name, one in found.items() if one.status != "ok"]
-    return VerdictsAnswer(
-        status="failed" if failed else "ok",
-        reasons=tuple(f"{name}: failed" for name in failed),
-        headline=count_words(found),
-        next_step=None,
-        cases=found,
     )
 
 
