@@ -5,13 +5,11 @@ rigs show. Sources are named where a form is somebody's.
 """
 
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from hdcal.blind.virtual_rig.elements.cup import cup_stiffness
-from hdcal.blind.virtual_rig.elements.end import End
-from hdcal.blind.virtual_rig.elements.ring import load_curve, stiffness
 from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
 
 FULL = 0.54  # deformation that the rigs reach [mm]
@@ -82,15 +80,15 @@ def _screw(rng) -> Shape:
 
 
 @cache
-def _height_law() -> PchipInterpolator:
-    """Return how stiff the cup is where it is loaded [mm], relative to 62 mm."""
-    heights = np.linspace(44.0, 68.0, 9)
-    zones, end = ((50.0, 0.68), (70.0, 0.83)), End(2.5, 20.0)
-    found = [
-        cup_stiffness(40.0, 70.0, zones, 207e3, 0.29, height, base=end)
-        for height in heights
-    ]
-    return PchipInterpolator(heights, np.array(found) / found[-3])
+def _curve(table: str) -> PchipInterpolator:
+    """Return the curve through a table of finite-element results.
+
+    The first lines of a table say what it holds. `python -m
+    benchmarks.virtual_rig_elements` in a checkout makes it.
+    """
+    text = (files("hdcal.blind.virtual_rig") / table).read_text("utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return PchipInterpolator(*np.loadtxt(lines[1:], delimiter=",").T)
 
 
 def contact_line(force, rig: Rig, size: float, shape: Shape):
@@ -100,22 +98,12 @@ def contact_line(force, rig: Rig, size: float, shape: Shape):
     finite-element cup.
     """
     moved = size * (np.maximum(rig.deformation, 0.0) / FULL) ** shape["power"]
-    return force * (_height_law()(62.0 - moved) - 1.0)
-
-
-@cache
-def _ring_law() -> PchipInterpolator:
-    """Return F/(kω) of the finite-element ring at ω/R."""
-    radius, depth = 40.0, np.arange(-10, 36) / 100.0
-    sizes = (radius, 0.68, 70.0, 207e3)
-    force = load_curve(*sizes, depth * radius)
-    straight = stiffness(*sizes) * np.where(depth == 0.0, 1.0, depth * radius)
-    return PchipInterpolator(depth, np.where(depth == 0.0, 1.0, force / straight))
+    return force * (_curve("cup.csv")(62.0 - moved) - 1.0)
 
 
 def large_displacement(force, rig: Rig, size: float, shape: Shape):
     """The ring leaves its small-displacement shape; size: 1/R [1/mm]."""
-    return force * (_ring_law()(rig.deformation * size) - 1.0)
+    return force * (_curve("ring.csv")(rig.deformation * size) - 1.0)
 
 
 def yielding(force, rig: Rig, size: float, shape: Shape):
