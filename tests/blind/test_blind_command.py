@@ -244,7 +244,7 @@ def test_a_set_that_fails_leaves_neither_folder_nor_key(
         yield from sealing.drawn(1)
         raise ZeroDivisionError
 
-    monkeypatch.setattr("hdcal.blind.virtual_rig.mixes.draw_cases", broken)
+    monkeypatch.setattr("hdcal.blind.virtual_rig.cases.draw_cases", broken)
     done = blind("make", "--cases", "2", "--mix", mix(), "--out", "set")
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
     assert not any(tmp_path.iterdir())

@@ -7,9 +7,9 @@ import pytest
 from benchmarks.virtual_rig_elements import tables
 from benchmarks.virtual_rig_elements.tables import FOLDER, TABLES
 
-from hdcal.blind.virtual_rig.loadings import PROGRAMS
+from hdcal.blind.virtual_rig.loadings import LOADINGS
 from hdcal.blind.virtual_rig.mechanics import FULL, contact_line, large_displacement
-from hdcal.blind.virtual_rig.mechanism import Rig
+from hdcal.blind.virtual_rig.mechanism import RigState
 
 
 @cache
@@ -56,8 +56,8 @@ def test_other_elements_are_noticed(name: str, size: str, changed, monkeypatch):
 def changed(mechanism, deformation: np.ndarray, size: float, shape) -> np.ndarray:
     """The force after a mechanism over the force before it."""
     force = np.full(deformation.shape, 100.0)
-    rig = Rig(PROGRAMS["ramp"]().history, force, deformation)
-    return 1.0 + mechanism(force, rig, size, shape) / force
+    state = RigState(LOADINGS["ramp"]().history, force, deformation)
+    return 1.0 + mechanism(force, state, size, shape) / force
 
 
 def test_the_mechanisms_go_through_the_tables():
