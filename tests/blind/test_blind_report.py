@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ NAUGHTY = (
 )
 
 
+@cache
 def made(count: int, rename: str | None = None) -> dict:
     """Return scores of a made-up diagnoser that is right three times in four."""
     rng = np.random.default_rng(4)

@@ -1,6 +1,8 @@
 """Labels and answers in a few words, for examples that a hand can reckon."""
 
 from hdcal.blind.label import Answer, Label
+from hdcal.blind.scoring.file_order import order_dependence
+from hdcal.blind.scoring.scored_case import match_answers
 from hdcal.blind.scoring.scores import score
 
 KINDS = {"slack": "rig", "friction": "rig", "drift": "time"}
@@ -22,6 +24,12 @@ def said(case="a", verdict="named", effect="slack", chances=None, **more) -> Ans
 
 def scored(labels, answers, **more) -> dict:
     return score(labels, {"hdcal": answers}, KINDS, **more)
+
+
+def order_of(labels, answers) -> dict:
+    """Return how answers go with the order of the files."""
+    cases = match_answers(labels, answers, name="answers", all_of_them=False)
+    return order_dependence(cases)
 
 
 def row(found: dict, key: str) -> dict:
