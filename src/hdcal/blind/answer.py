@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.answers import Answers
+from hdcal.blind.answer_files import Answers
 from hdcal.blind.diagnosers import (
     DIAGNOSERS,
     Diagnoser,
