@@ -7,7 +7,7 @@ import pytest
 from handmade import order_of
 from honest import EFFECTS, FAMILIES, PAIRS, Check, make_check, worded
 
-from hdcal.blind.label import Answer
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.scoring.bar import bar
 from hdcal.blind.scoring.file_order import order_dependence
 from hdcal.blind.scoring.reliability import reliabilities
@@ -44,7 +44,7 @@ def check() -> Check:
     return make_check()
 
 
-def rows_of(check: Check, answers: Sequence[Answer]) -> dict[str, dict]:
+def rows_of(check: Check, answers: Sequence[CaseAnswer]) -> dict[str, dict]:
     """Return the rows of the bar by key, without the rest of the score."""
     cases = match_answers(check.labels, answers, name="hdcal", all_of_them=True)
     stated = reliabilities([c for c in cases if c.label.case in check.mixed])
@@ -52,17 +52,19 @@ def rows_of(check: Check, answers: Sequence[Answer]) -> dict[str, dict]:
     return {row["key"]: row for row in rows}
 
 
-def missed(check: Check, answers: Sequence[Answer]) -> set[str]:
+def missed(check: Check, answers: Sequence[CaseAnswer]) -> set[str]:
     """Return the keys of the rows that are missed."""
     return {key for key, row in rows_of(check, answers).items() if row["met"] is False}
 
 
-def changed(check: Check, change: Callable[[Answer], Answer]) -> list[Answer]:
+def changed(
+    check: Check, change: Callable[[CaseAnswer], CaseAnswer]
+) -> list[CaseAnswer]:
     """Return every honest answer after a change."""
     return [change(answer) for answer in check.answers]
 
 
-def certain(answer: Answer, effect: str) -> Answer:
+def certain(answer: CaseAnswer, effect: str) -> CaseAnswer:
     """Return an answer that is sure of one effect."""
     return replace(
         answer,
@@ -121,7 +123,7 @@ def test_one_who_reads_noise_as_effects(check: Check):
     }
 
 
-def sharpened(answer: Answer) -> Answer:
+def sharpened(answer: CaseAnswer) -> CaseAnswer:
     """Return an answer three times as sure of everything."""
     cubed = {name: p**3 for name, p in answer.probabilities.items()}
     total = sum(cubed.values())
@@ -138,7 +140,7 @@ def test_one_who_is_surer_than_he_may_be(check: Check):
 
 
 def test_one_who_is_less_sure_than_he_could_be(check: Check):
-    def flattened(answer: Answer) -> Answer:
+    def flattened(answer: CaseAnswer) -> CaseAnswer:
         rooted = {name: p**0.2 for name, p in answer.probabilities.items()}
         total = sum(rooted.values())
         chances = {name: p / total for name, p in rooted.items()}
@@ -185,7 +187,7 @@ def test_cases_that_are_not_shuffled_are_seen(check: Check):
 
 
 def test_one_whose_intervals_are_too_narrow_or_too_wide(check: Check):
-    def stretched(factor: float) -> list[Answer]:
+    def stretched(factor: float) -> list[CaseAnswer]:
         return changed(
             check,
             lambda answer: replace(

@@ -1,6 +1,6 @@
 """Labels and answers in a few words, for examples that a hand can reckon."""
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring.file_order import order_dependence
 from hdcal.blind.scoring.scored_case import match_answers
 from hdcal.blind.scoring.scores import score
@@ -13,11 +13,11 @@ def truth(case="a", kind="effect", names=("slack",), r=1.0, **more) -> Label:
     return Label(case, kind, names, r=r, sigma=1.0, **{**plain, **more})
 
 
-def said(case="a", verdict="named", effect="slack", chances=None, **more) -> Answer:
+def said(case="a", verdict="named", effect="slack", chances=None, **more) -> CaseAnswer:
     chances = chances or {effect or "none": 1.0}
     inclusion = {n: p for n, p in chances.items() if n not in ("none", "unknown")}
     plain = {"inclusion": inclusion, "detected": True, "set": tuple(chances)}
-    return Answer(
+    return CaseAnswer(
         case, verdict, effect, None, probabilities=chances, **{**plain, **more}
     )
 

@@ -66,7 +66,7 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CaseAnswer:
     """What a diagnoser says of one case; the words are those of verdict.json.
 
     Attributes:
@@ -104,7 +104,7 @@ class Answer:
         return asdict(self)
 
     @classmethod
-    def from_plain(cls, data: dict[str, Any]) -> "Answer":
+    def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":
         """Return the answer of plain data."""
         spans = {k: data[k] and tuple(data[k]) for k in ("gap", "closed") if k in data}
         sizes = {k: tuple(v) for k, v in data.get("amplitude", {}).items()}

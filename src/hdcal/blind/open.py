@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.answer_files import Answers, frozen_names
+from hdcal.blind.answer_files import AnswerFiles, frozen_names
 from hdcal.blind.closures import closures
 from hdcal.blind.document import write_scores
-from hdcal.blind.label import Answer
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.scoring.scores import JUDGED, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
@@ -35,7 +35,7 @@ class OpenedSet:
     folder: Path
     result: dict[str, Any]
     secret: Sealed
-    answers: dict[str, list[Answer]]
+    answers: dict[str, list[CaseAnswer]]
     families: dict[str, str]
 
 
@@ -53,7 +53,7 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet
     found = read_set(folder)
     # Whoever is not scored today was blind all the same, and is recorded as such.
     everyone = frozen_names(found) if not by else _present(found, by)
-    frozen = {name: Answers(found, name).frozen() for name in everyone}
+    frozen = {name: AnswerFiles(found, name).frozen() for name in everyone}
     hashes = {name: data["sha256"] for name, (data, _) in frozen.items()}
     before = _read_opened(found)
     first = hashes if before is None else before["answers"]

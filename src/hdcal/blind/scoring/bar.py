@@ -12,8 +12,8 @@ from hdcal.blind.scoring.tables import precision
 
 
 @dataclass(frozen=True)
-class Promise:
-    """One row of the bar.
+class BarRow:
+    """One promise.
 
     Attributes:
         what: in words.
@@ -43,7 +43,8 @@ class Promise:
         `met` compares the value itself with the target; `firm` tells whether the whole
         interval is on the same side.
         """
-        met, ends = self.met_by(found.value), [*map(self.met_by, (found.lo, found.hi))]
+        met = self.met_by(found.value)
+        ends = [self.met_by(found.lo), self.met_by(found.hi)]
         return {
             "key": key,
             "what": self.what,
@@ -63,45 +64,45 @@ _R1, _R05 = "at r = 1, rich program", "at r = 0.5, rich program"
 _TOP = "calibration error of the most probable hypothesis"
 _EACH = "calibration error of single effects given 5 % or more"
 _ORDER = "answers depend on file order: p-value that they do not"
-PROMISES = {
-    "false_alarm_iid": Promise(
+ROWS = {
+    "false_alarm_iid": BarRow(
         "false alarms without a gap, independent noise", "at most", 0.05
     ),
-    "false_alarm_ar": Promise(_SERIAL, "at most", 0.05),
-    "named_on_null": Promise("an effect named without a gap", "at most", 0.01),
-    "detected": Promise("effects detected from r√n = 5 on", "at least", 0.9),
-    "top1_rich_r1": Promise(f"true effect first {_R1}", "at least", 0.9),
-    "oracle_r1": Promise(f"short of the oracle {_R1}", "at most", 0.04, "points"),
-    "top1_rich_r0.5": Promise(f"true effect first {_R05}", "at least", 0.7),
-    "oracle_r0.5": Promise(f"short of the oracle {_R05}", "at most", 0.08, "points"),
-    "top1_r1_2": Promise(
+    "false_alarm_ar": BarRow(_SERIAL, "at most", 0.05),
+    "named_on_null": BarRow("an effect named without a gap", "at most", 0.01),
+    "detected": BarRow("effects detected from r√n = 5 on", "at least", 0.9),
+    "top1_rich_r1": BarRow(f"true effect first {_R1}", "at least", 0.9),
+    "oracle_r1": BarRow(f"short of the oracle {_R1}", "at most", 0.04, "points"),
+    "top1_rich_r0.5": BarRow(f"true effect first {_R05}", "at least", 0.7),
+    "oracle_r0.5": BarRow(f"short of the oracle {_R05}", "at most", 0.08, "points"),
+    "top1_r1_2": BarRow(
         "true effect first at r = 1 to 2, all programs", "at least", 0.85
     ),
-    "top1_r5": Promise("true effect first at r = 5, all programs", "at least", 0.7),
-    "set_holds": Promise("90 % set holds the true effect, r ≥ 0.5", "at least", 0.9),
-    "set_size": Promise("size of the 90 % set at r = 1", "at most", 1.6, "effects"),
-    "precision": Promise(
+    "top1_r5": BarRow("true effect first at r = 5, all programs", "at least", 0.7),
+    "set_holds": BarRow("90 % set holds the true effect, r ≥ 0.5", "at least", 0.9),
+    "set_size": BarRow("size of the 90 % set at r = 1", "at most", 1.6, "effects"),
+    "precision": BarRow(
         "a named effect is a true one, all kinds of cases", "at least", 0.95
     ),
-    "unknown_spanned": Promise(f"{_LISTED}: called unknown", "at least", 0.9),
-    "named_spanned": Promise(f"{_LISTED}: an effect named", "at most", 0.05),
-    "unknown_unspanned": Promise(f"{_CHOSEN}: called unknown", "at least", 0.7),
-    "named_unspanned": Promise(f"{_CHOSEN}: an effect named", "at most", 0.1),
-    "named_withheld": Promise(
+    "unknown_spanned": BarRow(f"{_LISTED}: called unknown", "at least", 0.9),
+    "named_spanned": BarRow(f"{_LISTED}: an effect named", "at most", 0.05),
+    "unknown_unspanned": BarRow(f"{_CHOSEN}: called unknown", "at least", 0.7),
+    "named_unspanned": BarRow(f"{_CHOSEN}: an effect named", "at most", 0.1),
+    "named_withheld": BarRow(
         "true effect withheld, r = 1: another named", "at most", 0.2
     ),
-    "amplitude": Promise("error of the amplitude", "at most", 0.07),
-    "amplitude_holds": Promise(
+    "amplitude": BarRow("error of the amplitude", "at most", 0.07),
+    "amplitude_holds": BarRow(
         "90 % interval holds the amplitude", "within", (0.85, 0.95)
     ),
-    "gap": Promise("error of the gap's size"),
-    "gap_holds": Promise("90 % interval holds the gap's size"),
-    "closed": Promise(
+    "gap": BarRow("error of the gap's size"),
+    "gap_holds": BarRow("90 % interval holds the gap's size"),
+    "closed": BarRow(
         "error of the closed share, true effect named", "at most", 0.08, "points"
     ),
-    "calibration_top": Promise(_TOP, "at most", 0.05),
-    "calibration_effects": Promise(_EACH, "at most", 0.05),
-    "order": Promise(_ORDER, "at least", 0.01, "p"),
+    "calibration_top": BarRow(_TOP, "at most", 0.05),
+    "calibration_effects": BarRow(_EACH, "at most", 0.05),
+    "order": BarRow(_ORDER, "at least", 0.01, "p"),
 }
 
 
@@ -129,7 +130,7 @@ def bar(
         "calibration_effects": stated["effects"].error,
         "order": Estimate(p, None, None, n, "permutation test"),
     }
-    return [promise.compared(key, found[key]) for key, promise in PROMISES.items()]
+    return [row.compared(key, found[key]) for key, row in ROWS.items()]
 
 
 def _detections(cases: Cases) -> dict[str, Estimate]:

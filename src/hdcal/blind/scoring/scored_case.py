@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.errors import Finding, InputError
 
 NONE, UNKNOWN = "none", "unknown"
@@ -18,7 +18,7 @@ class ScoredCase:
     """A label beside an answer to the same case."""
 
     label: Label
-    answer: Answer
+    answer: CaseAnswer
 
     @property
     def plain_effect(self) -> bool:
@@ -130,7 +130,11 @@ def credit(chances: Mapping[str, float], truth: str) -> float:
 
 
 def match_answers(
-    labels: Sequence[Label], answers: Sequence[Answer], *, name: str, all_of_them: bool
+    labels: Sequence[Label],
+    answers: Sequence[CaseAnswer],
+    *,
+    name: str,
+    all_of_them: bool,
 ) -> list[ScoredCase]:
     """Return every label with its answer, in the order of the labels.
 
@@ -162,7 +166,7 @@ def match_answers(
     return [ScoredCase(one, found[one.case]) for one in labels if one.case in found]
 
 
-def _faults(answer: Answer) -> list[str]:
+def _faults(answer: CaseAnswer) -> list[str]:
     chances = answer.probabilities
     values = [*chances.values(), *answer.inclusion.values()]
     if not all(math.isfinite(v) and -1e-9 <= v <= 1.0 + _SLACK for v in values):

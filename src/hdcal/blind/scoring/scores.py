@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring import file_order, tables
 from hdcal.blind.scoring.bar import bar
 from hdcal.blind.scoring.detection import METHOD, detection
@@ -50,7 +50,7 @@ NOTES = {
 
 def score(
     labels: Sequence[Label],
-    answers: Mapping[str, Sequence[Answer]],
+    answers: Mapping[str, Sequence[CaseAnswer]],
     families: Mapping[str, str],
     closures: Mapping[str, float] | None = None,
     calibration_cases: set[str] | None = None,
@@ -60,25 +60,23 @@ def score(
 
     Args:
         labels: the truth, as the opened seal shows it.
-        answers: by diagnoser; who is judged must answer every case, the others
-            stand beside it and are scored on what they answered.
+        answers: by diagnoser; only who is judged must answer every case.
         families: family of each effect of the library.
         closures: case → true closed share of the best fit of the true effect's form.
         calibration_cases: cases drawn as the prior says; None for all.
         judged: the diagnoser whose answers are held against the bar.
 
     Raises:
-        InputError: who is judged left cases out, somebody answered one twice or one
-            that does not exist, or stated probabilities that are none.
+        InputError: as `match_answers`.
     """
     found = {
         name: match_answers(labels, said, name=name, all_of_them=name == judged)
         for name, said in {judged: (), **answers}.items()
     }
     own, known = found[judged], closures or {}
-    chosen = own
-    if calibration_cases is not None:
-        chosen = [case for case in own if case.label.case in calibration_cases]
+    everyone = {label.case for label in labels}
+    wanted = everyone if calibration_cases is None else calibration_cases
+    chosen = [case for case in own if case.label.case in wanted]
     stated, order = reliabilities(chosen), order_dependence(own)
     rows = bar(own, known, stated, order)
     confused = tables.confusion(own, families)
@@ -92,17 +90,11 @@ def score(
         "brier": {name: brier_score(c).plain() for name, c in found.items()},
         "confusion": confused,
         "mix_ups": tables.mix_ups(confused),
-        "reliability": {
-            **{name: each.plain() for name, each in stated.items()},
-            "classwise": effect_errors(chosen),
-        },
+        "reliability": {**tables.plain(stated), "classwise": effect_errors(chosen)},
         "detection": detection(own),
         **groups(own, families, known),
         "pairs": tables.pairs(own),
-        "rivals": [
-            *(tables.rival_row(name, cases) for name, cases in found.items()),
-            tables.oracle_row(own),
-        ],
+        "rivals": tables.rivals(found, own),
         "order": order,
         "notes": NOTES,
     }

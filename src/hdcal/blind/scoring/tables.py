@@ -6,6 +6,7 @@ from typing import Any
 
 from hdcal.blind.scoring.estimates import Estimate, share
 from hdcal.blind.scoring.proper_scores import log_score
+from hdcal.blind.scoring.reliability import Reliability
 from hdcal.blind.scoring.scored_case import (
     NONE,
     UNKNOWN,
@@ -83,29 +84,27 @@ def pairs(cases: Cases) -> dict[str, Any]:
     return {"n": len(own), **plain(found)}
 
 
-def rival_row(name: str, cases: Cases) -> dict[str, Any]:
-    """Return what one diagnoser achieves, as a row beside the others."""
-    silent = [*null_cases(cases, "iid"), *null_cases(cases, "ar")]
-    found = {
-        **_first([c for c in cases if c.plain_effect], lambda c: c.credit),
-        "false_alarms": share(c.answer.detected for c in silent),
-        "precision": precision(cases),
-        "log_score": log_score(cases),
-    }
-    return {"name": name, "n": len(cases), **plain(found)}
+def rivals(found: Mapping[str, Cases], own: Cases) -> list[dict[str, Any]]:
+    """Return what each diagnoser achieves, and the bound that the oracle sets.
 
-
-def oracle_row(cases: Cases) -> dict[str, Any]:
-    """Return the bound that the oracle sets; it knows that an effect acts."""
-    known = [c for c in cases if c.plain_effect and c.label.oracle]
-    return {
-        "name": "oracle bound",
-        "n": len(known),
-        **plain(_first(known, lambda c: c.oracle_credit)),
-        "false_alarms": None,
-        "precision": None,
-        "log_score": None,
-    }
+    Args:
+        found: cases by diagnoser.
+        own: of the judged one, for the oracle, who knows that an effect acts.
+    """
+    rows = []
+    for name, cases in found.items():
+        silent = [*null_cases(cases, "iid"), *null_cases(cases, "ar")]
+        numbers = {
+            **_first([c for c in cases if c.plain_effect], lambda c: c.credit),
+            "false_alarms": share(c.answer.detected for c in silent),
+            "precision": precision(cases),
+            "log_score": log_score(cases),
+        }
+        rows.append({"name": name, "n": len(cases), **plain(numbers)})
+    known = [c for c in own if c.plain_effect and c.label.oracle]
+    bound = plain(_first(known, lambda c: c.oracle_credit))
+    unknown = dict.fromkeys(("false_alarms", "precision", "log_score"))
+    return [*rows, {"name": "oracle bound", "n": len(known), **bound, **unknown}]
 
 
 def _first(cases: Cases, credit: Callable[[ScoredCase], float]) -> dict[str, Estimate]:
@@ -122,6 +121,6 @@ def precision(cases: Cases) -> Estimate:
     return share(c.named_right for c in cases if c.named and not c.label.withheld)
 
 
-def plain(found: Mapping[str, Estimate]) -> dict[str, Any]:
+def plain(found: Mapping[str, Estimate | Reliability]) -> dict[str, Any]:
     """Return plain data for JSON."""
     return {key: value.plain() for key, value in found.items()}
