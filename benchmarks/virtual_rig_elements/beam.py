@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hdcal.blind.virtual_rig.elements.banded import assemble_matrix, assemble_vector
+from benchmarks.virtual_rig_elements.banded import assemble_matrix, assemble_vector
 
 Floats = NDArray[np.floating[Any]]
 
@@ -24,8 +24,8 @@ class Beams(NamedTuple):
     bending: Floats
 
 
-class Response(NamedTuple):
-    """What the chain answers to its displacements.
+class ChainState(NamedTuple):
+    """Energy, forces and tangent of the displaced chain.
 
     Attributes:
         energy: strain energy [N mm].
@@ -38,7 +38,7 @@ class Response(NamedTuple):
     tangent: Floats
 
 
-def respond(beams: Beams, state: Floats) -> Response:
+def respond(beams: Beams, state: Floats) -> ChainState:
     """Return energy, forces and tangent of displaced and rotated nodes.
 
     Args:
@@ -46,7 +46,7 @@ def respond(beams: Beams, state: Floats) -> Response:
         state: displacements x, y [mm] and rotation [rad], shape (nodes, 3).
 
     Returns:
-        Response of the chain.
+        Energy, nodal forces and tangent.
 
     Source:
         M. Crisfield, Non-linear Finite Element Analysis of Solids and Structures,
@@ -77,7 +77,7 @@ def respond(beams: Beams, state: Floats) -> Response:
     modes[:, 2, 5] += 1.0
     inner = np.column_stack([normal, moment])
     force = np.einsum("em,emi->ei", inner, modes)
-    return Response(
+    return ChainState(
         float(energy),
         assemble_vector(force),
         assemble_matrix(

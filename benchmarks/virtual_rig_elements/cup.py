@@ -8,14 +8,14 @@ Sanders, which vanish in rigid motion.
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from hdcal.blind.virtual_rig.elements.banded import assemble_matrix, assemble_vector
-from hdcal.blind.virtual_rig.elements.end import End, end_stiffness
+from benchmarks.virtual_rig_elements.banded import assemble_matrix, assemble_vector
+from benchmarks.virtual_rig_elements.end import End, end_stiffness
 
 Floats = NDArray[np.floating[Any]]
 Base = Literal["clamped", "held", "free"]
@@ -28,16 +28,34 @@ FIXED: dict[Base, list[int]] = {"clamped": [0, 2, 4, 5], "held": [2, 4], "free":
 STIFF = 1e12  # of a support to the wall: errors of its inverse
 
 
+class Cup(NamedTuple):
+    """A cylindrical wall on a base.
+
+    Attributes:
+        radius: R of the middle surface [mm].
+        length: L from base to rim [mm].
+        thickness: δ [mm], or zones (upper end [mm], thickness [mm]) from the base on,
+            such as ((50, 0.68), (70, 0.83)) for a tooth band of equal circumferential
+            bending stiffness; the last one ends at `length`.
+        modulus: Young's modulus E [MPa].
+        poisson: Poisson's ratio ν.
+        base: an end disc; or "clamped" to a rigid body, "held" round but free to
+            warp, "free" as a tube.
+    """
+
+    radius: float
+    length: float
+    thickness: float | Zones
+    modulus: float
+    poisson: float
+    base: Base | End = "clamped"
+
+
 def cup_stiffness(
-    radius: float,
-    length: float,
-    thickness: float | Zones,
-    modulus: float,
-    poisson: float,
+    cup: Cup,
     load_height: float,
     *,
     load_length: float = 1.0,
-    base: Base | End = "clamped",
     elements: int = 40,
     harmonics: int = 30,
 ) -> float:
@@ -48,17 +66,9 @@ def cup_stiffness(
     Around it is a point; the sum over n = 0, 2, 4, … converges as n⁻³.
 
     Args:
-        radius: R of the middle surface [mm].
-        length: L from base to rim [mm].
-        thickness: δ [mm], or zones (upper end [mm], thickness [mm]) from the base on,
-            such as ((50, 0.68), (70, 0.83)) for a tooth band of equal circumferential
-            bending stiffness; the last one ends at `length`.
-        modulus: Young's modulus E [MPa].
-        poisson: Poisson's ratio ν.
+        cup: wall and base.
         load_height: c of the load's middle above the base [mm].
         load_length: axial length that the load is spread over [mm].
-        base: an end disc; or "clamped" to a rigid body, "held" round but free to
-            warp, "free" as a tube.
         elements: least number along the axis.
         harmonics: number of terms n = 2, 4, … beside n = 0.
 
@@ -70,6 +80,7 @@ def cup_stiffness(
         TR R-24 (1959); O. Zienkiewicz & R. Taylor, The Finite Element Method, vol. 2,
         semi-analytical elements.
     """
+    radius, length, thickness, modulus, poisson, base = cup
     zones = ((length, thickness),) if isinstance(thickness, float | int) else thickness
     low = max(load_height - 0.5 * load_length, 0.0)
     high = min(load_height + 0.5 * load_length, length)

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.errors import Finding, InputError
 
 NONE, UNKNOWN = "none", "unknown"
@@ -13,11 +14,11 @@ _SLACK = 1e-3
 
 
 @dataclass(frozen=True)
-class Judged:
+class ScoredCase:
     """A label beside an answer to the same case."""
 
     label: Label
-    answer: Answer
+    answer: CaseAnswer
 
     @property
     def plain_effect(self) -> bool:
@@ -34,7 +35,7 @@ class Judged:
         """Whether exactly one effect acts."""
         return self.label.kind == "effect" and len(self.label.truth) == 1
 
-    @property
+    @cached_property
     def truth(self) -> str | None:
         """The true hypothesis; None of real data, which has no single one."""
         label = self.label
@@ -44,23 +45,24 @@ class Judged:
             return NONE
         if label.kind == "outside" or set(label.truth) & set(label.withheld):
             return UNKNOWN
-        return hypothesis("+".join(label.truth))
+        return sorted_parts("+".join(label.truth))
 
-    @property
+    @cached_property
     def probabilities(self) -> dict[str, float]:
         """Of all hypotheses, pairs with their parts in alphabetical order."""
         found: dict[str, float] = {}
         for name, value in self.answer.probabilities.items():
-            found[hypothesis(name)] = found.get(hypothesis(name), 0.0) + value
+            name = sorted_parts(name)
+            found[name] = found.get(name, 0.0) + value
         return found
 
-    @property
+    @cached_property
     def top(self) -> str:
         """Most probable hypothesis; that nothing is missing, of who gave none."""
-        return (leaders(self.probabilities) or [NONE])[0]
+        return (most_probable(self.probabilities) or [NONE])[0]
 
     @property
-    def spoken(self) -> str:
+    def stated(self) -> str:
         """The one thing that the answer says: none, unknown or the first effect."""
         word = self.answer.verdict
         return word if word in (NONE, UNKNOWN) else self.answer.effect or NONE
@@ -68,7 +70,7 @@ class Judged:
     @property
     def top_effect(self) -> str | None:
         """Most probable effect, whatever the verdict; None where no effect has any."""
-        return (leaders(self.answer.inclusion) or [None])[0]
+        return (most_probable(self.answer.inclusion) or [None])[0]
 
     @property
     def credit(self) -> float:
@@ -101,12 +103,21 @@ class Judged:
         return 0.95 * low <= self.label.r <= 1.05 * high
 
 
-def hypothesis(name: str) -> str:
+Cases = Sequence[ScoredCase]
+
+
+def null_cases(cases: Cases, noise: str) -> list[ScoredCase]:
+    """Return the cases without a gap in one kind of noise, serial up to .5."""
+    own = [c for c in cases if c.label.kind == "null" and c.label.noise == noise]
+    return [c for c in own if noise != "ar" or c.label.correlation <= 0.5 + 1e-9]
+
+
+def sorted_parts(name: str) -> str:
     """Return one spelling of a pair, whichever of the two comes first."""
     return "+".join(sorted(name.split("+")))
 
 
-def leaders(chances: Mapping[str, float]) -> list[str]:
+def most_probable(chances: Mapping[str, float]) -> list[str]:
     """Return the most probable of some names, all of them in a tie."""
     best = max(chances.values(), default=0.0)
     return sorted(n for n, p in chances.items() if p == best) if best > 0.0 else []
@@ -114,13 +125,17 @@ def leaders(chances: Mapping[str, float]) -> list[str]:
 
 def credit(chances: Mapping[str, float], truth: str) -> float:
     """Return 1 where the most probable name is true, 1/k in a tie of k, else 0."""
-    found = leaders(chances)
+    found = most_probable(chances)
     return 1.0 / len(found) if truth in found else 0.0
 
 
-def judged_cases(
-    labels: Sequence[Label], answers: Sequence[Answer], *, name: str, all_of_them: bool
-) -> list[Judged]:
+def match_answers(
+    labels: Sequence[Label],
+    answers: Sequence[CaseAnswer],
+    *,
+    name: str,
+    all_of_them: bool,
+) -> list[ScoredCase]:
     """Return every label with its answer, in the order of the labels.
 
     Args:
@@ -136,21 +151,22 @@ def judged_cases(
     """
     problems, found = [], {answer.case: answer for answer in answers}
     cases = [label.case for label in labels]
-    if len(set(cases)) < len(cases):
+    known = set(cases)
+    if len(known) < len(cases):
         problems.append(("labels", "two labels share a case's name"))
     if len(found) < len(answers):
         problems.append((name, "a case is answered twice"))
-    problems += [(name, f"no label for case {c}") for c in found if c not in {*cases}]
+    problems += [(name, f"no label for case {c}") for c in found if c not in known]
     if all_of_them:
         problems += [(name, f"no answer to case {c}") for c in cases if c not in found]
     problems += [(name, text) for a in found.values() for text in _faults(a)]
     if problems:
         remedy = "give one answer per case, with probabilities that sum to 1"
         raise InputError(Finding(file, text, remedy) for file, text in problems)
-    return [Judged(label, found[label.case]) for label in labels if label.case in found]
+    return [ScoredCase(one, found[one.case]) for one in labels if one.case in found]
 
 
-def _faults(answer: Answer) -> list[str]:
+def _faults(answer: CaseAnswer) -> list[str]:
     chances = answer.probabilities
     values = [*chances.values(), *answer.inclusion.values()]
     if not all(math.isfinite(v) and -1e-9 <= v <= 1.0 + _SLACK for v in values):

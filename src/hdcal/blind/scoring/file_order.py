@@ -6,18 +6,18 @@ takes away what it may have from the neighbours. Two things are compared: how of
 neighbours get the same answer, and how often an answer is what is true next door.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from hdcal.blind.scoring.estimates import SEED, share
-from hdcal.blind.scoring.judged import Judged
+from hdcal.blind.scoring.scored_case import Cases
 
-_DEALS = 1000
+_PERMUTATIONS = 1000
 
 
-def order_dependence(cases: Sequence[Judged]) -> dict[str, Any]:
+def order_dependence(cases: Cases) -> dict[str, Any]:
     """Return how answers go with the order of the files, by a permutation test.
 
     Args:
@@ -30,11 +30,10 @@ def order_dependence(cases: Sequence[Judged]) -> dict[str, Any]:
     """
     found = sorted((c for c in cases if c.truth), key=lambda c: c.label.case)
     truth = _codes([str(case.truth) for case in found])
-    spoken = [case.spoken for case in found]
-    both = _codes([str(case.truth) for case in found] + spoken)
-    true, said = both[: len(found)], both[len(found) :]
+    both = _codes([str(c.truth) for c in found] + [c.stated for c in found])
+    true, stated = both[: len(found)], both[len(found) :]
     half = len(found) // 2
-    right = said == true
+    right = stated == true
     result = {
         "n": len(found),
         "p_value": None,
@@ -43,16 +42,14 @@ def order_dependence(cases: Sequence[Judged]) -> dict[str, Any]:
     }
     if len(found) < 3:
         return result
-    same = _compared(lambda a: _agree(a, a), said, truth)
-    next_door = _compared(lambda a: _agree(a, true) + _agree(true, a), said, truth)
-    shuffled = _compared(lambda a: _agree(a, a), true, np.zeros_like(true))
-    chance = min(1.0, 2.0 * min(same["p_value"], next_door["p_value"]))
+    same = _tested(lambda a: _agree(a, a), stated, truth)
+    next_truth = _tested(lambda a: _agree(a, true) + _agree(true, a), stated, truth)
     return {
         **result,
-        "p_value": chance,
+        "p_value": min(1.0, 2.0 * min(same["p_value"], next_truth["p_value"])),
         "same_as_neighbour": same,
-        "truth_of_neighbour": next_door,
-        "truth_itself": shuffled,
+        "truth_of_neighbour": next_truth,
+        "truth_itself": _tested(lambda a: _agree(a, a), true, np.zeros_like(true)),
     }
 
 
@@ -65,18 +62,20 @@ def _agree(one: np.ndarray, two: np.ndarray) -> int:
     return int(np.sum(one[:-1] == two[1:]))
 
 
-def _compared(statistic, said: np.ndarray, truth: np.ndarray) -> dict[str, Any]:
-    """Return a count, what dealing anew would give, and how often as many."""
+def _tested(
+    statistic: Callable[[np.ndarray], int], values: np.ndarray, group: np.ndarray
+) -> dict[str, Any]:
+    """Return a count, what permuting within groups gives, and how often as many."""
     rng = np.random.default_rng(SEED)
-    own = np.argsort(truth, kind="stable")
-    counts = np.empty(_DEALS)
-    for deal in range(_DEALS):
-        dealt = np.empty_like(said)
-        dealt[own] = said[np.lexsort((rng.random(len(said)), truth))]
-        counts[deal] = statistic(dealt)
-    seen = statistic(said)
+    own = np.argsort(group, kind="stable")
+    counts = np.empty(_PERMUTATIONS)
+    for place in range(_PERMUTATIONS):
+        permuted = np.empty_like(values)
+        permuted[own] = values[np.lexsort((rng.random(len(values)), group))]
+        counts[place] = statistic(permuted)
+    seen = statistic(values)
     return {
         "seen": seen,
         "expected": float(counts.mean()),
-        "p_value": float((1 + np.sum(counts >= seen)) / (1 + _DEALS)),
+        "p_value": float((1 + np.sum(counts >= seen)) / (1 + _PERMUTATIONS)),
     }

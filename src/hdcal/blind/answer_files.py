@@ -1,10 +1,10 @@
-"""Answers to a blind check on disk: one file each, then all of them frozen."""
+"""AnswerFiles to a blind check on disk: one file each, then all of them frozen."""
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.label import Answer
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import Entry, is_name, is_stamped, stamped
 from hdcal.blind.sealed_set import BlindSet, read_json, refusal
 from hdcal.errors import InputError
@@ -17,7 +17,7 @@ _WORDS = ("none", "named", "ambiguous", "unknown")
 _ASK_AGAIN = "Delete it and run 'hdcal blind answer' again"
 
 
-class Answers:
+class AnswerFiles:
     """The answers of one diagnoser to one set.
 
     Args:
@@ -125,7 +125,7 @@ class Answers:
         write_whole(self.file, as_json(data))
         return data
 
-    def frozen(self) -> tuple[dict[str, Any], list[Answer]]:
+    def frozen(self) -> tuple[dict[str, Any], list[CaseAnswer]]:
         """Return the frozen answers, as data and as answers in the set's order.
 
         Raises:
@@ -181,14 +181,14 @@ class Answers:
             raise refusal(self.path(case), words, remedy + " to answer all cases anew")
 
 
-def read_answer(data: Any, case: str, path: Path) -> Answer:
+def read_answer(data: Any, case: str, path: Path) -> CaseAnswer:
     """Return the answer of plain data from a file.
 
     Raises:
         InputError: it is none, or one to another case.
     """
     try:
-        answer = Answer.from_plain(data)
+        answer = CaseAnswer.from_plain(data)
         numbers = [*answer.probabilities.values(), *answer.inclusion.values()]
         # Sums of shares may pass 1 by a rounding error.
         if not all(0.0 <= number <= 1.001 for number in numbers):
@@ -217,10 +217,10 @@ def frozen_names(found: BlindSet) -> list[str]:
         raise refusal(found.folder, words, "Run 'hdcal blind answer' first")
     findings = []
     for name in sorted(names):
-        if not Answers(found, name).file.exists():
+        if not AnswerFiles(found, name).file.exists():
             words = f"the answers of '{name}' are not frozen"
             remedy = "Let 'hdcal blind answer' come to its end, or move them away"
-            findings += refusal(Answers(found, name).folder, words, remedy).findings
+            findings += refusal(AnswerFiles(found, name).folder, words, remedy).findings
     if findings:
         raise InputError(findings)
     return sorted(names)

@@ -13,16 +13,35 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, solveh_banded
 
-from hdcal.blind.virtual_rig.elements.banded import multiply
-from hdcal.blind.virtual_rig.elements.beam import Beams, Response, respond
+from benchmarks.virtual_rig_elements.banded import multiply
+from benchmarks.virtual_rig_elements.beam import Beams, ChainState, respond
 from hdcal.errors import NotUsable
 
 Floats = NDArray[np.floating[Any]]
-Part = Literal["quarter", "half"]
 
 LARGEST_STEP = 0.02  # of the radius; Newton's region of convergence with room
 MOST_ITERATIONS = 30
-DEFAULT_ELEMENTS = 40
+
+
+class Ring(NamedTuple):
+    """A ring between two opposed radial loads, and how it is meshed.
+
+    Attributes:
+        radius: R of the centre line [mm].
+        thickness: δ [mm], one number, or one per element counted from the load.
+        length: axial width L [mm]; EA = E L δ, EI = E L δ³/12.
+        modulus: Young's modulus E [MPa].
+        elements: number of elements where `thickness` is one number.
+        part: what is meshed. "quarter" for thickness symmetric about both diameters,
+            "half" for symmetry about the line of the loads only.
+    """
+
+    radius: float
+    thickness: ArrayLike
+    length: float
+    modulus: float
+    elements: int = 40
+    part: Literal["quarter", "half"] = "quarter"
 
 
 class _Mesh(NamedTuple):
@@ -33,28 +52,13 @@ class _Mesh(NamedTuple):
     copies: int  # how many of this part make the ring
 
 
-def load_curve(
-    radius: float,
-    thickness: ArrayLike,
-    length: float,
-    modulus: float,
-    displacement: ArrayLike,
-    *,
-    elements: int = DEFAULT_ELEMENTS,
-    part: Part = "quarter",
-) -> Floats:
+def load_curve(ring: Ring, displacement: ArrayLike) -> Floats:
     """Return the force at either load for imposed radial displacements.
 
     Args:
-        radius: R of the centre line [mm].
-        thickness: δ [mm], one number, or one per element counted from the load.
-        length: axial width L [mm]; EA = E L δ, EI = E L δ³/12.
-        modulus: Young's modulus E [MPa].
+        ring: the ring and its mesh.
         displacement: ω of one load towards the centre [mm], shape (points,); negative
             pulls. Half the change of diameter.
-        elements: number of elements where `thickness` is one number.
-        part: what is meshed. "quarter" for thickness symmetric about both diameters,
-            "half" for symmetry about the line of the loads only.
 
     Returns:
         Force F [N], shape (points,), with the sign of the displacement.
@@ -66,73 +70,28 @@ def load_curve(
         M. Crisfield, Non-linear Finite Element Analysis of Solids and Structures,
         vol. 1, sec. 7.3 (corotational beam).
     """
-    mesh = _mesh(radius, thickness, length, modulus, elements, part)
-    path = _equilibria(mesh, radius, np.atleast_1d(np.asarray(displacement, float)))
-    return np.array([_load(state.force) for state in path])
+    return np.array([_load(state.force) for state in _equilibria(ring, displacement)])
 
 
-def strain_energy(
-    radius: float,
-    thickness: ArrayLike,
-    length: float,
-    modulus: float,
-    displacement: ArrayLike,
-    *,
-    elements: int = DEFAULT_ELEMENTS,
-    part: Part = "quarter",
-) -> Floats:
+def strain_energy(ring: Ring, displacement: ArrayLike) -> Floats:
     """Return the energy U [N mm] of the whole ring; two loads work, so 2 F = dU/dω.
 
-    Args:
-        radius: as in `load_curve`.
-        thickness: as in `load_curve`.
-        length: as in `load_curve`.
-        modulus: as in `load_curve`.
-        displacement: as in `load_curve`.
-        elements: as in `load_curve`.
-        part: as in `load_curve`.
-
-    Returns:
-        Strain energy [N mm], shape (points,).
-
-    Source:
-        As `load_curve`.
+    Arguments, errors and source as in `load_curve`.
     """
-    mesh = _mesh(radius, thickness, length, modulus, elements, part)
-    path = _equilibria(mesh, radius, np.atleast_1d(np.asarray(displacement, float)))
-    return mesh.copies * np.array([state.energy for state in path])
+    energies = [state.energy for state in _equilibria(ring, displacement)]
+    return _mesh(ring).copies * np.array(energies)
 
 
-def stiffness(
-    radius: float,
-    thickness: ArrayLike,
-    length: float,
-    modulus: float,
-    *,
-    elements: int = DEFAULT_ELEMENTS,
-    part: Part = "quarter",
-) -> float:
+def stiffness(ring: Ring) -> float:
     """Return dF/dω [N/mm] of the undeformed ring.
 
     Thin and inextensible it is π E L δ³/(24 R³ S), S = (π² − 8)/16.
 
-    Args:
-        radius: as in `load_curve`.
-        thickness: as in `load_curve`.
-        length: as in `load_curve`.
-        modulus: as in `load_curve`.
-        elements: as in `load_curve`.
-        part: as in `load_curve`.
-
-    Returns:
-        Force per radial displacement of one load [N/mm].
-
     Source:
         As `load_curve`; the closed form from S. Timoshenko, Strength of Materials.
     """
-    mesh = _mesh(radius, thickness, length, modulus, elements, part)
-    rest = np.zeros((len(mesh.beams.axial) + 1, 3))
-    tangent = respond(mesh.beams, rest).tangent
+    mesh = _mesh(ring)
+    tangent = respond(mesh.beams, _at_rest(mesh)).tangent
     return _load(multiply(tangent, _unit_press(mesh, tangent).ravel()))
 
 
@@ -162,24 +121,22 @@ def toothed_wall(
     return wall + height * on_tooth
 
 
-def _mesh(
-    radius: float,
-    thickness: ArrayLike,
-    length: float,
-    modulus: float,
-    elements: int,
-    part: Part,
-) -> _Mesh:
-    delta = np.asarray(thickness, float)
-    delta = np.full(elements, delta) if delta.ndim == 0 else delta
-    axial, bending = _sections(delta, length, modulus)
-    arc = np.pi / 2.0 if part == "quarter" else np.pi
+def _mesh(ring: Ring) -> _Mesh:
+    delta = np.asarray(ring.thickness, float)
+    delta = np.full(ring.elements, delta) if delta.ndim == 0 else delta
+    axial, bending = _sections(delta, ring.length, ring.modulus)
+    arc = np.pi / 2.0 if ring.part == "quarter" else np.pi
     angle = np.linspace(0.0, arc, len(delta) + 1)
-    node = radius * np.column_stack([np.sin(angle), np.cos(angle)])
+    node = ring.radius * np.column_stack([np.sin(angle), np.cos(angle)])
     # On the unloaded diameter the far node slides in x; at the other load it is held.
     last = 3 * len(delta)
-    free, copies = (slice(3, last + 1), 4) if part == "quarter" else (slice(3, last), 2)
+    quarter = ring.part == "quarter"
+    free, copies = (slice(3, last + 1), 4) if quarter else (slice(3, last), 2)
     return _Mesh(Beams(np.diff(node, axis=0), axial, bending), free, copies)
+
+
+def _at_rest(mesh: _Mesh) -> Floats:
+    return np.zeros((len(mesh.beams.axial) + 1, 3))
 
 
 def _sections(delta: Floats, length: float, modulus: float) -> tuple[Floats, Floats]:
@@ -187,22 +144,23 @@ def _sections(delta: Floats, length: float, modulus: float) -> tuple[Floats, Flo
     return modulus * length * delta, modulus * length * delta**3 / 12.0
 
 
-def _equilibria(mesh: _Mesh, radius: float, displacement: Floats) -> Iterator[Response]:
-    """Yield the response at each displacement, walking from one to the next."""
-    state, reached = np.zeros((len(mesh.beams.axial) + 1, 3)), 0.0
-    response = respond(mesh.beams, state)
-    for target in displacement:
+def _equilibria(ring: Ring, displacement: ArrayLike) -> Iterator[ChainState]:
+    """Yield the chain at each displacement, walking from one to the next."""
+    mesh, radius = _mesh(ring), ring.radius
+    state, reached = _at_rest(mesh), 0.0
+    chain = respond(mesh.beams, state)
+    for target in np.atleast_1d(np.asarray(displacement, float)):
         steps = int(np.ceil(abs(target - reached) / (LARGEST_STEP * radius)))
         for goal in np.linspace(reached, target, steps + 1)[1:]:
             # Pressing along the tangent first keeps the jump out of the element at
             # the load, where it would be a large stretch.
-            state = state + (goal - reached) * _unit_press(mesh, response.tangent)
-            state, response = _newton(mesh, state, radius)
+            state = state + (goal - reached) * _unit_press(mesh, chain.tangent)
+            state, chain = _newton(mesh, state, radius)
             reached = goal
-        yield response
+        yield chain
 
 
-def _newton(mesh: _Mesh, state: Floats, radius: float) -> tuple[Floats, Response]:
+def _newton(mesh: _Mesh, state: Floats, radius: float) -> tuple[Floats, ChainState]:
     """Return the balanced state and its response; imposed dofs stay as they are."""
     for _ in range(MOST_ITERATIONS):
         response = respond(mesh.beams, state)
