@@ -25,25 +25,21 @@ from hdcal.inference.density import (
     MEMBERS,
     log_likelihood,
     log_prior,
-    predict_rows,
 )
 from hdcal.inference.diagnostics import diagnose_parameters, mixing
 from hdcal.inference.flat_directions import (
     beside_members,
     dead_parameters,
     flat_directions,
-    member_columns,
-    sensitivity,
 )
+from hdcal.inference.linearisation import linearise
 from hdcal.inference.posterior import (
     Posterior,
     build_tree,
-    gap_columns,
     versions,
 )
 from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.problem import Problem, build_problem, problem_priors
-from hdcal.inference.programs import let_go_of_programs
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
@@ -165,7 +161,6 @@ def calibrate(
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
     check_settings(chains, warmup, draws)
-    let_go_of_programs()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)
@@ -237,13 +232,11 @@ def _identification(case: Case, problem: Problem, found: Draws) -> tuple[Check, 
     centre = {
         name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
     }
-    records, columns = case.records, gap_columns(problem, case)
-    _, noise = predict_rows(problem, centre, records, columns)
-    sd = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
-    members = member_columns(problem, centre, records, columns)[0] / sd[:, None]
+    near = linearise(problem, centre, case.records)
+    members = near.members / near.sd[:, None]
     slopes = {
-        name: beside_members(slope / sd, members)
-        for name, slope in sensitivity(problem, centre, records, columns).items()
+        name: beside_members(slope / near.sd, members)
+        for name, slope in near.slopes.items()
     }
     dead = dead_parameters(slopes, problem)
     alive = {name: slope for name, slope in slopes.items() if name not in dead}

@@ -20,6 +20,8 @@ from hdcal.inference import archive
 from hdcal.inference.checks import Check
 from hdcal.inference.density import pointwise_log_likelihood
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.discrepancy import discrepancy_columns
+from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.sample import Draws
 from hdcal.physics.effect import Effect
@@ -201,13 +203,6 @@ def _look_up(names, library, file) -> tuple[type[Effect], ...]:
     return tuple(library[name] for name in names)
 
 
-def gap_columns(problem: Problem, case: Case):
-    """Return the basis of the gap at the rows of the case, or None."""
-    return (
-        None if problem.gap is None else problem.gap.columns(case.records.deformation)
-    )
-
-
 @jax.jit
 def _pointwise(problem, values, records, columns):
     one = partial(pointwise_log_likelihood, problem)
@@ -231,12 +226,14 @@ def build_tree(
         prior_draws: by parameter, each (draw,).
         log_likelihood: total of each draw, (chain, draw).
     """
-    records = case.records
-    size = log_likelihood.size * len(records.force)
+    records, rows = case.records, len(case.records.force)
+    size = log_likelihood.size * rows
     by_row = {"total": log_likelihood}
     if size <= _MOST_LOG_LIKELIHOODS:
-        columns = gap_columns(problem, case)
-        by_row = {"force": _pointwise(problem, draws.values, records, columns)}
+        padded = pad_records(records)
+        columns = discrepancy_columns(problem.gap, padded.deformation)
+        each = _pointwise(problem, draws.values, padded, columns)
+        by_row = {"force": np.asarray(each)[..., :rows]}
     tree = from_dict(
         {
             "posterior": draws.values,
