@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from functools import singledispatch
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
@@ -115,11 +117,17 @@ def pointwise_log_likelihood(
     )
 
 
-def log_likelihood(problem: Problem, values: Values) -> Float[Array, ""]:
+@singledispatch
+def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
     """Return the log likelihood of all data, members integrated out where they can.
 
     Padding counts for nothing.
     """
+    raise NotImplementedError(type(problem).__name__)
+
+
+@log_likelihood.register
+def _(problem: Problem, values: Values) -> Float[Array, ""]:
     if problem.integrated:
         return linear_part(problem, values).log_likelihood()
     if problem.blocks is not None:
@@ -246,3 +254,17 @@ def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
             law = distribution(prior, positive=name in POSITIVE)
             total = total + law.log_prob(values[name])
     return total
+
+
+def densities(problem: Sampled, draws: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Return log prior and log likelihood of each draw, (chain, draw) each."""
+    of_prior, of_data = _densities(problem, draws)
+    return np.asarray(of_prior), np.asarray(of_data)
+
+
+@jax.jit
+def _densities(problem: Sampled, values):
+    def both(one):
+        return log_prior(problem, one), log_likelihood(problem, one)
+
+    return jax.vmap(jax.vmap(both))(values)

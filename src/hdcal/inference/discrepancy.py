@@ -6,7 +6,6 @@ stiffness and offsets can explain. It knows no temperature.
 """
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -79,17 +78,9 @@ def build_discrepancy(deformation: Float[Array, " n"]) -> Discrepancy:
     rows = len(deformation)
     padded = repeat_last_row(np.asarray(deformation), bucket_size(rows))
     scaled = (padded - centre) / half_range
-    line, basis = (np.asarray(part)[:rows] for part in _line_and_basis(scaled))
+    line, basis = np.asarray(_line(scaled))[:rows], np.asarray(_basis(scaled))[:rows]
     absorbed = np.linalg.lstsq(line, basis, rcond=None)[0]
     return Discrepancy(centre, half_range, absorbed)
-
-
-@jax.jit
-def _line_and_basis(scaled):
-    return _line(scaled), _basis(scaled)
-
-
-_columns = jax.jit(Discrepancy.columns)
 
 
 def discrepancy_columns(
@@ -103,7 +94,7 @@ def discrepancy_columns(
     """
     if discrepancy is None:
         return None
-    return np.asarray(_columns(discrepancy, deformation))
+    return np.asarray(discrepancy.columns(deformation))
 
 
 def prior_sd(sd, length) -> Float[Array, " m"]:

@@ -1,5 +1,6 @@
 """Which parameters the data cannot tell apart, said in words."""
 
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -28,7 +29,7 @@ def beside_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
     return np.concatenate([column - members @ taken, -taken])
 
 
-def dead_parameters(slopes: dict, problem: Sampled) -> list[str]:
+def dead_parameters(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[str]:
     """Return the parameters that these data cannot see at all.
 
     Args:
@@ -43,7 +44,7 @@ def dead_parameters(slopes: dict, problem: Sampled) -> list[str]:
     return dead
 
 
-def flat_directions(slopes: dict, problem: Sampled) -> list[str]:
+def flat_directions(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[str]:
     """Name what the data leave to the prior: parameters, pairs, then the rest.
 
     A direction is flat when the data say less along it than the priors do: with J the

@@ -130,6 +130,10 @@ def _moved(problem: Sampled, position: Position, values) -> Position:
     return unconstrain_fn(model, (problem,), {}, known)
 
 
+# What is compiled anew for each kind of problem and takes many memory mappings.
+COMPILED = (_expand, _prior_median, _moved)
+
+
 def fit(
     problem: Sampled,
     key: Key[Array, ""],
