@@ -1,14 +1,17 @@
 """Padding counts for nothing: densities and gradients are those of the bare rows."""
 
 import dataclasses
+from typing import ClassVar
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from moving import moving_case
 from rigs import draw_truth, make_case, make_gear, program
 
-from hdcal.data.priors import effect_priors
+from hdcal.data.priors import Prior, effect_priors
+from hdcal.errors import InputError
 from hdcal.inference import compress, density
 from hdcal.inference.dynamic_problem import (
     build_dynamic,
@@ -18,6 +21,7 @@ from hdcal.inference.dynamic_problem import (
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
+from hdcal.physics.effect import Effect, Stage, parameter
 from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.
@@ -122,6 +126,39 @@ def test_a_row_of_padding_that_counts_is_seen():
     values = values_of(problem)
     found, slow = (float(EXPAND(p, values)[0]) for p in (more, bare(problem, case)))
     assert abs(found - slow) > 1e-6 * abs(slow)
+
+
+class Centred(Effect):
+    """A force about the mean deformation: it looks at rows to come."""
+
+    name: ClassVar[str] = "centred"
+    stage: ClassVar[Stage] = "force"
+    family: ClassVar[str] = "drift"
+
+    size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
+
+    def apply(self, signal, rows):
+        """Return the force and its share."""
+        return signal + self.size * (rows.deformation - jnp.mean(rows.deformation))
+
+
+class Cumulative(Centred):
+    """The same about the mean of the rows so far."""
+
+    name: ClassVar[str] = "cumulative"
+
+    def apply(self, signal, rows):
+        """Return the force and its share."""
+        mean = jnp.cumsum(rows.deformation) / jnp.arange(1, len(signal) + 1)
+        return signal + self.size * (rows.deformation - mean)
+
+
+def test_an_effect_from_outside_that_does_not_bear_padding_is_refused():
+    prior = Prior("half_normal", (1.0,), "N/mm", "a test")
+    priors = {"centred.size": prior, "cumulative.size": prior}
+    with pytest.raises(InputError, match=r"centred.*further ones follow"):
+        build_problem(case_of(), priors, (Centred,))
+    assert build_problem(case_of(), priors, (Cumulative,)).count == 198
 
 
 def test_groups_of_no_rows_change_nothing():

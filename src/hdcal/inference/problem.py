@@ -21,6 +21,7 @@ from hdcal.inference.discrepancy import (
     discrepancy_columns,
 )
 from hdcal.inference.distributions import scaled
+from hdcal.inference.held_rows import check_held_rows
 from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
@@ -220,13 +221,15 @@ def build_problem(
         with_gap: add the leftover discrepancy.
 
     Raises:
-        InputError: an effect lacks its covariates or a prior.
+        InputError: an effect lacks its covariates or a prior, or does not bear that
+            rows are padded.
     """
     _check_needs(case, effects)
     effects = without_scatter(effects)
     theory = theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     measured, reading = case.records, case_reading(case)
+    check_held_rows(effects, measured, reading)
     records, count = pad_records(measured), len(measured.force)
     gap = build_discrepancy(measured.deformation) if with_gap else None
     columns = discrepancy_columns(gap, records.deformation)
