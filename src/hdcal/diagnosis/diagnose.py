@@ -28,7 +28,6 @@ from hdcal.evidence.assessment import (
 )
 from hdcal.evidence.row_means import shorten
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.programs import let_go_of_programs
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
@@ -69,7 +68,6 @@ def diagnose(
     """
     check_effect_priors(case, {**EFFECTS, **library})
     _check_rise(case)
-    let_go_of_programs()
     rng = np.random.default_rng(seed)
     library = dict(library)
     short, group = shorten(case)
