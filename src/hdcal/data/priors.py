@@ -3,28 +3,11 @@
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior import Prior as Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
 from hdcal.data.toml_file import TomlFile, nearest, read_toml
-from hdcal.errors import Finding, InputError
-
-__all__ = [
-    "DYNAMIC_UNITS",
-    "FAMILIES",
-    "MATERIAL_UNITS",
-    "MODEL_UNITS",
-    "SCALE_UNITS",
-    "Prior",
-    "dynamic_priors",
-    "effect_priors",
-    "material_names",
-    "material_priors",
-    "read_effect_priors",
-    "read_prior",
-    "read_priors",
-    "rig_priors",
-]
+from hdcal.errors import Finding, InputError, attempt
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
 
@@ -81,12 +64,9 @@ def read_priors(
         if key in ("name", "description"):
             continue
         if key not in units:
-            words = "unknown parameter"
-            findings.append(toml.finding(words, nearest(key, list(units)), key))
-            continue
-        prior, wrong = read_prior(entry, key, toml, units[key])
-        findings += wrong
-        if prior is not None:
+            remedy = nearest(key, list(units))
+            findings.append(toml.finding("unknown parameter", remedy, key))
+        elif prior := attempt(findings, read_prior, entry, key, toml, units[key]):
             found[key] = prior
     if findings:
         raise InputError(findings)
@@ -107,21 +87,22 @@ def dynamic_priors() -> dict[str, Prior]:
 def effect_priors() -> dict[str, Prior]:
     """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
     toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
-    found, findings = read_effect_priors(toml.table, "", toml)
-    if findings:
-        raise InputError(findings)
-    return found
+    return read_effect_priors(toml.table, "", toml)
 
 
-def read_effect_priors(
-    tables: dict, prefix: str, toml: TomlFile
-) -> tuple[dict[str, Prior], list[Finding]]:
-    """Read tables of effects; their names are the business of a higher floor.
+def read_effect_priors(tables: dict, prefix: str, toml: TomlFile) -> dict[str, Prior]:
+    """Read tables of effects; physics knows their names, not this reader.
 
     Args:
         tables: effect -> parameter -> entry.
         prefix: dotted key of the tables, empty at the top.
         toml: the file they stand in.
+
+    Returns:
+        The priors by `effect.parameter`.
+
+    Raises:
+        InputError: holds everything that is wrong with the tables.
     """
     found: dict[str, Prior] = {}
     findings: list[Finding] = []
@@ -132,11 +113,12 @@ def read_effect_priors(
             findings.append(toml.finding(words, remedy, key))
             continue
         for parameter, entry in parameters.items():
-            prior, wrong = read_prior(entry, f"{key}.{parameter}", toml)
-            findings += wrong
-            if prior is not None:
+            place = f"{key}.{parameter}"
+            if prior := attempt(findings, read_prior, entry, place, toml):
                 found[f"{effect}.{parameter}"] = prior
-    return found, findings
+    if findings:
+        raise InputError(findings)
+    return found
 
 
 def material_names() -> list[str]:
