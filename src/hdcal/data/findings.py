@@ -3,12 +3,12 @@
 from collections.abc import Iterable
 from typing import NoReturn
 
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 
 LISTED = 20  # findings of one kind that are spelled out before "and N more"
 
 
-class FileFindings(list[Finding]):
+class FileFindings(Findings):
     """Findings about one file, so that a user sees all of them at once.
 
     Args:

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hdcal.data.findings import FileFindings
 from hdcal.data.measurements import read_columns
-from hdcal.errors import InputError
 
 _COLUMNS = ("time", "force")
 
@@ -23,15 +23,14 @@ def read_force(
     Raises:
         InputError: holds everything that is wrong with the file.
     """
-    found = read_columns(
-        path, columns, quantities=_COLUMNS, required=_COLUMNS, fewest=2
-    )
-    if "time" in found.values:
-        back = np.zeros(len(found.table.rows), bool)
-        back[1:] = np.diff(found.values["time"]) <= 0.0
-        words = "the time is not later than that of the row before"
-        remedy = "Write a jump of the force as two rows a little apart"
-        found.find(back, "time", words, remedy)
-    if found.findings:
-        raise InputError(found.findings)
+    with FileFindings(str(path)) as findings:
+        found = read_columns(
+            path, columns, findings, quantities=_COLUMNS, required=_COLUMNS, fewest=2
+        )
+        if "time" in found.values:
+            back = np.zeros(len(found.table.rows), bool)
+            back[1:] = np.diff(found.values["time"]) <= 0.0
+            words = "the time is not later than that of the row before"
+            remedy = "Write a jump of the force as two rows a little apart"
+            found.find(back, "time", words, remedy)
     return found.values["time"], found.values["force"]

@@ -22,7 +22,7 @@ from hdcal.data.priors import (
 )
 from hdcal.data.records import Geometry
 from hdcal.data.toml_file import TomlFile, nearest, read_toml
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 
 
 def read_gear(path: Path | str, theory: str | None = None) -> Gear:
@@ -41,16 +41,15 @@ def read_gear(path: Path | str, theory: str | None = None) -> Gear:
     """
     path = Path(path)
     toml = read_toml(path, str(path))
-    findings: list[Finding] = []
-    model = attempt(findings, check_schema, toml)
-    findings += size_findings(toml)
-    if theory is not None and theory not in get_args(Theory):
-        remedy = nearest(theory, list(get_args(Theory)))
-        findings.append(Finding("theory", f"unknown theory '{theory}'", remedy))
-    facts = attempt(findings, _material, toml, path.parent)
-    given = attempt(findings, _given_priors, toml)
-    if findings or model is None or facts is None or given is None:
-        raise InputError(findings)
+    with Findings() as wrong:
+        model = wrong.attempt(check_schema, toml)
+        wrong += size_findings(toml)
+        if theory is not None and theory not in get_args(Theory):
+            remedy = nearest(theory, list(get_args(Theory)))
+            wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
+        facts = wrong.attempt(_material, toml, path.parent)
+        given = wrong.attempt(_given_priors, toml)
+    assert model is not None and facts is not None and given is not None
     return _assemble(model, theory, facts, given, path, toml)
 
 
@@ -130,23 +129,22 @@ def _given_priors(toml: TomlFile) -> tuple[dict[str, Prior], dict[str, Prior]]:
     """Priors of the table [priors]: the gear's and the rig's, and the effects'."""
     given: dict[str, Prior] = {}
     tables: dict[str, dict] = {}
-    findings: list[Finding] = []
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
     table = toml.table.get("priors")
-    for name, entry in table.items() if isinstance(table, dict) else ():
-        key = f"priors.{name}"
-        effect, dot, parameter = name.partition(".")
-        if name in units:
-            if prior := attempt(findings, read_prior, entry, key, toml, units[name]):
-                given[name] = prior
-        elif dot:
-            tables.setdefault(effect, {})[parameter] = entry
-        elif isinstance(entry, dict) and "family" not in entry:
-            tables.setdefault(name, {}).update(entry)
-        else:
-            remedy = nearest(name, list(units)) + "; or a table [priors.EFFECT]"
-            findings.append(toml.finding("unknown key", remedy, key))
-    effects = attempt(findings, read_effect_priors, tables, "priors", toml)
-    if findings or effects is None:
-        raise InputError(findings)
+    with Findings() as wrong:
+        for name, entry in table.items() if isinstance(table, dict) else ():
+            key = f"priors.{name}"
+            effect, dot, parameter = name.partition(".")
+            if name in units:
+                if prior := wrong.attempt(read_prior, entry, key, toml, units[name]):
+                    given[name] = prior
+            elif dot:
+                tables.setdefault(effect, {})[parameter] = entry
+            elif isinstance(entry, dict) and "family" not in entry:
+                tables.setdefault(name, {}).update(entry)
+            else:
+                remedy = nearest(name, list(units)) + "; or a table [priors.EFFECT]"
+                wrong.append(toml.finding("unknown key", remedy, key))
+        effects = wrong.attempt(read_effect_priors, tables, "priors", toml)
+    assert effects is not None
     return given, effects

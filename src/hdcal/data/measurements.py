@@ -14,7 +14,6 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
-from hdcal.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -58,19 +57,19 @@ def read_measurements(
     Raises:
         InputError: holds everything that is wrong with the file.
     """
-    columns = read_columns(path, mapping)
-    rows = len(columns.table.rows)
-    specimen = _labels(columns.values.get("specimen"), rows)
-    run = _runs(columns.values.get("run"), specimen, rows)
-    check_time(columns, run.index)
-    if columns.findings:
-        raise InputError(columns.findings)
+    with FileFindings(str(path)) as findings:
+        columns = read_columns(path, mapping, findings)
+        rows = len(columns.table.rows)
+        specimen = _labels(columns.values.get("specimen"), rows)
+        run = _runs(columns.values.get("run"), specimen, rows)
+        check_time(columns, run.index)
     return Measurements(columns, run, specimen)
 
 
 def read_columns(
     path: Path | str,
     mapping: Mapping[str, str] | None,
+    findings: FileFindings,
     *,
     quantities: Sequence[str] = QUANTITIES,
     required: Sequence[str] = REQUIRED,
@@ -81,6 +80,7 @@ def read_columns(
     Args:
         path: the file.
         mapping: quantity -> header with its unit in brackets, or None.
+        findings: of the file; gets one for everything that is wrong.
         quantities: what to look for.
         required: which of them must be there.
         fewest: rows that are needed.
@@ -88,7 +88,6 @@ def read_columns(
     Raises:
         InputError: no table can be found in the file.
     """
-    findings = FileFindings(str(path))
     utf8, sha256 = read_text(Path(path), findings)
     table = split_table(utf8, findings)
     used = match_columns(table, mapping or {}, quantities, required, findings)

@@ -6,7 +6,7 @@ from pathlib import Path
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.toml_file import TomlFile, nearest
 from hdcal.data.units import UnitError, to_code
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Findings, InputError
 
 # A modulus of 207 is meant in GPa, a thermal coefficient of 3 in 1e-4/K and a mass of
 # 0.03 in kg, so these are never read without their unit.
@@ -48,11 +48,10 @@ def read_prior(
     if not isinstance(family, str) or family not in FAMILIES:
         words = "names no family" if family is None else f"unknown family '{family}'"
         raise toml.error(words, nearest(str(family), list(FAMILIES)), f"{key}.family")
-    findings: list[Finding] = []
-    numbers = attempt(findings, _numbers, entry, family, key, toml)
-    conversion = attempt(findings, _conversion, entry, key, toml, unit)
-    if numbers is None or conversion is None:
-        raise InputError(findings)
+    with Findings() as wrong:
+        numbers = wrong.attempt(_numbers, entry, family, key, toml)
+        conversion = wrong.attempt(_conversion, entry, key, toml, unit)
+    assert numbers is not None and conversion is not None
     scale, name = conversion
     if unit is not None:
         _check_sign(family, numbers, key, toml)

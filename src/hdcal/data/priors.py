@@ -7,7 +7,7 @@ from hdcal.data.prior import Prior as Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
 from hdcal.data.toml_file import TomlFile, nearest, read_toml
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
 
@@ -59,17 +59,15 @@ def read_priors(
     """
     toml = read_toml(source, file or source.name)
     found: dict[str, Prior] = {}
-    findings: list[Finding] = []
-    for key, entry in toml.table.items():
-        if key in ("name", "description"):
-            continue
-        if key not in units:
-            remedy = nearest(key, list(units))
-            findings.append(toml.finding("unknown parameter", remedy, key))
-        elif prior := attempt(findings, read_prior, entry, key, toml, units[key]):
-            found[key] = prior
-    if findings:
-        raise InputError(findings)
+    with Findings() as wrong:
+        for key, entry in toml.table.items():
+            if key in ("name", "description"):
+                continue
+            if key not in units:
+                remedy = nearest(key, list(units))
+                wrong.append(toml.finding("unknown parameter", remedy, key))
+            elif prior := wrong.attempt(read_prior, entry, key, toml, units[key]):
+                found[key] = prior
     return found
 
 
@@ -105,19 +103,17 @@ def read_effect_priors(tables: dict, prefix: str, toml: TomlFile) -> dict[str, P
         InputError: holds everything that is wrong with the tables.
     """
     found: dict[str, Prior] = {}
-    findings: list[Finding] = []
-    for effect, parameters in tables.items():
-        key = ".".join(filter(None, (prefix, effect)))
-        if not isinstance(parameters, dict):
-            words, remedy = "is not a table of parameters", f"Write [{key}]"
-            findings.append(toml.finding(words, remedy, key))
-            continue
-        for parameter, entry in parameters.items():
-            place = f"{key}.{parameter}"
-            if prior := attempt(findings, read_prior, entry, place, toml):
-                found[f"{effect}.{parameter}"] = prior
-    if findings:
-        raise InputError(findings)
+    with Findings() as wrong:
+        for effect, parameters in tables.items():
+            key = ".".join(filter(None, (prefix, effect)))
+            if not isinstance(parameters, dict):
+                words, remedy = "is not a table of parameters", f"Write [{key}]"
+                wrong.append(toml.finding(words, remedy, key))
+                continue
+            for parameter, entry in parameters.items():
+                place = f"{key}.{parameter}"
+                if prior := wrong.attempt(read_prior, entry, place, toml):
+                    found[f"{effect}.{parameter}"] = prior
     return found
 
 

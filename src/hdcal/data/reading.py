@@ -11,7 +11,7 @@ from hdcal.data.gear import read_gear
 from hdcal.data.loading import derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
@@ -39,17 +39,16 @@ def read_case(
     folder = data.is_dir()
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
-    findings: list[Finding] = []
-    measured = attempt(findings, read_measurements, csv_path, columns)
-    if gear is None and not gear_path.exists():
-        findings.append(_no_gear(data))
+    with Findings() as wrong:
+        measured = wrong.attempt(read_measurements, csv_path, columns)
         found = None
-    else:
-        found = attempt(findings, read_gear, gear_path, theory)
-    if measured is not None and found is not None:
-        findings += _too_far(measured.columns, found)
-    if findings or measured is None or found is None:
-        raise InputError(findings)
+        if gear is None and not gear_path.exists():
+            wrong.append(_no_gear(data))
+        else:
+            found = wrong.attempt(read_gear, gear_path, theory)
+        if measured is not None and found is not None:
+            wrong += _too_far(measured.columns, found)
+    assert measured is not None and found is not None
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
         gear=found,

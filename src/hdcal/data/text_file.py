@@ -30,7 +30,7 @@ def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
     if path.is_dir():
         findings.refuse("is a folder", "Name the file inside it")
     try:
-        raw, sha256 = _stream(path, findings)
+        raw = _stream(path, findings)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
     except PermissionError:
@@ -41,13 +41,12 @@ def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
     utf8 = _as_utf8(raw, findings)
     if b"\r" in utf8:
         utf8 = utf8.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return utf8, sha256
+    return utf8, hashlib.sha256(raw).hexdigest()
 
 
-def _stream(path: Path, findings: FileFindings) -> tuple[bytes, str]:
-    """Bytes and hash; gives up at the first sign that this is not a table."""
-    digest, kept = hashlib.sha256(), []
-    line, row, size, wide = 0, 1, 0, False
+def _stream(path: Path, findings: FileFindings) -> bytes:
+    """The bytes; gives up at the first sign that this is not a table."""
+    kept, line, row, size, wide = [], 0, 1, 0, False
     with open(path, "rb") as stream:
         while chunk := stream.read(CHUNK):
             if not kept:
@@ -64,12 +63,10 @@ def _stream(path: Path, findings: FileFindings) -> tuple[bytes, str]:
                 findings.refuse(words, "Write one row of readings per line", row)
             size += len(chunk)
             if size > LARGEST_FILE:
-                findings.refuse(
-                    "is larger than 4 GiB", "Split or thin out the readings"
-                )
-            digest.update(chunk)
+                remedy = "Split or thin out the readings"
+                findings.refuse("is larger than 4 GiB", remedy)
             kept.append(chunk)
-    return b"".join(kept), digest.hexdigest()
+    return b"".join(kept)
 
 
 def _as_utf8(raw: bytes, findings: FileFindings) -> bytes:
