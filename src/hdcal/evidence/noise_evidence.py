@@ -6,6 +6,7 @@ exact but for σ.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import equinox as eqx
 import jax
@@ -65,10 +66,10 @@ class NoiseProblem(eqx.Module):
     count: int | Array
 
 
-def _noise_of(effect: Effect | None, problem: NoiseProblem, log_sd) -> Noise:
+def _noise_of(effect: Effect, problem: NoiseProblem, log_sd) -> Noise:
     sd = jnp.sqrt(jnp.exp(2.0 * log_sd) + problem.known_sd**2)
     noise = Noise(jnp.zeros(1), jnp.broadcast_to(sd, (1, *problem.reading.shape)))
-    return noise if effect is None else effect.apply(noise, problem.rows)
+    return effect.apply(noise, problem.rows)
 
 
 def _minus_log_density(point, effect, problem: NoiseProblem, sigma: Prior):
@@ -92,8 +93,10 @@ def _row_precision(point, effect, problem: NoiseProblem):
     return jnp.sum(share / noise.sd**2, axis=0)
 
 
-def _laplace(effect: Effect | None, problem: NoiseProblem, sigma: Prior, start):
-    """Return log evidence and effective precision of each row, of one effect."""
+@jax.jit
+@partial(jax.vmap, in_axes=(0, None, None, None))
+def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
+    """Return log evidence and effective precision of each row, of each effect."""
 
     def minus(point):
         return _minus_log_density(point, effect, problem, sigma)
@@ -119,10 +122,6 @@ def _laplace(effect: Effect | None, problem: NoiseProblem, sigma: Prior, start):
         - 0.5 * log_det
     )
     return evidence, _row_precision(best, effect, problem)
-
-
-_laplace_of_none = jax.jit(_laplace)
-_laplace_of_many = jax.jit(jax.vmap(_laplace, in_axes=(0, None, None, None)))
 
 
 def _noise_problem(
@@ -164,22 +163,27 @@ def noise_evidence(
     values, amplitude = _grid(effect, case)
     sigma, problem = case.priors["sigma"], _noise_problem(case, beside)
     start = _least_squares(problem, case.noise_sd)
-    made = effect(**values)
-    found, precision = map(np.asarray, _laplace_of_many(made, problem, sigma, start))
-    plain, _ = _laplace_of_none(None, problem, sigma, start)
+    log_evidence, precision = map(
+        np.asarray, _laplace(effect(**values), problem, sigma, start)
+    )
+    # The last point is that of plain noise.
+    found, plain = log_evidence[:-1], log_evidence[-1]
     weight = np.exp(found - np.logaddexp.reduce(found))
-    relative = 1.0 / np.sqrt(weight @ precision[:, : problem.count])
+    relative = 1.0 / np.sqrt(weight @ precision[:-1, : problem.count])
     return NoiseEvidence(
-        float(np.logaddexp.reduce(found) - np.log(len(found)) - np.asarray(plain)),
+        float(np.logaddexp.reduce(found) - np.log(len(found)) - plain),
         relative / np.exp(np.mean(np.log(relative))),
-        weighted_quantiles(values[amplitude], weight),
+        weighted_quantiles(values[amplitude][:-1], weight),
     )
 
 
 def _grid(
     effect: type[Effect], case: PreparedCase
 ) -> tuple[dict[str, np.ndarray], str]:
-    """Return values of every parameter at all points, and the amplitude's name."""
+    """Return values of every parameter at all points, and the amplitude's name.
+
+    A last point follows at which the amplitude is null: the noise is plain there.
+    """
     declared, axes = parameters(effect), []
     for name, about in declared.items():
         prior = case.priors[f"{effect.name}.{name}"]
@@ -188,7 +192,10 @@ def _grid(
         fixed = prior.family == "fixed"
         axes.append(prior.numbers[:1] if fixed else frozen(prior).ppf(quantiles))
     mesh = np.meshgrid(*map(np.asarray, axes), indexing="ij")
-    values = {n: m.ravel().astype(float) for n, m in zip(declared, mesh, strict=True)}
+    values = {}
+    for (name, about), column in zip(declared.items(), mesh, strict=True):
+        plain = column.flat[0] if about.null is None else about.null
+        values[name] = np.append(column.ravel(), plain).astype(float)
     return values, next(n for n, about in declared.items() if about.null is not None)
 
 
