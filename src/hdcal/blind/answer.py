@@ -18,9 +18,9 @@ from hdcal.blind.diagnosers import (
 )
 from hdcal.blind.seal import Entry, canonical, digest
 from hdcal.blind.sealed_set import CASES, SET, BlindSet, read_set, refusal
+from hdcal.cli.processes import completed
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.library import choose_library
-from hdcal.diagnosis.many_cases import completed
 from hdcal.errors import Finding, HdcalError, InputError
 
 # Name of the case, its answer, and what is wrong: of the last two one is empty.

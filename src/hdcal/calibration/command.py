@@ -11,7 +11,7 @@ from hdcal.cli.options import (
     case_options,
     force_option,
     json_option,
-    read_columns,
+    read_given,
     seed_option,
 )
 from hdcal.errors import Finding, InputError
@@ -68,18 +68,14 @@ def calibrate(console: Console, data, gear, columns, theory, out, force, **setti
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
-    from hdcal.data.reading import read_case
     from hdcal.report.folder import check_target
 
     findings = []
-    case = None
     dynamic = settings.pop("dynamic")
     if dynamic:
         findings += _not_dynamic(settings)
-    try:
-        case = read_case(data, gear, columns=read_columns(columns), theory=theory)
-    except InputError as error:
-        findings += error.findings
+    case = read_given(console, data, gear, columns, theory)
+    findings += console.wrong
     # Said now, not after minutes of sampling.
     target = out if out is not None else f"{case.name if case else 'x'}-calibration"
     if case is not None or out is not None:

@@ -1,13 +1,8 @@
 """The report of a calibration: one HTML page that needs nothing else."""
 
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import (
-    THEORY_WORDS,
-    data_rows,
-    parameter_row,
-    render_page,
-)
-from hdcal.report.provenance import prior_rows, provenance_rows
+from hdcal.report.page import parameter_row, render_page
+from hdcal.report.provenance import THEORY_WORDS, data_rows, prior_rows, provenance_rows
 from hdcal.report.words import estimate, label
 
 _TEMPLATE = "calibration.html.j2"

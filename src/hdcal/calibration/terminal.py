@@ -8,8 +8,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from hdcal.report.paragraph import paragraph
 from hdcal.report.plain import harmless
-from hdcal.report.terminal import paragraph
 from hdcal.report.words import estimate, label, number, unit
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.report.answer import EffectName, Probability, Real, Words
 from hdcal.report.parameters import Interval
 
 VerdictWord = Literal["none", "named", "ambiguous", "unknown"]
@@ -29,12 +30,12 @@ class Gap:
     """
 
     detected: bool
-    probability: float
+    probability: Probability
     rms_N: Interval
-    noise_sd_N: float
-    share_of_full_scale: float
-    autocorrelation: float
-    rounding_N: float | None = None
+    noise_sd_N: Real
+    share_of_full_scale: Real
+    autocorrelation: Real
+    rounding_N: Real | None = None
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Cell:
 class CovariateShare:
     """Part of the gap's variance along one covariate, 90 % interval."""
 
-    covariate: str
+    covariate: Words
     share: Interval
 
 
@@ -157,8 +158,8 @@ class Which:
 class LadderEntry:
     """Error of one model, from the nominal one down to the noise."""
 
-    model: str
-    rms_N: float
+    model: Words
+    rms_N: Real
 
 
 @dataclass(frozen=True)
@@ -179,11 +180,11 @@ class Closure:
     ladder: tuple[LadderEntry, ...]
     closed: Interval | None
     held_out: str
-    extrapolated_closed: float | None
-    placebo_closed: float | None
+    extrapolated_closed: Real | None
+    placebo_closed: Real | None
     remainder_N: Interval | None
     reason: str
-    bars: dict[str, float] = field(default_factory=dict)
+    bars: dict[str, Real] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -197,9 +198,9 @@ class NextRun:
         cost: in words, such as "one ramp".
     """
 
-    run: str
-    separates: tuple[str, ...]
-    information_nats: float
+    run: Words
+    separates: tuple[EffectName, ...]
+    information_nats: Real
     cost: str
 
 
@@ -215,7 +216,7 @@ class BudgetPart:
         split_by: the extra run or measurement that would tell it from the others.
     """
 
-    name: str
+    name: Words
     factor: Interval
     prior: Interval
     driven_by: Literal["prior", "data"]
@@ -234,7 +235,7 @@ class Budget:
     """
 
     K: Interval
-    formula: str
+    formula: Literal["ring", "cup", "article"]
     parts: tuple[BudgetPart, ...]
     note: str
 

@@ -2,8 +2,8 @@
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import gear_rows, parameter_row, render_page
-from hdcal.report.provenance import prior_rows, provenance_rows
+from hdcal.report.page import parameter_row, render_page
+from hdcal.report.provenance import gear_rows, prior_rows, provenance_rows
 from hdcal.report.words import estimate, with_unit
 
 # Quantity of an answer -> what it is called and its unit.

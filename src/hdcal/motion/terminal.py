@@ -9,8 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from hdcal.motion.document import QUANTITIES, quantity_rows
+from hdcal.report.paragraph import paragraph
 from hdcal.report.plain import harmless
-from hdcal.report.terminal import paragraph
 from hdcal.report.words import estimate
 
 

@@ -3,7 +3,7 @@
 import click
 
 from hdcal.cli.console import Console
-from hdcal.cli.options import case_options, json_option, read_columns
+from hdcal.cli.options import case_options, json_option, read_given
 
 SCHEMA = "hdcal.check/1"
 _MOST_LISTED = 8
@@ -15,9 +15,9 @@ _MOST_LISTED = 8
 @click.pass_obj
 def check(console: Console, data, gear, columns, theory):
     """Read DATA and its gear file, and say what was understood."""
-    from hdcal.data.reading import read_case
-
-    case = read_case(data, gear, columns=read_columns(columns), theory=theory)
+    with console.wrong:
+        case = read_given(console, data, gear, columns, theory)
+    assert case is not None
     found = _describe(case)
     console.table(*_words(found))
     if console.json:
