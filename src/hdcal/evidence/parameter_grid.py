@@ -1,4 +1,4 @@
-"""Where an effect is looked at: quantiles of its shapes, cells of its amplitude."""
+"""Where an effect is computed: quantiles of its shapes, cells of its amplitude."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from hdcal.physics.effect import Effect, parameters
 
 # Quantiles of a shape parameter; with several, the number of each. An effect that is
 # not linear in its amplitude has many cells at each of them, and gets fewer.
-SHAPE_POINTS = {"line": (25, 7, 4), "cells": (7, 4, 3), "subspace": (15, 5, 3)}
+SHAPE_POINTS = {"linear": (25, 7, 4), "cells": (7, 4, 3), "subspace": (15, 5, 3)}
 # Edges of the amplitude's cells reach from the first to the last, in prior sds.
 SMALLEST, LARGEST = 1.0 / 64.0, 16.0
 # Ratio of neighbouring edges: an effect that is linear in its amplitude needs cells
@@ -26,8 +26,8 @@ SCALE_WEIGHTS = np.array([0.2, 0.25, 0.35, 0.2])
 
 
 @dataclass(frozen=True)
-class Grid:
-    """Points and cells of one effect.
+class ParameterGrid:
+    """Shape points and amplitude cells of one effect.
 
     Attributes:
         effect: the effect.
@@ -66,9 +66,9 @@ def make_grid(
     effect: type[Effect],
     priors: Mapping[str, Prior],
     ratio: float = COARSE,
-    kind: str = "line",
-) -> Grid:
-    """Lay out the points of one effect.
+    kind: str = "linear",
+) -> ParameterGrid:
+    """Return the points and cells of one effect.
 
     Args:
         effect: of the library.
@@ -85,7 +85,7 @@ def make_grid(
     normal = prior.family in ("normal", "half_normal")
     if not normal:
         mass = np.diff(frozen(prior).cdf(edges))
-    return Grid(
+    return ParameterGrid(
         effect=effect,
         amplitudes=amplitudes,
         shapes=_shape_points(free, SHAPE_POINTS[kind]),

@@ -14,7 +14,7 @@ _MOST_LEVELS = 8
 
 
 @dataclass(frozen=True)
-class Declared:
+class DeclaredCell:
     """One cell: which rows are in it.
 
     Attributes:
@@ -38,7 +38,7 @@ def declare_cells(
     records: Records,
     run_labels: tuple[str, ...] = (),
     specimen_labels: tuple[str, ...] = (),
-) -> list[Declared]:
+) -> list[DeclaredCell]:
     """Divide the rows by every covariate that was measured, and by pairs of them.
 
     Args:
@@ -48,7 +48,7 @@ def declare_cells(
     """
     by_deformation = _parts("deformation", records.deformation, "mm", 3)
     found = _parts("deformation", records.deformation, "mm", 3)
-    other: list[Declared] = []
+    other: list[DeclaredCell] = []
     if "temperature" in records.known:
         other += _levels("temperature", records.temperature, "°C")
     if "unloading" in records.known:
@@ -64,7 +64,7 @@ def declare_cells(
     return [cell for cell in [*found, *alone, *both] if _useful(cell)]
 
 
-def _useful(cell: Declared) -> bool:
+def _useful(cell: DeclaredCell) -> bool:
     inside = np.count_nonzero(cell.rows)
     return bool(_FEWEST <= inside <= len(cell.rows) - _FEWEST)
 
@@ -73,14 +73,14 @@ def _number(value: float) -> str:
     return f"{value:.3g}"
 
 
-def _parts(name: str, values, unit: str, count: int) -> list[Declared]:
+def _parts(name: str, values, unit: str, count: int) -> list[DeclaredCell]:
     values = np.asarray(values, float)
     edges = np.linspace(values.min(), values.max(), count + 1)
     if edges[0] == edges[-1]:
         return []
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, count - 1)
     return [
-        Declared(
+        DeclaredCell(
             name,
             f"{_number(low)} … {_number(high)} {unit}",
             float(low),
@@ -92,7 +92,7 @@ def _parts(name: str, values, unit: str, count: int) -> list[Declared]:
     ]
 
 
-def _levels(name: str, values, unit: str) -> list[Declared]:
+def _levels(name: str, values, unit: str) -> list[DeclaredCell]:
     values = np.asarray(values, float)
     rounded = np.round(values)
     levels = np.unique(rounded)
@@ -101,7 +101,7 @@ def _levels(name: str, values, unit: str) -> list[Declared]:
     if len(levels) > _MOST_LEVELS:
         return _parts(name, values, unit, 3)
     return [
-        Declared(
+        DeclaredCell(
             name,
             f"{level:.0f} {unit}",
             float(level),
@@ -113,9 +113,9 @@ def _levels(name: str, values, unit: str) -> list[Declared]:
     ]
 
 
-def _directions(records: Records) -> list[Declared]:
+def _directions(records: Records) -> list[DeclaredCell]:
     return [
-        Declared(
+        DeclaredCell(
             "direction",
             word,
             np.nan,
@@ -127,12 +127,12 @@ def _directions(records: Records) -> list[Declared]:
     ]
 
 
-def _labels(name: str, index, labels: tuple[str, ...]) -> list[Declared]:
+def _labels(name: str, index, labels: tuple[str, ...]) -> list[DeclaredCell]:
     members = np.unique(index)
     if not 1 < len(members) <= 12:
         return []
     return [
-        Declared(
+        DeclaredCell(
             name,
             f"{name} {labels[member] if member < len(labels) else member}",
             np.nan,
@@ -144,8 +144,8 @@ def _labels(name: str, index, labels: tuple[str, ...]) -> list[Declared]:
     ]
 
 
-def _cross(one: Declared, other: Declared) -> Declared:
-    return Declared(
+def _cross(one: DeclaredCell, other: DeclaredCell) -> DeclaredCell:
+    return DeclaredCell(
         f"{one.covariate} × {other.covariate}",
         f"{one.label}, {other.label}",
         other.start,

@@ -1,9 +1,9 @@
 """Structure that no smooth function shows: in a stretch of rows, or with a period.
 
 Stretches are dyadic windows along each order of the rows; periods are those of
-Fourier's. Too many to weigh one by one: of each family the direction that the data
-show most stands for all, and its evidence is divided by their number, which is a
-lower bound of the family's own.
+Fourier's. They are too many for an evidence of each: of each family the direction that
+the data show most represents all, and its evidence is divided by their number, which
+is a lower bound of the family's own.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.evidence.prepare import Setting
-from hdcal.evidence.whitened_rows import beside_line
+from hdcal.evidence.linear_rows import remove_base
+from hdcal.evidence.prepare import PreparedCase
 
 # Windows are no shorter than this many rows, nor than this share of all.
 _SHORTEST, _FINEST = 2, 1.0 / 32.0
@@ -20,7 +20,7 @@ _MOST_PERIODS = 96
 
 
 @dataclass(frozen=True)
-class Family:
+class DirectionFamily:
     """Directions of one kind.
 
     Attributes:
@@ -34,7 +34,7 @@ class Family:
     width: int
 
 
-def families(records: Records) -> list[Family]:
+def direction_families(records: Records) -> list[DirectionFamily]:
     """Return every family of local or periodic directions.
 
     Args:
@@ -53,11 +53,11 @@ def families(records: Records) -> list[Family]:
         table[:, path] = inside
         # A stretch may be off by a force, or by a part of the stiffness.
         pairs = np.stack([table, table * deformation], axis=1).reshape(-1, rows)
-        found.append(Family(f"stretch of {name}", pairs, 2))
+        found.append(DirectionFamily(f"stretch of {name}", pairs, 2))
     count = min(rows // 2, _MOST_PERIODS)
     turns = 2.0 * np.pi * np.arange(2, count + 1)[:, None] * order / rows
     waves = np.stack([np.cos(turns), np.sin(turns)], axis=1).reshape(-1, rows)
-    return [*found, Family("period", waves, 2)]
+    return [*found, DirectionFamily("period", waves, 2)]
 
 
 def _windows(rows: int) -> np.ndarray:
@@ -72,20 +72,20 @@ def _windows(rows: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def likeliest(setting: Setting) -> list[tuple[str, np.ndarray, float]]:
+def likeliest_directions(case: PreparedCase) -> list[tuple[str, np.ndarray, float]]:
     """Return of each family the member that the data show most.
 
     Args:
-        setting: the case.
+        case: whose readings choose.
 
     Returns:
         Name, columns (width, n) and log of the number of members.
     """
-    rows = setting.rows
-    error = np.asarray(beside_line(rows, np.asarray(rows.reading)[None]))[0]
+    rows = case.rows
+    error = remove_base(rows, rows.reading[None])[0]
     found = []
-    for family in families(setting.records):
-        left = np.asarray(beside_line(rows, family.columns))
+    for family in direction_families(case.records):
+        left = remove_base(rows, family.columns)
         table = left.reshape(-1, family.width, left.shape[-1])
         if not len(table):
             continue

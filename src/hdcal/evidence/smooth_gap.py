@@ -1,4 +1,4 @@
-"""How the gap's variance is shared by the covariates: an additive Gaussian process.
+"""The smooth gap and its shares by covariate: an additive Gaussian process.
 
 Gap = Σ_c f_c with f_c = B_c w_c, w_c ~ N(0, τ_c²), orthogonal to the base model;
 Gibbs sampling of weights, scales and noise in whitened rows.
@@ -9,13 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.data.records import Array
-from hdcal.evidence.inner_products import project
-from hdcal.evidence.kernels import kernels, visible_kernels
-from hdcal.evidence.prepare import Setting
-from hdcal.evidence.whitened_rows import beside_line
+from hdcal.evidence.kernels import kernel_columns, visible_kernels
+from hdcal.evidence.linear_rows import project
+from hdcal.evidence.prepare import PreparedCase
 
-# Which kernels speak for which covariate; the first match counts.
+# Which covariate each kernel belongs to.
 COVARIATES = {
     "deformation": "deformation",
     "temperature": "temperature",
@@ -36,7 +34,7 @@ _DRAWS, _BURN_IN = 150, 50
 
 
 @dataclass(frozen=True)
-class Additive:
+class SmoothGap:
     """Posterior draws of the smooth gap.
 
     Attributes:
@@ -48,71 +46,67 @@ class Additive:
             that the base model and the smooth gap use up [N].
     """
 
-    shares: dict[str, Float[Array, " d"]]
-    rms: Float[Array, " d"]
-    mean: Float[Array, " n"]
-    variance: Float[Array, " d"]
+    shares: dict[str, Float[np.ndarray, " d"]]
+    rms: Float[np.ndarray, " d"]
+    mean: Float[np.ndarray, " n"]
+    variance: Float[np.ndarray, " d"]
     noise_sd: float
 
 
 @dataclass(frozen=True)
-class Basis:
+class AdditiveBasis:
     """Columns of all components [N], shape (k, n), and which kernel each is of."""
 
     names: tuple[str, ...]
-    columns: Float[Array, "k n"]
-    groups: Int[Array, " k"]
+    columns: Float[np.ndarray, "k n"]
+    groups: Int[np.ndarray, " k"]
 
 
-def additive_basis(setting: Setting) -> Basis:
+def additive_basis(case: PreparedCase) -> AdditiveBasis:
     """Return the components that these rows can show beside the base model."""
-    names, columns = visible_kernels(
-        kernels(setting.records), lambda table: beside_line(setting.rows, table), _WIDTH
-    )
+    names, columns = visible_kernels(case.rows, kernel_columns(case.records), _WIDTH)
     kept = [i for i, name in enumerate(names) if name in COVARIATES]
     groups = np.repeat(np.arange(len(kept)), _WIDTH)
     flat = columns[kept].reshape(-1, columns.shape[-1])
     used = np.any(flat != 0.0, axis=1)
-    return Basis(tuple(names[i] for i in kept), flat[used], groups[used])
+    return AdditiveBasis(tuple(names[i] for i in kept), flat[used], groups[used])
 
 
-def fit_additive(
-    setting: Setting,
-    basis: Basis,
+def fit_smooth_gap(
+    case: PreparedCase,
+    basis: AdditiveBasis,
     correlation: float,
     rng: np.random.Generator,
-    reading: Float[Array, " n"] | None = None,
+    reading: Float[np.ndarray, " n"] | None = None,
     floor: float = DETECTED,
-) -> Additive:
+) -> SmoothGap:
     """Draw the smooth gap between readings and base model.
 
     Args:
-        setting: the case.
+        case: whose gap it is.
         basis: of the components.
         correlation: AR(1) coefficient of the noise.
         rng: source of randomness.
-        reading: to fit instead of the setting's own [N].
+        reading: to fit instead of the case's own [N].
         floor: prior scale of a component in noise sds.
     """
-    rows = setting.rows
-    columns, groups = np.asarray(basis.columns), np.asarray(basis.groups)
+    rows, columns, groups = case.rows, basis.columns, basis.groups
     target = rows.reading if reading is None else reading
-    table = np.concatenate([np.asarray(target)[None], columns])
-    white = np.asarray(project(rows, correlation, table)).T
+    white = project(rows, correlation, np.concatenate([target[None], columns])).T
     draws, variance, used = _gibbs(
-        white[:, 0], white[:, 1:], groups, setting.noise_sd, floor, rng
+        white[:, 0], white[:, 1:], groups, case.noise_sd, floor, rng
     )
     parts = [draws * (groups == g) for g in range(len(basis.names))]
     size = np.array([np.mean((part @ columns) ** 2, axis=1) for part in parts])
     total = np.maximum(size.sum(axis=0), 1e-300)
-    shares: dict[str, Float[Array, " d"]] = {}
+    shares: dict[str, Float[np.ndarray, " d"]] = {}
     for name, each in zip(basis.names, size / total, strict=True):
         covariate = COVARIATES[name]
         shares[covariate] = shares.get(covariate, 0.0) + each
     curve = draws @ columns
     left = white[:, 0] - white[:, 1:] @ draws.mean(axis=0)
     freedom = max(len(target) - used, 1.0)
-    return Additive(
+    return SmoothGap(
         shares,
         np.sqrt(np.mean(curve**2, axis=1)),
         curve.mean(axis=0),
