@@ -1,14 +1,77 @@
 """Options that several commands share, and how their texts are read."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
 
+from hdcal.cli.console import Console
+from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
 
+if TYPE_CHECKING:
+    from hdcal.data.case import Case
+
 MOST_POINTS = 100_000
-_THEORIES = ("ring", "cup", "article")
+
+
+T = TypeVar("T")
+
+
+class Parsed(click.ParamType):
+    """An option's text, read by hdcal; what cannot be read is said with all else.
+
+    Args:
+        name: shown in the help.
+        read: called with the text and the option's name; raises `InputError`.
+    """
+
+    def __init__(self, name: str, read: Callable[[str, str], Any]):
+        self.name = name
+        self._read = read
+
+    def convert(self, value, param, ctx):
+        """Return what was read, or None where the text cannot be."""
+        if not isinstance(value, str) or param is None or ctx is None:
+            return value
+        return ctx.obj.wrong.attempt(self._read, value, param.opts[0])
+
+
+def read_all(read: Callable[[Sequence[str], str], T]):
+    """Return a callback that reads all texts of an option that may be repeated.
+
+    Args:
+        read: called with the texts and the option's name; raises `InputError`.
+    """
+
+    def callback(context: click.Context, option: click.Parameter, texts) -> T | None:
+        return context.obj.wrong.attempt(read, texts, option.opts[0])
+
+    return callback
+
+
+def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:
+    """Read every QUANTITY=HEADER.
+
+    Raises:
+        InputError: one of them has no such form, or a quantity comes twice.
+    """
+    found: dict[str, str] = {}
+    findings = []
+    for text in texts:
+        quantity, sign, header = (part.strip() for part in text.partition("="))
+        if not (quantity and sign and header):
+            remedy = "Write it like force=Load[kgf]"
+            findings.append(Finding(option, f"'{text}' names no header", remedy))
+        elif quantity in found:
+            words = f"'{quantity}' is given twice"
+            findings.append(Finding(option, words, "Keep one of them"))
+        found[quantity] = header
+    if findings:
+        raise InputError(findings)
+    return found
 
 
 def case_options(command: Callable) -> Callable:
@@ -21,7 +84,7 @@ def reading_options(command: Callable) -> Callable:
     for add in (
         click.option(
             "--theory",
-            type=click.Choice(_THEORIES),
+            type=click.Choice(get_args(Theory)),
             help="Stiffness formula that K multiplies; overrides the gear file.",
         ),
         click.option(
@@ -29,6 +92,7 @@ def reading_options(command: Callable) -> Callable:
             "columns",
             metavar="QUANTITY=HEADER",
             multiple=True,
+            callback=read_all(read_columns),
             help="Read a quantity from a header of your own: force=Load[kgf].",
         ),
         click.option(
@@ -41,6 +105,16 @@ def reading_options(command: Callable) -> Callable:
     return command
 
 
+def read_given(console: Console, data, gear, columns, theory) -> "Case | None":
+    """Read the case that `case_options` named; what is wrong is kept by the console."""
+    from hdcal.data.reading import read_case
+
+    if columns is None:  # it could not be read, which is said already
+        return None
+    read = partial(read_case, columns=columns, theory=theory)
+    return console.wrong.attempt(read, data, gear)
+
+
 def json_option(command: Callable) -> Callable:
     """Add --json; the console knows it already, click has to accept it."""
     words = "Print one JSON object; words go to standard error."
@@ -48,6 +122,12 @@ def json_option(command: Callable) -> Callable:
         "--json", "_json", is_flag=True, expose_value=False, help=words
     )
     return option(command)
+
+
+def out_option(command: Callable) -> Callable:
+    """Add --out and --force, for a command that writes a folder where it is asked."""
+    words = "Also write a folder with a report."
+    return click.option("--out", metavar="DIR", help=words)(force_option(command))
 
 
 def force_option(command: Callable) -> Callable:
@@ -78,26 +158,17 @@ def seed_option(command: Callable) -> Callable:
     )(command)
 
 
-def read_columns(texts: tuple[str, ...]) -> dict[str, str]:
-    """Read every QUANTITY=HEADER.
+def read_whole_numbers(text: str, option: str) -> list[int]:
+    """Read a list of whole numbers.
 
     Raises:
-        InputError: one of them has no such form, or a quantity comes twice.
+        InputError: it is none.
     """
-    found: dict[str, str] = {}
-    findings = []
-    for text in texts:
-        quantity, sign, header = (part.strip() for part in text.partition("="))
-        if not (quantity and sign and header):
-            remedy = "Write it like force=Load[kgf]"
-            findings.append(Finding("--column", f"'{text}' names no header", remedy))
-        elif quantity in found:
-            words = f"'{quantity}' is given twice"
-            findings.append(Finding("--column", words, "Keep one of them"))
-        found[quantity] = header
-    if findings:
-        raise InputError(findings)
-    return found
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        words = f"'{text[:60]}' is no list of whole numbers"
+        raise InputError([Finding(option, words, "Write it like 1,3")]) from None
 
 
 def read_grid(text: str, option: str) -> list[float]:

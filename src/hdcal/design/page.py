@@ -1,6 +1,7 @@
 """The reports of designs and studies: one HTML page each that needs nothing else."""
 
-from hdcal.report.page import THEORY_WORDS, render_page
+from hdcal.report.page import render_page
+from hdcal.report.provenance import THEORY_WORDS
 from hdcal.report.words import estimate, number, unit
 
 _TEMPLATE = "design.html.j2"

@@ -7,8 +7,8 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from hdcal.report.paragraph import paragraph
 from hdcal.report.plain import harmless
-from hdcal.report.terminal import paragraph
 from hdcal.report.words import estimate
 
 # Rows of a study printed to a terminal; all are in study.csv.

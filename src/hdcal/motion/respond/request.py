@@ -75,14 +75,17 @@ def make_request(
         raise InputError(findings)
     if not isinstance(drive, str):
         return _sampled(drive, points)
-    times = np.linspace(0.0, length, points)
-    if drive == "step":
+    return _shaped(drive, amplitude, tones, np.linspace(0.0, length, points))
+
+
+def _shaped(shape: str, amplitude: float, tones: list[float], times) -> Request:
+    if shape == "step":
         return Request(Step(amplitude), f"a step of {amplitude:g} N", times)
-    if drive == "sine":
+    if shape == "sine":
         words = f"a sine of {amplitude:g} N at {tones[0]:g} Hz"
         return Request(Sine(amplitude, tones[0]), words, times)
     words = f"a sweep of {amplitude:g} N from {tones[0]:g} to {tones[1]:g} Hz"
-    return Request(Chirp(amplitude, tones[0], tones[1], length), words, times)
+    return Request(Chirp(amplitude, *tones, float(times[-1])), words, times)
 
 
 def _sampled(drive, points: int) -> Request:
@@ -98,8 +101,11 @@ def _tones(drive, frequency, duration: float, points: int, find) -> list[float]:
     if len(given) != need:
         words, remedy = {
             0: ("such a force has no frequency", "Leave it out"),
-            1: ("a sine needs one frequency", "Write it like 5"),
-            2: ("a chirp needs its first and last", "Write it like 5:200"),
+            1: ("a sine needs one frequency", "Give it in Hz, such as 5"),
+            2: (
+                "a chirp needs its first and last",
+                "Give both in Hz",
+            ),
         }[need]
         find("frequency", words, remedy)
         return []

@@ -14,12 +14,13 @@ from hdcal.errors import Finding, InputError, NotUsable, attempt
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.document import remarks
+from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
-from hdcal.motion.respond.remarks import drivers, remarks, tested_rows
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
-from hdcal.report.parameters import INTERVAL, interval
+from hdcal.report.parameters import INTERVAL, credible_interval
 
 _MOST_DRAWS = 10_000
 # More take minutes, and a band that long past its start says nothing new.
@@ -31,6 +32,7 @@ class Response:
     """The motion under a force; one entry per time.
 
     Attributes:
+        posterior: what the answer rests on.
         time_s: times.
         force_N: on the gear.
         deformation_lo_mm: lower end of the pointwise band of the deformation, as
@@ -50,6 +52,7 @@ class Response:
         remarks: what the reader must know, in sentences.
     """
 
+    posterior: Posterior
     time_s: np.ndarray
     force_N: np.ndarray
     deformation_lo_mm: np.ndarray
@@ -69,6 +72,13 @@ class Response:
         names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
         names += ("deformation_hi_mm", "tested")
         return {name: getattr(self, name) for name in names}
+
+    def _repr_html_(self) -> str:
+        from hdcal.motion.respond.document import response_document
+        from hdcal.motion.respond.summary import response_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(response_document(self, response_answer(self)))
 
 
 def respond(
@@ -133,11 +143,12 @@ def _integrated(
     lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
     estimates = {
-        name: {**interval(facts[name]), "driven_by": driver}
+        name: {**vars(credible_interval(facts[name])), "driven_by": driver}
         for name, driver in drivers(posterior, mass, damping).items()
     }
     tested = tested_rows(posterior, at, lo, hi)
     return Response(
+        posterior,
         request.times,
         np.asarray(jax.vmap(request.force)(request.times)),
         lo,
@@ -150,7 +161,7 @@ def _integrated(
         len(done),
         tuple(effect.name for effect in kept),
         tuple(effect.name for effect in left),
-        remarks(posterior, request.times, estimates, kept, left, tested),
+        tuple(remarks(posterior, request.times, estimates, kept, left, tested)),
     )
 
 

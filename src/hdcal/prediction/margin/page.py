@@ -9,7 +9,8 @@ from hdcal.prediction.margin.document import (
     newtons,
 )
 from hdcal.prediction.margin.result import Level, Margin
-from hdcal.report.page import gear_rows, render_page
+from hdcal.report.page import render_page
+from hdcal.report.provenance import gear_rows
 from hdcal.report.words import hypothesis, number
 
 _TEMPLATE = "margin.html.j2"

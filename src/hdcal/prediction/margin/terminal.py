@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from rich.console import RenderableType
 from rich.text import Text
 
+from hdcal.report.paragraph import paragraph
 from hdcal.report.plain import harmless
-from hdcal.report.terminal import paragraph
 
 
 def closing_words(plain: dict, folder: str | None) -> Iterator[RenderableType]:
