@@ -8,7 +8,7 @@ from hdcal.design.answer import DesignAnswer
 from hdcal.design.study.article_tables import ArticleRow
 from hdcal.report.answer import Answer, Promise
 
-_COLUMNS = ("material", "force_median_N", "force_lo_N", "force_hi_N", "stress_MPa")
+_COLUMNS = ["material", "force_median_N", "force_lo_N", "force_hi_N", "stress_MPa"]
 
 
 @dataclass(frozen=True, kw_only=True)
