@@ -5,6 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from hostile_names import NAMES
 from markupsafe import escape
 
 from hdcal.calibration.document import calibration_report
@@ -18,17 +19,6 @@ from hdcal.prediction.bands.bands import default_bands
 from hdcal.report.canvas import render
 from hdcal.report.draws_figure import prior_figure, sampler_figure
 from hdcal.report.plain import as_json
-
-NAMES = [
-    "<script>alert(1)</script>",
-    "\"><img src=x onerror='alert(1)'>",
-    "]]></title>&amp;--><!--",
-    "$x^{$ \\frac{1}",
-    "a\x00b\x1b[31m\x07\u202e",
-    "谐波减速器 🦾",
-    "{{ 7 * 7 }}{% raw %}",
-    "n" * 200,
-]
 
 
 @pytest.fixture(scope="module")

@@ -60,7 +60,11 @@ class Console:
             self.wrong.attempt(check_target, out, force=force)
 
     def answer(
-        self, document: "Document", answer: "Answer", folder: str | None = None
+        self,
+        document: "Document",
+        answer: "Answer",
+        folder: str | None = None,
+        opened: str = "report.html",
     ) -> int:
         """Show an answer and return the command's exit code.
 
@@ -68,10 +72,11 @@ class Console:
             document: for people.
             answer: for --json.
             folder: where the whole result lies, or None.
+            opened: what to open in it first; empty where that depends.
         """
         from hdcal.report.terminal import terminal_lines
 
-        self.table(*terminal_lines(document, folder))
+        self.table(*terminal_lines(document, folder, opened))
         if self.json:
             self.data(answer)
         return 0 if answer.status == "ok" else 1

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 from click.core import ParameterSource
@@ -15,12 +15,11 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
+from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
-
-_THEORIES = ("ring", "cup", "article")
 
 
 def repeated_option(
@@ -49,7 +48,7 @@ def reading_options(command: Callable) -> Callable:
     for add in (
         click.option(
             "--theory",
-            type=click.Choice(_THEORIES),
+            type=click.Choice(get_args(Theory)),
             help="Stiffness formula that K multiplies; overrides the gear file.",
         ),
         repeated_option(

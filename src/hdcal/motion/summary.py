@@ -80,18 +80,19 @@ def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
     values = {name: draw[rows] for name, draw in draws.items()}
     mean, new = _predict(problem, values, jax.random.key(seed))
     tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
-    low, middle, high = np.quantile(mean, tails, axis=0)
-    new_low, _, new_high = np.quantile(new, tails, axis=0)
+    real = slice(problem.count)
+    low, middle, high = np.quantile(mean[:, real], tails, axis=0)
+    new_low, _, new_high = np.quantile(new[:, real], tails, axis=0)
     return MotionBands(
-        np.asarray(problem.time),
-        np.asarray(problem.force),
-        np.asarray(problem.deformation),
+        np.asarray(problem.time[real]),
+        np.asarray(problem.force[real]),
+        np.asarray(problem.deformation[real]),
         low,
         middle,
         high,
         new_low,
         new_high,
-        np.full(len(problem.time), posterior.usable),
+        np.full(problem.count, posterior.usable),
     )
 
 

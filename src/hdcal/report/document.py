@@ -60,6 +60,8 @@ class Table:
         rows: one cell for each column.
         numbers: titles of the columns that hold numbers, aligned to the right.
         long: titles of the columns whose texts may break anywhere.
+        names: titles of the columns whose texts may not break.
+        spare: titles of the columns that a terminal leaves out.
         strong: indices of the rows that stand out.
     """
 
@@ -68,6 +70,8 @@ class Table:
     rows: Sequence[Sequence[Cell]]
     numbers: frozenset[str] = frozenset()
     long: frozenset[str] = frozenset()
+    names: frozenset[str] = frozenset()
+    spare: frozenset[str] = frozenset()
     strong: frozenset[int] = frozenset()
 
 

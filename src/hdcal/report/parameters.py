@@ -1,13 +1,15 @@
 """Parameters of a posterior, with their intervals, in the units of people."""
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.diagnostics import Diagnosis, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
-from hdcal.report.answer import Real
+from hdcal.report.answer import Promise, Real, Words
 
 INTERVAL = 0.95
 
@@ -41,6 +43,33 @@ class Interval:
     hi: Real
 
 
+@dataclass(frozen=True, kw_only=True)
+class ParameterEstimate(Interval):
+    """A parameter with its sampling quality, and who decided it.
+
+    What does not exist, as for a parameter that the gear file fixes, is NaN.
+
+    Attributes:
+        unit: of the interval.
+        rhat: rank-normalised split R-hat.
+        ess_bulk: effective draws for the centre.
+        ess_tail: effective draws for the interval's ends.
+        contraction: share of the prior's variance that the data removed.
+        prior_sensitivity: to power-scaling of the priors.
+        likelihood_sensitivity: to power-scaling of the likelihood.
+        driven_by: whether the data or the prior decide it.
+    """
+
+    unit: Words
+    rhat: Real
+    ess_bulk: Real
+    ess_tail: Real
+    contraction: Annotated[float, Promise(nullable=True, maximum=1)]
+    prior_sensitivity: Real
+    likelihood_sensitivity: Real
+    driven_by: Driver
+
+
 def credible_interval(values: np.ndarray) -> Interval:
     """Return median and equal-tailed 95 % credible interval."""
     return Interval(**interval(values))
@@ -60,6 +89,36 @@ def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
     effect_name, field = name.split(".")
     effect = next(e for e in posterior.effects if e.name == effect_name)
     return parameters(effect)[field].unit, 1.0
+
+
+_NONE = math.nan
+# Of a parameter that was not sampled, because the gear file fixes it.
+_FIXED = Diagnosis(
+    rhat=_NONE,
+    ess_bulk=_NONE,
+    ess_tail=_NONE,
+    contraction=0.0,
+    prior_sensitivity=_NONE,
+    likelihood_sensitivity=_NONE,
+    driven_by="prior",
+)
+
+
+def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
+    """Return every parameter's estimate by name, those that were fixed last."""
+    found, draws = posterior.diagnoses, posterior.draws
+    fixed = [n for n in posterior.priors if n in draws and n not in found]
+    return {
+        name: _estimate(posterior, name, found.get(name)) for name in (*found, *fixed)
+    }
+
+
+def _estimate(
+    posterior: Posterior, name: str, found: Diagnosis | None
+) -> ParameterEstimate:
+    unit, factor = unit_of(posterior, name)
+    ends = credible_interval(posterior.draws[name] * factor)
+    return ParameterEstimate(**vars(ends), unit=unit, **vars(found or _FIXED))
 
 
 def parameter_entry(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
 from hdcal.report.words import label, number, prior_words, with_unit
 
@@ -35,13 +36,6 @@ def provenance_rows(posterior: Posterior, summary: dict, command: str) -> list:
         ("versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
     ]
     return rows + ([("command", command)] if command else [])
-
-
-THEORY_WORDS = {
-    "ring": "inextensible ring",
-    "cup": "cup with a held base",
-    "article": "slope plotted in the article",
-}
 
 
 def data_rows(case: Case) -> list[tuple[str, str]]:

@@ -64,8 +64,12 @@ def study_document(found: StudyAnswer, command: str = "") -> Document:
     note = f"Band: {band(found)}. Stress: hoop bending under the load, median."
     left = "all are in study.csv."
 
+    told = found.varied or ("deformation_mm",)
+    spare = {HEADINGS[name] for name in shown if name not in told} | {"stress [MPa]"}
+
     def table(part: Sequence[Sequence[str]]) -> Table:
-        return Table(["material", *numbers], part, frozenset(numbers))
+        columns = ["material", *numbers]
+        return Table(columns, part, frozenset(numbers), spare=frozenset(spare))
 
     first = [table(rows[:_FIRST_ROWS]), Text(note, soft=True)]
     sections = [picture("study", "Force", _STUDY)]
