@@ -15,7 +15,8 @@ from hdcal.design.checks import (
     unseen_findings,
 )
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.design.sizes import beyond_tested, far_from_tested, geometry_with
+from hdcal.design.sentences import beyond_tested, far_from_tested
+from hdcal.design.sizes import geometry_with
 from hdcal.errors import Finding, InputError, attempt
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.profile import peak_stress
@@ -52,6 +53,13 @@ class Study:
     basis: DesignDraws
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        from hdcal.design.study.document import study_document
+        from hdcal.design.study.summary import study_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(study_document(study_answer(self)))
 
 
 def study(

@@ -11,7 +11,7 @@ from hdcal.prediction.engine.conditions import (
     is_tested,
 )
 from hdcal.prediction.engine.forces import Quantity
-from hdcal.prediction.engine.population import Population, population_words, widest
+from hdcal.prediction.engine.population import Population, widest
 from hdcal.prediction.engine.population_force import PopulationForce, population_force
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
@@ -23,6 +23,7 @@ from hdcal.prediction.margin.bounds import (
 )
 from hdcal.prediction.margin.checks import check_margin
 from hdcal.prediction.margin.deformation_reached import deformation_reached
+from hdcal.prediction.margin.document import population_words
 from hdcal.prediction.margin.gradients import gradients
 from hdcal.prediction.margin.remarks import extrapolations, remarks
 from hdcal.prediction.margin.request import Criteria, MarginRequest
