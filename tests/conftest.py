@@ -16,10 +16,6 @@ _OWN = pytest.StashKey[str]()
 
 def pytest_configure(config: pytest.Config) -> None:
     """Name one cache for this process, its workers and every command they start."""
-    from hdcal.cli.compilation_cache import one_thread_for_algebra
-
-    # As commands do: workers share the cores, so threads would wait for each other.
-    one_thread_for_algebra()
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
     # As commands do: two processes on two cores, each with two threads, only wait.
