@@ -14,6 +14,7 @@ from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
@@ -68,9 +69,7 @@ class Response:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
-        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
-        names += ("deformation_hi_mm", "tested")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
 
     def _repr_html_(self) -> str:
         from hdcal.motion.respond.document import response_document
