@@ -52,15 +52,27 @@ class Console:
         """Return the command line as it was given, for a result's provenance."""
         return shlex.join(["hdcal", *sys.argv[1:]])
 
-    def check_target(self, out: str | None, force: bool) -> None:
-        """Note where a result could not be written, before any work is done."""
+    def check_target(
+        self, out: str | None, force: bool, option: str = "--force"
+    ) -> None:
+        """Note where a result could not be written, before any work is done.
+
+        Args:
+            out: the folder to make, or None.
+            force: whether an older result may be replaced.
+            option: what to say to replace it.
+        """
         if out is not None:
             from hdcal.report.folder import check_target
 
-            self.wrong.attempt(check_target, out, force=force)
+            self.wrong.attempt(check_target, out, force=force, option=option)
 
     def answer(
-        self, document: "Document", answer: "Answer", folder: str | None = None
+        self,
+        document: "Document",
+        answer: "Answer",
+        folder: str | None = None,
+        opened: str = "report.html",
     ) -> int:
         """Show an answer and return the command's exit code.
 
@@ -68,10 +80,11 @@ class Console:
             document: for people.
             answer: for --json.
             folder: where the whole result lies, or None.
+            opened: what to open in it first; empty where that depends.
         """
         from hdcal.report.terminal import terminal_lines
 
-        self.table(*terminal_lines(document, folder))
+        self.table(*terminal_lines(document, folder, opened))
         if self.json:
             self.data(answer)
         return 0 if answer.status == "ok" else 1

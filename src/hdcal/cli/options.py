@@ -3,18 +3,18 @@
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import click
 
 from hdcal.cli.console import Console
+from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
 
 MOST_POINTS = 100_000
-_THEORIES = ("ring", "cup", "article")
 
 
 T = TypeVar("T")
@@ -84,7 +84,7 @@ def reading_options(command: Callable) -> Callable:
     for add in (
         click.option(
             "--theory",
-            type=click.Choice(_THEORIES),
+            type=click.Choice(get_args(Theory)),
             help="Stiffness formula that K multiplies; overrides the gear file.",
         ),
         click.option(

@@ -60,6 +60,8 @@ class Table:
         rows: one cell for each column.
         numbers: titles of the columns that hold numbers, aligned to the right.
         long: titles of the columns whose texts may break anywhere.
+        names: titles of the columns whose texts may not break.
+        spare: titles of the columns that a terminal leaves out.
         strong: indices of the rows that stand out.
     """
 
@@ -68,6 +70,8 @@ class Table:
     rows: Sequence[Sequence[Cell]]
     numbers: frozenset[str] = frozenset()
     long: frozenset[str] = frozenset()
+    names: frozenset[str] = frozenset()
+    spare: frozenset[str] = frozenset()
     strong: frozenset[int] = frozenset()
 
 
@@ -165,6 +169,8 @@ class Document:
         return self.next_steps[0] if self.next_steps else None
 
 
-def notices(*found: tuple[str, Sequence[str]]) -> tuple[Notice, ...]:
-    """Return cautions by title; those without a sentence are left out."""
-    return tuple(Notice(title, said) for title, said in found if said)
+def notices(
+    *found: tuple[str, Sequence[str]], tone: Tone = "caution"
+) -> tuple[Notice, ...]:
+    """Return notices by title; those without a sentence are left out."""
+    return tuple(Notice(title, said, tone) for title, said in found if said)

@@ -25,13 +25,14 @@ _COLOURS = {"good": "green", "caution": "yellow", "bad": "red", "neutral": ""}
 
 
 def terminal_lines(
-    document: Document, folder: str | None = None
+    document: Document, folder: str | None = None, opened: str = "report.html"
 ) -> Iterator[RenderableType]:
     """Yield a document for a terminal; figures and long sections are left out.
 
     Args:
         document: what to show; its texts may come from anywhere.
         folder: where the whole result lies, or None.
+        opened: what to open in it first; empty where that depends.
     """
     title = f"{document.name}: {document.subtitle}"
     yield RichText(printable(title), "bold")
@@ -49,7 +50,8 @@ def terminal_lines(
         yield from _titled(notice.title, notice.sentences, _COLOURS[notice.tone])
     yield from _titled("What to do next", document.next_steps)
     if folder is not None:
-        yield RichText(f"\nThe result: {printable(folder)}  (open report.html)")
+        how = f"  (open {opened})" if opened else ""
+        yield RichText(f"\nThe result: {printable(folder)}{how}")
 
 
 def _titled(title: str, said: Sequence[str], colour: str = "") -> Iterator:
@@ -80,12 +82,16 @@ def _block(block: Block) -> Iterator[RenderableType]:
 
 def _table(table: Table) -> RichTable:
     made = RichTable(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in table.columns:
+    shown = [i for i, title in enumerate(table.columns) if title not in table.spare]
+    for title in (table.columns[i] for i in shown):
         right = title in table.numbers
-        made.add_column(title, justify="right" if right else "left", no_wrap=right)
+        whole = right or title in table.names
+        made.add_column(
+            RichText(title), justify="right" if right else "left", no_wrap=whole
+        )
     for index, row in enumerate(table.rows):
         style = "bold" if index in table.strong else ""
-        made.add_row(*map(_cell, row), style=style)
+        made.add_row(*(_cell(row[i]) for i in shown), style=style)
     return made
 
 

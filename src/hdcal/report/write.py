@@ -3,10 +3,8 @@
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from hdcal.report.answer import Answer
-from hdcal.report.canvas import render
+from hdcal.report.canvas import Figure, render
 from hdcal.report.document import Document
 from hdcal.report.folder import whole_folder
 from hdcal.report.html import html_page
@@ -40,18 +38,33 @@ def write_report(
     Raises:
         InputError: the folder exists or cannot be written.
     """
-    figures = figures or {}
     # Drawn before the folder is begun: an older result stays as long as possible.
-    title = f"{document.name}: {document.kind}"
-    images = {name: render(figure, "svg", title) for name, figure in figures.items()}
-    shown = list(figures) if kept is None else kept
-    pictures = {f"{name}.svg": images[name] for name in shown}
-    pictures |= {f"{n}.png": render(figures[n], "png", title) for n in shown}
-    page = html_page(document, images).encode("utf-8", "xmlcharrefreplace")
+    files = report_files(document, figures or {}, kept)
     with whole_folder(target, force=force) as folder:
         for name, answer in answers.items():
             (folder / name).write_text(as_json(answer), "utf-8")
-        for name, content in {PAGE: page, **pictures}.items():
+        for name, content in files.items():
             (folder / name).write_bytes(content)
         if save is not None:
             save(folder)
+
+
+def report_files(
+    document: Document,
+    figures: Mapping[str, Figure],
+    kept: Collection[str] | None = None,
+) -> dict[str, bytes]:
+    """Return the page and the pictures of a report by the names of their files.
+
+    Args:
+        document: the report.
+        figures: of the document's pictures, by name.
+        kept: figures that become files of their own too; by default all of them.
+    """
+    title = f"{document.name}: {document.kind}"
+    images = {name: render(figure, "svg", title) for name, figure in figures.items()}
+    files = {PAGE: html_page(document, images).encode("utf-8", "xmlcharrefreplace")}
+    for name in figures if kept is None else kept:
+        files[f"{name}.svg"] = images[name]
+        files[f"{name}.png"] = render(figures[name], "png", title)
+    return files
