@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdcal.cli.console import Console
-from hdcal.cli.options import Parsed, read_all, read_columns
+from hdcal.cli.option_types import Parsed, read_all, read_columns
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
