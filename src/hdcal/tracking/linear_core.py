@@ -2,18 +2,16 @@
 
 What is known is kept as the mean m of the coefficients and a square root A of their
 covariance over σ², which each row updates by Potter's formula (Kaminski, Bryson and
-Schmidt 1971). Unlike an update of the covariance itself this loses no digits, whatever
-the rows are like.
+Schmidt, IEEE Trans. Autom. Control 16, 1971). Unlike an update of the covariance itself
+this keeps its digits when rows hardly differ from each other.
 
-Arrays have any leading axes: none for one core, one for many cores side by side.
+Arrays have leading axes "...": none for one core, one for many cores side by side.
 """
 
-from math import sqrt
-
 import numpy as np
-from scipy.linalg.lapack import (  # pyright: ignore[reportAttributeAccessIssue]
-    dpotrf,
-    dtrtrs,
+from scipy.linalg.lapack import (
+    dpotrf,  # pyright: ignore[reportAttributeAccessIssue]
+    dtrtrs,  # pyright: ignore[reportAttributeAccessIssue]
 )
 
 from hdcal.tracking.normal_inverse_gamma import (
@@ -45,8 +43,8 @@ class LinearCores:
 
     def __init__(self, prior: NormalInverseGamma):
         axes = np.broadcast_shapes(prior.mean.shape, prior.root.shape[:-1])
-        # In Fortran's order numbers of many cores lie side by side in memory, where
-        # arithmetic is fast.
+        # In Fortran's order the numbers of many cores lie side by side in memory, which
+        # makes arithmetic on them twice as fast.
         self.mean = np.broadcast_to(prior.mean, axes).copy("F")
         root = np.broadcast_to(prior.root, (*axes, prior.root.shape[-1]))
         self.root = root.copy("F")
@@ -91,7 +89,7 @@ class LinearCores:
             variance: to add, in the square of its unit.
         """
         ratio = np.asarray(variance / (self.rate / self.shape))[..., None, None]
-        # In the coordinates β = m + L u: only along what was free in the prior.
+        # Over the prior's root: what the prior took as known stays so.
         relative = self._inverse @ self.root
         added = np.sqrt(ratio) * self._inverse[..., index, None]
         added = np.broadcast_to(added, (*relative.shape[:-1], 1))
@@ -136,7 +134,7 @@ class LinearCore(LinearCores):
         return middle, student_sd(scale, freedom), scale * half_width(freedom)
 
     def _fade(self) -> None:
-        """Temper towards the wide prior, whose precision is a part of the prior's."""
+        """Temper towards the wide prior: add a part of the first prior's precision."""
         keep, prior = self._forget, self._prior
         part = (1.0 - keep) / _FADED**2
         relative = self._inverse @ self.root

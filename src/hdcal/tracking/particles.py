@@ -46,17 +46,13 @@ class Particles(WeightedCores):
     ):
         centre, about = fixed - fixed.mean(axis=0), linear - linear.mean(axis=0)
         slope = np.linalg.lstsq(centre, about, rcond=1e-10)[0]
+        given = linear.mean(axis=0) + centre[chosen] @ slope
         left = about - centre @ slope
         law = match_draws(linear, variance)
         noise = law.rate / law.shape
         root = square_root(left.T @ left / len(left) / noise)
-        prior = replace(
-            law,
-            mean=np.insert(
-                linear.mean(axis=0) + centre[chosen] @ slope, 1, 1.0, axis=1
-            ),
-            root=np.insert(root, 1, 0.0, axis=0),
-        )
+        mean, root = np.insert(given, 1, 1.0, axis=1), np.insert(root, 1, 0.0, axis=0)
+        prior = replace(law, mean=mean, root=root)
         super().__init__(prior, np.full(len(chosen), 1.0 / len(chosen)))
 
     @property

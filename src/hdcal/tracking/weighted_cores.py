@@ -1,6 +1,6 @@
 """Linear cores side by side, each weighted by how well it predicted the rows so far."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from math import sqrt
 
 import numpy as np
@@ -10,7 +10,7 @@ from hdcal.tracking.linear_core import LinearCores
 from hdcal.tracking.normal_inverse_gamma import FARTHEST, NormalInverseGamma, half_width
 
 
-class WeightedCores(LinearCores):
+class WeightedCores(LinearCores, ABC):
     """A mixture of linear cores that differ in what a row cannot update.
 
     Args:
@@ -65,7 +65,9 @@ class WeightedCores(LinearCores):
         self.rows += 1
         return middle, spread * half_width(freedom), score
 
-    def mixed(self, middle: np.ndarray, spread: np.ndarray | float) -> tuple[float, float]:
+    def mixed(
+        self, middle: np.ndarray, spread: np.ndarray | float
+    ) -> tuple[float, float]:
         """Return centre and spread of a mixture of laws with these."""
         centre = float(self.weight @ middle)
         variance = float(self.weight @ (spread**2 + (middle - centre) ** 2))
