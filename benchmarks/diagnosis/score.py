@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks.diagnosis import causes
-from benchmarks.diagnosis.oracle import judge
 from benchmarks.diagnosis.loadings import LOADINGS, line
+from benchmarks.diagnosis.oracle import judge
 from benchmarks.diagnosis.world import World, draw_noise, draw_world
 from hdcal.data.records import Records
 from hdcal.diagnosis.diagnose import diagnose
