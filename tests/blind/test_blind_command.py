@@ -586,11 +586,11 @@ def test_a_spoiled_answer_is_not_gone_on_from(blind, frozen: Path, spoil, words:
 
 
 def test_a_fingerprint_tells_what_was_changed(monkeypatch):
-    from hdcal.diagnosis import model_posterior as weigh
+    from hdcal.diagnosis import model_posterior
 
     before = fingerprint.__wrapped__()
     assert fingerprint.__wrapped__() == before
-    monkeypatch.setattr(weigh, "NAMED", 0.8)
+    monkeypatch.setattr(model_posterior, "NAMED", 0.8)
     after = fingerprint.__wrapped__("minus:outliers")
     assert {key for key in before if before[key] != after[key]} == {
         "library_sha256",

@@ -13,12 +13,12 @@ from hdcal.blind.rival_methods import fit_each
 from hdcal.blind.seal import canonical, digest
 from hdcal.data.case import Case
 from hdcal.data.resources import priors_folder
-from hdcal.diagnosis import model_posterior as weigh
+from hdcal.diagnosis import model_posterior
 from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.library import choose_library
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.where import FALSE_ALARM
-from hdcal.evidence.assessment import NONE, UNKNOWN
+from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.inference.posterior import versions
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
@@ -128,7 +128,7 @@ def fingerprint(library: str | None = None) -> dict[str, Any]:
         library: `minus:NAME[,NAME]`, left out of every case.
     """
     thresholds = {
-        name: getattr(weigh, name)
+        name: getattr(model_posterior, name)
         for name in ("PRIOR_NONE", "PRIOR_UNKNOWN", "PRIOR_PAIRS", "NAMED")
     }
     considered = choose_library(library).items()

@@ -10,7 +10,7 @@ from hdcal.blind.virtual_rig.loadings import Loading, loading_of
 from hdcal.calibration.calibrate import check_names
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, InputError
-from hdcal.evidence.assessment import UNKNOWN
+from hdcal.evidence.case_evidence import UNKNOWN
 from hdcal.physics.registry import EFFECTS
 
 # The name of a measurement may tell its cause; of one case none is needed.

@@ -11,7 +11,7 @@ from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.report.answer import EffectName, Probability, Real, Words
 from hdcal.report.parameters import Interval
 
-Word = Literal["none", "named", "ambiguous", "unknown"]
+VerdictWord = Literal["none", "named", "ambiguous", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Gap:
     """Whether model and measurement part, and by how much.
 
     Attributes:
-        detected: the simultaneous gate at 5 % is passed.
+        detected: the residual test is significant at 5 %.
         probability: posterior probability that anything is missing (1 − P(none)).
         rms_N: root mean square of the gap at the tested rows, 90 % interval; NaN
             where none is detected.
@@ -74,7 +74,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Share:
+class CovariateShare:
     """Part of the gap's variance along one covariate, 90 % interval."""
 
     covariate: Words
@@ -86,7 +86,7 @@ class Where:
     """Where the gap lies.
 
     Attributes:
-        p_value: family-wise, of the simultaneous gate.
+        p_value: family-wise, of the residual test.
         statistics: largest |z| over the cells and of the noise's shape, by name.
         cells: every pre-declared cell.
         shares: of the gap's variance by covariate; empty when no gap is detected.
@@ -98,7 +98,7 @@ class Where:
     p_value: float
     statistics: dict[str, float]
     cells: tuple[Cell, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[CovariateShare, ...]
     residual_N: np.ndarray
     gap_N: np.ndarray
     records: Records
@@ -133,13 +133,13 @@ class Which:
         log_evidence: of each hypothesis, relative to none [nat].
         amplitude: of `effect`; None without one.
         not_testable: effect → features that the records lack.
-        not_excited: effects that this program cannot show at a physical size.
-        inseparable: pairs of effects that this program can never tell apart.
+        not_excited: effects that this loading cannot show at a physical size.
+        inseparable: pairs of effects that this loading can never tell apart.
         sensitivity: top inclusion for amplitude priors ⅓ and 3 times as wide.
         stability: share of block-bootstrap samples with the same top hypothesis.
     """
 
-    verdict: Word
+    verdict: VerdictWord
     effect: str | None
     second_effect: str | None
     set: tuple[str, ...]
@@ -155,16 +155,16 @@ class Which:
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One rung of the ladder from the nominal model to the noise floor."""
+class LadderEntry:
+    """Error of one model, from the nominal one down to the noise."""
 
     model: Words
     rms_N: Real
 
 
 @dataclass(frozen=True)
-class Shrink:
-    """How far the gap shrinks once the effect is added.
+class Closure:
+    """How far the gap closes once the effect is added.
 
     Attributes:
         ladder: nominal, calibrated, with the effect, with the remainder, noise.
@@ -177,7 +177,7 @@ class Shrink:
         bars: closed share of each member of the set, by effect.
     """
 
-    ladder: tuple[Rung, ...]
+    ladder: tuple[LadderEntry, ...]
     closed: Interval | None
     held_out: str
     extrapolated_closed: Real | None
@@ -249,7 +249,7 @@ class Verdict:
         gap: whether there is a gap.
         where: where it lies.
         which: what causes it.
-        shrink: how far it shrinks.
+        shrink: how far it closes once the effect is added.
         next_test: runs that would tell more, best first.
         budget: of the scale factor K.
         posteriors: calibrated corrected models by effect (joined with +), with the
@@ -265,7 +265,7 @@ class Verdict:
     gap: Gap
     where: Where
     which: Which
-    shrink: Shrink
+    shrink: Closure
     next_test: tuple[NextRun, ...]
     budget: Budget
     posteriors: dict[str, tuple[float, Posterior]]

@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.records import Array
+from hdcal.inference.padding import append_zeros, bucket_size
 
 
-class Blocks(eqx.Module):
+class CompressedRows(eqx.Module):
     """Triangular factors, one for each group of rows that share their noise.
 
     Attributes:
@@ -40,7 +41,7 @@ def group_rows(run, specimen, known_sd) -> tuple[np.ndarray, np.ndarray]:
     return distinct, group.reshape(-1)
 
 
-def compress(columns, force, distinct, group) -> Blocks:
+def compress(columns, force, distinct, group) -> CompressedRows:
     """Reduce rows to one triangular factor per group.
 
     Args:
@@ -48,6 +49,10 @@ def compress(columns, force, distinct, group) -> Blocks:
         force: readings y [N], shape (n,).
         distinct: (run, specimen, known sd) of each group, shape (g, 3).
         group: group index of each row, shape (n,).
+
+    Returns:
+        One factor per group. Where a stated sd tells rows apart, their number is any
+        number: groups of no rows then fill up the bucket.
     """
     table = np.column_stack([columns, force])
     width = table.shape[1]
@@ -57,17 +62,19 @@ def compress(columns, force, distinct, group) -> Blocks:
     for index, rows in enumerate(np.split(table, np.cumsum(count)[:-1])):
         factor = np.linalg.qr(rows, mode="r")
         factors[index, : len(factor)] = factor
-    return Blocks(
+    rows = CompressedRows(
         factors,
         count.astype(float),
         distinct[:, 2],
         distinct[:, 0].astype(int),
         distinct[:, 1].astype(int),
     )
+    same_sd = (distinct[:, 2] == distinct[0, 2]).all()
+    return rows if same_sd else append_zeros(rows, bucket_size(len(distinct)))
 
 
 def residual(
-    blocks: Blocks, coefficients: Float[Array, "g p"]
+    blocks: CompressedRows, coefficients: Float[Array, "g p"]
 ) -> Float[Array, "g p+1"]:
     """Return y − X c of each block in its rotated rows [N]."""
     target = blocks.factor[..., -1]
@@ -76,7 +83,7 @@ def residual(
 
 
 def log_likelihood(
-    blocks: Blocks, coefficients: Float[Array, "g p"], sigma, step
+    blocks: CompressedRows, coefficients: Float[Array, "g p"], sigma, step
 ) -> Float[Array, ""]:
     """Return the log likelihood of all rows of all blocks.
 

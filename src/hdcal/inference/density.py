@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from functools import singledispatch
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
@@ -14,6 +16,7 @@ from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_offsets import Linear, contrasts
+from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.physics.chain import (
     Base,
@@ -114,8 +117,17 @@ def pointwise_log_likelihood(
     )
 
 
-def log_likelihood(problem: Problem, values: Values) -> Float[Array, ""]:
-    """Return the log likelihood of all data, members integrated out where they can."""
+@singledispatch
+def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
+    """Return the log likelihood of all data, members integrated out where they can.
+
+    Padding counts for nothing.
+    """
+    raise NotImplementedError(type(problem).__name__)
+
+
+@log_likelihood.register
+def _(problem: Problem, values: Values) -> Float[Array, ""]:
     if problem.integrated:
         return linear_part(problem, values).log_likelihood()
     if problem.blocks is not None:
@@ -124,7 +136,8 @@ def log_likelihood(problem: Problem, values: Values) -> Float[Array, ""]:
             problem.blocks, coefficients, values["sigma"], problem.step
         )
     rows, columns = problem.rows, problem.columns
-    return jnp.sum(pointwise_log_likelihood(problem, values, rows, columns))
+    each = pointwise_log_likelihood(problem, values, rows, columns)
+    return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 
 def linear_part(problem: Problem, values: Values) -> Linear:
@@ -155,18 +168,19 @@ def _linear_rows(problem: Problem, values: Values, scale) -> Linear:
         design.append(contrasts(problem.runs)[records.run])
     if "gap" in problem.integrated:
         design.append(problem.columns)
+    real = measured(len(sd), problem.count)
     return Linear(
-        residual=records.force - mean,
-        design=jnp.concatenate(design, axis=1),
+        residual=jnp.where(real, records.force - mean, 0.0),
+        design=jnp.where(real[:, None], jnp.concatenate(design, axis=1), 0.0),
         sd=sd,
         scale=scale,
-        log_volume=jnp.sum(jnp.log(sd)),
-        count=len(sd),
+        log_volume=jnp.sum(jnp.where(real, jnp.log(sd), 0.0)),
+        count=problem.count,
     )
 
 
 def _linear_blocks(
-    problem: Problem, blocks: compress.Blocks, values: Values, scale
+    problem: Problem, blocks: compress.CompressedRows, values: Values, scale
 ) -> Linear:
     groups, width = blocks.factor.shape[:2]
     design = []  # each [group, column of X, weight]
@@ -199,7 +213,7 @@ def _linear_blocks(
 
 
 def _block_coefficients(
-    problem: Problem, blocks: compress.Blocks, values: Values
+    problem: Problem, blocks: compress.CompressedRows, values: Values
 ) -> Float[Array, "g p"]:
     """Return the coefficients of each block, those of the gap zero."""
     base = member_base(problem, values, blocks.run, blocks.specimen)
@@ -240,3 +254,17 @@ def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
             law = distribution(prior, positive=name in POSITIVE)
             total = total + law.log_prob(values[name])
     return total
+
+
+def densities(problem: Sampled, draws: Values) -> tuple[np.ndarray, np.ndarray]:
+    """Return log prior and log likelihood of each draw, (chain, draw) each."""
+    of_prior, of_data = _densities(problem, draws)
+    return np.asarray(of_prior), np.asarray(of_data)
+
+
+@jax.jit
+def _densities(problem: Sampled, values):
+    def both(one):
+        return log_prior(problem, one), log_likelihood(problem, one)
+
+    return jax.vmap(jax.vmap(both))(values)

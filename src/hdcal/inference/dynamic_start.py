@@ -12,6 +12,7 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import frozen
 from hdcal.inference.dynamic_problem import DynamicProblem
+from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import linear_response
 
 _RATIOS = np.array([0.005, 0.03, 0.2])
@@ -24,6 +25,8 @@ _TAIL = 1e-3
 @jax.jit
 def _residual(problem: DynamicProblem, frequency, ratio):
     """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and zero of the best fit."""
+    real = measured(len(problem.time), problem.count)
+    read = jnp.where(real, problem.deformation, 0.0)
 
     def one(frequency, ratio):
         # A mass of one over ω² has a stiffness of one.
@@ -40,11 +43,12 @@ def _residual(problem: DynamicProblem, frequency, ratio):
             ],
             axis=1,
         )
+        columns = jnp.where(real[:, None], columns, 0.0)
         size = jnp.linalg.norm(columns, axis=0) + 1e-300
         design = columns / size
         normal = design.T @ design + 1e-10 * jnp.eye(4)
-        weights = jnp.linalg.solve(normal, design.T @ problem.deformation)
-        left = problem.deformation - design @ weights
+        weights = jnp.linalg.solve(normal, design.T @ read)
+        left = read - design @ weights
         found = weights / size * jnp.array([1.0, 1.0, pace, 1.0])
         # A gear gives way in the direction of the force, or it is none.
         return jnp.where(found[0] > 0.0, left @ left, jnp.inf), found
@@ -85,10 +89,11 @@ def _frequencies(problem: DynamicProblem) -> np.ndarray:
     soft, stiff = ends["K"] * ends["E0"] * problem.unit_stiffness
     light, heavy = ends["mass"]
     low, high = np.sqrt(soft / heavy), np.sqrt(stiff / light)
-    nyquist = np.pi / np.median(np.diff(problem.time))
+    time = problem.time[: problem.count]
+    nyquist = np.pi / np.median(np.diff(time))
     high = min(high, nyquist)
     low = min(low, 0.5 * high)
-    width = _FINENESS * 2.0 * np.pi / problem.time[-1]
+    width = _FINENESS * 2.0 * np.pi / time[-1]
     count = int(np.clip((high - low) / width, _FEWEST, _MOST))
     return np.linspace(low, high, count) / (2.0 * np.pi)
 
@@ -113,7 +118,7 @@ def _values(problem: DynamicProblem, place, found, left) -> dict[str, float]:
         "initial_deformation": found[1],
         "initial_velocity": found[2],
         "deformation_offset": found[3],
-        "deformation_sigma": max(np.sqrt(left / len(problem.time)), 1e-6),
+        "deformation_sigma": max(np.sqrt(left / problem.count), 1e-6),
     }
     start = {}
     for name, value in values.items():

@@ -3,31 +3,25 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import ClassVar
 
-import jax
 import numpy as np
 import xarray as xr
-from arviz_base import from_dict
 
 from hdcal.data.case import Case, Theory
 from hdcal.data.priors import Prior
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import archive
 from hdcal.inference.checks import Check
-from hdcal.inference.density import pointwise_log_likelihood
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.sample import Draws
 from hdcal.physics.effect import Effect
 
 FILE_NAME = "posterior.nc"
 _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
-# Above this many numbers the log likelihood of every row and draw is not kept.
-_MOST_LOG_LIKELIHOODS = 8_000_000
 
 
 @dataclass(frozen=True, repr=False)
@@ -199,84 +193,6 @@ def _look_up(names, library, file) -> tuple[type[Effect], ...]:
             for name in unknown
         )
     return tuple(library[name] for name in names)
-
-
-def gap_columns(problem: Problem, case: Case):
-    """Return the basis of the gap at the rows of the case, or None."""
-    return (
-        None if problem.gap is None else problem.gap.columns(case.records.deformation)
-    )
-
-
-@jax.jit
-def _pointwise(problem, values, records, columns):
-    one = partial(pointwise_log_likelihood, problem)
-    inner = jax.vmap(one, in_axes=(0, None, None))
-    return jax.vmap(inner, in_axes=(0, None, None))(values, records, columns)
-
-
-def build_tree(
-    case: Case,
-    problem: Problem,
-    draws: Draws,
-    prior_draws: Mapping[str, np.ndarray],
-    log_likelihood: np.ndarray,
-) -> xr.DataTree:
-    """Collect everything in ArviZ' groups.
-
-    Args:
-        case: data and gear.
-        problem: what was sampled.
-        draws: from the sampler.
-        prior_draws: by parameter, each (draw,).
-        log_likelihood: total of each draw, (chain, draw).
-    """
-    records = case.records
-    size = log_likelihood.size * len(records.force)
-    by_row = {"total": log_likelihood}
-    if size <= _MOST_LOG_LIKELIHOODS:
-        columns = gap_columns(problem, case)
-        by_row = {"force": _pointwise(problem, draws.values, records, columns)}
-    tree = from_dict(
-        {
-            "posterior": draws.values,
-            "prior": {name: values[None] for name, values in prior_draws.items()},
-            "sample_stats": sampler_statistics(draws),
-            "observed_data": {"force": np.asarray(records.force)},
-            "constant_data": archive.covariates(records),
-            "log_likelihood": {n: np.asarray(v) for n, v in by_row.items()},
-        },
-        dims={
-            "force": ["row"],
-            **{name: ["row"] for name in archive.UNITS},
-            "run_offset": ["run_label"],
-            "specimen_deviation": ["specimen_label"],
-            "gap_weights": ["basis"],
-        },
-        coords={
-            "run_label": list(case.run_labels),
-            "specimen_label": list(case.specimen_labels),
-        },
-    )
-    if size > _MOST_LOG_LIKELIHOODS:
-        tree["log_likelihood"].attrs["note"] = (
-            f"{size} values by row and draw are not kept; this is the log likelihood "
-            "of all rows, runs, specimens and gap integrated out where they were"
-        )
-    return tree
-
-
-def sampler_statistics(draws: Draws) -> dict[str, np.ndarray]:
-    """Return what ArviZ wants to know of the sampler, (chain, draw) each."""
-    return {
-        "energy": draws.energy,
-        "lp": -draws.potential,
-        "diverging": draws.diverging,
-        "n_steps": draws.n_steps,
-        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
-        "acceptance_rate": draws.acceptance,
-        "step_size": draws.step_size,
-    }
 
 
 def versions() -> dict[str, str]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -11,10 +12,17 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
-from hdcal.inference.compress import Blocks, compress, group_rows
+from hdcal.inference.compress import CompressedRows, compress, group_rows
 from hdcal.inference.density_protocol import Sampled
-from hdcal.inference.discrepancy import Gap, build_gap
+from hdcal.inference.discrepancy import (
+    BASIS_SIZE,
+    Discrepancy,
+    build_discrepancy,
+    discrepancy_columns,
+)
 from hdcal.inference.distributions import scaled
+from hdcal.inference.held_rows import check_held_rows
+from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
@@ -32,6 +40,8 @@ _FINE_STEP = 1.3
 # digits in the difference of two nearly equal probabilities.
 _NO_STEP = 1e-3
 
+_base_columns = jax.jit(linear_columns)
+
 
 class Problem(Sampled):
     """Everything the model needs; only arrays change between data sets of one shape.
@@ -41,9 +51,9 @@ class Problem(Sampled):
         units: of the sampling coordinate of each half-normal amplitude.
         unit_stiffness: k_theory/E, radial [mm].
         reading: how the rig reads.
-        records: all rows, or None when they are compressed.
+        records: all rows, padded, or None when they are compressed.
         blocks: compressed rows, or None.
-        columns: basis of the gap at the rows, or None.
+        columns: basis of the gap at the padded rows, or None.
         gap: the leftover discrepancy, or None.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
@@ -51,6 +61,7 @@ class Problem(Sampled):
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
         integrated: which of "run", "specimen", "gap" are integrated out exactly.
+        count: measured rows; `records` and `columns` have padding after them.
     """
 
     priors: dict[str, Prior]
@@ -58,19 +69,20 @@ class Problem(Sampled):
     unit_stiffness: Float[Array, ""] | float
     reading: Reading
     records: Records | None
-    blocks: Blocks | None
+    blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
-    gap: Gap | None
+    gap: Discrepancy | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: frozenset[str] = eqx.field(static=True)
+    count: int = 0
 
     @property
     def rows(self) -> Records:
-        """The kept rows.
+        """The kept rows, padded.
 
         Raises:
             ValueError: they were compressed.
@@ -209,58 +221,77 @@ def build_problem(
         with_gap: add the leftover discrepancy.
 
     Raises:
-        InputError: an effect lacks its covariates or a prior.
+        InputError: an effect lacks its covariates or a prior, or does not bear that
+            rows are padded.
     """
     _check_needs(case, effects)
     effects = without_scatter(effects)
     theory = theory or case.gear.theory
-    records = case.records
     priors = problem_priors(case, effects, shipped, theory)
-    reading = case_reading(case)
-    base_columns = np.asarray(linear_columns(records, reading))
-    noise_sd = pilot_noise(records)
-    runs = len(case.run_labels) if "run" in records.known else 0
-    specimens = len(case.specimen_labels) if "specimen" in records.known else 0
-    members = {
-        kind
-        for kind, present in (("run", runs), ("specimen", specimens), ("gap", with_gap))
-        if present
-    }
-    step = case.gear.force_resolution
-    few = len(records.force) <= _FEW_ROWS and not members
-    rounded = step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
-    gap = build_gap(records.deformation) if with_gap else None
-    columns = None if gap is None else np.asarray(gap.columns(records.deformation))
-    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
-    design = base_columns if columns is None else np.hstack([base_columns, columns])
-    # One factor per row (an sd of its own in each) would be larger than the rows.
-    factor_rows = len(distinct) * (design.shape[1] + 1)
-    many = factor_rows > max(len(design), _MANY_FACTOR_ROWS)
-    keep_rows = bool(effects) or rounded or many
+    measured, reading = case.records, case_reading(case)
+    check_held_rows(effects, measured, reading)
+    records, count = pad_records(measured), len(measured.force)
+    gap = build_discrepancy(measured.deformation) if with_gap else None
+    columns = discrepancy_columns(gap, records.deformation)
+    base_columns = np.asarray(_base_columns(records, reading))[:count]
+    noise_sd = pilot_noise(measured)
+    members = _member_counts(case, with_gap)
+    rounded = _is_rounded(case, noise_sd, few=count <= _FEW_ROWS and not members)
     blocks = None
-    if not keep_rows:
-        blocks = compress(design, records.force, distinct, group)
-    else:
+    if not effects and not rounded:
+        own = [] if columns is None else [columns[:count]]
+        blocks = _compress(measured, np.hstack([base_columns, *own]))
+    integrated = set(members)
+    if blocks is None:
         # Through an effect the force need not be linear in the stiffness.
-        members.discard("specimen")
+        integrated.discard("specimen")
     gaussian = not rounded and all(effect.stage != "noise" for effect in effects)
-    integrated = frozenset(members if gaussian else ())
     return Problem(
         priors=bare(priors),
-        units=amplitude_units(records, reading, effects, priors, noise_sd),
+        units=amplitude_units(
+            measured, base_columns, reading, effects, priors, noise_sd
+        ),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
-        records=records if keep_rows else None,
+        records=records if blocks is None else None,
         blocks=blocks,
-        columns=columns if keep_rows else None,
+        columns=columns if blocks is None else None,
         gap=gap,
-        step=step,
+        step=case.gear.force_resolution,
         effects=effects,
         rounded=rounded,
-        runs=runs,
-        specimens=specimens,
-        integrated=integrated,
+        runs=members.get("run", 0),
+        specimens=members.get("specimen", 0),
+        integrated=frozenset(integrated if gaussian else ()),
+        count=count,
     )
+
+
+def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
+    """Return how many members of each kind have a parameter of their own."""
+    known = case.records.known
+    counts = {
+        "run": len(case.run_labels) if "run" in known else 0,
+        "specimen": len(case.specimen_labels) if "specimen" in known else 0,
+        "gap": BASIS_SIZE if with_gap else 0,
+    }
+    return {kind: count for kind, count in counts.items() if count}
+
+
+def _is_rounded(case: Case, noise_sd: float, *, few: bool) -> bool:
+    """Return whether the exact rounding likelihood is needed, or cheap."""
+    step = case.gear.force_resolution
+    return step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
+
+
+def _compress(records: Records, design) -> CompressedRows | None:
+    """Return the rows compressed, or None where that would be no smaller."""
+    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
+    # One factor per row (an sd of its own in each) would be larger than the rows.
+    factor_rows = len(distinct) * (design.shape[1] + 1)
+    if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
+        return None
+    return compress(design, records.force, distinct, group)
 
 
 def case_reading(case: Case) -> Reading:

@@ -121,6 +121,10 @@ def _constrain(problem, whitening, standard, keys):
     return jax.vmap(jax.vmap(one))(standard, keys)
 
 
+# What is compiled anew for each kind of problem and takes many memory mappings.
+COMPILED = (_start, _advance, _constrain)
+
+
 def sample(
     problem: Sampled,
     whitening: Whitening,

@@ -14,7 +14,6 @@ from hdcal.physics.theory import RING_SERIES
 TITLE = "Study on Flexible Gear Deformation in Harmonic Drive Gear"
 # Table 1, and below Table 4; the load height is not given, no claim here needs it.
 WALL, RADIUS, LENGTH, POISSON = 0.68, 40.0, 70.0, 0.3
-GEAR = Geometry(WALL, RADIUS, LENGTH, load_height=LENGTH, poisson=POISSON)
 MODULUS = 210e3
 DEFORMATION = 0.4
 SLOPE_THEORY, SLOPE_MEASURED, INFLUENCE = 1625.19, 210.41, 0.13
@@ -60,6 +59,11 @@ class Claim:
     data: str
     verdict: Outcome
     numbers: dict[str, float] = field(default_factory=dict)
+
+
+def article_gear() -> Geometry:
+    """Return the sizes of the article's gear."""
+    return Geometry(WALL, RADIUS, LENGTH, load_height=LENGTH, poisson=POISSON)
 
 
 def outcome(holds: bool) -> Outcome:

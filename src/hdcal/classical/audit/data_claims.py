@@ -9,7 +9,6 @@ from hdcal.classical.audit.article import (
     DEFORMATION,
     ERROR_CLAIMED,
     FORCE_CLAIMED,
-    GEAR,
     INFLUENCE,
     MODULUS,
     RADIUS,
@@ -19,6 +18,7 @@ from hdcal.classical.audit.article import (
     TABLE_4,
     WALL,
     Claim,
+    article_gear,
     outcome,
 )
 from hdcal.classical.audit.theory_claims import cubic
@@ -206,7 +206,7 @@ def _resolution(case: Case, line: PolynomialFit, parabola: PolynomialFit) -> Cla
 
 def _influence(line: PolynomialFit, origin: PolynomialFit) -> Iterator[Claim]:
     slopes = (float(line.coefficients[1]), float(origin.coefficients[0]))
-    nominal = float(ring(GEAR, MODULUS))
+    nominal = float(ring(article_gear(), MODULUS))
     article = [slope / SLOPE_THEORY for slope in slopes]
     proper = [slope / nominal for slope in slopes]
     numbers = {

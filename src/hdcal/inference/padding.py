@@ -1,0 +1,81 @@
+"""Row buckets: few array lengths, so that few executables serve data of every size.
+
+JAX compiles one executable for each shape of its arguments and keeps it as long as
+the process lives; each takes some twenty of the 65,530 memory mappings that Linux
+allows a process. Rows are therefore padded, outside of what is compiled, to one of a
+few lengths. Padding counts for nothing: where rows are summed, `measured` or a weight
+of zero leaves it out.
+"""
+
+from typing import TypeVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool
+
+from hdcal.data.records import Array, Records
+
+Tree = TypeVar("Tree")
+
+_SMALLEST = 16
+
+
+def bucket_size(rows: int) -> int:
+    """Return the length that so many rows are padded to.
+
+    Lengths are 16, 24, 32, 48, 64, 96, …: two per doubling, so that at most a third
+    of the padded rows are padding (from 16 rows on) and a million rows know 33
+    lengths.
+
+    Args:
+        rows: number of rows; none count as one.
+    """
+    power = _SMALLEST
+    while power < rows:
+        power *= 2
+    between = 3 * power // 4
+    return between if power > _SMALLEST and rows <= between else power
+
+
+def repeat_last_row(tree: Tree, size: int) -> Tree:
+    """Return arrays of at least one row, followed by copies of the last one.
+
+    For records: a load that is held changes nothing in the rows before it.
+
+    Args:
+        tree: pytree of arrays that share their first axis.
+        size: rows in all, as `bucket_size` gives it.
+    """
+    return jax.tree.map(lambda array: _pad(array, size, "edge"), tree)
+
+
+def pad_records(records: Records) -> Records:
+    """Return records with their last row repeated up to the size of their bucket."""
+    return repeat_last_row(records, bucket_size(len(records.force)))
+
+
+def append_zeros(tree: Tree, size: int) -> Tree:
+    """Return arrays followed by rows of zeros, such as weights and design rows.
+
+    Args:
+        tree: pytree of arrays that share their first axis.
+        size: rows in all, as `bucket_size` gives it.
+    """
+    return jax.tree.map(lambda array: _pad(array, size, "constant"), tree)
+
+
+def measured(size: int, count) -> Bool[Array, " n"]:
+    """Return which of the padded rows were measured; serves inside `jax.jit`.
+
+    Args:
+        size: rows in all.
+        count: rows that were measured, not compiled in.
+    """
+    return jnp.arange(size) < count
+
+
+def _pad(array, size: int, mode) -> np.ndarray:
+    array = np.asarray(array)
+    widths = [(0, size - len(array)), *[(0, 0)] * (array.ndim - 1)]
+    return np.pad(array, widths, mode=mode)
