@@ -15,7 +15,7 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import rounding_check
 from hdcal.inference.density import MEMBER_SD, MEMBERS
 from hdcal.inference.executables import bound_executables
-from hdcal.inference.flat_directions import beside_members
+from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
@@ -168,15 +168,15 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
-            name: beside_members(slope / near.sd, members)
+            name: remove_members(slope / near.sd, members)
             for name, slope in near.slopes.items()
         },
-        mixed=_beside_parameters(problem, found),
+        mixed=_other_quantities(problem, found),
         checks=[rounding_check(float(problem.step), problem.rounded, sigma)],
     )
 
 
-def _beside_parameters(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
+def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     """Return what else must have mixed: the headline, and members that were sampled."""
     others = {"stiffness": found.values["stiffness"]}
     for kind, name in MEMBERS.items():

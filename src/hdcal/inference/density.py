@@ -11,13 +11,13 @@ from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_offsets import Linear, contrasts
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import (
     Base,
     linear_coefficients,

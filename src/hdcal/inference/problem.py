@@ -13,7 +13,6 @@ from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import (
     BASIS_SIZE,
     Discrepancy,
@@ -22,6 +21,7 @@ from hdcal.inference.discrepancy import (
 from hdcal.inference.distributions import scaled
 from hdcal.inference.padding import pad_records
 from hdcal.inference.padding_check import check_padding
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
@@ -89,7 +89,7 @@ class Problem(Sampled):
         return self.records
 
 
-def bare(priors: Mapping[str, Prior]) -> dict[str, Prior]:
+def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
     """Return priors without their texts.
 
     Text is static: left in, another source line would mean another compilation.
@@ -233,7 +233,7 @@ def build_problem(
     rows = keep_or_compress(records, columns, gap, keep=rounded or bool(effects))
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     return Problem(
-        priors=bare(priors),
+        priors=without_texts(priors),
         units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
