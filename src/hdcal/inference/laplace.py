@@ -62,7 +62,7 @@ def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     if not isinstance(problem, Problem):
         return value
     vanishing = {}
-    if problem.gap is not None and "gap" not in problem.integrated:
+    if problem.discrepancy is not None and "discrepancy" not in problem.integrated:
         vanishing["sigma"] = BASIS_SIZE
     if "_run_offset" in position:
         vanishing["run_offset_sd"] = (problem.runs - 1) / 2

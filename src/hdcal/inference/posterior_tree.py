@@ -82,7 +82,7 @@ def force_log_likelihood(
     if draws.energy.size * rows > _MOST_LOG_LIKELIHOODS:
         return {TOTAL: densities(problem, draws.values)[1]}
     padded = pad_records(case.records)
-    columns = discrepancy_columns(problem.gap, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     each = _pointwise(problem, draws.values, padded, columns)
     return {"force": np.asarray(each)[..., :rows]}
 

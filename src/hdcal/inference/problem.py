@@ -50,14 +50,14 @@ class Problem(Sampled):
         reading: how the rig reads.
         records: all rows, padded, or None when they are compressed.
         blocks: compressed rows, or None.
-        columns: basis of the gap at the padded rows, or None.
-        gap: the leftover discrepancy, or None.
+        columns: basis of the discrepancy at the padded rows, or None.
+        discrepancy: the leftover one, or None.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
-        integrated: which of "run", "specimen", "gap" are integrated out exactly.
+        integrated: which of "run", "specimen", "discrepancy" are integrated out.
         count: measured rows; `records` and `columns` have padding after them.
     """
 
@@ -68,7 +68,7 @@ class Problem(Sampled):
     records: Records | None
     blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
-    gap: Discrepancy | None
+    discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
@@ -228,16 +228,16 @@ def build_problem(
     check_padding(effects, records, reading)
     noise_sd, members = pilot_noise(records), _member_counts(case, with_gap)
     rounded = _is_rounded(case, noise_sd, members)
-    gap = build_discrepancy(records.deformation) if with_gap else None
+    leftover = build_discrepancy(records.deformation) if with_gap else None
     columns = _columns(records, reading)
-    rows = keep_or_compress(records, columns, gap, keep=rounded or bool(effects))
+    rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     return Problem(
         priors=without_texts(priors),
         units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
-        gap=gap,
+        discrepancy=leftover,
         step=case.gear.force_resolution,
         effects=effects,
         rounded=rounded,
@@ -253,7 +253,7 @@ def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[st
     if rounded or any(effect.stage == "noise" for effect in effects):
         return frozenset()
     # Through an effect the force need not be linear in the stiffness.
-    return frozenset({"run", "specimen", "gap"} if compressed else {"run", "gap"})
+    return frozenset({"run", "discrepancy", *(["specimen"] if compressed else [])})
 
 
 def _columns(records: Records, reading: Reading) -> np.ndarray:
@@ -268,7 +268,7 @@ def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "gap": BASIS_SIZE if with_gap else 0,
+        "discrepancy": BASIS_SIZE if with_gap else 0,
     }
     return {kind: count for kind, count in counts.items() if count}
 

@@ -223,7 +223,7 @@ def _beginning(known: Posterior | Gear, seed: int) -> Beginning:
     if isinstance(known, Gear):
         return of_gear(known, seed)
     known.require_usable()
-    if known.problem.gap is not None:
+    if known.problem.discrepancy is not None:
         words = "holds a leftover discrepancy, which cannot be followed"
         remedy = "Calibrate again without --with-gap"
         raise InputError([Finding("RUN", words, remedy)])

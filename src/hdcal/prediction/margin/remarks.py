@@ -51,7 +51,7 @@ def _extrapolations(outlook: Outlook, temperature) -> Iterator[str]:
     at, low, high = question.deformation, question.low, question.high
     beyond = max(low - at, at - high)
     if beyond > 1e-9:
-        fitted = outlook.posterior.problem.gap is not None
+        fitted = outlook.posterior.problem.discrepancy is not None
         source = "the fitted leftover discrepancy" if fitted else "the prior only"
         length = outlook.values["gap_length"] * (high - low)
         sd = outlook.values["gap_sd"] * np.sqrt(-np.expm1(-((beyond / length) ** 2)))
@@ -131,7 +131,7 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
             "With tolerances the forces are those of gears that differ from the tested "
             "ones in these sizes and in nothing else."
         )
-    if all(outlook.posterior.problem.gap is None for _, outlook in outlooks):
+    if all(outlook.posterior.problem.discrepancy is None for _, outlook in outlooks):
         yield from misfits(posterior)
     if (rare is not None and rare < 1.0 / draws) or rounded_tail:
         yield (
