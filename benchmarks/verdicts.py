@@ -74,11 +74,11 @@ def _cases(size: int, count: int) -> list:
     import numpy as np
 
     import hdcal
-    from hdcal.evidence.prepare import take
+    from hdcal.evidence.row_features import take_rows
 
     case = hdcal.read_case(_CYCLES)
     rows = np.arange(size) % len(case.records.force)
-    records = take(case.records, rows)
+    records = take_rows(case.records, rows)
     path = np.linspace(0.0, 12.0 * np.pi, size)
     half = np.where(np.sin(path) >= 0.0, 1.0, -1.0)
     deformation = 0.28 - 0.26 * np.cos(path)

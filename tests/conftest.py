@@ -18,6 +18,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Name one cache for this process, its workers and every command they start."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
+    # As commands do: two processes on two cores, each with two threads, only wait.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     config.stash[_OWN] = os.environ["HDCAL_CACHE_DIR"] = tempfile.mkdtemp("-hdcal")
     # What `hdcal.cli.compilation_cache` sets for commands.
     os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{config.stash[_OWN]}/compiled"

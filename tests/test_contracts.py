@@ -89,3 +89,35 @@ def test_a_module_in_no_room_breaks_the_rooms(tree: Path):
     result = lint(tree, "--contract", "rooms")
     assert result.returncode == 1, result.stdout + result.stderr
     assert "attic" in result.stdout
+
+
+def layers() -> list[list[str]]:
+    """Return the rooms from the top down; several in one layer know no other."""
+    return [layer.split(" | ") for layer in CONTRACTS["rooms"]["layers"]]
+
+
+def forbidden() -> list[tuple[str, str]]:
+    """Return every pair of rooms of which the first must not import the second."""
+    return [
+        (room, other)
+        for depth, layer in enumerate(layers())
+        for room in layer
+        for other in [r for above in layers()[: depth + 1] for r in above]
+        if room not in (other, "__main__")
+    ]
+
+
+def test_every_edge_that_points_up_or_across_is_caught(tree: Path):
+    pairs = forbidden()
+    assert len(pairs) > 80
+    for room, other in pairs:
+        folder = tree / "src" / "hdcal" / room
+        path = folder / "planted.py" if folder.is_dir() else folder.with_suffix(".py")
+        before = path.read_text("utf-8") if path.exists() else '"""Planted."""\n'
+        path.write_text(f"{before}import hdcal.{other}\n", "utf-8")
+    result = lint(tree, "--contract", "rooms")
+    assert result.returncode == 1, result.stdout + result.stderr
+    said = " ".join(result.stdout.split())
+    for room, other in pairs:
+        words = f"hdcal.{room} is not allowed to import hdcal.{other}:"
+        assert words in said, words

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import ParamSpec, Self, TypeVar
 
+P = ParamSpec("P")
 T = TypeVar("T")
 
 
@@ -49,6 +50,39 @@ class InputError(HdcalError):
 
 class NotUsable(HdcalError):
     """A result exists but failed its checks, so nothing may be derived from it."""
+
+
+class Findings(list[Finding]):
+    """What several steps found wrong, said all at once.
+
+    As a context it raises an `InputError` of everything that was found inside it:
+
+        with Findings() as wrong:
+            case = wrong.attempt(read_case, path)
+            wrong.attempt(check_target, out)
+    """
+
+    def attempt(
+        self, make: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs
+    ) -> T | None:
+        """Return what is made, or None and keep why it cannot be."""
+        try:
+            return make(*args, **kwargs)
+        except InputError as error:
+            self += error.findings
+            return None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind, error, trace) -> None:
+        if isinstance(error, InputError):
+            self += error.findings
+        elif error is not None:
+            return
+        if self:
+            # One gear file may be behind many cases; its faults are said once.
+            raise InputError(dict.fromkeys(self)) from None
 
 
 def attempt(findings: list[Finding], make: Callable[..., T], *arguments) -> T | None:

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 
 from hdcal.classical.audit.article import Claim
-from hdcal.classical.audit.audit import audit, summarise_audit
+from hdcal.classical.audit.audit import audit
 from hdcal.classical.audit.data_claims import data_claims
+from hdcal.classical.audit.summary import audit_answer
 from hdcal.classical.audit.theory_claims import cubic
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
+from hdcal.report.plain import as_plain
 
 
 @pytest.fixture(scope="module")
@@ -115,7 +117,7 @@ def test_readings_that_bear_the_article_out_would_turn_the_verdicts(case):
 
 
 def test_the_plain_data_hold_the_fits_of_table_2(claims):
-    found = summarise_audit(claims)
+    found = as_plain(audit_answer(claims))
     assert sum(found["count"].values()) == len(claims)
     r2 = {one["model"]: round(one["r2"], 5) for one in found["fits"]}
     assert r2["a ω"] == 0.99396

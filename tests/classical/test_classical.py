@@ -8,9 +8,11 @@ from rigs import make_case, make_records
 from scipy import stats
 
 from hdcal.classical.fit.fit import fit, fit_powers
-from hdcal.classical.fit.summary import model_name, summarise_fits
+from hdcal.classical.fit.notation import model_name
+from hdcal.classical.fit.summary import fit_answer
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
+from hdcal.report.plain import as_plain
 
 DATASETS = Path(__file__).parents[2] / "datasets"
 # NIST StRD, linear regression, Pontius: deflection as a quadratic of load. The
@@ -205,10 +207,10 @@ def test_exact_data_leave_nothing_to_divide_by():
 
 def test_the_summary_says_what_the_curves_leave_out(pontius):
     case = read_case(DATASETS / "thermal-demo")
-    notes = " ".join(summarise_fits(case, fit(case))["notes"])
+    notes = " ".join(fit_answer(case, fit(case)).notes)
     assert "no curve here knows it" in notes
     assert "loading and unloading are fitted as one curve" in notes
-    found = summarise_fits(pontius, fit(pontius, [1, 2]), at=1.0)
+    found = as_plain(fit_answer(pontius, fit(pontius, [1, 2]), at=1.0))
     assert "2 runs are fitted as one" in " ".join(found["notes"])
     assert found["fits"][0]["held_out_runs_N"] > found["fits"][2]["held_out_runs_N"]
     assert min(one["aicc_over_best"] for one in found["fits"]) == 0.0
@@ -217,4 +219,4 @@ def test_the_summary_says_what_the_curves_leave_out(pontius):
     force = np.polyval(top["polyfit_order"], 1.0)
     assert top["at"]["force_N"] == pytest.approx(force, rel=1e-12)
     with pytest.raises(InputError, match="no deformation of this gear"):
-        summarise_fits(pontius, fit(pontius), at=400.0)
+        fit_answer(pontius, fit(pontius), at=400.0)

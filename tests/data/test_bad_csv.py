@@ -3,7 +3,7 @@
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.source_bytes import LONGEST_LINE
+from hdcal.data.text_file import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"

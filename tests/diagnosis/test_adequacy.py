@@ -8,20 +8,20 @@ from diagnosis_cases import NOISE, judged, rich, simulated
 from rigs import make_case
 
 from hdcal.diagnosis.adequacy import sign_odds
-from hdcal.diagnosis.model_posterior import Weighed, doubted
-from hdcal.evidence.noise_evidence import lattice_step
+from hdcal.diagnosis.model_posterior import ModelPosterior, move_to_unknown
+from hdcal.evidence.quantisation import rounding_step
 
-DOUBTED = {"none": 0.1, "unknown": 0.1, "a": 0.6, "a+b": 0.2}
+BEFORE = {"none": 0.1, "unknown": 0.1, "a": 0.6, "a+b": 0.2}
 
 
-def test_what_is_doubted_goes_to_unknown():
-    before = Weighed(DOUBTED, {"a": 0.8, "b": 0.2}, np.ones(1), {})
-    after = doubted(before, {"a": 0.5})
+def test_what_a_test_takes_away_goes_to_unknown():
+    before = ModelPosterior(BEFORE, {"a": 0.8, "b": 0.2}, np.ones(1), {})
+    after = move_to_unknown(before, {"a": 0.5})
     assert after.probabilities["a"] == pytest.approx(0.3)
     assert after.probabilities["unknown"] == pytest.approx(0.4)
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
     assert after.inclusion == pytest.approx({"a": 0.5, "b": 0.2})
-    assert doubted(before, {}).probabilities == pytest.approx(DOUBTED)
+    assert move_to_unknown(before, {}).probabilities == pytest.approx(BEFORE)
 
 
 def changed(change, seed: int = 3):
@@ -85,9 +85,9 @@ def test_counts_are_found_through_few_digits():
     rng = np.random.default_rng(2)
     true = 0.83721
     readings = np.round(0.3127 + true * rng.integers(0, 120, 200), 4)
-    step, _ = lattice_step(readings, 0.5)
+    step, _ = rounding_step(readings, 0.5)
     assert step == pytest.approx(true, rel=1e-5)
-    assert lattice_step(np.round(rng.normal(50.0, 20.0, 200), 4), 0.5)[0] == 0.0
+    assert rounding_step(np.round(rng.normal(50.0, 20.0, 200), 4), 0.5)[0] == 0.0
 
 
 def test_odds_of_signs_are_an_integral():

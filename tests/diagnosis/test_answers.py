@@ -10,10 +10,10 @@ from rigs import make_case, ramp
 
 from hdcal.data.prior import Prior
 from hdcal.diagnosis import diagnose as module
-from hdcal.diagnosis import next_run as next_test
-from hdcal.diagnosis.candidate_runs import proposals
+from hdcal.diagnosis import next_run
+from hdcal.diagnosis.candidate_runs import candidate_runs
 from hdcal.diagnosis.verdict import Verdict
-from hdcal.evidence.row_means import shorten
+from hdcal.evidence.row_means import average_rows
 from hdcal.physics.registry import EFFECTS
 
 CURVED = {"progressive_stiffening": {"slope": 0.1}}
@@ -67,7 +67,10 @@ def mirrored(records):
 
 def test_compression_read_as_negative_gets_the_same_runs(curved):
     records = curved.case.records
-    runs, others = proposals(records, 20.0), proposals(mirrored(records), 20.0)
+    runs, others = (
+        candidate_runs(records, 20.0),
+        candidate_runs(mirrored(records), 20.0),
+    )
     for one, other in zip(runs, others, strict=True):
         assert one.words == other.words
         np.testing.assert_allclose(
@@ -86,10 +89,10 @@ def test_compression_read_as_negative_gets_the_same_runs(curved):
 
 def test_without_a_run_there_is_a_reason(curved, monkeypatch):
     assert curved.next_test and not curved.no_run
-    monkeypatch.setattr(next_test, "_LEAST_NATS", np.inf)
+    monkeypatch.setattr(next_run, "_LEAST_NATS", np.inf)
     little = judged(curved.case)
     assert not little.next_test and "would tell more" in little.no_run
-    monkeypatch.setattr(next_test, "_LEAST_SHARE", 0.8)
+    monkeypatch.setattr(next_run, "_LEAST_SHARE", 0.8)
     few = judged(curved.case)
     assert not few.next_test and "fewer than two" in few.no_run
 
@@ -127,7 +130,7 @@ def test_a_gap_that_is_seen_is_not_put_down_to_rounding(curved):
 
 
 def test_the_rows_of_a_mean_are_told(monkeypatch):
-    monkeypatch.setattr(module, "shorten", lambda case: shorten(case, 60))
+    monkeypatch.setattr(module, "average_rows", lambda case: average_rows(case, 60))
     verdict = judged(simulated(rich()))
     assert verdict.averaged_rows == 3
     assert len(verdict.where.records.force) < 180 == len(verdict.case.records.force)

@@ -10,11 +10,15 @@ from types import ModuleType
 import jsonschema
 import pytest
 from commands import XB1, Hdcal
-from test_verdict_json import schema
 from verdicts import KINDS
 
-from hdcal.diagnosis.many_cases import run_all
+from hdcal.cli.processes import run_all
+from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, InputError
+from hdcal.report.answer import json_schema
+
+SCHEMA = json_schema(VerdictAnswer)
+
 
 FILES = {
     "report.html",
@@ -75,7 +79,7 @@ def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
     assert done.returncode == 0, done.stderr
     assert names(tmp_path / "run") == FILES
     found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
-    jsonschema.validate(found, schema())
+    jsonschema.validate(found, SCHEMA)
     assert json.loads(done.stdout) == found
     assert found["seed"] == 3 and not found["quick"]
     assert "Most likely cause: hysteresis (96 %)" in done.stderr

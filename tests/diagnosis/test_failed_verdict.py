@@ -7,13 +7,18 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from test_verdict_json import schema
 from verdicts import KINDS
 
 from hdcal.data.case import Case
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
 from hdcal.diagnosis.result_folder import write_verdict
-from hdcal.diagnosis.terminal import closing_words, overview
 from hdcal.diagnosis.verdict import Verdict
+from hdcal.report.answer import json_schema
+from hdcal.report.terminal import terminal_lines
+
+SCHEMA = json_schema(VerdictAnswer)
 
 
 def hollow(value):
@@ -40,10 +45,11 @@ def test_without_numbers_everything_is_written(kind: str, tmp_path: Path):
         folder = tmp_path / str(len(reasons))
         folder.mkdir()
         found = write_verdict(replace(verdict, reasons=reasons), folder)
-        jsonschema.validate(json.loads((folder / "verdict.json").read_text()), schema())
+        jsonschema.validate(json.loads((folder / "verdict.json").read_text()), SCHEMA)
         assert all(path.stat().st_size > 100 for path in folder.iterdir())
-        assert list(closing_words(found, "there"))
-        assert list(overview({kind: found}, "there"))
+        assert list(terminal_lines(verdict_document(found), "there"))
+        many = overview_document(verdicts_answer({kind: found}))
+        assert list(terminal_lines(many, "there"))
 
 
 def test_without_cells_or_rungs_everything_is_written(tmp_path: Path):

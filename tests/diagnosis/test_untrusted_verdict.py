@@ -4,17 +4,19 @@ from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
+from hostile_names import NAMES
 from rich.console import Console
-from test_untrusted_names import NAMES
 from verdicts import named
 
-from hdcal.diagnosis.document import verdict_report
+from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.figure.closure import shrink_figure
 from hdcal.diagnosis.figure.where import where_figure
 from hdcal.diagnosis.figure.which import which_figure
-from hdcal.diagnosis.terminal import closing_words, overview
-from hdcal.diagnosis.verdict_json import verdict_json
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.report.canvas import render
+from hdcal.report.html import html_page
+from hdcal.report.terminal import terminal_lines
 
 FIGURES = {"where": where_figure, "which": which_figure, "shrink": shrink_figure}
 
@@ -35,7 +37,7 @@ def renamed(name: str):
 @pytest.mark.parametrize("name", NAMES)
 def test_names_are_only_text(name: str):
     verdict = renamed(name)
-    found = verdict_json(verdict)
+    found = verdict_answer(verdict)
     images = {}
     for what in FIGURES:
         figure = FIGURES[what](verdict)
@@ -43,7 +45,7 @@ def test_names_are_only_text(name: str):
         tree = ElementTree.fromstring(images[what])
         tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
         assert not tags & {"script", "img", "foreignObject", "a"}
-    page = verdict_report(verdict, found, images, name)
+    page = html_page(verdict_document(found, verdict.case, name), images)
     assert "<script" not in page and "<img src=x" not in page and "<!--" not in page
     assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
     assert page.count("<title>") == page.count("</title>") == 1
@@ -51,10 +53,12 @@ def test_names_are_only_text(name: str):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_names_cannot_steer_the_terminal(name: str):
-    found = verdict_json(replace(renamed(name), reasons=()))
+    found = verdict_answer(replace(renamed(name), reasons=()))
     terminal = Console(record=True, width=110, highlight=False, quiet=False)
     with terminal.capture() as caught:
-        terminal.print(*closing_words(found, name), *overview({name: found}, name))
+        many = overview_document(verdicts_answer({name: found}))
+        for document in (verdict_document(found, command=name), many):
+            terminal.print(*terminal_lines(document, name))
     assert not set(caught.get()) & {"\x00", "\x1b", "\x07", "\u202e"}
 
 

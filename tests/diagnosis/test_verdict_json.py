@@ -4,30 +4,30 @@ import copy
 import json
 import math
 from dataclasses import replace
-from importlib.resources import files
 
 import jsonschema
 import pytest
 from rigs import cycles, make_case
 from verdicts import KINDS, named
 
+from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.places import places
-from hdcal.diagnosis.verdict_json import verdict_json
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.words import NO_PROOF, PROPORTIONAL
+from hdcal.report.answer import json_schema
 from hdcal.report.parameters import Interval
 from hdcal.report.plain import as_json
 from hdcal.report.words import likely, newton, percent
 
 
 def schema() -> dict:
-    """Return the schema that ships with the package."""
-    path = files("hdcal.report") / "schemas" / "verdict-1.schema.json"
-    return json.loads(path.read_text("utf-8"))
+    """Return the schema that is generated from the answer."""
+    return json_schema(VerdictAnswer)
 
 
 def plain(kind: str) -> dict:
     """Return a verdict as it is read back from its file."""
-    return json.loads(as_json(verdict_json(KINDS[kind]())))
+    return json.loads(as_json(verdict_answer(KINDS[kind]())))
 
 
 def text(kind: str) -> str:
@@ -48,7 +48,9 @@ def test_every_kind_obeys_the_schema(kind: str):
 @pytest.mark.parametrize("part", ["", "gap", "where", "which", "shrink", "budget"])
 def test_the_schema_misses_every_key_that_is_left_out(part: str):
     rules = schema()
-    keys = (rules["properties"][part] if part else rules)["required"]
+    place = rules["properties"][part]["$ref"].rpartition("/")[2] if part else None
+    keys = (rules["$defs"][place] if place else rules)["required"]
+    assert len(keys) > 3
     for key in keys:
         found = copy.deepcopy(plain("named"))
         del (found[part] if part else found)[key]
@@ -105,7 +107,7 @@ def test_the_contract_of_the_format_holds():
 def test_what_is_not_a_number_is_null():
     verdict = named()
     gap = replace(verdict.gap, rms_N=Interval(math.nan, math.nan, math.inf))
-    found = json.loads(as_json(verdict_json(replace(verdict, gap=gap))))
+    found = json.loads(as_json(verdict_answer(replace(verdict, gap=gap))))
     assert found["gap"]["rms_N"] == {"median": None, "lo": None, "hi": None}
     jsonschema.validate(found, schema())
 
@@ -147,7 +149,7 @@ def said(verdict, **parts) -> str:
         part: replace(getattr(verdict, part), **values)
         for part, values in parts.items()
     }
-    return " ".join(verdict_json(replace(verdict, **new))["answer"])
+    return " ".join(verdict_answer(replace(verdict, **new)).answer)
 
 
 def test_an_unknown_that_only_leads_is_said_with_a_reserve():
@@ -169,10 +171,10 @@ def test_of_means_the_noise_is_that_of_a_mean():
     # 144 rows in all, of which 48 means were looked at.
     case = make_case(cycles(144))
     verdict = replace(verdict, case=case, averaged_rows=3)
-    found = verdict_json(verdict)
-    assert found["data"]["rows"] == 144 and found["data"]["averaged_rows"] == 3
+    found = verdict_answer(verdict)
+    assert found.data.rows == 144 and found.data.averaged_rows == 3
     jsonschema.validate(json.loads(as_json(found)), schema())
-    words = " ".join(found["answer"])
+    words = " ".join(found.answer)
     assert "the noise of a mean of 3 readings is 0.3 N" in words
     # 4.2 · 0.3 / √48
     assert "a gap of less than about 0.18 N" in words
@@ -198,8 +200,8 @@ def test_of_many_pairs_of_one_shape_those_that_matter_are_named():
     assert "nor 2 other pairs" in words
     verdict = named()
     fewer = replace(verdict.which, inseparable=verdict.which.inseparable[1:])
-    found = verdict_json(replace(verdict, which=fewer))
-    assert any("nor 1 other pair (in" in line for line in found["limits"])
+    found = verdict_answer(replace(verdict, which=fewer))
+    assert any("nor 1 other pair (in" in line for line in found.limits)
 
 
 @pytest.mark.parametrize(
@@ -215,7 +217,7 @@ def test_a_gap_without_a_range_that_is_off(statistic: str, words: str):
     chances = {"largest": 3.0, "p_spread": 0.5, "p_largest": 0.6, statistic: 0.001}
     where = replace(verdict.where, cells=cells, statistics=chances)
     gap = replace(verdict.gap, rms_N=Interval(1.5, 1.0, 2.0))
-    assert words in verdict_json(replace(verdict, where=where, gap=gap))["answer"][0]
+    assert words in verdict_answer(replace(verdict, where=where, gap=gap)).answer[0]
 
 
 def test_a_failed_diagnosis_answers_nothing():
@@ -231,14 +233,12 @@ def test_touching_ranges_of_one_sign_are_one_place():
     assert len(found["where"]["regions"]) == 5
 
 
-def cell(covariate: str, low: float, high: float, bias: float) -> dict:
-    """Return a cell as plain data, as far as words are made of it."""
+def cell(covariate: str, low: float, high: float, bias: float) -> CellAnswer:
+    """Return a cell, as far as words are made of it."""
     label = {"run": "run 3", "direction": "unloading"}.get(covariate, "loading, 1 mm")
-    nowhere = low != low
-    ends = {"from": None if nowhere else low, "to": None if nowhere else high}
     unit = {"time": "s", "temperature": "°C"}.get(covariate, "")
-    words = {"covariate": covariate, "label": label, "unit": unit}
-    return {**words, **ends, "bias_N": {"median": bias}}
+    size = Interval(bias, bias, bias)
+    return CellAnswer(covariate, label, low, high, unit, 1, size, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -253,9 +253,9 @@ def cell(covariate: str, low: float, high: float, bias: float) -> dict:
         (cell("direction × deformation", 0.0, 1.0, 1.0), "for loading, 1 mm"),
     ],
 )
-def test_places_in_words(region: dict, words: str):
+def test_places_in_words(region: CellAnswer, words: str):
     ends = cell("time", 0.0, 1.0, 0.0), cell("time", 1.0, 2000.0, 0.0)
-    where = {"regions": [region], "cells": [region, *ends]}
+    where = WhereAnswer(0.0, {}, (), (region,), (region, *ends))
     assert list(places(where)) == [(words, 1.0)]
 
 

@@ -2,19 +2,20 @@
 
 from dataclasses import replace
 
-from rich.table import Table
 from verdicts import KINDS, named
 
-from hdcal.diagnosis.document import verdict_report
-from hdcal.diagnosis.terminal import overview
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.overview import overview_document, verdicts_answer
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.verdict import Verdict
-from hdcal.diagnosis.verdict_json import verdict_json
+from hdcal.report.document import Table
+from hdcal.report.html import html_page
 
 
 def page(verdict: Verdict) -> str:
     """Return the text of the report, its figures empty."""
     images = {name: b"" for name in ("where", "which", "shrink")}
-    return verdict_report(verdict, verdict_json(verdict), images)
+    return html_page(verdict_document(verdict_answer(verdict), verdict.case), images)
 
 
 def test_k_is_said_with_its_formula():
@@ -34,9 +35,12 @@ def test_what_is_not_seen_has_a_dash_for_its_size():
     words = page(KINDS["none"]())
     assert "0 … 0 N" not in words and "of full scale" not in words
     assert "of what is not seen there is no size" in words
-    table, *_ = overview({"a": verdict_json(KINDS["none"]())}, "there")
+    document = overview_document(
+        verdicts_answer({"a": verdict_answer(KINDS["none"]())})
+    )
+    (table,) = document.sections[0].blocks
     assert isinstance(table, Table)
-    assert [str(cell) for cell in table.columns[4].cells] == ["–"]
+    assert [row[table.columns.index("gap")] for row in table.rows] == ["–"]
 
 
 def test_rounding_is_told_apart_from_the_gate():

@@ -4,12 +4,17 @@ import numpy as np
 import pytest
 
 from hdcal.diagnosis.library import choose_library
-from hdcal.diagnosis.model_posterior import Weighed, log_priors, verdict_word, weigh
+from hdcal.diagnosis.model_posterior import (
+    ModelPosterior,
+    log_priors,
+    model_posterior,
+    verdict_word,
+)
 from hdcal.errors import InputError
 from hdcal.physics.registry import EFFECTS
 
 
-def weighed(**share) -> Weighed:
+def handmade(**share) -> ModelPosterior:
     """Return a hand-made posterior; what is not said of the names is inferred."""
     share = {name.replace("__", "+"): value for name, value in share.items()}
     effects = {p for n in share for p in n.split("+")} - {"none", "unknown"}
@@ -17,7 +22,7 @@ def weighed(**share) -> Weighed:
         effect: sum(v for n, v in share.items() if effect in n.split("+"))
         for effect in sorted(effects)
     }
-    return Weighed(share, inclusion, np.ones(1), {})
+    return ModelPosterior(share, inclusion, np.ones(1), {})
 
 
 @pytest.mark.parametrize(
@@ -35,14 +40,14 @@ def weighed(**share) -> Weighed:
     ],
 )
 def test_one_word_for_a_table(share, detected, word):
-    assert verdict_word(weighed(**share), detected) == word
+    assert verdict_word(handmade(**share), detected) == word
 
 
 def test_the_smallest_set_holds_ninety_per_cent():
-    found = weighed(none=0.05, unknown=0.02, a=0.6, b=0.2, a__c=0.13)
+    found = handmade(none=0.05, unknown=0.02, a=0.6, b=0.2, a__c=0.13)
     assert found.smallest_set == ("a", "b", "c")
-    assert weighed(none=0.05, unknown=0.01, a=0.94).smallest_set == ("a",)
-    assert weighed(none=0.2, unknown=0.0, a=0.8).smallest_set == ("a", "none")
+    assert handmade(none=0.05, unknown=0.01, a=0.94).smallest_set == ("a",)
+    assert handmade(none=0.2, unknown=0.0, a=0.8).smallest_set == ("a", "none")
 
 
 def test_priors_sum_to_one_and_groups_keep_their_share():
@@ -63,13 +68,13 @@ def test_weighing_is_bayes_rule():
     prior = np.exp(log_priors(names))
     joint = prior[:, None] * np.exp(np.stack([table[n] for n in names]))
     joint /= joint.sum()
-    found = weigh(table)
+    found = model_posterior(table)
     expected = dict(zip(names, joint.sum(axis=1), strict=True))
     assert found.probabilities == pytest.approx(expected)
     np.testing.assert_allclose(found.correlation, joint.sum(axis=0))
     both = expected["a"] + expected["a+b"]
     assert found.inclusion["a"] == pytest.approx(both)
-    shifted = weigh({name: value + 500.0 for name, value in table.items()})
+    shifted = model_posterior({name: value + 500.0 for name, value in table.items()})
     assert shifted.probabilities == pytest.approx(found.probabilities)
 
 

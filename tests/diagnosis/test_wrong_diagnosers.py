@@ -9,11 +9,11 @@ from rigs import cycles
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
-from hdcal.diagnosis.model_posterior import log_priors, weigh
-from hdcal.evidence import prepare as ground
-from hdcal.evidence.assess import assess
-from hdcal.evidence.assessment import NONE
-from hdcal.evidence.whitened_rows import CORRELATIONS
+from hdcal.diagnosis.model_posterior import log_priors, model_posterior
+from hdcal.evidence import prepare as prepare_module
+from hdcal.evidence.case_evidence import NONE
+from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.evidence.linear_rows import CORRELATIONS
 from hdcal.inference.distributions import frozen
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
@@ -31,7 +31,8 @@ LEVEL = 1e-3
 
 
 def probabilities(case) -> dict[str, float]:
-    return weigh(assess(case, LIBRARY, effect_priors()).table).probabilities
+    evidence = compute_evidence(case, LIBRARY, effect_priors())
+    return model_posterior(evidence.table).probabilities
 
 
 def shares(case) -> dict[str, float]:
@@ -59,7 +60,7 @@ def test_noise_seldom_alarms(correlation):
 
 def test_evidences_that_know_no_serial_noise_alarm(monkeypatch):
     # As many as before, so that nothing is compiled anew.
-    monkeypatch.setattr(ground, "CORRELATIONS", (0.0,) * len(CORRELATIONS))
+    monkeypatch.setattr(prepare_module, "CORRELATIONS", (0.0,) * len(CORRELATIONS))
     found = alarms.__wrapped__(0.5, 25)
     assert stats.binomtest(found, 25, 0.05, "greater").pvalue < LEVEL, found
 

@@ -12,26 +12,34 @@ from dense import (
     log_integral,
     log_normal,
     noise_grid,
-    settle,
+    prepared_case,
 )
 from scipy.special import logsumexp
 
-from hdcal.evidence.amplitude_grids import SCALE_WEIGHTS, SCALES
 from hdcal.evidence.closed_form import (
-    block_evidence,
-    entry_evidence,
-    plain_evidence,
+    base_evidence,
+    cell_evidence,
+    subspace_evidence,
 )
-from hdcal.evidence.closed_form_pairs import Couples, couple_evidence
-from hdcal.evidence.effect_lines import TOLERANCES, draw_lines, entries_of, join
 from hdcal.evidence.inner_products import (
-    block_statistics,
-    gram,
-    ground,
-    line_statistics,
-    tolerant_statistics,
+    common_terms,
+    gram_matrix,
+    piece_products,
+    subspace_products,
 )
-from hdcal.evidence.whitened_rows import log_absorbed, whiten, whitening_jacobian
+from hdcal.evidence.linear_rows import (
+    log_det_projection,
+    log_det_whitening,
+    whiten,
+)
+from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES
+from hdcal.evidence.piecewise_effect import (
+    TOLERANCES,
+    amplitude_cells,
+    join_cells,
+    piecewise_effect,
+)
+from hdcal.evidence.piecewise_pairs import CellPairs, cell_pair_evidence
 from hdcal.physics.registry import EFFECTS
 
 CORRELATIONS = (0.0, 0.4)
@@ -47,39 +55,39 @@ def at_one(setting, correlation):
     return replace(setting.rows, correlations=np.array([correlation]))
 
 
-def laid_out(effect, correlation):
-    """Return rows, lines of the effect and prior of σ for data that show it."""
-    records = settle().records
-    setting = settle(ADDED[effect](records), correlation=correlation)
-    lines = draw_lines(EFFECTS[effect], setting)
-    assert lines.linear
-    return at_one(setting, correlation), lines, setting.priors["sigma"]
+def prepared(effect, correlation):
+    """Return rows, pieces of the effect and prior of σ for data that show it."""
+    records = prepared_case().records
+    setting = prepared_case(ADDED[effect](records), correlation=correlation)
+    pieces = piecewise_effect(EFFECTS[effect], setting)
+    assert pieces.linear
+    return at_one(setting, correlation), pieces, setting.priors["sigma"]
 
 
-def entries_at(lines, tolerance):
-    """Return entries with one tolerance, as likely as not."""
+def cells_at(pieces, tolerance):
+    """Return cells with one tolerance, as likely as not."""
     if tolerance == 0.0:
-        return join([entries_of(lines, tight=True)], [0])
-    part = entries_of(lines)
-    kept = part["tolerance"] == tolerance
-    part = {name: column[kept] for name, column in part.items()}
-    part["log_weight"] += np.log(len(TOLERANCES)) - np.log(0.6)
-    return join([part], [0])
+        return amplitude_cells(pieces, exact=True)
+    cells = amplitude_cells(pieces)
+    kept = cells.tolerance == tolerance
+    cells = jax.tree.map(lambda column: column[kept], cells)
+    weight = cells.log_weight + np.log(len(TOLERANCES)) - np.log(0.6)
+    return join_cells([replace(cells, log_weight=weight)], [0])
 
 
-def closed_line(rows, lines, tolerance, sigma):
-    nodes = tolerant_statistics(rows, lines.offsets, lines.slopes, lines.shapes)
-    found = entry_evidence(ground(rows), nodes, entries_at(lines, tolerance), sigma)
+def closed_form(rows, pieces, tolerance, sigma):
+    nodes = piece_products(rows, pieces.offsets, pieces.slopes, pieces.shapes)
+    found = cell_evidence(common_terms(rows), nodes, cells_at(pieces, tolerance), sigma)
     return float(logsumexp(np.asarray(found[0])))
 
 
 @pytest.mark.parametrize("correlation", CORRELATIONS)
 @pytest.mark.parametrize("effect", ADDED)
 def test_no_effect_is_a_dense_normal(effect, correlation):
-    rows, lines, sigma = laid_out(effect, correlation)
-    nothing = 0.0 * lines.slopes
-    length = line_statistics(rows, nothing, nothing).ee[:, 0]
-    found = plain_evidence(ground(rows), length, sigma)[0]
+    rows, pieces, sigma = prepared(effect, correlation)
+    nothing = 0.0 * pieces.slopes
+    length = piece_products(rows, nothing, nothing).ee[:, 0]
+    found = base_evidence(common_terms(rows), length, sigma)[0]
     fixed, reading = covariance(rows, correlation), np.asarray(rows.reading)[:, None]
     slow = [
         log_normal(reading, sd**2 * fixed)[0] + weight
@@ -93,27 +101,27 @@ def test_no_effect_is_a_dense_normal(effect, correlation):
 @pytest.mark.parametrize("effect", ADDED)
 def test_a_linear_effect_is_its_integral(effect, correlation, tolerance):
     """Over amplitude, three prior scales and σ; the shape may differ by a fifth."""
-    rows, lines, sigma = laid_out(effect, correlation)
+    rows, pieces, sigma = prepared(effect, correlation)
     slow = line_integral(
         rows,
-        lines.slopes[0],
-        lines.grid,
+        pieces.slopes[0],
+        pieces.grid,
         sigma,
         correlation,
         tolerance,
         SCALES,
         SCALE_WEIGHTS,
     )
-    assert closed_line(rows, lines, tolerance, sigma) == pytest.approx(slow, abs=0.02)
+    assert closed_form(rows, pieces, tolerance, sigma) == pytest.approx(slow, abs=0.02)
 
 
 def test_cells_of_the_tolerance_are_coarse():
     """A tolerance in proportion to the amplitude itself gives 0.36 nat less here."""
-    rows, lines, sigma = laid_out("coulomb_friction", 0.0)
+    rows, pieces, sigma = prepared("coulomb_friction", 0.0)
     meant = line_integral(
         rows,
-        lines.slopes[0],
-        lines.grid,
+        pieces.slopes[0],
+        pieces.grid,
         sigma,
         0.0,
         0.2,
@@ -121,36 +129,38 @@ def test_cells_of_the_tolerance_are_coarse():
         SCALE_WEIGHTS,
         cells=False,
     )
-    assert abs(closed_line(rows, lines, 0.2, sigma) - meant) < 0.5
+    assert abs(closed_form(rows, pieces, 0.2, sigma) - meant) < 0.5
 
 
 @pytest.mark.parametrize("forgotten", ["base model", "correlation", "half the prior"])
 def test_a_wrong_integral_is_noticed(forgotten):
     """The comparison can fail: leave one thing out of the closed form."""
-    rows, lines, sigma = laid_out("coulomb_friction", 0.4)
+    rows, pieces, sigma = prepared("coulomb_friction", 0.4)
     slow = line_integral(
-        rows, lines.slopes[0], lines.grid, sigma, 0.4, 0.0, SCALES, SCALE_WEIGHTS
+        rows, pieces.slopes[0], pieces.grid, sigma, 0.4, 0.0, SCALES, SCALE_WEIGHTS
     )
     wrong = {
         "base model": replace(rows, base=0.5 * rows.base),
         "correlation": replace(rows, correlations=np.array([0.2])),
         "half the prior": rows,
     }[forgotten]
-    found = closed_line(wrong, lines, 0.0, sigma)
+    found = closed_form(wrong, pieces, 0.0, sigma)
     found -= np.log(2.0) * (forgotten == "half the prior")
     assert abs(found - slow) > 0.1
 
 
 @pytest.mark.parametrize("correlation", CORRELATIONS)
 def test_a_subspace_is_a_dense_normal(correlation):
-    setting = settle(0.6 * np.sin(np.arange(24) / 3.0), correlation=correlation)
+    setting = prepared_case(0.6 * np.sin(np.arange(24) / 3.0), correlation=correlation)
     rows, sigma = at_one(setting, correlation), setting.priors["sigma"]
     columns = np.random.default_rng(8).normal(size=(5, 24)) / 2.0
     columns[4] = 0.0  # padding
     columns[0] = np.sin(np.arange(24) / 3.0)
     scale = np.array([[0.1, 0.6, 3.0]])
-    blocks = block_statistics(rows, columns[None])
-    found = block_evidence(ground(rows), blocks, scale, np.log(scale / 3.7), sigma)
+    blocks = subspace_products(rows, columns[None])
+    found = subspace_evidence(
+        common_terms(rows), blocks, scale, np.log(scale / 3.7), sigma
+    )
     fixed, reading = covariance(rows, correlation), np.asarray(rows.reading)[:, None]
     for factor, one in zip(scale[0], np.asarray(found)[0, 0], strict=True):
         wide = factor**2 * columns.T @ columns
@@ -162,20 +172,20 @@ def test_a_subspace_is_a_dense_normal(correlation):
         assert one == pytest.approx(slow, abs=0.02), factor
 
 
-def couple(angle, low, high, truth=(0.5, 0.5), seed=2):
+def cell_pair(angle, low, high, truth=(0.5, 0.5), seed=2):
     """Return rows, slopes and inner products of two effects so much alike."""
     rng = np.random.default_rng(seed)
-    one = np.asarray(settle().records.sense, float)
+    one = np.asarray(prepared_case().records.sense, float)
     other = np.cos(np.arange(24) * 1.3)
     two = angle * one + np.sqrt(1.0 - angle**2) * other / other.std()
-    setting = settle(truth[0] * one + truth[1] * two, seed=int(rng.integers(99)))
+    setting = prepared_case(truth[0] * one + truth[1] * two, seed=int(rng.integers(99)))
     rows = at_one(setting, 0.0)
-    table = np.asarray(gram(rows, 0.0, np.stack([one, two])))
+    table = np.asarray(gram_matrix(rows, 0.0, np.stack([one, two])))
 
     def each(value):
         return np.broadcast_to(np.asarray(value, float).reshape(-1, 1), (2, 1))
 
-    couples = Couples(
+    pairs = CellPairs(
         ee=table[0, :1],
         eu=table[0, 1:, None],
         uu=np.array([table[1, 1], table[1, 2], table[2, 2]])[:, None],
@@ -185,12 +195,12 @@ def couple(angle, low, high, truth=(0.5, 0.5), seed=2):
         precision=each(1.0 / 1.5**2),
         log_height=np.log(1.0 / (2.0 * np.pi * 1.5**2)) * np.ones(1),
     )
-    return rows, setting.priors["sigma"], np.stack([one, two]), couples
+    return rows, setting.priors["sigma"], np.stack([one, two]), pairs
 
 
-def couple_integral(rows, sigma, slopes, couples):
+def cell_pair_integral(rows, sigma, slopes, pairs):
     """Integrate over both amplitudes on a fine mesh, and over σ."""
-    low, high = np.asarray(couples.low)[:, 0], np.asarray(couples.high)[:, 0]
+    low, high = np.asarray(pairs.low)[:, 0], np.asarray(pairs.high)[:, 0]
     a, b = (np.linspace(*ends, 161) for ends in zip(low, high, strict=True))
     mesh = np.stack(np.meshgrid(a, b, indexing="ij"))
     target = np.asarray(rows.reading) - np.einsum("kij,kn->ijn", mesh, slopes)
@@ -216,17 +226,17 @@ BOXES = {
 @pytest.mark.parametrize("box", BOXES)
 @pytest.mark.parametrize("angle", [0.0, 0.5, 0.9])
 def test_a_pair_is_its_double_integral(angle, box):
-    rows, sigma, slopes, couples = couple(angle, *BOXES[box])
-    shared = ground(rows)
-    found = couple_evidence(shared.constant[0], shared.rows, couples, sigma)[0]
-    slow = couple_integral(rows, sigma, slopes, couples)
+    rows, sigma, slopes, pairs = cell_pair(angle, *BOXES[box])
+    shared = common_terms(rows)
+    found = cell_pair_evidence(shared.constant[0], shared.rows, pairs, sigma)[0]
+    slow = cell_pair_integral(rows, sigma, slopes, pairs)
     assert found == pytest.approx(slow, abs=0.1)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.3, 0.6])
 def test_whitened_rows_are_independent(correlation):
     rows = replace(
-        settle().rows,
+        prepared_case().rows,
         before=np.where(np.arange(24) % 8 == 0, -1, np.arange(24) - 1),
         weight=1.0 / np.linspace(0.7, 1.4, 24),
     )
@@ -234,21 +244,21 @@ def test_whitened_rows_are_independent(correlation):
     serial = covariance(replace(rows, base=0.0 * rows.base), correlation)
     np.testing.assert_allclose(matrix @ serial @ matrix.T, np.eye(24), atol=1e-12)
     volume = np.linalg.slogdet(matrix)[1]
-    assert whitening_jacobian(rows, correlation) == pytest.approx(volume)
+    assert log_det_whitening(rows, correlation) == pytest.approx(volume)
     dense = matrix @ covariance(rows, correlation) @ matrix.T
-    assert log_absorbed(rows, correlation) == pytest.approx(
+    assert log_det_projection(rows, correlation) == pytest.approx(
         -np.linalg.slogdet(dense)[1]
     )
 
 
 def test_products_are_those_of_the_inverse_covariance():
-    setting = settle()
+    setting = prepared_case()
     rows = at_one(setting, 0.4)
     curves = np.random.default_rng(3).normal(size=(3, 24))
     table = np.concatenate([np.asarray(rows.reading)[None], curves])
     dense = table @ np.linalg.solve(covariance(rows, 0.4), table.T)
-    np.testing.assert_allclose(gram(rows, 0.4, curves), dense, rtol=1e-6)
-    nodes = line_statistics(rows, curves, curves[::-1])
+    np.testing.assert_allclose(gram_matrix(rows, 0.4, curves), dense, rtol=1e-6)
+    nodes = piece_products(rows, curves, curves[::-1])
     left = table[0] - curves
     dense = np.linalg.inv(covariance(rows, 0.4))
     np.testing.assert_allclose(nodes.ee[0], np.diag(left @ dense @ left.T), rtol=1e-6)

@@ -20,12 +20,12 @@ from scipy.special import logsumexp
 
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
-from hdcal.evidence import effect_lines as lines_module
-from hdcal.evidence.effect_curves import curves
-from hdcal.evidence.effect_lines import draw_lines
-from hdcal.evidence.prepare import lay_out
-from hdcal.evidence.single_evidence import assess_singles
-from hdcal.evidence.whitened_rows import beside_line
+from hdcal.evidence import piecewise_effect as pieces_module
+from hdcal.evidence.effect_curves import effect_curves
+from hdcal.evidence.linear_rows import remove_base
+from hdcal.evidence.piecewise_effect import piecewise_effect
+from hdcal.evidence.prepare import prepare
+from hdcal.evidence.single_evidence import single_evidence
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
@@ -67,10 +67,12 @@ def data_of(name: str, gap: float):
     field = next(n for n, about in declared.items() if about.null is not None)
     own = {n: np.array([about.typical]) for n, about in declared.items()}
     shaped = replace(case.records, force=159.0 * np.asarray(case.records.deformation))
-    setting = lay_out(replace(case, records=shaped), effect_priors(), TRUTH["sigma"])
+    prepared = prepare(replace(case, records=shaped), effect_priors(), TRUTH["sigma"])
     for _ in range(8):
-        added = curves(effect, own, setting.base, setting.records, setting.reading)
-        left = np.asarray(beside_line(setting.rows, added))
+        added = effect_curves(
+            effect, own, prepared.base, prepared.records, prepared.reading
+        )
+        left = remove_base(prepared.rows, added)
         own[field] = own[field] * gap * TRUTH["sigma"] / np.sqrt(np.mean(left**2))
     truth = TRUTH | {f"{name}.{n}": v[0] for n, v in own.items()}
     problem = build_problem(case, effect_priors(), (effect,))
@@ -79,13 +81,13 @@ def data_of(name: str, gap: float):
 
 def closed(case, name: str) -> float:
     """Return the closed form's log ratio, with the amplitude's prior as it stands."""
-    setting = lay_out(case, effect_priors())
-    rows = replace(setting.rows, correlations=np.zeros(1))
-    drawn = [draw_lines(EFFECTS[name], setting)]
+    prepared = prepare(case, effect_priors())
+    rows = replace(prepared.rows, correlations=np.zeros(1))
+    drawn = [piecewise_effect(EFFECTS[name], prepared)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lines_module, "SCALES", np.ones(1))
-        patch.setattr(lines_module, "SCALE_WEIGHTS", np.ones(1))
-        found = assess_singles(rows, drawn, setting.priors["sigma"], tolerant=False)
+        patch.setattr(pieces_module, "SCALES", np.ones(1))
+        patch.setattr(pieces_module, "SCALE_WEIGHTS", np.ones(1))
+        found = single_evidence(rows, drawn, prepared.priors["sigma"], tolerant=False)
     return float(found.by_correlation(name)[0] - found.none[0])
 
 
@@ -174,10 +176,10 @@ def test_another_prior_is_noticed(monkeypatch):
     """The comparison can fail: the mixture of scales in place of the shipped prior."""
     name = SLICE[0]
     case = data_of(name, SMALL)
-    setting = lay_out(case, effect_priors())
-    rows = replace(setting.rows, correlations=np.zeros(1))
-    drawn = [draw_lines(EFFECTS[name], setting)]
-    sigma = setting.priors["sigma"]
-    found = assess_singles(rows, drawn, sigma, tolerant=False)
+    prepared = prepare(case, effect_priors())
+    rows = replace(prepared.rows, correlations=np.zeros(1))
+    drawn = [piecewise_effect(EFFECTS[name], prepared)]
+    sigma = prepared.priors["sigma"]
+    found = single_evidence(rows, drawn, sigma, tolerant=False)
     wrong = float(found.by_correlation(name)[0] - found.none[0])
     assert abs(wrong - closed(case, name)) > BAR

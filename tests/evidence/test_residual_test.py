@@ -1,22 +1,22 @@
-"""The gate keeps its false-alarm rate, and its z values are those of dense algebra."""
+"""The residual test keeps its false-alarm rate; its z values are those of algebra."""
 
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from dense import NOISE, covariance, settle
+from dense import NOISE, covariance, prepared_case
 from scipy import stats
 
-from hdcal.evidence.residual_test import gate, pull_back
-from hdcal.evidence.whitened_rows import whiten
+from hdcal.evidence.linear_rows import whiten
+from hdcal.evidence.residual_test import Directions, pull_back, residual_test
 
 SIZE, RUNS = 24, 240
 
 
-def directions():
-    """Return cells and curves that the base model does not hold."""
-    records = settle().records
+def directions() -> Directions:
+    """Return cells and curves that the base model does not hold, and others."""
+    records = prepared_case().records
     cells = np.stack(
         [
             records.sense > 0,
@@ -27,7 +27,7 @@ def directions():
         axis=1,
     )
     curves = np.stack([records.deformation**2, np.sin(records.angle)], axis=1)
-    return cells.astype(float), curves
+    return Directions(cells.astype(float), curves, labels(), waves())
 
 
 def labels():
@@ -39,18 +39,18 @@ def waves():
 
 
 @cache
-def null_gates(correlation, believed):
-    """Return gates of pure noise about a base model drawn from its prior."""
-    setting, (cells, curves) = settle(), directions()
+def null_tests(correlation, believed):
+    """Return tests of pure noise about a base model drawn from its prior."""
+    prepared = prepared_case()
     rng = np.random.default_rng(17)
     lag = np.abs(np.arange(SIZE)[:, None] - np.arange(SIZE))
     factor = np.linalg.cholesky(correlation**lag)
     found = []
     for _ in range(RUNS):
         noise = NOISE * factor @ rng.normal(size=SIZE)
-        reading = setting.rows.base @ rng.normal(size=4) + noise
-        one = replace(setting, rows=replace(setting.rows, reading=reading))
-        found.append(gate(one, believed, cells, curves, labels(), waves(), rng))
+        reading = prepared.rows.base @ rng.normal(size=4) + noise
+        one = replace(prepared, rows=replace(prepared.rows, reading=reading))
+        found.append(residual_test(one, believed, directions(), rng))
     return found
 
 
@@ -60,20 +60,20 @@ def null_gates(correlation, believed):
 )
 def test_p_values_of_noise_are_uniform(statistic, correlation):
     values = [
-        g.statistics[f"p_{statistic}"] for g in null_gates(correlation, correlation)
+        g.statistics[f"p_{statistic}"] for g in null_tests(correlation, correlation)
     ]
     assert stats.kstest(values, "uniform").pvalue > 1e-3
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5])
-def test_noise_passes_the_gate_as_seldom_as_it_says(correlation):
-    alarms = sum(g.p_value <= 0.05 for g in null_gates(correlation, correlation))
+def test_noise_fails_the_test_as_seldom_as_it_says(correlation):
+    alarms = sum(g.p_value <= 0.05 for g in null_tests(correlation, correlation))
     assert stats.binomtest(alarms, RUNS, 0.05, "greater").pvalue > 1e-3
 
 
 def test_serial_noise_taken_for_independent_is_noticed():
     """The check can fail: the same noise, its correlation not known."""
-    alarms = sum(g.p_value <= 0.05 for g in null_gates(0.5, 0.0))
+    alarms = sum(g.p_value <= 0.05 for g in null_tests(0.5, 0.0))
     assert stats.binomtest(alarms, RUNS, 0.05, "greater").pvalue < 1e-3, alarms
 
 
@@ -81,8 +81,8 @@ def test_serial_noise_taken_for_independent_is_noticed():
 def test_pulling_back_is_the_transposed_inverse(correlation):
     before = np.where(np.isin(np.arange(9), [0, 4, 8]), -1, np.arange(9) - 1)
     weight = np.linspace(0.5, 1.5, 9)
-    setting = settle(rows=12)
-    rows = replace(setting.rows, before=before, weight=weight)
+    prepared = prepared_case(rows=12)
+    rows = replace(prepared.rows, before=before, weight=weight)
     matrix = np.asarray(whiten(rows, np.eye(9), correlation))
     cells = np.random.default_rng(1).normal(size=(9, 3))
     found = pull_back(before, weight, correlation, cells)
@@ -92,8 +92,9 @@ def test_pulling_back_is_the_transposed_inverse(correlation):
 @pytest.mark.parametrize("correlation", [0.0, 0.4])
 def test_z_of_a_cell_is_its_sum_over_its_sd(correlation):
     """Generalised least squares with dense matrices; slope and offset are free."""
-    setting, (cells, curves) = settle(0.8), directions()
-    rows = setting.rows
+    prepared, declared = prepared_case(0.8), directions()
+    cells = declared.cells
+    rows = prepared.rows
     serial = covariance(replace(rows, base=0.0 * rows.base), correlation)
     below = np.asarray(rows.precision).copy()
     below[:2] = 0.0
@@ -104,15 +105,7 @@ def test_z_of_a_cell_is_its_sum_over_its_sd(correlation):
     residual = reading - smooth @ reading
     # In units of σ²: prior rows are data with noise too.
     spread = serial - base @ np.linalg.solve(gram, base.T)
-    found = gate(
-        setting,
-        correlation,
-        cells,
-        curves,
-        labels(),
-        waves(),
-        np.random.default_rng(0),
-    )
+    found = residual_test(prepared, correlation, declared, np.random.default_rng(0))
     np.testing.assert_allclose(found.residual, residual, atol=1e-8)
     # Before the common factor, the noise sd.
     total = cells.T @ residual

@@ -82,7 +82,7 @@ def test_effects_of_the_moment_go_along_and_others_are_named():
 
 def test_what_swings_faster_than_the_points_is_told():
     found = respond(still_posterior(), "step", **KNOWN, **{**SMALL, "duration": 0.5})
-    assert any("more --points" in words for words in found.remarks)
+    assert any("more points" in words for words in found.remarks)
 
 
 def test_nothing_follows_from_a_failed_calibration():

@@ -6,14 +6,14 @@ from scipy import linalg, stats
 from scipy.special import logsumexp
 
 from hdcal.data.priors import effect_priors
-from hdcal.evidence.prepare import Setting, lay_out
-from hdcal.evidence.whitened_rows import beside_line
+from hdcal.evidence.linear_rows import remove_base
+from hdcal.evidence.prepare import PreparedCase, prepare
 from hdcal.inference.distributions import frozen
 
 NOISE = 0.4
 
 
-def settle(added=0.0, *, rows=24, correlation=0.0, seed=4) -> Setting:
+def prepared_case(added=0.0, *, rows=24, correlation=0.0, seed=4) -> PreparedCase:
     """Return a small case of cycles with AR(1) noise and something added [N]."""
     records = cycles(rows)
     rng = np.random.default_rng(seed)
@@ -25,7 +25,7 @@ def settle(added=0.0, *, rows=24, correlation=0.0, seed=4) -> Setting:
     force = 195.0 * records.deformation * (1.0 - 3e-4 * rise) + 1.0 + added + noise
     case = make_case(records, make_gear())
     object.__setattr__(case.records, "force", force)
-    return lay_out(case, effect_priors(), NOISE)
+    return prepare(case, effect_priors(), NOISE)
 
 
 def covariance(rows, correlation: float) -> np.ndarray:
@@ -49,7 +49,7 @@ def noise_grid(prior, centre=NOISE, count=49):
 
 def wiggles(rows, shape) -> np.ndarray:
     """Return what one unit of tolerance adds per unit of the amplitude [N]."""
-    left = np.asarray(beside_line(rows, shape[None]))[0]
+    left = remove_base(rows, shape[None])[0]
     return left * np.asarray(rows.tolerance)
 
 

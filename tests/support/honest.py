@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import gammaln, ive, logsumexp, softmax
 from scipy.stats import chi2
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 
 FAMILIES = {
     "friction": "rig",
@@ -35,7 +35,7 @@ class Check:
     """A set of cases with honest answers to it."""
 
     labels: list[Label]
-    answers: list[Answer]
+    answers: list[CaseAnswer]
     closures: dict[str, float]
     mixed: set[str]
 
@@ -88,10 +88,10 @@ def _anywhere(seen: np.ndarray, lengths: np.ndarray) -> float:
     return float(logsumexp(log_mean - 0.5 * lengths**2))
 
 
-def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> Answer:
+def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> CaseAnswer:
     """Return the honest answer to what was seen."""
     return worded(
-        Answer(
+        CaseAnswer(
             case=case,
             verdict="none",
             effect=None,
@@ -104,7 +104,7 @@ def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> Answer
     )
 
 
-def worded(answer: Answer) -> Answer:
+def worded(answer: CaseAnswer) -> CaseAnswer:
     """Return an answer with words, set and inclusion that follow its probabilities."""
     chances = answer.probabilities
     inclusion = {
@@ -214,7 +214,7 @@ def _finished(label: Label, seen: np.ndarray) -> Label:
     )
 
 
-def _sized(answer: Answer, label: Label, seen, closure, rng) -> Answer:
+def _sized(answer: CaseAnswer, label: Label, seen, closure, rng) -> CaseAnswer:
     own = directions()
     sd = ROWS**-0.5
     if answer.effect is not None:

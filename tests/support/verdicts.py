@@ -12,11 +12,11 @@ from hdcal.diagnosis.verdict import (
     Budget,
     BudgetPart,
     Cell,
+    Closure,
+    CovariateShare,
     Gap,
+    LadderEntry,
     NextRun,
-    Rung,
-    Share,
-    Shrink,
     Verdict,
     Where,
     Which,
@@ -70,15 +70,15 @@ def _cells(case: Case, residual) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-def _verdict(case: Case, gap, which: Which, shrink: Shrink, **other) -> Verdict:
+def _verdict(case: Case, gap, which: Which, shrink: Closure, **other) -> Verdict:
     noise = np.random.default_rng(3).normal(0.0, NOISE, len(gap))
     size = float(np.sqrt(np.mean(gap**2)))
     found = which.verdict != "none"
     chance = 1.0 - which.probabilities["none"]
     rms = Interval(size, 0.9 * size, 1.1 * size) if found else Interval(NAN, NAN, NAN)
     shares = (
-        Share("deformation", Interval(0.7, 0.6, 0.8)),
-        Share("direction", Interval(0.25, 0.2, 0.3)),
+        CovariateShare("deformation", Interval(0.7, 0.6, 0.8)),
+        CovariateShare("direction", Interval(0.25, 0.2, 0.3)),
     )
     runs = other.pop("next_test", ())
     return Verdict(
@@ -154,13 +154,13 @@ def _which(verdict, probabilities, **other) -> Which:
     )
 
 
-def _shrink(*effects: str, size=3.0, closed=CLOSED) -> Shrink:
+def _shrink(*effects: str, size=3.0, closed=CLOSED) -> Closure:
     name = "+".join(["calibrated", *effects])
     rungs = [("nominal", 41.0), ("calibrated", size), ("noise", NOISE)]
     rungs[2:2] = [(name, 0.45)] if effects else []
     rungs[-1:-1] = [(f"{name}+remainder", 0.32)]
-    return Shrink(
-        ladder=tuple(Rung(*rung) for rung in rungs),
+    return Closure(
+        ladder=tuple(LadderEntry(*rung) for rung in rungs),
         closed=closed,
         held_out="leave-one-half-cycle-out",
         extrapolated_closed=0.78,
@@ -215,7 +215,11 @@ def none() -> Verdict:
     shrink = _shrink(size=0.31, closed=None)
     shrink = replace(
         shrink,
-        ladder=(Rung("nominal", 41.0), Rung("calibrated", 0.31), Rung("noise", NOISE)),
+        ladder=(
+            LadderEntry("nominal", 41.0),
+            LadderEntry("calibrated", 0.31),
+            LadderEntry("noise", NOISE),
+        ),
         reason="no gap is detected, so that there is nothing to close",
         extrapolated_closed=None,
         placebo_closed=None,

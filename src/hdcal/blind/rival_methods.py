@@ -7,9 +7,9 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
-from hdcal.evidence.assessment import NONE
-from hdcal.evidence.effect_lines import draw_lines
-from hdcal.evidence.prepare import Setting, lay_out
+from hdcal.evidence.case_evidence import NONE
+from hdcal.evidence.piecewise_effect import piecewise_effect
+from hdcal.evidence.prepare import PreparedCase, prepare
 from hdcal.evidence.subspaces import effect_columns, is_subspace
 from hdcal.physics.effect import Effect
 
@@ -48,9 +48,9 @@ def fit_each(
         library: effects to fit, by name.
         noise_sd: against which the base's priors count [N]; by default the pilot's.
     """
-    setting = lay_out(case, effect_priors(), noise_sd)
-    base = _base(setting)
-    reading = np.asarray(setting.rows.reading)
+    prepared = prepare(case, effect_priors(), noise_sd)
+    base = _base(prepared)
+    reading = prepared.rows.reading
     rows = len(reading)
     padded = np.pad(reading, (0, base.shape[0] - rows))
     left = padded - base @ (base.T @ padded)
@@ -58,12 +58,12 @@ def fit_each(
     for name, effect in library.items():
         if effect.stage == "noise" or effect.needs - case.records.known:
             continue
-        if is_subspace(effect, setting):
-            tables = effect_columns(effect, setting)
+        if is_subspace(effect, prepared):
+            tables = effect_columns(effect, prepared)
             offsets, count = np.zeros((len(tables), rows)), tables.shape[1]
         else:
-            lines = draw_lines(effect, setting)
-            tables, offsets = lines.slopes[:, None], lines.offsets
+            pieces = piecewise_effect(effect, prepared)
+            tables, offsets = pieces.slopes[:, None], pieces.offsets
             count = 1
         shapes = int(len(tables) > 1)
         square = min(
@@ -95,16 +95,16 @@ def own_form_closure(
     return 1.0 - float(np.sqrt(found[name].square / found[NONE].square))
 
 
-def _base(setting: Setting) -> np.ndarray:
+def _base(prepared: PreparedCase) -> np.ndarray:
     """Return orthonormal base columns, each above the rows of the priors.
 
     Slope and offset are free; what temperature does is held by its prior, else no
     effect of temperature could be told.
     """
-    rows = setting.rows
-    held = np.sqrt(np.asarray(rows.precision))
+    rows = prepared.rows
+    held = np.sqrt(rows.precision)
     below = np.diag(np.where(np.arange(len(held)) < _FREE, 0.0, held))
-    stacked = np.vstack([np.asarray(rows.base), below])
+    stacked = np.vstack([rows.base, below])
     left, strength, _ = np.linalg.svd(stacked, full_matrices=False)
     return left[:, strength > 1e-9 * strength[0]]
 

@@ -4,16 +4,21 @@ import contextlib
 import io
 import logging
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from hdcal.errors import Finding
+from hdcal.errors import Finding, Findings
 from hdcal.report.plain import as_json, printable
+
+if TYPE_CHECKING:
+    from hdcal.report.answer import Answer
+    from hdcal.report.document import Document
 
 
 class Console:
@@ -25,6 +30,8 @@ class Console:
 
     def __init__(self, *, json: bool):
         self.json = json
+        # What the options' texts held that could not be read.
+        self.wrong = Findings()
 
     def prepare(self) -> None:
         """Quiet the libraries, and let any text be printed on any terminal."""
@@ -40,11 +47,53 @@ class Console:
         if not sys.warnoptions:
             warnings.simplefilter("ignore")
 
+    @property
+    def command(self) -> str:
+        """Return the command line as it was given, for a result's provenance."""
+        return shlex.join(["hdcal", *sys.argv[1:]])
+
+    def check_target(
+        self, out: str | None, force: bool, option: str = "--force"
+    ) -> None:
+        """Note where a result could not be written, before any work is done.
+
+        Args:
+            out: the folder to make, or None.
+            force: whether an older result may be replaced.
+            option: what to say to replace it.
+        """
+        if out is not None:
+            from hdcal.report.folder import check_target
+
+            self.wrong.attempt(check_target, out, force=force, option=option)
+
+    def answer(
+        self,
+        document: "Document",
+        answer: "Answer",
+        folder: str | None = None,
+        opened: str = "report.html",
+    ) -> int:
+        """Show an answer and return the command's exit code.
+
+        Args:
+            document: for people.
+            answer: for --json.
+            folder: where the whole result lies, or None.
+            opened: what to open in it first; empty where that depends.
+        """
+        from hdcal.report.terminal import terminal_lines
+
+        self.table(*terminal_lines(document, folder, opened))
+        if self.json:
+            self.data(answer)
+        return 0 if answer.status == "ok" else 1
+
     def result(self, text: str) -> None:
         """Print the result for people; with --json it moves to standard error."""
         self._print(text, to_error=self.json)
 
-    def data(self, plain: dict) -> None:
+    def data(self, plain: "dict | Answer") -> None:
         """Print the one JSON object."""
         self._print(as_json(plain).rstrip(), to_error=False)
 

@@ -5,8 +5,7 @@ from typing import Literal
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
-
-Theory = Literal["ring", "cup", "article"]
+from hdcal.data.theory_names import Theory
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from hdcal.errors import Finding, InputError
 
 LARGEST = 1 << 20
 
-_TABLE = re.compile(r"\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?")
-_KEY = re.compile(r"\s*(?P<name>[\w.\"'-]+(\s*\.\s*[\w\"'-]+)*)\s*=")
+# of lines without blanks around them
+_TABLE = re.compile(r"\[\[?(?P<name>[^\[\]]+)\]\]?\s*(#.*)?")
+_KEY = re.compile(r"[\w\"'-]+")
 _PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
 
 
@@ -23,30 +24,26 @@ class TomlFile:
     Attributes:
         file: how the user named it.
         table: its content.
-        lines: its text.
+        rows: line of each dotted key and table.
     """
 
     file: str
     table: dict
-    lines: tuple[str, ...]
+    rows: dict[str, int]
 
     def finding(self, problem: str, remedy: str, key: str) -> Finding:
         """A finding about a dotted key, with its line where that is found."""
         return Finding(self.file, problem, remedy, self.row(key), key)
 
+    def error(self, problem: str, remedy: str, key: str) -> InputError:
+        """An error of that one finding."""
+        return InputError([self.finding(problem, remedy, key)])
+
     def row(self, key: str) -> int | None:
         """Line of a dotted key, or of the innermost table around it."""
-        best, row, table = "", None, ""
-        for number, line in enumerate(self.lines, 1):
-            if match := _TABLE.fullmatch(line):
-                table = here = _bare(match["name"])
-            elif match := _KEY.match(line):
-                here = ".".join(filter(None, (table, _bare(match["name"]))))
-            else:
-                continue
-            if len(here) > len(best) and (key == here or key.startswith(here + ".")):
-                best, row = here, number
-        return row
+        while key and key not in self.rows:
+            key = key.rpartition(".")[0]
+        return self.rows.get(key)
 
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
@@ -87,7 +84,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
         raise _refusal(file, words, "Mend that line", row) from None
-    return TomlFile(file, table, tuple(text.splitlines()))
+    return TomlFile(file, table, _rows(text))
 
 
 def nearest(name: str, known: list[str], what: str = "Known are") -> str:
@@ -96,6 +93,22 @@ def nearest(name: str, known: list[str], what: str = "Known are") -> str:
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
     hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
     return f"{hint}{what}: {', '.join(known)}"
+
+
+def _rows(text: str) -> dict[str, int]:
+    rows: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(map(str.strip, text.splitlines()), 1):
+        name, sign, _ = line.partition("=")
+        if header := _TABLE.fullmatch(line):
+            here = table = _bare(header["name"])
+        elif sign and all(_KEY.fullmatch(part.strip()) for part in name.split(".")):
+            here = ".".join(filter(None, (table, _bare(name))))
+        else:
+            continue
+        if here:
+            rows.setdefault(here, number)
+    return rows
 
 
 def _bare(name: str) -> str:

@@ -6,12 +6,12 @@ import numpy as np
 
 from hdcal.data.records import Records
 
-# Rows of every proposed run: one program of the computer serves them all.
+# Rows of every proposed run: one executable serves them all.
 ROWS = 32
 
 
 @dataclass(frozen=True)
-class Proposal:
+class CandidateRun:
     """One run that a rig can do.
 
     Attributes:
@@ -27,7 +27,9 @@ class Proposal:
     records: Records
 
 
-def proposals(records: Records, reference_temperature: float) -> list[Proposal]:
+def candidate_runs(
+    records: Records, reference_temperature: float
+) -> list[CandidateRun]:
     """Return the runs that could come next, made to fit what was tested.
 
     Args:
@@ -38,8 +40,10 @@ def proposals(records: Records, reference_temperature: float) -> list[Proposal]:
     warm = float(records.temperature[-1])
     pace = _pace(records)
 
-    def run(words: str, cost: str, effort, path, seconds, **columns) -> Proposal:
-        return Proposal(words, cost, effort, _rows(records, path, seconds, **columns))
+    def run(words: str, cost: str, effort, path, seconds, **columns) -> CandidateRun:
+        return CandidateRun(
+            words, cost, effort, _rows(records, path, seconds, **columns)
+        )
 
     up = np.linspace(low, top, ROWS)
     loop = np.concatenate([up[::2], up[::-2]])

@@ -2,22 +2,16 @@
 
 import click
 
+from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    force_option,
-    json_option,
-    read_columns,
-    reading_options,
-    seed_option,
-)
-from hdcal.errors import InputError
+from hdcal.cli.options import force_option, json_option, reading_options, seed_option
 
 # With more cases than this reports are made only when asked for.
 MANY = 20
 
 
-@click.command(short_help="Where, why and how far the model is off.")
+@command(short_help="Where, why and how far the model is off.")
 @reading_options
 @click.argument("cases", metavar="CASE...", nargs=-1, required=True)
 @click.option(
@@ -54,54 +48,30 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     """
     one_thread_for_algebra()
     from hdcal.diagnosis.library import choose_library
-    from hdcal.diagnosis.many_cases import read_cases
+    from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
+    from hdcal.diagnosis.overview import document_and_answer
     from hdcal.physics.registry import EFFECTS
-    from hdcal.report.folder import check_target
-
-    findings, found, target = [], [], out
-    try:
-        choose_library(settings["library"], EFFECTS)
-    except InputError as error:
-        findings += error.findings
-    try:
-        found = read_cases(cases, gear, read_columns(columns), theory)
-        # Of many cases the folder is no single one's.
-        name = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
-        target = name if out is None else out
-    except InputError as error:
-        findings += error.findings
-    if target is not None:
-        try:
-            check_target(target, force=force)
-        except InputError as error:
-            findings += error.findings
-    if findings:
-        raise InputError(findings)
-    return _diagnose(console, found, settings, target, force)
-
-
-def _diagnose(console: Console, cases, settings, target, force) -> int:
-    keep_compilations()
-    from hdcal.diagnosis.many_cases import diagnose_all
-    from hdcal.diagnosis.terminal import closing_words, overview
     from hdcal.report.folder import whole_folder
 
-    single = len(cases) == 1
-    for case in cases:
-        for note in case.notes:
-            console.words(note if single else f"{case.name}: {note}")
+    with console.wrong as wrong:
+        wrong.attempt(choose_library, settings["library"], EFFECTS)
+        found = []
+        if columns is not None:
+            found = wrong.attempt(read_cases, cases, gear, columns, theory) or []
+        if out is None and found:
+            # Of many cases the folder is no single one's.
+            out = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
+        console.check_target(out, force)
+    keep_compilations()
+    tell_notes(console, found)
     if settings["report"] is None:
-        settings["report"] = len(cases) <= MANY
+        settings["report"] = len(found) <= MANY
         if not settings["report"]:
             console.words(f"more than {MANY} cases: no reports without --report")
-    with whole_folder(target, force=force) as folder:
-        found = diagnose_all(cases, folder, **settings)
-    verdicts = list(found.values())
-    if single:
-        words = closing_words(verdicts[0], str(target), report=settings["report"])
-    else:
-        words = overview(found, str(target))
-    console.table(*words)
-    if console.json:
-        console.data(verdicts[0] if single else {"cases": found})
-    return 0 if all(verdict["status"] == "ok" for verdict in verdicts) else 1
+    assert out is not None
+    with whole_folder(out, force=force) as folder:
+        answers = diagnose_all(found, folder, command=console.command, **settings)
+    opened = "report.html" if settings["report"] else "verdict.json"
+    return console.answer(
+        *document_and_answer(answers), out, opened if len(answers) == 1 else ""
+    )

@@ -8,25 +8,31 @@ import numpy as np
 from hdcal.calibration.calibrate import calibrate, check_effect_priors
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
-from hdcal.diagnosis.adequacy import doubt
-from hdcal.diagnosis.closure import shrink
-from hdcal.diagnosis.model_posterior import Weighed, weigh
+from hdcal.diagnosis.adequacy import move_inadequate_to_unknown
+from hdcal.diagnosis.closure import closure
+from hdcal.diagnosis.model_posterior import ModelPosterior, model_posterior
 from hdcal.diagnosis.next_run import rank_runs
-from hdcal.diagnosis.stiffness_factors import budget
-from hdcal.diagnosis.verdict import Gap, Shrink, Verdict, Which
-from hdcal.diagnosis.where import FALSE_ALARM, describe, interval, look
-from hdcal.diagnosis.which import answer
-from hdcal.errors import Finding, InputError
-from hdcal.evidence.additive_gap import additive_basis, fit_additive
-from hdcal.evidence.assess import assess
-from hdcal.evidence.assessment import (
-    NONE,
-    QUANTISATION,
-    UNKNOWN,
-    Assessment,
-    expansion_beside,
+from hdcal.diagnosis.stiffness_factors import stiffness_budget
+from hdcal.diagnosis.verdict import Closure, Gap, Verdict, Which
+from hdcal.diagnosis.where import (
+    FALSE_ALARM,
+    declared_directions,
+    describe_where,
+    interval,
 )
-from hdcal.evidence.row_means import shorten
+from hdcal.diagnosis.which import identify_cause
+from hdcal.errors import Finding, InputError
+from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
+from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
+from hdcal.evidence.residual_test import ResidualTest, residual_test
+from hdcal.evidence.row_means import average_rows
+from hdcal.evidence.smooth_gap import (
+    AdditiveBasis,
+    SmoothGap,
+    additive_basis,
+    fit_smooth_gap,
+)
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
@@ -70,63 +76,86 @@ def diagnose(
     _check_rise(case)
     rng = np.random.default_rng(seed)
     library = dict(library)
-    short, group = shorten(case)
+    averaged, group = average_rows(case)
     if group > 1:
         library = {n: e for n, e in library.items() if e.stage != "noise"}
-    found, weighed = _weigh_twice(short, library)
-    correlation = float(
-        weighed.correlation @ np.asarray(found.setting.rows.correlations)
-    )
-    cells, tested = look(found, short, correlation, rng)
-    rounded = QUANTISATION in weighed.top.split("+")
+    evidence, posterior = _evidence_and_posterior(averaged, library)
+    correlation = float(posterior.correlation @ evidence.prepared.rows.correlations)
+    cells, directions = declared_directions(evidence, averaged)
+    tested = residual_test(evidence.prepared, correlation, directions, rng)
+    rounded = QUANTISATION in posterior.top.split("+")
     detected = tested.p_value <= FALSE_ALARM or rounded
-    if detected:
-        # Draws of its own: what follows does not hang on how many were doubted.
-        weighed = doubt(found, weighed, short, correlation, rng.spawn(1)[0])
     smooth = basis = None
     if detected:
-        basis = additive_basis(found.setting)
-        smooth = fit_additive(found.setting, basis, correlation, rng)
-    which = answer(found, weighed, detected, library, rng)
-    names = [n for n in (which.effect, which.second_effect) if n]
-    if basis is None:
-        far = _nothing_shrinks(_NO_GAP)
-    elif which.verdict == "none":
-        far = _nothing_shrinks(_NO_CAUSE)
-    else:
-        members = [n for n in which.set if n in found.singles.names or n in found.wide]
-        far = shrink(found, names, members, basis, correlation, rng)
-    posteriors = {} if quick else refit(case, which, weighed, library, seed, progress)
+        # Draws of its own: what follows does not depend on how many were tested.
+        posterior = move_inadequate_to_unknown(
+            evidence, posterior, averaged, correlation, rng.spawn(1)[0]
+        )
+        basis = additive_basis(evidence.prepared)
+        smooth = fit_smooth_gap(evidence.prepared, basis, correlation, rng)
+    which = identify_cause(evidence, posterior, detected, library, rng)
+    closed = _closure(evidence, which, basis, correlation, rng)
+    posteriors = {} if quick else refit(case, which, posterior, library, seed, progress)
     failed = [n for n, (_, p) in posteriors.items() if not p.usable]
-    runs, no_run = rank_runs(found, weighed, library, rng)
-    size = interval(smooth.rms) if smooth is not None else _NOT_SEEN
+    runs, no_run = rank_runs(evidence, posterior, library, rng)
+    step = evidence.rounding_step if rounded and tested.p_value > FALSE_ALARM else None
     return Verdict(
         case=case,
-        gap=Gap(
-            detected,
-            1.0 - weighed.probabilities[NONE],
-            size,
-            far.ladder[-1].rms_N if far.ladder else tested.noise_sd,
-            size.median / float(np.max(np.abs(case.records.force))),
-            correlation,
-            found.step if rounded and tested.p_value > FALSE_ALARM else None,
-        ),
-        where=describe(found, short, cells, tested, smooth, detected),
+        gap=_gap(case, posterior, tested, smooth, closed, correlation, step),
+        where=describe_where(evidence, averaged, cells, tested, smooth),
         which=_sampled_size(which, posteriors),
-        shrink=far,
+        shrink=closed,
         next_test=runs,
-        budget=budget(found, case, names),
+        budget=stiffness_budget(evidence, case, _named(which)),
         posteriors={n: p for n, p in posteriors.items() if n not in failed},
         library=tuple(library),
-        notes=tuple(_notes(found, which, list(posteriors), failed, group)),
+        notes=tuple(_notes(evidence, which, list(posteriors), failed, group)),
         reasons=_reasons(posteriors, failed),
         averaged_rows=group,
         no_run=no_run,
     )
 
 
-def _nothing_shrinks(reason: str) -> Shrink:
-    return Shrink((), None, "", None, None, None, reason)
+def _named(which: Which) -> list[str]:
+    return [name for name in (which.effect, which.second_effect) if name]
+
+
+def _gap(
+    case: Case,
+    posterior: ModelPosterior,
+    tested: ResidualTest,
+    smooth: SmoothGap | None,
+    closed: Closure,
+    correlation: float,
+    rounding_step: float | None,
+) -> Gap:
+    """Return whether there is a gap and how large it is."""
+    size = _NOT_SEEN if smooth is None else interval(smooth.rms)
+    return Gap(
+        smooth is not None,
+        1.0 - posterior.probabilities[NONE],
+        size,
+        closed.ladder[-1].rms_N if closed.ladder else tested.noise_sd,
+        size.median / float(np.max(np.abs(case.records.force))),
+        correlation,
+        rounding_step,
+    )
+
+
+def _closure(
+    evidence: CaseEvidence,
+    which: Which,
+    basis: AdditiveBasis | None,
+    correlation: float,
+    rng: np.random.Generator,
+) -> Closure:
+    """Return how far the named effects close the gap, or why there is none to close."""
+    if basis is None or which.verdict == "none":
+        reason = _NO_GAP if basis is None else _NO_CAUSE
+        return Closure((), None, "", None, None, None, reason)
+    effects = {*evidence.single.names, *evidence.subspace_effects}
+    members = [name for name in which.set if name in effects]
+    return closure(evidence, _named(which), members, basis, correlation, rng)
 
 
 def _reasons(posteriors: Mapping, failed: list[str]) -> tuple[str, ...]:
@@ -142,42 +171,43 @@ def _reasons(posteriors: Mapping, failed: list[str]) -> tuple[str, ...]:
 
 def _check_rise(case: Case) -> None:
     """Refuse forces that do not grow with the deformation: no stiffness is negative."""
-    told = case.records
-    deformation = told.deformation - np.mean(told.deformation)
-    if deformation @ np.asarray(told.force) > 0.0:
+    deformation = case.records.deformation - np.mean(case.records.deformation)
+    if deformation @ np.asarray(case.records.force) > 0.0:
         return
     words = "the force does not grow with the deformation"
     remedy = "check the signs of both columns and that the load cell was connected"
     raise InputError([Finding(case.name, words, remedy)])
 
 
-def _weigh_twice(
+def _evidence_and_posterior(
     case: Case, library: dict[str, type[Effect]]
-) -> tuple[Assessment, Weighed]:
-    """Weigh the hypotheses, a second time where a large effect has bent the first.
+) -> tuple[CaseEvidence, ModelPosterior]:
+    """Compare the hypotheses, a second time where a large effect has bent the first.
 
     Effects act about a stiffness and the base's priors count against a noise: first
     those of rough fits, which a large effect has biased, then those beside the
     likeliest hypothesis.
     """
     priors = effect_priors()
-    found = assess(case, library, priors)
-    weighed = weigh(found.table)
-    names = [name for name in weighed.top.split("+") if name in found.effects]
-    setting = found.setting
-    stiffness, noise_sd = expansion_beside(found, names)
-    moved = abs(stiffness / float(setting.base.stiffness) - 1.0) > _SAME_STIFFNESS
-    noisier = abs(np.log(noise_sd / setting.noise_sd)) > _SAME_NOISE
+    evidence = compute_evidence(case, library, priors)
+    posterior = model_posterior(evidence.table)
+    names = [name for name in posterior.top.split("+") if name in evidence.effects]
+    prepared = evidence.prepared
+    stiffness, noise_sd = stiffness_and_noise_beside(evidence, names)
+    moved = abs(stiffness / float(prepared.base.stiffness) - 1.0) > _SAME_STIFFNESS
+    noisier = abs(np.log(noise_sd / prepared.noise_sd)) > _SAME_NOISE
     if stiffness <= 0.0 or noise_sd <= 0.0 or not (moved or noisier):
-        return found, weighed
-    found = assess(case, library, priors, stiffness=stiffness, noise_sd=noise_sd)
-    return found, weigh(found.table)
+        return evidence, posterior
+    evidence = compute_evidence(
+        case, library, priors, stiffness=stiffness, noise_sd=noise_sd
+    )
+    return evidence, model_posterior(evidence.table)
 
 
 def refit(
     case: Case,
     which: Which,
-    weighed: Weighed,
+    posterior: ModelPosterior,
     library: dict[str, type[Effect]],
     seed: int,
     progress: Progress | None,
@@ -191,17 +221,16 @@ def refit(
     if which.verdict in ("none", "unknown"):
         chosen = {which.verdict: 1.0}
     elif which.verdict == "named" and which.effect:
-        both = [n for n in (which.effect, which.second_effect) if n]
-        chosen = {"+".join(sorted(both)): 1.0}
+        chosen = {"+".join(sorted(_named(which))): 1.0}
     else:
-        share = sorted(weighed.probabilities.items(), key=lambda item: -item[1])
+        share = sorted(posterior.probabilities.items(), key=lambda item: -item[1])
         kept = [item for item in share if item[1] >= _LEAST_SHARE][:_MOST_REFITS]
         total = sum(probability for _, probability in kept)
         chosen = {name: probability / total for name, probability in kept}
     result = {}
     for name, share in chosen.items():
         effects = () if name in (NONE, UNKNOWN) else tuple(name.split("+"))
-        posterior = calibrate(
+        calibrated = calibrate(
             case,
             effects=effects,
             with_gap=name == UNKNOWN,
@@ -209,7 +238,7 @@ def refit(
             registry=library,
             progress=progress,
         )
-        result[name] = (share, posterior)
+        result[name] = (share, calibrated)
     return result
 
 
@@ -233,11 +262,15 @@ def _sampled_size(
 
 
 def _notes(
-    found: Assessment, which: Which, refitted: list[str], failed: list[str], group: int
+    evidence: CaseEvidence,
+    which: Which,
+    refitted: list[str],
+    failed: list[str],
+    group: int,
 ) -> list[str]:
     notes = [
         f"{name} is accounted for by the gear file's force_resolution_N"
-        for name in found.accounted
+        for name in evidence.accounted
     ]
     notes += [
         f"the calibration with {name} failed its checks and is left out of the bands"

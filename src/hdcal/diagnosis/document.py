@@ -1,200 +1,156 @@
-"""The report of a diagnosis: one HTML page that needs nothing else."""
+"""The report of a diagnosis; the sentences of its answer are in `words`."""
 
-from collections.abc import Iterator
-
-from hdcal.calibration.summary import summarise
-from hdcal.diagnosis.verdict import Verdict
-from hdcal.diagnosis.words import held_out, one_reading
+from hdcal.data.case import Case
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.sections import shrink_section, where_section, which_section
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import data_rows, gear_rows, parameter_row, render_page
+from hdcal.report.document import (
+    Document,
+    Facts,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Text,
+)
+from hdcal.report.parameters import parameter_estimates
+from hdcal.report.posterior_sections import driver_tag, parameter_table
+from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
     hypothesis,
-    likely,
-    newton,
     number,
-    percent,
-    percent_span,
 )
 
-_TEMPLATE = "verdict.html.j2"
-_MOST_ROWS = 12
+_FAILED = (
+    "The diagnosis did not pass its checks, so it gives no answer, and every number "
+    "and figure on this page may be wrong."
+)
 
 
-def verdict_report(
-    verdict: Verdict,
-    found: dict,
-    images: dict[str, bytes],
+def verdict_document(
+    found: VerdictAnswer,
+    case: Case | None = None,
     command: str = "",
     refit: tuple[str, Posterior] | None = None,
-) -> str:
-    """Return the report as the text of an HTML file.
+) -> Document:
+    """Return the report; its pictures are where, which, shrink and, refitted, bands.
 
     Args:
-        verdict: from `diagnose`.
-        found: the same as plain data.
-        images: SVG files named where, which, shrink and, with a refit, bands.
+        found: from `verdict_answer`.
+        case: that was diagnosed; without it the report does not describe the data.
         command: how the result was made.
         refit: hypothesis and posterior of the corrected model.
     """
-    regions = found["where"]["regions"]
-    chances = found["which"]["probabilities"]
-    shares = found["where"]["shares"]
-    context = {
-        "kind": "diagnosis",
-        "found": found,
-        "failed": found["status"] != "ok",
-        "name": verdict.case.gear.name,
-        "gap": _gap(found),
-        "regions": [_region(cell) for cell in regions[:_MOST_ROWS]],
-        "hidden": max(len(regions) - _MOST_ROWS, 0),
-        "shares": [(s["covariate"], percent_span(s["share"])) for s in shares],
-        "hypotheses": _hypotheses(found["which"]),
-        "others": max(len(chances) - _MOST_ROWS, 0),
-        "robustness": list(_robustness(found["which"])),
-        "closed": _closed(found["shrink"]),
-        "runs": [_run(run) for run in found["next_test"]],
-        "K": _K(found["budget"]),
-        "budget": [_part(part) for part in found["budget"]["parts"]],
-        "refit": refit and _refit(*refit),
-        "data_rows": data_rows(verdict.case),
-        "provenance": _provenance(verdict, found, command),
-    }
-    return render_page(_TEMPLATE, context, images)
-
-
-def _gap(found: dict) -> list[tuple[str, str, str]]:
-    gap, p = found["gap"], found["where"]["p_value"]
-    chance = f"p = {number(p)}"
-    words = "a gap is seen" if gap["detected"] else "no gap is seen"
-    seen = ("seen", chance, f"{words}; how often noise alone looks like this")
-    if gap["rounding_N"] is not None:
-        steps = f"in steps of {newton(gap['rounding_N'])}"
-        seen = ("seen", "rounding", f"{steps}; nothing else is seen ({chance})")
-    noise = f"standard deviation of {one_reading(found)}"
-    return [
-        seen,
-        ("probability", percent(gap["probability"]), "that anything is missing"),
-        *_size(gap),
-        ("noise", newton(gap["noise_sd_N"]), noise),
-    ]
-
-
-def _size(gap: dict) -> list[tuple[str, str, str]]:
-    if gap["rms_N"]["median"] is None:
-        return [("size", "–", "of what is not seen there is no size")]
-    middle, span = estimate(gap["rms_N"])
-    share = percent(gap["share_of_full_scale"])
-    return [
-        ("size", f"{middle} N", f"root mean square; 90 % interval {span} N"),
-        ("of full scale", share, "size over the largest force tested"),
-    ]
-
-
-def _region(cell: dict) -> dict:
-    bias = cell["bias_N"]
-    width = None if bias["hi"] is None else bias["hi"] - bias["lo"]
-    return {
-        "covariate": cell["covariate"],
-        "label": cell["label"],
-        "rows": str(cell["rows"]),
-        "bias": number(bias["median"], width),
-        "z": number(cell["z"], 10.0),
-        "share": percent(cell["share"]),
-    }
-
-
-def _hypotheses(which: dict) -> list[dict]:
-    chances, evidence = which["probabilities"], which["log_evidence"]
-    together = likely(chances)
-    ranked = sorted(chances, key=lambda name: -(chances[name] or 0.0))
-    return [
-        {
-            "words": hypothesis(name),
-            "chance": percent(chances[name]),
-            "evidence": number(evidence.get(name), 10.0),
-            "likely": name in together,
-        }
-        for name in ranked[:_MOST_ROWS]
-    ]
-
-
-def _robustness(which: dict) -> Iterator[str]:
-    if which["sensitivity"]:
-        texts = [
-            f"{percent(value)} ({name.replace('_', ' ')})"
-            for name, value in which["sensitivity"].items()
-        ]
-        yield (
-            "With other beliefs about the size of effects, the first cause would have "
-            f"{', '.join(texts)}."
-        )
-    if which["stability"] is not None:
-        share = percent(which["stability"])
-        yield f"With other readings of the same kind, the ranking's top stays: {share}."
-
-
-def _closed(shrink: dict) -> list[tuple[str, str]]:
-    if shrink["closed"] is None:
-        return []
-    rows = [(f"closed on {held_out(shrink)}", percent_span(shrink["closed"]))]
-    for name, key in (
-        ("with the largest deformations held out", "extrapolated_closed"),
-        ("by a free curve instead (placebo)", "placebo_closed"),
-    ):
-        if shrink[key] is not None:
-            rows.append((name, percent(shrink[key])))
-    rows += [(f"by {hypothesis(n)}", percent(v)) for n, v in shrink["bars"].items()]
-    if shrink["remainder_N"] is not None:
-        middle, span = estimate(shrink["remainder_N"])
-        rows.append(("left after it", f"{middle} N, 90 % interval {span} N"))
-    return rows
-
-
-def _run(run: dict) -> dict:
-    return {
-        "run": run["run"],
-        "separates": ", ".join(map(hypothesis, run["separates"])),
-        "information": number(run["information_nats"], 1.0),
-        "cost": run["cost"],
-    }
-
-
-def _K(budget: dict) -> str:
-    middle, span = estimate(budget["K"])
-    return (
-        f"K by the {budget['formula']} formula, at the prior's mean modulus, is "
-        f"{middle}, 90 % interval {span}."
+    quick = ", quick: no margins were sampled" if found.quick else ""
+    return Document(
+        name=found.gear.name,
+        kind="diagnosis",
+        subtitle="Diagnosis of the gap between model and measurement from "
+        f"{found.data.rows} readings ({found.data.name}), theory "
+        f"“{found.gear.theory}”{quick}.",
+        headline=found.headline,
+        # The next run closes the answer in JSON; here it has a frame of its own.
+        answers=found.answer[1 : len(found.answer) - (found.next_step is not None)],
+        next_steps=[] if found.next_step is None else [found.next_step],
+        sections=[
+            where_section(found),
+            which_section(found),
+            shrink_section(found.shrink),
+            _next_runs(found),
+            _budget(found),
+            _corrected(found, refit),
+            Section("What this cannot say", [Sentences(found.limits)], brief=True),
+            *([Section("Remarks", [Sentences(found.notes)], True)] * bool(found.notes)),
+            *([] if case is None else [Section("Data", [Facts(data_rows(case))])]),
+        ],
+        provenance=[] if case is None else _provenance(case, found, command),
+        failed=found.reasons,
+        failed_words=_FAILED,
     )
 
 
-def _part(part: dict) -> dict:
-    middle, span = estimate(part["factor"])
-    return {
-        "name": part["name"],
-        "factor": middle,
-        "span": span,
-        "prior": " : ".join(estimate(part["prior"])),
-        "driven_by": part["driven_by"],
-        "split_by": part["split_by"],
-    }
-
-
-def _refit(name: str, posterior: Posterior) -> dict:
-    entries = summarise(posterior)["parameters"].items()
-    return {
-        "effects": hypothesis(name),
-        "failed": not posterior.usable,
-        "parameters": [parameter_row(n, entry) for n, entry in entries],
-    }
-
-
-def _provenance(verdict: Verdict, found: dict, command: str) -> list[tuple[str, str]]:
+def _next_runs(found: VerdictAnswer) -> Section:
+    heading = "Runs that would tell more, if the cause is in the library"
+    if not found.next_test:
+        return Section(
+            heading, [Text(f"No run is proposed: {found.next_test_reason}.")]
+        )
     rows = [
-        *gear_rows(verdict.case, verdict.case.gear.theory),
-        ("library", ", ".join(found["library"])),
-        ("seed", str(found["seed"])),
-        ("versions", ", ".join(f"{k} {v}" for k, v in found["versions"].items())),
-        *(("note", note) for note in found["notes"]),
+        [
+            run.run,
+            ", ".join(map(hypothesis, run.separates)),
+            number(run.information_nats, 1.0),
+            run.cost,
+        ]
+        for run in found.next_test
+    ]
+    columns = ["run", "tells apart", "information [nat]", "cost"]
+    note = (
+        "“Something outside the library” predicts nothing and is left out of this "
+        "ranking."
+    )
+    table = Table(columns, rows, frozenset({"information [nat]"}))
+    return Section(heading, [table, Text(note, soft=True)], brief=True)
+
+
+def _budget(found: VerdictAnswer) -> Section:
+    budget = found.budget
+    middle, span = estimate(budget.K)
+    words = (
+        f"K by the {budget.formula} formula, at the prior's mean modulus, is {middle}, "
+        f"90 % interval {span}. {budget.note}"
+    )
+    rows = [
+        [
+            part.name,
+            *estimate(part.factor),
+            " : ".join(estimate(part.prior)),
+            driver_tag(part.driven_by),
+            part.split_by,
+        ]
+        for part in budget.parts
+    ]
+    numbers = ("factor", "90 % interval", "before the data")
+    columns = ["part of K", *numbers, "driven by", "what would tell it"]
+    table = [Table(columns, rows, frozenset(numbers))] if rows else []
+    return Section("Why K is not 1", [Text(words), *table])
+
+
+def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Section:
+    heading = "The corrected model"
+    if refit is None:
+        why = ": the diagnosis was quick" if found.quick else ""
+        return Section(heading, [Text(f"None was sampled{why}.")])
+    name, posterior = refit
+    bad = "" if posterior.usable else " This fit failed its checks; do not use it."
+    words = (
+        f"Calibrated again with {hypothesis(name)}. All draws are in posterior.nc, the "
+        f"numbers of the bands in bands.csv.{bad}"
+    )
+    caption = (
+        "Dark band: where the corrected model lies with 95 % probability. Light band: "
+        "where one new reading lies with 95 % probability. Hatched and dotted: outside "
+        "what was tested."
+    )
+    shows = "Measured force over deformation with the bands of the corrected model"
+    note = "Intervals hold 95 % of the posterior, with equal tails."
+    blocks = [
+        Text(words),
+        Picture("bands", shows, caption),
+        parameter_table(parameter_estimates(posterior)),
+        Text(note, soft=True),
+    ]
+    return Section(heading, blocks)
+
+
+def _provenance(
+    case: Case, found: VerdictAnswer, command: str
+) -> list[tuple[str, str]]:
+    rows = [
+        *gear_rows(case, case.gear.theory),
+        ("library", ", ".join(found.library)),
+        ("seed", str(found.seed)),
+        ("versions", ", ".join(f"{k} {v}" for k, v in found.versions.items())),
     ]
     return rows + ([("command", command)] if command else [])

@@ -1,4 +1,4 @@
-"""Which effects a diagnosis considers."""
+"""Which effects a diagnosis considers: the library, or a part of it."""
 
 from collections.abc import Mapping
 
@@ -26,8 +26,8 @@ def choose_library(
         return dict(registry)
     if not spec.startswith(_MINUS):
         raise InputError(
-            [Finding("--library", f"'{spec}' is not understood", "use minus:NAME")]
+            [Finding("library", f"'{spec}' is not understood", "use minus:NAME")]
         )
     names = [name.strip() for name in spec.removeprefix(_MINUS).split(",")]
-    check_names(names, registry, "--library")
+    check_names(names, registry, "library")
     return {name: effect for name, effect in registry.items() if name not in names}

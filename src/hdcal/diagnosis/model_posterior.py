@@ -1,12 +1,12 @@
 """From evidences to a posterior over hypotheses, and from there to a verdict."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdcal.diagnosis.verdict import Word
-from hdcal.evidence.assessment import NONE, UNKNOWN
+from hdcal.diagnosis.verdict import VerdictWord
+from hdcal.evidence.case_evidence import NONE, UNKNOWN
 
 # Prior probabilities of none, unknown and all pairs; the effects share the rest.
 PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_PAIRS = 0.5, 0.1, 0.03
@@ -14,7 +14,7 @@ NAMED = 0.9
 
 
 @dataclass(frozen=True)
-class Weighed:
+class ModelPosterior:
     """Posterior over hypotheses.
 
     Attributes:
@@ -66,8 +66,8 @@ def log_priors(names: list[str]) -> np.ndarray:
     return np.log(prior / prior.sum())
 
 
-def weigh(table: Mapping[str, np.ndarray]) -> Weighed:
-    """Weigh hypotheses by evidence and prior.
+def model_posterior(table: Mapping[str, np.ndarray]) -> ModelPosterior:
+    """Return the posterior over hypotheses.
 
     Args:
         table: log evidence of each by AR(1) coefficient, all of which are equally
@@ -79,44 +79,47 @@ def weigh(table: Mapping[str, np.ndarray]) -> Weighed:
     joint = joint / joint.sum()
     share = dict(zip(names, joint.sum(axis=1).tolist(), strict=True))
     effects = [n for n in names if n not in (NONE, UNKNOWN) and "+" not in n]
-    inclusion = {
-        effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
-        for effect in effects
-    }
     whole = {n: float(np.logaddexp.reduce(v)) for n, v in table.items()}
-    return Weighed(
+    return ModelPosterior(
         share,
-        inclusion,
+        _inclusion(share, effects),
         joint.sum(axis=0),
         {name: value - whole[NONE] for name, value in whole.items()},
     )
 
 
-def doubted(weighed: Weighed, kept: Mapping[str, float]) -> Weighed:
-    """Return the posterior with what is doubted moved to unknown.
+def _inclusion(share: Mapping[str, float], effects: Iterable[str]) -> dict[str, float]:
+    """Return the probability of each effect over singles and pairs."""
+    return {
+        effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
+        for effect in effects
+    }
+
+
+def move_to_unknown(
+    posterior: ModelPosterior, kept: Mapping[str, float]
+) -> ModelPosterior:
+    """Return the posterior with a part of some hypotheses moved to unknown.
 
     Args:
-        weighed: posterior.
+        posterior: over hypotheses.
         kept: share of its probability that a hypothesis keeps, by name.
     """
-    share = {n: p * kept.get(n, 1.0) for n, p in weighed.probabilities.items()}
-    share[UNKNOWN] += sum(weighed.probabilities.values()) - sum(share.values())
-    inclusion = {
-        effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
-        for effect in weighed.inclusion
-    }
-    return replace(weighed, probabilities=share, inclusion=inclusion)
+    share = {n: p * kept.get(n, 1.0) for n, p in posterior.probabilities.items()}
+    share[UNKNOWN] += sum(posterior.probabilities.values()) - sum(share.values())
+    inclusion = _inclusion(share, posterior.inclusion)
+    return replace(posterior, probabilities=share, inclusion=inclusion)
 
 
-def verdict_word(weighed: Weighed, detected: bool) -> Word:
+def verdict_word(posterior: ModelPosterior, detected: bool) -> VerdictWord:
     """Return the verdict in one word."""
-    share = weighed.probabilities
+    share = posterior.probabilities
     if not detected or share[NONE] >= 0.5:
         return "none"
-    if weighed.top == UNKNOWN:
+    if posterior.top == UNKNOWN:
         return "unknown"
     return (
         "named"
-        if max(weighed.inclusion.values(), default=0.0) >= NAMED
+        if max(posterior.inclusion.values(), default=0.0) >= NAMED
         else "ambiguous"
     )

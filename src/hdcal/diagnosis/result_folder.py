@@ -3,18 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
-from hdcal.calibration.figure.bands import calibration_figure
-from hdcal.diagnosis.document import verdict_report
-from hdcal.diagnosis.figure.closure import shrink_figure
-from hdcal.diagnosis.figure.where import where_figure
-from hdcal.diagnosis.figure.which import which_figure
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.verdict import Verdict, member_files
-from hdcal.diagnosis.verdict_json import verdict_json
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residuals import residuals
 from hdcal.prediction.averaged_bands import averaged_bands
+from hdcal.prediction.bands.bands import Bands
 from hdcal.prediction.causes import ORIGIN
-from hdcal.report.canvas import render
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.plain import as_json
 
@@ -27,7 +22,7 @@ def write_verdict(
     report: bool = True,
     seed: int = 0,
     quick: bool = False,
-) -> dict:
+) -> VerdictAnswer:
     """Write everything that `hdcal diagnose` leaves behind for one case.
 
     Args:
@@ -39,24 +34,28 @@ def write_verdict(
         quick: whether nothing was sampled.
 
     Returns:
-        The verdict as plain data, as it was written.
+        The answer, as it was written.
     """
-    found = verdict_json(verdict, seed=seed, quick=quick)
+    found = verdict_answer(verdict, seed=seed, quick=quick)
     (folder / "verdict.json").write_text(as_json(found), "utf-8")
     refit, bands = corrected(verdict), None
     if refit is not None:
         bands = averaged_bands(list(verdict.posteriors.values()))
         _save_models(verdict, folder)
-        (folder / "bands.csv").write_text(
-            columns_csv(bands.columns()), "utf-8", newline=""
-        )
+        table = columns_csv(bands.columns())
+        (folder / "bands.csv").write_text(table, "utf-8", newline="")
     if report:
-        images = _draw(verdict, refit, bands, folder)
-        page = verdict_report(verdict, found, images, command, refit).encode(
-            "utf-8", "xmlcharrefreplace"
-        )
-        (folder / "report.html").write_bytes(page)
+        _write_report(verdict, found, refit, bands, command, folder)
     return found
+
+
+def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
+    """Return the most probable corrected model with its name."""
+    weighed = verdict.posteriors
+    if not weighed:
+        return None
+    name = max(weighed, key=lambda name: weighed[name][0])
+    return name, weighed[name][1]
 
 
 def _save_models(verdict: Verdict, folder: Path) -> None:
@@ -69,28 +68,30 @@ def _save_models(verdict: Verdict, folder: Path) -> None:
         replace(posterior, settings=settings).save(folder / file)
 
 
-def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
-    """Return the most probable corrected model with its name."""
-    weighed = verdict.posteriors
-    if not weighed:
-        return None
-    name = max(weighed, key=lambda name: weighed[name][0])
-    return name, weighed[name][1]
+def _write_report(
+    verdict: Verdict,
+    found: VerdictAnswer,
+    refit: tuple[str, Posterior] | None,
+    bands: Bands | None,
+    command: str,
+    folder: Path,
+) -> None:
+    from hdcal.calibration.figure.bands import calibration_figure
+    from hdcal.diagnosis.document import verdict_document
+    from hdcal.diagnosis.figure.closure import shrink_figure
+    from hdcal.diagnosis.figure.where import where_figure
+    from hdcal.diagnosis.figure.which import which_figure
+    from hdcal.inference.residuals import residuals
+    from hdcal.report.write import report_files
 
-
-def _draw(verdict: Verdict, refit, bands, folder: Path) -> dict[str, bytes]:
-    """Write every figure, and return the SVG files by name."""
-    title = f"{verdict.case.gear.name}: diagnosis"
-    drawn = {
+    figures = {
         "where": where_figure(verdict),
         "which": which_figure(verdict),
         "shrink": shrink_figure(verdict),
     }
-    if refit is not None:
+    if refit is not None and bands is not None:
         left = residuals(refit[1])
-        drawn["bands"] = calibration_figure(refit[1], bands, left)
-    images = {name: render(f, "svg", title) for name, f in drawn.items()}
-    for name, figure in drawn.items():
-        (folder / f"{name}.svg").write_bytes(images[name])
-        (folder / f"{name}.png").write_bytes(render(figure, "png", title))
-    return images
+        figures["bands"] = calibration_figure(refit[1], bands, left)
+    document = verdict_document(found, verdict.case, command, refit)
+    for name, content in report_files(document, figures).items():
+        (folder / name).write_bytes(content)

@@ -7,9 +7,10 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.verdict import Budget, BudgetPart
-from hdcal.evidence.assessment import Assessment, design_of
+from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
-from hdcal.evidence.prepare import _log_moments as log_moments
+from hdcal.evidence.hypothesis_design import design_of
+from hdcal.evidence.prepare import log_moments
 from hdcal.physics.theory import THEORIES
 from hdcal.report.parameters import Interval
 
@@ -24,7 +25,9 @@ _NOTE = (
 )
 
 
-def budget(found: Assessment, case: Case, names: Sequence[str] = ()) -> Budget:
+def stiffness_budget(
+    evidence: CaseEvidence, case: Case, names: Sequence[str] = ()
+) -> Budget:
     """Split K into factors by prior and likelihood in log space.
 
     log K = Σ log f_i with log f_i ~ N(m_i, s_i²): given the measured log K each part
@@ -33,12 +36,12 @@ def budget(found: Assessment, case: Case, names: Sequence[str] = ()) -> Budget:
     ring formula leaves out.
 
     Args:
-        found: for the fitted stiffness.
+        evidence: for the fitted stiffness.
         case: the gear.
         names: effects beside which the stiffness is fitted.
     """
     causes = _causes(case)
-    log_k, log_k_sd = _measured(found, names)
+    log_k, log_k_sd = _measured(evidence, names)
     mean = np.array([m for _, m, _, _ in causes])
     sd = np.array([s for _, _, s, _ in causes])
     whole = np.sum(sd**2) + log_k_sd**2
@@ -55,7 +58,7 @@ def budget(found: Assessment, case: Case, names: Sequence[str] = ()) -> Budget:
         )
         for i, (name, _, _, split_by) in enumerate(causes)
     )
-    note = _NOTE + _own_theory(found, case, log_k)
+    note = _NOTE + _own_theory(evidence, case, log_k)
     if abs(surprise) > 3.0 * np.sqrt(whole):
         note += (
             " The product lies further from 1 than these causes reach together: check "
@@ -64,12 +67,12 @@ def budget(found: Assessment, case: Case, names: Sequence[str] = ()) -> Budget:
     return Budget(_factor(log_k, log_k_sd), "ring", parts, note)
 
 
-def _own_theory(found: Assessment, case: Case, log_k: float) -> str:
+def _own_theory(evidence: CaseEvidence, case: Case, log_k: float) -> str:
     """Say what K is by the gear's own formula, where that is not the ring's."""
     theory = case.gear.theory
     if theory == "ring":
         return ""
-    own = np.exp(log_k) * found.setting.ring / found.setting.nominal
+    own = np.exp(log_k) * evidence.prepared.ring / evidence.prepared.nominal
     return f" By the gear's own theory ({theory}) K is {own:.3g}."
 
 
@@ -78,15 +81,15 @@ def _factor(mean: float, sd: float) -> Interval:
     return Interval(float(middle), float(low), float(high))
 
 
-def _measured(found: Assessment, names: Sequence[str]) -> tuple[float, float]:
+def _measured(evidence: CaseEvidence, names: Sequence[str]) -> tuple[float, float]:
     """Return log K by the ring formula at the prior's mean modulus, and its sd."""
-    setting = found.setting
-    design = design_of(found, names)
-    fit = fit_design(setting.rows, design, setting.noise_sd, 0.0)
+    prepared = evidence.prepared
+    design = design_of(evidence, names)
+    fit = fit_design(prepared.rows, design, prepared.noise_sd, 0.0)
     # The first coefficient is the deviation of log stiffness, in prior sds.
-    log_stiffness = setting.log_stiffness + setting.log_stiffness_sd * fit.mean[0]
-    sd = setting.log_stiffness_sd * np.sqrt(fit.covariance[0, 0])
-    return float(log_stiffness - np.log(setting.ring)), float(sd)
+    log_stiffness = prepared.log_stiffness + prepared.log_stiffness_sd * fit.mean[0]
+    sd = prepared.log_stiffness_sd * np.sqrt(fit.covariance[0, 0])
+    return float(log_stiffness - np.log(prepared.ring)), float(sd)
 
 
 def _causes(case: Case) -> list[tuple[str, float, float, str]]:

@@ -8,9 +8,10 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.report.answer import EffectName, Probability, Real, Words
 from hdcal.report.parameters import Interval
 
-Word = Literal["none", "named", "ambiguous", "unknown"]
+VerdictWord = Literal["none", "named", "ambiguous", "unknown"]
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Gap:
     """Whether model and measurement part, and by how much.
 
     Attributes:
-        detected: the simultaneous gate at 5 % is passed.
+        detected: the residual test is significant at 5 %.
         probability: posterior probability that anything is missing (1 − P(none)).
         rms_N: root mean square of the gap at the tested rows, 90 % interval; NaN
             where none is detected.
@@ -29,12 +30,12 @@ class Gap:
     """
 
     detected: bool
-    probability: float
+    probability: Probability
     rms_N: Interval
-    noise_sd_N: float
-    share_of_full_scale: float
-    autocorrelation: float
-    rounding_N: float | None = None
+    noise_sd_N: Real
+    share_of_full_scale: Real
+    autocorrelation: Real
+    rounding_N: Real | None = None
 
 
 @dataclass(frozen=True)
@@ -73,10 +74,10 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Share:
+class CovariateShare:
     """Part of the gap's variance along one covariate, 90 % interval."""
 
-    covariate: str
+    covariate: Words
     share: Interval
 
 
@@ -85,7 +86,7 @@ class Where:
     """Where the gap lies.
 
     Attributes:
-        p_value: family-wise, of the simultaneous gate.
+        p_value: family-wise, of the residual test.
         statistics: largest |z| over the cells and of the noise's shape, by name.
         cells: every pre-declared cell.
         shares: of the gap's variance by covariate; empty when no gap is detected.
@@ -97,7 +98,7 @@ class Where:
     p_value: float
     statistics: dict[str, float]
     cells: tuple[Cell, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[CovariateShare, ...]
     residual_N: np.ndarray
     gap_N: np.ndarray
     records: Records
@@ -132,13 +133,13 @@ class Which:
         log_evidence: of each hypothesis, relative to none [nat].
         amplitude: of `effect`; None without one.
         not_testable: effect → features that the records lack.
-        not_excited: effects that this program cannot show at a physical size.
-        inseparable: pairs of effects that this program can never tell apart.
+        not_excited: effects that this loading cannot show at a physical size.
+        inseparable: pairs of effects that this loading can never tell apart.
         sensitivity: top inclusion for amplitude priors ⅓ and 3 times as wide.
         stability: share of block-bootstrap samples with the same top hypothesis.
     """
 
-    verdict: Word
+    verdict: VerdictWord
     effect: str | None
     second_effect: str | None
     set: tuple[str, ...]
@@ -154,16 +155,16 @@ class Which:
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One rung of the ladder from the nominal model to the noise floor."""
+class LadderEntry:
+    """Error of one model, from the nominal one down to the noise."""
 
-    model: str
-    rms_N: float
+    model: Words
+    rms_N: Real
 
 
 @dataclass(frozen=True)
-class Shrink:
-    """How far the gap shrinks once the effect is added.
+class Closure:
+    """How far the gap closes once the effect is added.
 
     Attributes:
         ladder: nominal, calibrated, with the effect, with the remainder, noise.
@@ -176,14 +177,14 @@ class Shrink:
         bars: closed share of each member of the set, by effect.
     """
 
-    ladder: tuple[Rung, ...]
+    ladder: tuple[LadderEntry, ...]
     closed: Interval | None
     held_out: str
-    extrapolated_closed: float | None
-    placebo_closed: float | None
+    extrapolated_closed: Real | None
+    placebo_closed: Real | None
     remainder_N: Interval | None
     reason: str
-    bars: dict[str, float] = field(default_factory=dict)
+    bars: dict[str, Real] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -197,9 +198,9 @@ class NextRun:
         cost: in words, such as "one ramp".
     """
 
-    run: str
-    separates: tuple[str, ...]
-    information_nats: float
+    run: Words
+    separates: tuple[EffectName, ...]
+    information_nats: Real
     cost: str
 
 
@@ -215,7 +216,7 @@ class BudgetPart:
         split_by: the extra run or measurement that would tell it from the others.
     """
 
-    name: str
+    name: Words
     factor: Interval
     prior: Interval
     driven_by: Literal["prior", "data"]
@@ -234,7 +235,7 @@ class Budget:
     """
 
     K: Interval
-    formula: str
+    formula: Literal["ring", "cup", "article"]
     parts: tuple[BudgetPart, ...]
     note: str
 
@@ -248,7 +249,7 @@ class Verdict:
         gap: whether there is a gap.
         where: where it lies.
         which: what causes it.
-        shrink: how far it shrinks.
+        shrink: how far it closes once the effect is added.
         next_test: runs that would tell more, best first.
         budget: of the scale factor K.
         posteriors: calibrated corrected models by effect (joined with +), with the
@@ -264,7 +265,7 @@ class Verdict:
     gap: Gap
     where: Where
     which: Which
-    shrink: Shrink
+    shrink: Closure
     next_test: tuple[NextRun, ...]
     budget: Budget
     posteriors: dict[str, tuple[float, Posterior]]

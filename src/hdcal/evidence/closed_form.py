@@ -1,11 +1,16 @@
 """Evidence in closed form: Gaussian in amplitudes, quadrature in the noise sd.
 
 With e the reading beside the base model, u the slope of an effect and V the
-projection that its shape tolerance leaves, a line of readings has
+projection that its shape tolerance leaves, one piece of an effect has
 
 log p = −n log σ − ½ log|I + v G| − ½ eVe/σ² + log ∫ π(a) exp(−½ A a² + B a) da,
 A = uVu/σ², B = uVe/σ², over a cell of the amplitude a.
+
+Pieces, cells and subspaces are padded to few lengths, so that few executables serve
+all cases.
 """
+
+from typing import TypeVar
 
 import equinox as eqx
 import jax
@@ -16,9 +21,14 @@ from jaxtyping import Float, Int
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
-from hdcal.evidence.inner_products import Blocks, Ground, Nodes
+from hdcal.evidence.inner_products import (
+    CommonTerms,
+    PieceProducts,
+    SubspaceProducts,
+)
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
+from hdcal.inference.padding import bucket_size, repeat_last_row
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 # Gauss–Hermite nodes for log σ: its posterior is close to normal.
@@ -29,23 +39,25 @@ _WIDER = 1.3
 # An effect that the rows cannot see at all has no precision; then the prior rules.
 TINY = 1e-12
 
+Tree = TypeVar("Tree")
 
-class Entries(eqx.Module):
-    """Cells of amplitudes on nodes, one entry for each.
+
+class AmplitudeCells(eqx.Module):
+    """Cells of amplitudes on pieces of effects, one entry for each.
 
     Attributes:
-        node: whose line the cell lies on.
+        piece: index of the piece that the cell lies on.
         low: lower end of the amplitude.
         high: upper end.
         size: amplitude to which the shape tolerance is proportional.
         mean: of the amplitude's prior.
         precision: of the amplitude's prior; 0 where the cell is filled evenly.
         log_height: log of the prior density's factor before its exponential.
-        log_weight: log prior probability of shape point and scale.
+        log_weight: log prior probability of shape point, scale and tolerance.
         tolerance: relative sd of the shape.
     """
 
-    node: Int[Array, " m"]
+    piece: Int[Array, " m"]
     low: Float[Array, " m"]
     high: Float[Array, " m"]
     size: Float[Array, " m"]
@@ -56,56 +68,61 @@ class Entries(eqx.Module):
     tolerance: Float[Array, " m"]
 
 
-def _log_noise(prior: Prior, log_sd):
-    return distribution(prior).log_prob(jnp.exp(log_sd)) + log_sd
+def pad_axis(tree: Tree, axis: int) -> Tree:
+    """Return arrays whose last entry along an axis is repeated to a shared length."""
+
+    def pad(leaf):
+        first = np.moveaxis(np.asarray(leaf), axis, 0)
+        return np.moveaxis(repeat_last_row(first, bucket_size(len(first))), 0, axis)
+
+    return jax.tree.map(pad, tree)
 
 
-def over_noise(value, centre, rows, prior: Prior):
-    """Integrate exp(value(log σ)) over log σ around a centre."""
+def integrate_noise(value, centre, rows, prior: Prior):
+    """Integrate exp(value(log σ)) π(log σ) over log σ around a centre."""
     width = _WIDER / jnp.sqrt(2.0 * jnp.maximum(rows - 4.0, 2.0))
 
     def at(node):
         point, log_weight = node
         log_sd = centre + np.sqrt(2.0) * width * point
-        return value(log_sd) + _log_noise(prior, log_sd) + log_weight + point**2
+        log_prior = distribution(prior).log_prob(jnp.exp(log_sd)) + log_sd
+        return value(log_sd) + log_prior + log_weight + point**2
 
     nodes = jnp.asarray(_POINTS), jnp.log(_WEIGHTS)
     return logsumexp(jax.lax.map(at, nodes), axis=0) + 0.5 * jnp.log(2.0 * width**2)
 
 
-def settle(step, start):
-    """Iterate a step until the most probable noise no longer moves."""
+def most_probable_noise(step, start):
+    """Iterate a step of log σ until it no longer moves."""
     return jax.lax.fori_loop(0, _ITERATIONS, lambda _, log_sd: step(log_sd), start)
 
 
-def log_cell(precision, pull, entries: Entries):
+def _log_cell(precision, pull, cells: AmplitudeCells):
     """Return log ∫ π(a) exp(−½ A a² + B a) da over each cell, mean and sd of a.
 
     Args:
         precision: A, information of the rows on the amplitude.
         pull: B, information times the estimate.
-        entries: cells and priors.
+        cells: cells and priors.
     """
-    whole = precision + entries.precision + TINY
-    drawn = pull + entries.precision * entries.mean
+    whole = precision + cells.precision + TINY
+    drawn = pull + cells.precision * cells.mean
     centre, root = drawn / whole, jnp.sqrt(whole)
-    mass = log_interval((entries.low - centre) * root, (entries.high - centre) * root)
+    mass = log_interval((cells.low - centre) * root, (cells.high - centre) * root)
     value = (
         0.5 * drawn * centre
-        - 0.5 * entries.precision * entries.mean**2
+        - 0.5 * cells.precision * cells.mean**2
         + 0.5 * (LOG_2PI - jnp.log(whole))
         + mass
-        + entries.log_height
+        + cells.log_height
     )
     return value, centre, 1.0 / root
 
 
-def _marginal(nodes: Nodes, entries: Entries, log_sd):
+def _without_tolerance(products: PieceProducts, cells: AmplitudeCells, log_sd):
     """Integrate the tolerance out: return log factor, eVe, eVu and uVu."""
-    own = jax.tree.map(lambda leaf: leaf[:, entries.node], nodes)
-    loose = ((entries.tolerance * entries.size) ** 2 * jnp.exp(-2.0 * log_sd))[
-        ..., None
-    ]
+    own = jax.tree.map(lambda leaf: leaf[:, cells.piece], products)
+    loose = ((cells.tolerance * cells.size) ** 2 * jnp.exp(-2.0 * log_sd))[..., None]
     factor = loose / (1.0 + loose * own.spread)
     return (
         -0.5 * jnp.sum(jnp.log1p(loose * own.spread), axis=-1),
@@ -115,101 +132,127 @@ def _marginal(nodes: Nodes, entries: Entries, log_sd):
     )
 
 
-def _noise_of_entries(ground: Ground, nodes: Nodes, entries: Entries):
-    """Return log of the most probable noise sd of each entry."""
+def _noise_of_cells(common: CommonTerms, products: PieceProducts, cells):
+    """Return log of the most probable noise sd of each cell."""
 
     def step(log_sd):
-        _, ee, eu, uu = _marginal(nodes, entries, log_sd)
+        _, ee, eu, uu = _without_tolerance(products, cells, log_sd)
         variance = jnp.exp(2.0 * log_sd)
-        whole = uu / variance + entries.precision + TINY
-        drawn = eu / variance + entries.precision * entries.mean
-        size = jnp.clip(drawn / whole, entries.low, entries.high)
+        whole = uu / variance + cells.precision + TINY
+        drawn = eu / variance + cells.precision * cells.mean
+        size = jnp.clip(drawn / whole, cells.low, cells.high)
         left = ee - 2.0 * size * eu + size**2 * uu
-        return 0.5 * jnp.log(jnp.maximum(left, 1e-9 * variance) / ground.rows)
+        return 0.5 * jnp.log(jnp.maximum(left, 1e-9 * variance) / common.rows)
 
-    return settle(step, 0.5 * jnp.log(nodes.ee[:, entries.node] / ground.rows))
+    start = 0.5 * jnp.log(products.ee[:, cells.piece] / common.rows)
+    return most_probable_noise(step, start)
 
 
 @jax.jit
-def entry_evidence(ground: Ground, nodes: Nodes, entries: Entries, sigma: Prior):
-    """Return the log evidence of each entry, and the amplitude given it.
+def _cell_evidence(common, products, cells, sigma: Prior):
+    centre = _noise_of_cells(common, products, cells)
+
+    def value(log_sd):
+        factor, ee, eu, uu = _without_tolerance(products, cells, log_sd)
+        variance = jnp.exp(2.0 * log_sd)
+        cell, _, _ = _log_cell(uu / variance, eu / variance, cells)
+        return factor - common.rows * log_sd - 0.5 * ee / variance + cell
+
+    total = integrate_noise(value, centre, common.rows, sigma)
+    _, _, eu, uu = _without_tolerance(products, cells, centre)
+    variance = jnp.exp(2.0 * centre)
+    _, mean, sd = _log_cell(uu / variance, eu / variance, cells)
+    constant = common.constant[:, None] - 0.5 * common.rows * LOG_2PI
+    return total + constant + cells.log_weight, mean, sd
+
+
+def cell_evidence(
+    common: CommonTerms, products: PieceProducts, cells: AmplitudeCells, sigma: Prior
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the log evidence of each cell, and the amplitude given it.
 
     Args:
-        ground: what all hypotheses share.
-        nodes: inner products.
-        entries: cells.
+        common: what all hypotheses share.
+        products: of the pieces.
+        cells: of the amplitudes.
         sigma: prior of the noise sd.
 
     Returns:
-        Log evidence with the entry's own prior weight, its amplitude's mean and sd
-        before the cell cuts it; each [correlation, entry].
+        Log evidence with the cell's own prior weight, its amplitude's mean and sd
+        before the cell cuts it; each [correlation, cell].
     """
-    centre = _noise_of_entries(ground, nodes, entries)
-
-    def value(log_sd):
-        factor, ee, eu, uu = _marginal(nodes, entries, log_sd)
-        variance = jnp.exp(2.0 * log_sd)
-        cell, _, _ = log_cell(uu / variance, eu / variance, entries)
-        return factor - ground.rows * log_sd - 0.5 * ee / variance + cell
-
-    total = over_noise(value, centre, ground.rows, sigma)
-    _, _, eu, uu = _marginal(nodes, entries, centre)
-    variance = jnp.exp(2.0 * centre)
-    _, mean, sd = log_cell(uu / variance, eu / variance, entries)
-    common = ground.constant[:, None] - 0.5 * ground.rows * LOG_2PI
-    return total + common + entries.log_weight, mean, sd
+    padded = pad_axis(products, 1), pad_axis(cells, 0)
+    found = _cell_evidence(common, *padded, sigma)
+    evidence, mean, sd = (np.asarray(part)[:, : len(cells.low)] for part in found)
+    return evidence, mean, sd
 
 
 @jax.jit
-def block_evidence(
-    ground: Ground,
-    blocks: Blocks,
-    scale: Float[Array, "b t"],
-    log_weight: Float[Array, "b t"],
+def _subspace_evidence(common, products, scale, log_weight, sigma: Prior):
+    def parts(log_sd):
+        loose = (scale**2 * jnp.exp(-2.0 * log_sd))[..., None]
+        spread, be = products.spread[:, :, None], products.be[:, :, None]
+        inside = 1.0 + loose * spread
+        left = products.ee[:, :, None] - jnp.sum(loose / inside * be**2, axis=-1)
+        return jnp.sum(jnp.log(inside), axis=-1), left
+
+    def step(log_sd):
+        return 0.5 * jnp.log(jnp.maximum(parts(log_sd)[1], 1e-12) / common.rows)
+
+    start = 0.5 * jnp.log(products.ee / common.rows)[:, :, None] + 0.0 * scale
+    log_sd = most_probable_noise(step, start)
+
+    def value(at):
+        log_det, left = parts(at)
+        return -common.rows * at - 0.5 * log_det - 0.5 * left * jnp.exp(-2.0 * at)
+
+    total = integrate_noise(value, log_sd, common.rows, sigma)
+    constant = common.constant[:, None, None] - 0.5 * common.rows * LOG_2PI
+    return total + constant + log_weight
+
+
+def subspace_evidence(
+    common: CommonTerms,
+    products: SubspaceProducts,
+    scale: Float[np.ndarray, "b t"],
+    log_weight: Float[np.ndarray, "b t"],
     sigma: Prior,
-):
+) -> Float[np.ndarray, "r b t"]:
     """Return the log evidence of each subspace at each scale.
 
     Args:
-        ground: what all hypotheses share.
-        blocks: inner products.
+        common: what all hypotheses share.
+        products: of the subspaces.
         scale: factor on the columns, one of several.
         log_weight: log prior probability of each.
         sigma: prior of the noise sd.
 
     Returns:
-        Log evidence, [correlation, block, scale].
+        Log evidence, [correlation, subspace, scale].
     """
-
-    def parts(log_sd):
-        loose = (scale**2 * jnp.exp(-2.0 * log_sd))[..., None]
-        spread, be = blocks.spread[:, :, None], blocks.be[:, :, None]
-        inside = 1.0 + loose * spread
-        left = blocks.ee[:, :, None] - jnp.sum(loose / inside * be**2, axis=-1)
-        return jnp.sum(jnp.log(inside), axis=-1), left
-
-    def step(log_sd):
-        return 0.5 * jnp.log(jnp.maximum(parts(log_sd)[1], 1e-12) / ground.rows)
-
-    start = 0.5 * jnp.log(blocks.ee / ground.rows)[:, :, None] + 0.0 * scale
-    log_sd = settle(step, start)
-
-    def value(at):
-        log_det, left = parts(at)
-        return -ground.rows * at - 0.5 * log_det - 0.5 * left * jnp.exp(-2.0 * at)
-
-    total = over_noise(value, log_sd, ground.rows, sigma)
-    common = ground.constant[:, None, None] - 0.5 * ground.rows * LOG_2PI
-    return total + common + log_weight
+    padded = pad_axis(products, 1), *pad_axis((scale, log_weight), 0)
+    return np.asarray(_subspace_evidence(common, *padded, sigma))[:, : len(scale)]
 
 
 @jax.jit
-def plain_evidence(ground: Ground, ee: Float[Array, " r"], sigma: Prior):
-    """Return the log evidence without any effect, one for each correlation."""
-    centre = 0.5 * jnp.log(ee / ground.rows)
+def _base_evidence(common, ee, sigma: Prior):
+    centre = 0.5 * jnp.log(ee / common.rows)
 
     def value(log_sd):
-        return -ground.rows * log_sd - 0.5 * ee * jnp.exp(-2.0 * log_sd)
+        return -common.rows * log_sd - 0.5 * ee * jnp.exp(-2.0 * log_sd)
 
-    total = over_noise(value, centre, ground.rows, sigma)
-    return total + ground.constant - 0.5 * ground.rows * LOG_2PI
+    total = integrate_noise(value, centre, common.rows, sigma)
+    return total + common.constant - 0.5 * common.rows * LOG_2PI
+
+
+def base_evidence(
+    common: CommonTerms, ee: Float[Array, " r"], sigma: Prior
+) -> Float[np.ndarray, " r"]:
+    """Return the log evidence without any effect, one for each correlation.
+
+    Args:
+        common: what all hypotheses share.
+        ee: squared length of the reading beside the base model.
+        sigma: prior of the noise sd.
+    """
+    return np.asarray(_base_evidence(common, ee, sigma))

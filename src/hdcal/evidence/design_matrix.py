@@ -1,85 +1,39 @@
-"""A hypothesis at its most probable point: what it adds to the base, linearised."""
+"""What a hypothesis adds to the base model, linearised, and its fit to some rows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from hdcal.data.records import Array
-from hdcal.evidence.effect_lines import Lines
-from hdcal.evidence.single_evidence import Singles
-from hdcal.evidence.subspaces import Subspaces
-from hdcal.evidence.whitened_rows import Rows, whiten
+from hdcal.evidence.linear_rows import LinearRows, whiten
 
 
 @dataclass(frozen=True)
-class Design:
+class DesignMatrix:
     """Contribution offset + columns · a with a ~ N(mean, sd²).
 
     Attributes:
-        offset: at amplitude zero of the line [N], shape (n,).
+        offset: at amplitude zero [N], shape (n,).
         columns: per unit of each amplitude [N], shape (k, n).
         mean: of the prior of each amplitude.
         sd: of the prior of each amplitude.
         values: parameters of the point by `effect.parameter`; amplitudes left out.
     """
 
-    offset: Float[Array, " n"]
-    columns: Float[Array, "k n"]
-    mean: Float[Array, " k"]
-    sd: Float[Array, " k"]
+    offset: Float[np.ndarray, " n"]
+    columns: Float[np.ndarray, "k n"]
+    mean: Float[np.ndarray, " k"]
+    sd: Float[np.ndarray, " k"]
     values: dict[str, float]
 
 
-def line_design(singles: Singles, lines: Lines, index: int) -> Design:
-    """Return the most probable line of an effect."""
-    cells = singles.cells[0]
-    own = np.flatnonzero(cells.owner == index)
-    weight = np.logaddexp.reduce(cells.log_evidence[:, own], axis=0)
-    entry = own[int(np.argmax(weight))]
-    node = int(cells.entries.node[entry]) - int(singles.starts[index])
-    e = cells.entries
-    return design_at(lines, node, float(e.mean[entry]), float(e.precision[entry]))
-
-
-def design_at(lines: Lines, node: int, mean: float, precision: float) -> Design:
-    """Return one line of an effect.
-
-    Args:
-        lines: of the effect.
-        node: index of the line.
-        mean: of the amplitude's prior.
-        precision: of the amplitude's prior; 0 where it is flat.
-    """
-    values = {
-        f"{lines.name}.{name}": float(table[node])
-        for name, table in lines.values.items()
-        if name not in lines.grid.amplitudes
-    }
-    return Design(
-        lines.offsets[node],
-        lines.slopes[node][None],
-        np.array([mean]),
-        1.0 / np.sqrt(np.array([precision or 1e-12])),
-        values,
-    )
-
-
-def subspace_design(spaces: Subspaces, name: str) -> Design:
-    """Return a subspace at its most probable shape and scale."""
-    shape, scale = spaces.likeliest(name)
-    columns = spaces.columns[spaces.of(name)[shape]]
-    columns = columns[np.any(columns != 0.0, axis=1)]
-    count = len(columns)
-    nothing = np.zeros(columns.shape[1])
-    return Design(nothing, columns, np.zeros(count), np.full(count, scale), {})
-
-
-def join_designs(designs: list[Design], rows: int) -> Design:
+def join_designs(designs: Sequence[DesignMatrix], rows: int) -> DesignMatrix:
     """Return several contributions as one; none is a design without columns."""
-    empty = Design(np.zeros(rows), np.zeros((0, rows)), np.zeros(0), np.zeros(0), {})
+    nothing = np.zeros(0)
+    empty = DesignMatrix(np.zeros(rows), np.zeros((0, rows)), nothing, nothing, {})
     every = [empty, *designs]
-    return Design(
+    return DesignMatrix(
         np.sum([d.offset for d in every], axis=0),
         np.concatenate([d.columns for d in every]),
         np.concatenate([d.mean for d in every]),
@@ -89,7 +43,7 @@ def join_designs(designs: list[Design], rows: int) -> Design:
 
 
 @dataclass(frozen=True)
-class Fit:
+class DesignFit:
     """Gaussian posterior of base coefficients and amplitudes given a design.
 
     Attributes:
@@ -114,12 +68,12 @@ class Fit:
 
 
 def fit_design(
-    rows: Rows,
-    design: Design,
+    rows: LinearRows,
+    design: DesignMatrix,
     noise_sd: float,
     correlation: float,
     kept: np.ndarray | None = None,
-) -> Fit:
+) -> DesignFit:
     """Fit base and design to some rows.
 
     Args:
@@ -130,15 +84,15 @@ def fit_design(
         kept: which rows count, shape (n,); others have no weight. Their neighbours
             keep the whitening of the whole run.
     """
-    columns = np.column_stack([np.asarray(rows.base), design.columns.T])
-    prior = np.concatenate([np.asarray(rows.precision), (noise_sd / design.sd) ** 2])
+    columns = np.column_stack([rows.base, design.columns.T])
+    prior = np.concatenate([rows.precision, (noise_sd / design.sd) ** 2])
     mean = np.concatenate([np.zeros(rows.base.shape[1]), design.mean])
-    target = np.asarray(rows.reading) - design.offset
-    white = np.asarray(whiten(rows, np.column_stack([target, columns]), correlation))
+    target = rows.reading - design.offset
+    white = whiten(rows, np.column_stack([target, columns]), correlation)
     if kept is not None:
         white = white[kept]
     target, seen = white[:, 0], white[:, 1:]
     precision = seen.T @ seen + np.diag(prior)
     covariance = noise_sd**2 * np.linalg.inv(precision)
     centre = np.linalg.solve(precision, seen.T @ target + prior * mean)
-    return Fit(centre, covariance, columns, np.asarray(design.offset))
+    return DesignFit(centre, covariance, columns, design.offset)

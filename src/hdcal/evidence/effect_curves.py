@@ -1,31 +1,52 @@
 """What an effect adds to the mean reading, at many values of its parameters."""
 
-from functools import partial
+from dataclasses import replace
 
 import jax
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 
-# Points predicted at a time, always as many: one compilation serves all grids. With
+# Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.
 _BLOCK, _MOST_VALUES = 16, 2**22
 
 
-@partial(jax.jit, static_argnames=("effect", "names"))
-def _curves(effect, names, values, base: Base, records: Records, reading: Reading):
+def padded_records(records: Records) -> Records:
+    """Return records of a length that many cases share, the last row repeated.
+
+    An effect looks back only: rows that follow do not change what it says of a row.
+    What is known of the records is left out; it would compile everything anew.
+    """
+    rows = replace(records, known=frozenset())
+    return repeat_last_row(rows, bucket_size(len(records.force)))
+
+
+@jax.jit
+def _base_reading(base: Base, records: Records, reading: Reading):
+    return predict_reading(base, (), records, reading)[0]
+
+
+def base_reading(base: Base, records: Records, reading: Reading) -> np.ndarray:
+    """Return the mean reading without effects [N], shape (n,)."""
+    found = _base_reading(base, padded_records(records), reading)
+    return np.asarray(found)[: len(records.force)]
+
+
+@jax.jit
+def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 
-    def one(row):
-        made = effect(**dict(zip(names, row, strict=True)))
-        return predict_reading(base, (made,), records, reading)[0] - plain
+    def one(effect):
+        return predict_reading(base, (effect,), records, reading)[0] - plain
 
-    return jax.vmap(one)(values)
+    return jax.vmap(one)(effects)
 
 
-def curves(
+def effect_curves(
     effect: type[Effect],
     values: dict[str, np.ndarray],
     base: Base,
@@ -44,13 +65,17 @@ def curves(
     Returns:
         Shape (g, n).
     """
-    names = tuple(values)
-    table = np.stack([np.asarray(values[name], float) for name in names], axis=1)
-    block = int(np.clip(_MOST_VALUES // len(records.force), 1, _BLOCK))
-    count = len(table)
-    table = np.concatenate([table, np.repeat(table[-1:], -count % block, axis=0)])
+    rows, padded = len(records.force), padded_records(records)
+    block = int(np.clip(_MOST_VALUES // rows, 1, _BLOCK))
+    table = {name: np.asarray(column, float) for name, column in values.items()}
+    count = len(next(iter(table.values())))
+    table = repeat_last_row(table, count + -count % block)
     parts = [
-        _curves(effect, names, table[i : i + block], base, records, reading)
-        for i in range(0, len(table), block)
+        np.asarray(_curves(effect(**_rows(table, i, block)), base, padded, reading))
+        for i in range(0, count, block)
     ]
-    return np.concatenate([np.asarray(part) for part in parts])[:count]
+    return np.concatenate(parts)[:count, :rows]
+
+
+def _rows(table: dict[str, np.ndarray], start: int, count: int):
+    return {name: column[start : start + count] for name, column in table.items()}

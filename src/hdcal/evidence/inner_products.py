@@ -1,21 +1,20 @@
 """The few inner products that hold all that the rows say about a hypothesis."""
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.evidence.whitened_rows import (
-    Rows,
-    beside_line,
-    log_absorbed,
-    whiten,
-    whitening_jacobian,
+from hdcal.evidence.linear_rows import (
+    LinearRows,
+    log_det_projection,
+    log_det_whitening,
+    project,
+    remove_base,
 )
 
 
-class Ground(eqx.Module):
+class CommonTerms(eqx.Module):
     """What all hypotheses share, one entry per correlation.
 
     Attributes:
@@ -24,11 +23,11 @@ class Ground(eqx.Module):
     """
 
     constant: Float[Array, " r"]
-    rows: Float[Array, ""] | float
+    rows: float
 
 
-class Nodes(eqx.Module):
-    """Lines e = y − o, u in the space beside the base model; [correlation, node].
+class PieceProducts(eqx.Module):
+    """Pieces e = y − o, u in the space beside the base model; [correlation, piece].
 
     Attributes:
         ee: squared length of what is left of the reading.
@@ -47,8 +46,8 @@ class Nodes(eqx.Module):
     tu: Float[Array, "r g j"]
 
 
-class Blocks(eqx.Module):
-    """Subspaces with one prior variance each; [correlation, block].
+class SubspaceProducts(eqx.Module):
+    """Subspaces with one prior variance each; [correlation, subspace].
 
     Attributes:
         ee: squared length of the reading beside the base model.
@@ -61,118 +60,88 @@ class Blocks(eqx.Module):
     be: Float[Array, "r b j"]
 
 
-@jax.jit
-def ground(rows: Rows) -> Ground:
+def common_terms(rows: LinearRows) -> CommonTerms:
     """Return what every hypothesis shares."""
-
-    def one(correlation):
-        log_det = log_absorbed(rows, correlation)
-        return whitening_jacobian(rows, correlation) + 0.5 * log_det
-
-    return Ground(jax.vmap(one)(rows.correlations), float(rows.reading.shape[0]))
-
-
-def project(rows: Rows, correlation, columns):
-    """Return columns whose inner products are those of P, not of P P.
-
-    P = (I + X S X')⁻¹ is no projection where the base's priors hold it back: what
-    these cost is kept in as many further entries as the base has columns.
-    """
-    base = whiten(rows, rows.base, correlation)
-    gram = base.T @ base + jnp.diag(rows.precision)
-    white = whiten(rows, columns.T, correlation).T
-    fitted = jnp.linalg.solve(gram, base.T @ white.T).T
-    held = jnp.sqrt(rows.precision) * fitted
-    return jnp.concatenate([white - fitted @ base.T, held], axis=1)
+    constant = [
+        log_det_whitening(rows, c) + 0.5 * log_det_projection(rows, c)
+        for c in rows.correlations
+    ]
+    return CommonTerms(np.array(constant), float(len(rows.reading)))
 
 
-@jax.jit
-def line_statistics(
-    rows: Rows, offsets: Float[Array, "g n"], slopes: Float[Array, "g n"]
-) -> Nodes:
-    """Reduce lines of curves to their inner products, without tolerance.
+def piece_products(
+    rows: LinearRows,
+    offsets: Float[np.ndarray, "g n"],
+    slopes: Float[np.ndarray, "g n"],
+    shapes: Float[np.ndarray, "g n"] | None = None,
+) -> PieceProducts:
+    """Reduce pieces of effects to their inner products.
 
     Args:
         rows: the data.
-        offsets: contribution at amplitude zero of each line [N].
+        offsets: contribution at amplitude zero of each piece [N].
         slopes: change per unit of the amplitude [N].
+        shapes: contribution per unit of the amplitude whose shape is uncertain [N];
+            None for exact shapes.
     """
-
-    def one(correlation):
-        left = project(rows, correlation, rows.reading[None] - offsets)
+    deviations = np.zeros((len(slopes), 0, slopes.shape[1]))
+    if shapes is not None:
+        deviations = remove_base(rows, shapes)[:, None] * rows.tolerance
+    flat = deviations.reshape(-1, slopes.shape[1])
+    parts = []
+    for correlation in rows.correlations:
+        left = project(rows, correlation, rows.reading - offsets)
         slope = project(rows, correlation, slopes)
-        nothing = jnp.zeros((len(offsets), 0))
-        return (*_lengths(left, slope), nothing, nothing, nothing)
-
-    return Nodes(*jax.lax.map(one, rows.correlations))
-
-
-def _lengths(left, slope):
-    return (
-        jnp.sum(left**2, axis=1),
-        jnp.sum(left * slope, axis=1),
-        jnp.sum(slope**2, axis=1),
-    )
+        lengths = [np.sum(a * b, axis=1) for a, b in ((left, left), (left, slope))]
+        loose = project(rows, correlation, flat)
+        loose = loose.reshape(*deviations.shape[:2], slope.shape[1])
+        both = np.stack([left, slope], axis=1)
+        spread, (te, tu) = _along_axes(loose, both)
+        parts.append((*lengths, np.sum(slope**2, axis=1), spread, te, tu))
+    return PieceProducts(*map(np.stack, zip(*parts, strict=True)))
 
 
-@jax.jit
-def tolerant_statistics(
-    rows: Rows,
-    offsets: Float[Array, "g n"],
-    slopes: Float[Array, "g n"],
-    shapes: Float[Array, "g n"],
-) -> Nodes:
-    """Reduce lines and the tolerance of their shapes to inner products.
-
-    Args:
-        rows: the data.
-        offsets: contribution at amplitude zero of each line [N].
-        slopes: change per unit of the amplitude [N].
-        shapes: contribution per unit of the amplitude whose shape is uncertain [N].
-    """
-    wiggles = beside_line(rows, shapes)[:, None] * rows.tolerance
-    flat = wiggles.reshape(-1, wiggles.shape[-1])
-
-    def one(correlation):
-        left = project(rows, correlation, rows.reading[None] - offsets)
-        slope = project(rows, correlation, slopes)
-        loose = project(rows, correlation, flat).reshape(*wiggles.shape[:2], -1)
-        spread, rotation = jnp.linalg.eigh(loose @ jnp.swapaxes(loose, 1, 2))
-        both = loose @ jnp.stack([left, slope], axis=2)
-        te, tu = jnp.moveaxis(jnp.swapaxes(rotation, 1, 2) @ both, 2, 0)
-        return (*_lengths(left, slope), jnp.maximum(spread, 0.0), te, tu)
-
-    return Nodes(*jax.lax.map(one, rows.correlations))
-
-
-@jax.jit
-def block_statistics(rows: Rows, columns: Float[Array, "b j n"]) -> Blocks:
-    """Reduce subspaces to their inner products; zero columns are harmless.
+def subspace_products(
+    rows: LinearRows, columns: Float[np.ndarray, "b j n"]
+) -> SubspaceProducts:
+    """Reduce subspaces to their inner products; zero columns change nothing.
 
     Args:
         rows: the data.
         columns: of each subspace, per unit of its prior sd [N].
     """
-
-    def one(correlation):
+    count, width, size = columns.shape
+    parts = []
+    for correlation in rows.correlations:
         left = project(rows, correlation, rows.reading[None])[0]
-
-        def each(block):
-            inside = project(rows, correlation, block)
-            spread, rotation = jnp.linalg.eigh(inside @ inside.T)
-            return jnp.maximum(spread, 0.0), rotation.T @ (inside @ left)
-
-        spread, be = jax.lax.map(each, columns)
-        return jnp.broadcast_to(left @ left, spread.shape[:1]), spread, be
-
-    return Blocks(*jax.lax.map(one, rows.correlations))
+        inside = project(rows, correlation, columns.reshape(-1, size))
+        inside = inside.reshape(count, width, -1)
+        reading = np.broadcast_to(left, (count, 1, len(left)))
+        spread, (be,) = _along_axes(inside, reading)
+        parts.append((np.full(count, left @ left), spread, be))
+    return SubspaceProducts(*map(np.stack, zip(*parts, strict=True)))
 
 
-@jax.jit
-def gram(
-    rows: Rows, correlation, curves: Float[Array, "m n"]
-) -> Float[Array, "m+1 m+1"]:
+def _along_axes(columns: np.ndarray, others: np.ndarray):
+    """Return squared lengths of the principal axes of columns, and products with them.
+
+    Args:
+        columns: of each subspace, shape (b, j, n).
+        others: vectors, shape (b, k, n).
+
+    Returns:
+        Shapes (b, j) and (k, b, j).
+    """
+    spread, rotation = np.linalg.eigh(columns @ np.swapaxes(columns, 1, 2))
+    products = others @ np.swapaxes(columns, 1, 2) @ rotation
+    return np.maximum(spread, 0.0), np.moveaxis(products, 1, 0)
+
+
+def gram_matrix(
+    rows: LinearRows, correlation: float, curves: Float[np.ndarray, "m n"]
+) -> Float[np.ndarray, "m+1 m+1"]:
     """Return all inner products of the reading (first) and curves, projected."""
-    table = jnp.concatenate([rows.reading[None], curves])
-    inside = project(rows, correlation, table)
+    inside = project(
+        rows, correlation, np.concatenate([np.asarray(rows.reading)[None], curves])
+    )
     return inside @ inside.T

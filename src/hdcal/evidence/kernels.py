@@ -6,7 +6,8 @@ from itertools import combinations
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.evidence.prepare import spread_out, within_run
+from hdcal.evidence.linear_rows import LinearRows, remove_base
+from hdcal.evidence.row_features import half_cycles, place_in_run, scale_to_unit
 
 # Number of functions along one covariate, along each of two, of labels.
 _ALONE, _TOGETHER, _LABELS = 16, 4, 24
@@ -15,7 +16,7 @@ _ALONE, _TOGETHER, _LABELS = 16, 4, 24
 _LEAST, _SAME = 1e-3, 0.97
 
 
-def kernels(records: Records) -> dict[str, np.ndarray]:
+def kernel_columns(records: Records) -> dict[str, np.ndarray]:
     """Return the columns of each kernel by name, shape (j, n), before projection.
 
     Each covariate, each product of two, and what belongs to runs, specimens,
@@ -54,12 +55,12 @@ def _alone(records: Records) -> dict[str, np.ndarray]:
         order = np.arange(1, _ALONE + 1)[:, None]
         return np.cos(np.pi * order * (x + 1.0) / 2.0)
 
-    found = {"deformation": cosines(spread_out(records.deformation))}
+    found = {"deformation": cosines(scale_to_unit(records.deformation))}
     levels = len(np.unique(np.round(records.temperature, 1)))
     if "temperature" in records.known and levels > 1:
-        table = cosines(spread_out(records.temperature))
+        table = cosines(scale_to_unit(records.temperature))
         found["temperature"] = table[: max(1, levels - 1)]
-    found["order in run"] = cosines(within_run(records.run))
+    found["order in run"] = cosines(place_in_run(records.run))
     if len(np.unique(records.run)) > 1:
         found["order"] = cosines(np.linspace(-1.0, 1.0, len(records.force)))
     if "angle" in records.known:
@@ -85,23 +86,14 @@ def _labels(records: Records) -> dict[str, np.ndarray]:
     return found
 
 
-def half_cycles(records: Records) -> np.ndarray:
-    """Return the index of the half cycle of each row, new with each run."""
-    run, sense = np.asarray(records.run), np.asarray(records.sense)
-    turned = (np.diff(run, prepend=run[0]) != 0) | (
-        np.diff(sense, prepend=sense[0]) != 0
-    )
-    return np.cumsum(turned)
-
-
 def visible_kernels(
-    tables: Mapping[str, np.ndarray], project, width: int
+    rows: LinearRows, tables: Mapping[str, np.ndarray], width: int
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Return the kernels that the base model leaves, scaled to unit mean square.
 
     Args:
+        rows: the data.
         tables: columns of each kernel by name, shape (j, n).
-        project: removes from curves (g, n) what the base model absorbs.
         width: number of columns to which each kernel is cut or padded.
 
     Returns:
@@ -109,7 +101,7 @@ def visible_kernels(
     """
     names, found = [], []
     for name, table in tables.items():
-        left = np.asarray(project(table))
+        left = remove_base(rows, table)
         size = np.sqrt(np.sum(np.mean(left**2, axis=1)))
         if size <= _LEAST * np.sqrt(np.sum(np.mean(table**2, axis=1))):
             continue
@@ -148,18 +140,3 @@ def principal(table: np.ndarray, width: int) -> np.ndarray:
         _, rotation = np.linalg.eigh(table @ table.T)
         table = rotation[:, -width:].T @ table
     return np.concatenate([table, np.zeros((width - len(table), rows))])
-
-
-def blocks_of(records: Records, fewest: int = 4) -> np.ndarray:
-    """Return the index of the block of each row: half cycles, else equal stretches.
-
-    Args:
-        records: rows, run after run.
-        fewest: number of half cycles below which runs are cut into stretches.
-    """
-    halves = half_cycles(records)
-    if halves[-1] + 1 >= fewest:
-        return halves
-    rows = len(halves)
-    count = int(np.clip(rows // 3, 2, 6))
-    return np.minimum(np.arange(rows) * count // rows, count - 1)

@@ -1,23 +1,21 @@
-"""Evidence of every pair of hypotheses, each kind by its own road."""
+"""Evidence of every pair of hypotheses, each kind in its own way."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from hdcal.evidence.assessment import (
-    QUANTISATION,
-    Assessment,
-    curve_of,
-    pair_name,
-)
-from hdcal.evidence.closed_form import block_evidence
-from hdcal.evidence.inner_products import block_statistics
-from hdcal.evidence.line_pairs import assess_couples
-from hdcal.evidence.noise_evidence import assess_noise
-from hdcal.evidence.single_evidence import Singles, assess_singles
+from hdcal.evidence.case_evidence import NONE, QUANTISATION, CaseEvidence, pair_name
+from hdcal.evidence.closed_form import subspace_evidence
+from hdcal.evidence.hypothesis_design import fitted_curve
+from hdcal.evidence.inner_products import subspace_products
+from hdcal.evidence.linear_rows import LinearRows
+from hdcal.evidence.noise_evidence import noise_evidence
+from hdcal.evidence.piecewise_pairs import piecewise_pair_evidence
+from hdcal.evidence.single_evidence import SingleEvidence, single_evidence
 from hdcal.evidence.subspaces import mean_evidence
-from hdcal.evidence.whitened_rows import Rows
+from hdcal.physics.effect import Effect
 
 # Correlations of less posterior weight than this take no part in pairs.
 _LEAST_WEIGHT = 0.02
@@ -25,110 +23,123 @@ _LEAST_WEIGHT = 0.02
 _BESIDE = 2
 
 
-def assess_pairs(found: Assessment, shaped, gain: float | None) -> dict:
-    """Return the log evidence of every pair, [correlation]."""
-    sigma = found.setting.priors["sigma"]
-    table, lines = found.table, found.lines
-    pairs = _line_pairs(found)
-    for name in found.wide:
-        beside = _with_subspace(found, name)
-        variant = assess_singles(beside, lines, sigma, tolerant=False)
-        both = _beside_subspace(found, beside, variant, name)
-        pairs |= {n: table[name] + gained for n, gained in both.items()}
-        for other in found.singles.names:
-            gained = variant.by_correlation(other) - variant.none
-            pairs[pair_name(name, other)] = table[name] + gained
-    mean = [*found.singles.names, *found.wide]
-    pairs |= _noise_pairs(found, shaped, mean)
+def pair_evidence(
+    evidence: CaseEvidence, noisy: Mapping[str, type[Effect]]
+) -> dict[str, np.ndarray]:
+    """Return the log evidence of every pair, [correlation].
+
+    Args:
+        evidence: of each hypothesis alone.
+        noisy: effects on the noise by name.
+    """
+    table = evidence.table
+    pairs = _piecewise_pairs(evidence)
+    for name in evidence.subspace_effects:
+        pairs |= _pairs_with_subspace(evidence, name)
+    mean = [*evidence.single.names, *evidence.subspace_effects]
+    pairs |= _noise_pairs(evidence, noisy, mean)
     if QUANTISATION in table:
-        others = [*mean, *found.noise]
+        # Rounding gains as much beside any effect as it does alone.
+        gain = table[QUANTISATION] - table[NONE]
+        others = [*mean, *evidence.noise]
         pairs |= {pair_name(QUANTISATION, n): table[n] + gain for n in others}
     return pairs
 
 
-def _noise_pairs(found: Assessment, shaped, mean: list[str]) -> dict:
-    """Return pairs of an effect on the noise with any other.
-
-    Noise takes up what structure the mean has left, so that its evidence is found
-    anew beside each of the likeliest effects; beside others the least of these counts.
-    """
-    table = found.table
-    whole = {name: np.logaddexp.reduce(table[name]) for name in mean}
-    best = sorted(mean, key=lambda name: -whole[name])[:_BESIDE]
-    pairs = {}
-    for noisy in found.noise:
-        factor = {
-            name: assess_noise(
-                shaped[noisy], found.setting, curve_of(found, name)
-            ).log_factor
-            for name in best
-        }
-        least = min([found.noise[noisy].log_factor, *factor.values()])
-        for name in mean:
-            gain = factor.get(name, least)
-            pairs[pair_name(noisy, name)] = table[name] + gain
-    for one, two in combinations(found.noise, 2):
-        least = min(found.noise[n].log_factor for n in (one, two))
-        better = np.maximum(table[one], table[two])
-        # They compete for the same rows: no more than the better one of them.
-        pairs[pair_name(one, two)] = better + min(least, 0.0)
-    return pairs
-
-
-def _line_pairs(found: Assessment) -> dict:
-    alone = np.stack([v for n, v in found.table.items()])
+def _piecewise_pairs(evidence: CaseEvidence) -> dict[str, np.ndarray]:
+    """Return pairs of effects with one amplitude each."""
+    if len(evidence.piecewise) < 2:
+        return {}
+    alone = np.stack(list(evidence.table.values()))
     weight = np.exp(np.max(alone, axis=0) - np.max(alone))
     weight = weight / weight.sum()
     pairs: dict[str, np.ndarray] = {}
-    for index, share in enumerate(weight):
-        if share < _LEAST_WEIGHT or len(found.lines) < 2:
-            continue
-        both = assess_couples(
-            found.setting.rows,
-            found.singles,
-            found.lines,
-            found.setting.priors["sigma"],
-            index,
+    for index in np.flatnonzero(weight >= _LEAST_WEIGHT):
+        both = piecewise_pair_evidence(
+            evidence.prepared.rows,
+            evidence.single,
+            evidence.piecewise,
+            evidence.prepared.priors["sigma"],
+            int(index),
         )
-        for (one, other), value in both.items():
-            name = pair_name(one, other)
-            pairs.setdefault(name, np.full(len(weight), -np.inf))[index] = value
+        for names, value in both.items():
+            impossible = np.full(len(weight), -np.inf)
+            pairs.setdefault(pair_name(*names), impossible)[index] = value
     return pairs
 
 
-def _beside_subspace(
-    found: Assessment, beside: Rows, variant: Singles, name: str
-) -> dict:
-    """Return what subspaces after this one gain beside it, by name of the pair."""
-    later = [other for other in found.wide if other > name]
+def _pairs_with_subspace(evidence: CaseEvidence, name: str) -> dict[str, np.ndarray]:
+    """Return pairs of one subspace with single effects and with subspaces after it."""
+    sigma = evidence.prepared.priors["sigma"]
+    rows = _with_subspace(evidence, name)
+    beside = single_evidence(rows, evidence.piecewise, sigma, tolerant=False)
+    alone = evidence.table[name]
+    pairs = {
+        other: alone + (mean_evidence(found) - beside.none)
+        for other, found in _later_subspaces(evidence, rows, beside, name).items()
+    }
+    pairs |= {n: alone + (beside.by_correlation(n) - beside.none) for n in beside.names}
+    return {pair_name(name, other): value for other, value in pairs.items()}
+
+
+def _later_subspaces(
+    evidence: CaseEvidence, rows: LinearRows, beside: SingleEvidence, name: str
+) -> dict[str, np.ndarray]:
+    """Return evidences of the subspaces after one beside it, [correlation, b, t]."""
+    later = [other for other in evidence.subspace_effects if other > name]
     if not later:
         return {}
-    spaces = found.subspaces
+    spaces = evidence.subspaces
     own = np.concatenate([spaces.of(other) for other in later])
-    sigma = found.setting.priors["sigma"]
-    evidence = block_evidence(
-        variant.ground,
-        block_statistics(beside, spaces.columns[own]),
+    found = subspace_evidence(
+        beside.common,
+        subspace_products(rows, spaces.columns[own]),
         spaces.scale[own],
         spaces.log_weight[own],
-        sigma,
+        evidence.prepared.priors["sigma"],
     )
     label = np.asarray(spaces.names)[own]
-    return {
-        pair_name(name, other): mean_evidence(np.asarray(evidence)[:, label == other])
-        - variant.none
-        for other in later
-    }
+    return {other: found[:, label == other] for other in later}
 
 
-def _with_subspace(found: Assessment, name: str) -> Rows:
+def _with_subspace(evidence: CaseEvidence, name: str) -> LinearRows:
     """Return rows whose base also absorbs an effect at its most probable scale."""
-    spaces, rows = found.subspaces, found.setting.rows
+    spaces, rows = evidence.subspaces, evidence.prepared.rows
     shape, scale = spaces.likeliest(name)
     columns = scale * spaces.columns[spaces.of(name)[shape]].T
-    noise = np.full(columns.shape[1], found.setting.noise_sd**2)
+    noise = np.full(columns.shape[1], evidence.prepared.noise_sd**2)
     return replace(
         rows,
         base=np.concatenate([rows.base, columns], axis=1),
         precision=np.concatenate([rows.precision, noise]),
     )
+
+
+def _noise_pairs(
+    evidence: CaseEvidence, noisy: Mapping[str, type[Effect]], mean: list[str]
+) -> dict[str, np.ndarray]:
+    """Return pairs of an effect on the noise with any other.
+
+    Noise takes up what structure the mean has left, so that its evidence is found
+    anew beside each of the likeliest effects; beside others the least of these counts.
+    """
+    table, noise = evidence.table, evidence.noise
+    whole = {name: np.logaddexp.reduce(table[name]) for name in mean}
+    best = sorted(mean, key=lambda name: -whole[name])[:_BESIDE]
+    curves = {name: fitted_curve(evidence, name) for name in best}
+    pairs = {}
+    for name, alone in noise.items():
+        factor = {
+            other: noise_evidence(noisy[name], evidence.prepared, curve).log_factor
+            for other, curve in curves.items()
+        }
+        least = min([alone.log_factor, *factor.values()])
+        for other in mean:
+            gain = factor.get(other, least)
+            pairs[pair_name(name, other)] = table[other] + gain
+    for one, two in combinations(noise, 2):
+        least = min(noise[one].log_factor, noise[two].log_factor)
+        better = np.maximum(table[one], table[two])
+        # They compete for the same rows: no more than the better one of them.
+        pairs[pair_name(one, two)] = better + min(least, 0.0)
+    return pairs

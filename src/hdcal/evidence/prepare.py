@@ -1,18 +1,24 @@
-"""From a case to the rows that every hypothesis is judged on."""
+"""From a case to the linear rows on which every hypothesis is compared."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import jax
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
-from hdcal.evidence.whitened_rows import CORRELATIONS, Rows
+from hdcal.evidence.effect_curves import base_reading
+from hdcal.evidence.linear_rows import CORRELATIONS, LinearRows
+from hdcal.evidence.row_features import (
+    place_in_run,
+    previous_rows,
+    scale_to_unit,
+    take_rows,
+)
 from hdcal.inference.distributions import frozen
 from hdcal.inference.problem import case_reading, pilot_noise, problem_priors
-from hdcal.physics.chain import Base, Reading, predict_reading
+from hdcal.physics.chain import Base, Reading
 from hdcal.physics.theory import THEORIES
 
 # Noise below this share of the largest force is taken as this.
@@ -20,15 +26,15 @@ _LEAST_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
-class Setting:
-    """One case, laid out for evidences.
+class PreparedCase:
+    """One case, linearised about a first fit of the base model.
 
     Attributes:
         records: rows, run after run.
         order: index in the case of each of these rows.
         reading: how the rig reads.
         base: the force model about which effects act.
-        rows: what the evidence needs.
+        rows: readings and base columns.
         noise_sd: pilot estimate [N].
         priors: of every parameter by site name.
         log_stiffness: prior mean of the log stiffness [log N/mm].
@@ -41,7 +47,7 @@ class Setting:
     order: np.ndarray
     reading: Reading
     base: Base
-    rows: Rows
+    rows: LinearRows
     noise_sd: float
     priors: dict[str, Prior]
     log_stiffness: float
@@ -55,21 +61,14 @@ class Setting:
             records, self.reading, self.priors, self.base, self.log_stiffness_sd
         )
 
-    def base_mean(self, records: Records) -> np.ndarray:
-        """Return the prior mean of the readings of other rows [N], shape (n,)."""
-        mean, _ = predict_reading(self.base, (), records, self.reading)
-        shift = self.log_stiffness - np.log(self.base.stiffness)
-        own = self.base_columns(records)[:, 0] / self.log_stiffness_sd
-        return np.asarray(mean) + own * shift
 
-
-def lay_out(
+def prepare(
     case: Case,
     priors: Mapping[str, Prior],
     noise_sd: float | None = None,
     stiffness: float | None = None,
-) -> Setting:
-    """Lay a case out for evidences.
+) -> PreparedCase:
+    """Linearise a case.
 
     Args:
         case: gear and records.
@@ -78,38 +77,35 @@ def lay_out(
         stiffness: about which effects act [N/mm]; by default from least squares.
     """
     order = np.argsort(np.asarray(case.records.run), kind="stable")
-    records = take(case.records, order)
+    records = take_rows(case.records, order)
     reading = case_reading(case)
     own = problem_priors(case, (), {}, case.gear.theory)
-    # Computed readings have no noise; nothing can be weighed against none at all.
+    # Computed readings have no noise, and a noise of zero has no density.
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
-    noise_sd = noise_sd or max(pilot_noise(records), least)
-    scale = _scale(case, own)
-    base, columns, mean = _base(records, reading, own, scale, noise_sd, stiffness)
+    noise_sd = float(noise_sd or max(pilot_noise(records), least))
+    scale = _stiffness_prior(case, own)
+    base, columns, mean = _linearise(records, reading, own, scale, noise_sd, stiffness)
     relative = np.sqrt(1.0 + (np.asarray(records.force_sd) / noise_sd) ** 2)
-    rows = Rows(
+    rows = LinearRows(
         reading=np.asarray(records.force) - mean,
         base=columns,
         # Columns are in units of the prior sd of their coefficients.
         precision=np.full(columns.shape[1], noise_sd**2),
-        before=rows_before(np.asarray(records.run)),
+        before=previous_rows(np.asarray(records.run)),
         weight=1.0 / relative,
         correlations=np.array(CORRELATIONS),
         tolerance=tolerance_functions(records),
     )
     table = {**priors, **case.gear.effect_priors, **case.gear.scale_priors, **own}
-    return Setting(records, order, reading, base, rows, noise_sd, table, *scale)
+    return PreparedCase(records, order, reading, base, rows, noise_sd, table, *scale)
 
 
-def take(records: Records, rows) -> Records:
-    """Return some rows of the records, features as they were."""
-    return jax.tree.map(lambda column: np.asarray(column)[rows], records)
-
-
-def rows_before(run: np.ndarray) -> np.ndarray:
-    """Return the index of the row before in the same run, −1 for a run's first."""
-    before = np.arange(len(run)) - 1
-    return np.where(np.diff(run, prepend=run[0] - 1) != 0, -1, before)
+def log_moments(prior: Prior) -> tuple[float, float]:
+    """Return mean and sd of the logarithm of a positive parameter."""
+    if prior.family == "lognormal":
+        return float(np.log(prior.numbers[0])), float(prior.numbers[1])
+    mean, sd = _moments(prior)
+    return float(np.log(mean)), sd / mean
 
 
 def _moments(prior: Prior) -> tuple[float, float]:
@@ -119,17 +115,10 @@ def _moments(prior: Prior) -> tuple[float, float]:
     return float(law.mean()), float(law.std())
 
 
-def _log_moments(prior: Prior) -> tuple[float, float]:
-    if prior.family == "lognormal":
-        return float(np.log(prior.numbers[0])), float(prior.numbers[1])
-    mean, sd = _moments(prior)
-    return float(np.log(mean)), sd / mean
-
-
-def _scale(case: Case, priors) -> tuple[float, float, float, float]:
+def _stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
     """Return mean and sd of the log stiffness, and both formulas with K = 1 [N/mm]."""
-    k_mean, k_sd = _log_moments(priors["K"])
-    e_mean, e_sd = _log_moments(priors["E0"])
+    k_mean, k_sd = log_moments(priors["K"])
+    e_mean, e_sd = log_moments(priors["E0"])
     modulus = np.exp(e_mean)
     nominal, ring = (
         float(THEORIES[theory](case.gear.geometry, modulus))
@@ -138,7 +127,7 @@ def _scale(case: Case, priors) -> tuple[float, float, float, float]:
     return k_mean + float(np.log(nominal)), float(np.hypot(k_sd, e_sd)), nominal, ring
 
 
-def _base(
+def _linearise(
     records: Records, reading: Reading, priors, scale, noise_sd: float, stiffness
 ):
     """Return base, columns in units of the prior sds, and prior mean of the readings.
@@ -159,9 +148,9 @@ def _base(
     # A measured slope that is not positive says nothing about effects on stiffness.
     stiffness = stiffness if stiffness > 0.0 else float(np.exp(expected))
     base = Base(stiffness, alpha, zero, offset, noise_sd)
-    mean, _ = predict_reading(base, (), records, reading)
     columns = _columns(records, reading, priors, base, expected_sd)
-    mean = np.asarray(mean) + stiffness * shape * (expected - np.log(stiffness))
+    mean = base_reading(base, records, reading)
+    mean = mean + stiffness * shape * (expected - np.log(stiffness))
     return base, columns, mean
 
 
@@ -188,36 +177,21 @@ def tolerance_functions(records: Records) -> np.ndarray:
 
     Together of unit mean square: the relative sd of a shape at a typical row.
     """
-    x = spread_out(records.deformation)
-    t = within_run(records.run)
+    x = scale_to_unit(records.deformation)
+    t = place_in_run(records.run)
     parts = [np.cos(np.pi * k * (x + 1.0) / 2.0) for k in (1, 2, 3)]
     parts += [np.cos(np.pi * k * (t + 1.0) / 2.0) for k in (1, 2)]
     parts.append(np.asarray(records.sense, float))
     # A law of temperature or of rate may bend.
-    parts += [spread_out(records.temperature), spread_out(np.abs(records.rate))]
+    parts += [
+        scale_to_unit(records.temperature),
+        scale_to_unit(np.abs(records.rate)),
+    ]
     table = np.stack(parts)
     return table / np.sqrt(np.sum(np.mean(table**2, axis=1)))
 
 
-def spread_out(values) -> np.ndarray:
-    """Return values scaled to −1 … 1; zeros where they are all the same."""
-    values = np.asarray(values, float)
-    low, high = values.min(), values.max()
-    return (2.0 * values - low - high) / (high - low) if high > low else 0.0 * values
-
-
-def within_run(run) -> np.ndarray:
-    """Return the place of each row in its run, −1 … 1; runs are contiguous."""
-    run = np.asarray(run)
-    place = np.zeros(len(run))
-    for rows in np.split(np.arange(len(run)), np.flatnonzero(np.diff(run)) + 1):
-        place[rows] = np.linspace(-1.0, 1.0, len(rows)) if len(rows) > 1 else 0.0
-    return place
-
-
-def reweighted(setting: Setting, relative_sd: Array) -> Setting:
-    """Return the setting with another noise sd in each row, relative to σ."""
-    rows = setting.rows
-    return replace(
-        setting, rows=replace(rows, weight=np.asarray(rows.weight) / relative_sd)
-    )
+def with_relative_noise(case: PreparedCase, relative_sd: Array) -> PreparedCase:
+    """Return the case with another noise sd in each row, relative to σ."""
+    weight = np.asarray(case.rows.weight) / np.asarray(relative_sd)
+    return replace(case, rows=replace(case.rows, weight=weight))

@@ -1,4 +1,4 @@
-"""Long records, shortened: means of neighbours say nearly as much as the rows."""
+"""Long records: means of neighbouring rows say nearly as much as the rows."""
 
 from dataclasses import replace
 
@@ -6,15 +6,14 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
-from hdcal.evidence.kernels import half_cycles
-from hdcal.evidence.prepare import take
+from hdcal.evidence.row_features import half_cycles, take_rows
 
 # Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
 MOST_ROWS = 10_000
 _AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
 
 
-def shorten(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
+def average_rows(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
     """Average neighbouring rows of a half cycle until few enough are left.
 
     Args:
@@ -29,7 +28,7 @@ def shorten(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
     if group == 1:
         return case, 1
     order = np.argsort(np.asarray(case.records.run), kind="stable")
-    records = take(case.records, order)
+    records = take_rows(case.records, order)
     return replace(case, records=_means(records, group)), group
 
 
@@ -41,7 +40,7 @@ def _means(records: Records, group: int) -> Records:
     member = np.cumsum(new) - 1
     count = np.bincount(member)
     first = np.flatnonzero(new)
-    short = take(records, first)
+    short = take_rows(records, first)
     means = {
         name: np.bincount(member, np.asarray(getattr(records, name))) / count
         for name in _AVERAGED

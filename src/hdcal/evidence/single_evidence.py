@@ -8,134 +8,133 @@ import jax
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.evidence.closed_form import Entries, entry_evidence, plain_evidence
-from hdcal.evidence.effect_lines import NO_TOLERANCE, Lines, entries_of, join
+from hdcal.evidence.closed_form import AmplitudeCells, base_evidence, cell_evidence
 from hdcal.evidence.inner_products import (
-    Ground,
-    Nodes,
-    ground,
-    line_statistics,
-    tolerant_statistics,
+    CommonTerms,
+    PieceProducts,
+    common_terms,
+    piece_products,
 )
-from hdcal.evidence.whitened_rows import Rows
+from hdcal.evidence.linear_rows import LinearRows
+from hdcal.evidence.piecewise_effect import (
+    NO_TOLERANCE,
+    PiecewiseEffect,
+    amplitude_cells,
+    join_cells,
+)
 
-# Numbers in one block of lines: 2**21 of them take 16 MB.
+# Numbers in one block of pieces: 2**21 of them take 16 MB.
 _MOST_VALUES = 2**21
-# Lines of each effect whose shape may differ from the library's: the likeliest.
+# Pieces of each effect whose shape may differ from the library's: the likeliest.
 _TOLERANT = 8
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Log evidences of cells; [correlation, entry].
+class CellEvidence:
+    """Log evidences of cells; [correlation, cell].
 
     Attributes:
-        owner: index of the effect of each entry.
-        entries: the cells.
+        owner: index of the effect of each cell.
+        cells: of the amplitudes.
         log_evidence: with prior weights, without the prior of the correlation.
         mean: of the amplitude before its cell cuts it.
         sd: of the amplitude before its cell cuts it.
     """
 
     owner: np.ndarray
-    entries: Entries
+    cells: AmplitudeCells
     log_evidence: np.ndarray
     mean: np.ndarray
     sd: np.ndarray
 
 
 @dataclass(frozen=True)
-class Singles:
-    """Evidence of every effect that is one line.
+class SingleEvidence:
+    """Evidence of every effect in pieces.
 
     Attributes:
         names: of the effects.
-        cells: without tolerance, and with it where that was asked for.
+        parts: with exact shapes, and with tolerance where that was asked for.
         none: without any effect, [correlation].
-        ground: what all share.
-        nodes: inner products of all lines.
-        starts: index of each effect's first line, and the end.
+        common: what all hypotheses share.
+        products: of all pieces.
+        starts: index of each effect's first piece, and the end.
     """
 
     names: tuple[str, ...]
-    cells: tuple[Cells, ...]
+    parts: tuple[CellEvidence, ...]
     none: np.ndarray
-    ground: Ground
-    nodes: Nodes
+    common: CommonTerms
+    products: PieceProducts
     starts: np.ndarray
 
     def by_correlation(self, name: str) -> np.ndarray:
         """Return the log evidence of an effect, [correlation]."""
         index = self.names.index(name)
-        parts = [c.log_evidence[:, c.owner == index] for c in self.cells]
+        parts = [p.log_evidence[:, p.owner == index] for p in self.parts]
         return np.logaddexp.reduce(np.concatenate(parts, axis=1), axis=1)
 
 
-def assess_singles(
-    rows: Rows,
-    lines: Sequence[Lines],
+def single_evidence(
+    rows: LinearRows,
+    effects: Sequence[PiecewiseEffect],
     sigma: Prior,
     *,
     tolerant: bool = True,
-) -> Singles:
+) -> SingleEvidence:
     """Compute the evidence of each effect alone.
 
     Args:
         rows: the data.
-        lines: of each effect.
+        effects: in pieces.
         sigma: prior of the noise sd.
         tolerant: let the shapes differ from the library's.
     """
-    shared = ground(rows)
-    nothing = np.zeros((1, len(rows.reading)))
-    if not lines:
-        nodes = line_statistics(rows, nothing, nothing)
-        none = np.asarray(plain_evidence(shared, nodes.ee[:, 0], sigma))
-        return Singles((), (), none, shared, nodes, np.zeros(1, int))
-    starts = np.cumsum([0] + [len(each.slopes) for each in lines])
+    common, nothing = common_terms(rows), np.zeros((0, len(rows.reading)))
+    starts = np.cumsum([0] + [len(each.slopes) for each in effects])
     offsets, slopes, shapes = (
-        np.concatenate([getattr(each, part) for each in lines])
+        np.concatenate([nothing, *(getattr(each, part) for each in effects)])
         for part in ("offsets", "slopes", "shapes")
     )
-    table = [np.concatenate([nothing, offsets]), np.concatenate([nothing, slopes])]
-    nodes = _in_blocks(line_statistics, rows, table)
-    none = plain_evidence(shared, nodes.ee[:, 0], sigma)
-    nodes = jax.tree.map(lambda leaf: leaf[:, 1:], nodes)
-    tight = _cells(shared, nodes, lines, starts, sigma, tight=True)
-    cells = (tight,)
+    products = _in_blocks(rows, offsets, slopes)
+    none = evidence_of_none(rows, sigma)
+    if not effects:
+        return SingleEvidence((), (), none, common, products, starts)
+    exact = _exact(common, products, effects, starts, sigma)
+    parts = (exact,)
     if tolerant:
-        chosen = _likeliest(tight, starts)
-        loose = _in_blocks(
-            tolerant_statistics, rows, [t[chosen] for t in (offsets, slopes, shapes)]
+        chosen = _likeliest(exact, starts)
+        loose = _in_blocks(rows, offsets[chosen], slopes[chosen], shapes[chosen])
+        weight = np.log(NO_TOLERANCE)
+        parts = (
+            replace(exact, log_evidence=exact.log_evidence + weight),
+            _tolerant(common, loose, effects, starts, sigma, chosen),
         )
-        every = _cells(shared, loose, lines, starts, sigma, chosen=chosen)
-        exact = replace(tight, log_evidence=tight.log_evidence + np.log(NO_TOLERANCE))
-        cells = (exact, every)
-    return Singles(
-        tuple(each.name for each in lines),
-        cells,
-        np.asarray(none),
-        shared,
-        nodes,
-        starts,
-    )
+    names = tuple(each.name for each in effects)
+    return SingleEvidence(names, parts, none, common, products, starts)
 
 
-def _in_blocks(reduce, rows: Rows, table: list[np.ndarray]) -> Nodes:
-    """Apply a reduction to blocks of lines, so that memory stays bounded."""
+def evidence_of_none(rows: LinearRows, sigma: Prior) -> np.ndarray:
+    """Return the log evidence without any effect, [correlation]."""
+    nothing = np.zeros((1, len(rows.reading)))
+    products = piece_products(rows, nothing, nothing)
+    return base_evidence(common_terms(rows), products.ee[:, 0], sigma)
+
+
+def _in_blocks(rows: LinearRows, *curves: np.ndarray) -> PieceProducts:
+    """Reduce blocks of pieces, so that memory stays bounded."""
     block = max(1, _MOST_VALUES // len(rows.reading))
     parts = [
-        jax.tree.map(np.asarray, reduce(rows, *(t[i : i + block] for t in table)))
-        for i in range(0, len(table[0]), block)
+        piece_products(rows, *(table[i : i + block] for table in curves))
+        for i in range(0, max(len(curves[0]), 1), block)
     ]
-    return jax.tree.map(lambda *p: np.concatenate(p, axis=1), *parts)
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves, axis=1), *parts)
 
 
-def _likeliest(tight: Cells, starts: np.ndarray) -> np.ndarray:
-    """Return the lines of each effect that explain the rows best, always as many."""
-    node = np.asarray(tight.entries.node)
+def _likeliest(exact: CellEvidence, starts: np.ndarray) -> np.ndarray:
+    """Return the pieces of each effect that explain the rows best, always as many."""
     best = np.full(starts[-1], -np.inf)
-    np.maximum.at(best, node, tight.log_evidence.max(axis=0))
+    np.maximum.at(best, exact.cells.piece, exact.log_evidence.max(axis=0))
     chosen = [
         low + np.sort(np.argsort(-best[low:high], kind="stable")[:_TOLERANT])
         for low, high in pairwise(starts)
@@ -143,47 +142,57 @@ def _likeliest(tight: Cells, starts: np.ndarray) -> np.ndarray:
     return np.concatenate(chosen)
 
 
-def _cells(
-    shared, nodes, lines, starts, sigma, scale=1.0, *, tight=False, chosen=None
-) -> Cells:
-    parts = [entries_of(each, scale, tight=tight) for each in lines]
-    owner = np.repeat(np.arange(len(parts)), [len(p["node"]) for p in parts])
-    entries = join(parts, starts[:-1])
-    if chosen is not None:
-        place = np.full(starts[-1], -1)
-        place[chosen] = np.arange(len(chosen))
-        kept = place[entries.node] >= 0
-        owner = owner[kept]
-        entries = jax.tree.map(lambda leaf: leaf[kept], entries)
-        seen = Entries(**{**vars(entries), "node": place[entries.node]})
-        found = entry_evidence(shared, nodes, seen, sigma)
-    else:
-        found = entry_evidence(shared, nodes, entries, sigma)
-    return Cells(owner, entries, *(np.asarray(part) for part in found))
+def _cells_of_all(effects, starts, **settings) -> tuple[np.ndarray, AmplitudeCells]:
+    """Return the cells of all effects, and the index of the effect of each."""
+    parts = [amplitude_cells(each, **settings) for each in effects]
+    owner = np.repeat(np.arange(len(parts)), [len(part.low) for part in parts])
+    return owner, join_cells(parts, starts[:-1])
 
 
-def rescaled(
-    singles: Singles, lines: Sequence[Lines], priors: dict[str, Prior], scale: float
+def _exact(common, products, effects, starts, sigma, scale=1.0) -> CellEvidence:
+    """Return the evidence of cells whose shapes are the library's."""
+    owner, cells = _cells_of_all(effects, starts, scale=scale, exact=True)
+    return CellEvidence(owner, cells, *cell_evidence(common, products, cells, sigma))
+
+
+def _tolerant(common, products, effects, starts, sigma, chosen) -> CellEvidence:
+    """Return the evidence of cells on chosen pieces, whose shapes may differ."""
+    owner, cells = _cells_of_all(effects, starts)
+    place = np.full(starts[-1], -1)
+    place[chosen] = np.arange(len(chosen))
+    kept = place[cells.piece] >= 0
+    owner, cells = owner[kept], jax.tree.map(lambda leaf: leaf[kept], cells)
+    among_chosen = replace(cells, piece=place[cells.piece])
+    found = cell_evidence(common, products, among_chosen, sigma)
+    return CellEvidence(owner, cells, *found)
+
+
+def rescaled_change(
+    single: SingleEvidence,
+    effects: Sequence[PiecewiseEffect],
+    priors: dict[str, Prior],
+    scale: float,
 ) -> dict[str, np.ndarray]:
     """Return by how much log evidences move when amplitude priors are rescaled.
 
     Args:
-        singles: with the priors as they are.
-        lines: of each effect.
+        single: with the priors as they are.
+        effects: in pieces.
         priors: by site name.
         scale: factor on the prior sds of the amplitudes.
 
     Returns:
         Change by effect, [correlation].
     """
-    if not lines:
+    if not effects:
         return {}
-    shared, nodes, sigma = singles.ground, singles.nodes, priors["sigma"]
-    before = singles.cells[0]
-    after = _cells(shared, nodes, lines, singles.starts, sigma, scale, tight=True)
+    before = single.parts[0]
+    after = _exact(
+        single.common, single.products, effects, single.starts, priors["sigma"], scale
+    )
     return {
         name: np.logaddexp.reduce(after.log_evidence[:, after.owner == index], axis=1)
         - np.logaddexp.reduce(before.log_evidence[:, before.owner == index], axis=1)
         + np.log(NO_TOLERANCE)
-        for index, name in enumerate(singles.names)
+        for index, name in enumerate(single.names)
     }

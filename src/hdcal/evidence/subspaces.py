@@ -2,17 +2,18 @@
 
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 from scipy import stats
 
 from hdcal.data.priors import Prior
-from hdcal.evidence.amplitude_grids import SCALE_WEIGHTS, SCALES, make_grid
-from hdcal.evidence.closed_form import block_evidence
-from hdcal.evidence.effect_curves import curves
-from hdcal.evidence.inner_products import Ground, block_statistics
+from hdcal.evidence.closed_form import subspace_evidence
+from hdcal.evidence.effect_curves import effect_curves, padded_records
+from hdcal.evidence.inner_products import CommonTerms, subspace_products
 from hdcal.evidence.kernels import principal
-from hdcal.evidence.prepare import Setting
-from hdcal.evidence.whitened_rows import Rows
+from hdcal.evidence.linear_rows import LinearRows
+from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES, make_grid
+from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
 from hdcal.physics.scatter import Scatter, scores
 
@@ -21,9 +22,11 @@ WIDTH = 24
 # Steps of the scale of a subspace of unknown size, as factors of its prior sd.
 _STEPS = 2.0 ** np.arange(-5.0, 3.0)
 
+_scores = jax.jit(scores)
+
 
 @dataclass(frozen=True)
-class Subspaces:
+class SubspaceEvidence:
     """Log evidence of each subspace.
 
     Attributes:
@@ -66,56 +69,58 @@ def mean_evidence(log_evidence: np.ndarray) -> np.ndarray:
     return whole - np.log(log_evidence.shape[1])
 
 
-def is_subspace(effect: type[Effect], setting: Setting) -> bool:
-    """Return whether an effect is a subspace rather than one line."""
+def is_subspace(effect: type[Effect], case: PreparedCase) -> bool:
+    """Return whether an effect is a subspace rather than of one amplitude."""
     if issubclass(effect, Scatter):
         return True
-    return len(make_grid(effect, setting.priors).amplitudes) > 1
+    return len(make_grid(effect, case.priors).amplitudes) > 1
 
 
-def effect_columns(effect: type[Effect], setting: Setting) -> np.ndarray:
+def effect_columns(effect: type[Effect], case: PreparedCase) -> np.ndarray:
     """Return what one prior sd of each amplitude or member adds [N].
 
     Args:
         effect: with several amplitudes, or of members.
-        setting: the case.
+        case: on whose rows it acts.
 
     Returns:
         One subspace for each shape point, shape (s, j, n).
     """
     if issubclass(effect, Scatter):
-        return _member_columns(effect, setting)[None]
-    grid = make_grid(effect, setting.priors, kind="subspace")
+        return _member_columns(effect, case)[None]
+    grid = make_grid(effect, case.priors, kind="subspace")
     count = len(grid.amplitudes)
     values = {n: np.repeat(v, count) for n, v in grid.shapes.items()}
     for index, name in enumerate(grid.amplitudes):
         values[name] = np.tile(grid.sd * np.eye(count)[index], grid.size)
-    found = curves(effect, values, setting.base, setting.records, setting.reading)
+    found = effect_curves(effect, values, case.base, case.records, case.reading)
     return found.reshape(grid.size, count, -1)
 
 
-def _member_columns(effect: type[Scatter], setting: Setting) -> np.ndarray:
-    label = np.asarray(getattr(setting.records, effect.members))
+def _member_columns(effect: type[Scatter], case: PreparedCase) -> np.ndarray:
+    label = np.asarray(getattr(case.records, effect.members))
     one = {"sd": np.ones(1)}
-    added = curves(effect, one, setting.base, setting.records, setting.reading)[0]
-    each = added / np.asarray(scores(label))
+    added = effect_curves(effect, one, case.base, case.records, case.reading)[0]
+    padded = getattr(padded_records(case.records), effect.members)
+    each = added / np.asarray(_scores(padded))[: len(label)]
     return each * (label == np.unique(label)[:, None])
 
 
-def effect_scales(effect: type[Effect], setting: Setting) -> tuple[np.ndarray, ...]:
+def effect_scales(
+    effect: type[Effect], case: PreparedCase
+) -> tuple[np.ndarray, np.ndarray]:
     """Return factors on the columns of an effect and their log prior weights."""
     if not issubclass(effect, Scatter):
         padding = len(_STEPS) - len(SCALES)
         weights = np.concatenate([SCALE_WEIGHTS, np.full(padding, 1e-300)])
         return np.concatenate([SCALES, np.ones(padding)]), np.log(weights)
-    grid = make_grid(effect, setting.priors)
-    return _half_normal_steps(grid.sd)
+    return _half_normal_steps(make_grid(effect, case.priors).sd)
 
 
-def large(effect: type[Effect], setting: Setting) -> float:
+def large_scale(effect: type[Effect], case: PreparedCase) -> float:
     """Return the factor on the columns of an effect of a large physical size."""
     scatter = issubclass(effect, Scatter)
-    return 2.0 * (make_grid(effect, setting.priors).sd if scatter else 1.0)
+    return 2.0 * (make_grid(effect, case.priors).sd if scatter else 1.0)
 
 
 def _half_normal_steps(sd: float) -> tuple[np.ndarray, np.ndarray]:
@@ -133,19 +138,19 @@ def unknown_scales(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
     return sd * _STEPS, np.full(len(_STEPS), -np.log(len(_STEPS)))
 
 
-def assess_subspaces(
-    rows: Rows,
-    shared: Ground,
+def evidence_of_subspaces(
+    rows: LinearRows,
+    common: CommonTerms,
     sigma: Prior,
     names: tuple[str, ...],
     tables: list[np.ndarray],
     scales: list[tuple[np.ndarray, np.ndarray]],
-) -> Subspaces:
+) -> SubspaceEvidence:
     """Compute the evidence of each subspace.
 
     Args:
         rows: the data.
-        shared: what all hypotheses share.
+        common: what all hypotheses share.
         sigma: prior of the noise sd.
         names: of the subspaces.
         tables: columns of each, shape (j, n).
@@ -154,6 +159,6 @@ def assess_subspaces(
     columns = np.stack([principal(np.asarray(t), WIDTH) for t in tables])
     factor = np.stack([s for s, _ in scales])
     weight = np.stack([w for _, w in scales])
-    blocks = block_statistics(rows, columns)
-    found = block_evidence(shared, blocks, factor, weight, sigma)
-    return Subspaces(names, columns, factor, weight, np.asarray(found))
+    products = subspace_products(rows, columns)
+    found = subspace_evidence(common, products, factor, weight, sigma)
+    return SubspaceEvidence(names, columns, factor, weight, found)

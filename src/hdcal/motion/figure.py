@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hdcal.inference.posterior import Posterior
+from hdcal.motion.bands import MotionBands
 from hdcal.motion.respond.respond import Response
-from hdcal.motion.summary import MotionBands
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -20,11 +20,10 @@ from hdcal.report.canvas import (
 )
 
 
-def response_figure(posterior: Posterior, response: Response) -> Figure:
+def response_figure(response: Response) -> Figure:
     """Draw the force, and below it the band of the deformation.
 
     Args:
-        posterior: whose name is shown.
         response: from `respond`.
     """
     time, unit = _clock(response.time_s)
@@ -56,9 +55,8 @@ def response_figure(posterior: Posterior, response: Response) -> Figure:
             )
         middle = response.deformation_median_mm
         below.plot(time, middle, color=BLUE, linewidth=1.0, label="median, row by row")
-        heading(
-            above, f"{plain(posterior.case.gear.name)}: {plain(response.request.words)}"
-        )
+        name = plain(response.posterior.case.gear.name)
+        heading(above, f"{name}: {plain(response.request.words)}")
         heading(below, "Deformation from the unloaded gear")
         _finish(below, lo, hi)
     return figure

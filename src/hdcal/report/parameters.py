@@ -1,12 +1,15 @@
 """Parameters of a posterior, with their intervals, in the units of people."""
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.diagnostics import Diagnosis, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
+from hdcal.report.answer import Promise, Real, Words
 
 INTERVAL = 0.95
 
@@ -31,6 +34,47 @@ UNITS: dict[str, tuple[str, float]] = {
 }
 
 
+@dataclass(frozen=True)
+class Interval:
+    """An equal-tailed interval with its median; which probability, says its owner."""
+
+    median: Real
+    lo: Real
+    hi: Real
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterEstimate(Interval):
+    """A parameter with its sampling quality, and who decided it.
+
+    What does not exist, as for a parameter that the gear file fixes, is NaN.
+
+    Attributes:
+        unit: of the interval.
+        rhat: rank-normalised split R-hat.
+        ess_bulk: effective draws for the centre.
+        ess_tail: effective draws for the interval's ends.
+        contraction: share of the prior's variance that the data removed.
+        prior_sensitivity: to power-scaling of the priors.
+        likelihood_sensitivity: to power-scaling of the likelihood.
+        driven_by: whether the data or the prior decide it.
+    """
+
+    unit: Words
+    rhat: Real
+    ess_bulk: Real
+    ess_tail: Real
+    contraction: Annotated[float, Promise(nullable=True, maximum=1)]
+    prior_sensitivity: Real
+    likelihood_sensitivity: Real
+    driven_by: Driver
+
+
+def credible_interval(values: np.ndarray) -> Interval:
+    """Return median and equal-tailed 95 % credible interval."""
+    return Interval(**interval(values))
+
+
 def interval(values: np.ndarray) -> dict[str, float]:
     """Return median and equal-tailed 95 % credible interval."""
     tail = (1.0 - INTERVAL) / 2.0
@@ -47,75 +91,31 @@ def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
     return parameters(effect)[field].unit, 1.0
 
 
-def parameter_entry(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:
-    """Return a parameter as an entry of a summary; fixed ones have no diagnosis."""
+_NONE = math.nan
+# Of a parameter that was not sampled, because the gear file fixes it.
+_FIXED = Diagnosis(
+    rhat=_NONE,
+    ess_bulk=_NONE,
+    ess_tail=_NONE,
+    contraction=0.0,
+    prior_sensitivity=_NONE,
+    likelihood_sensitivity=_NONE,
+    driven_by="prior",
+)
+
+
+def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
+    """Return every parameter's estimate by name, those that were fixed last."""
+    found, draws = posterior.diagnoses, posterior.draws
+    fixed = [n for n in posterior.priors if n in draws and n not in found]
+    return {
+        name: _estimate(posterior, name, found.get(name)) for name in (*found, *fixed)
+    }
+
+
+def _estimate(
+    posterior: Posterior, name: str, found: Diagnosis | None
+) -> ParameterEstimate:
     unit, factor = unit_of(posterior, name)
-    entry = {"unit": unit, **interval(posterior.draws[name] * factor)}
-    if found is None:  # fixed by the gear file
-        return {
-            **entry,
-            "rhat": None,
-            "ess_bulk": None,
-            "ess_tail": None,
-            "driven_by": "prior",
-            "contraction": 0.0,
-        }
-    numbers = {name: _finite(value) for name, value in vars(found).items()}
-    return {**entry, **numbers}
-
-
-def _finite(value):
-    # JSON has no NaN: a statistic that could not be computed is null.
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def flat_directions(posterior: Posterior) -> list[str]:
-    """Return the sentences about what the data cannot tell apart."""
-    return [check.words for check in posterior.checks if check.outcome == "note"]
-
-
-def parameter_entries(posterior: Posterior) -> dict[str, dict]:
-    """Return every parameter's entry by name, those that were fixed last."""
-    names = [*posterior.diagnoses]
-    names += [n for n in posterior.priors if n in posterior.draws and n not in names]
-    return {
-        name: parameter_entry(posterior, name, posterior.diagnoses.get(name))
-        for name in names
-    }
-
-
-def warnings_of(posterior: Posterior) -> list[str]:
-    """Return the warnings of the checks as sentences."""
-    return [
-        check.words[:1].upper() + check.words[1:]
-        for check in posterior.checks
-        if check.outcome == "warning"
-    ]
-
-
-def sampling_entry(posterior: Posterior) -> dict:
-    """Return how the draws were come by."""
-    stats = posterior.tree["sample_stats"].to_dataset()
-    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
-    settings = {name: posterior.settings[name] for name in names}
-    return settings | {"divergences": int(stats["diverging"].sum())}
-
-
-def data_entry(posterior: Posterior) -> dict:
-    """Return which data it was."""
-    case = posterior.case
-    return {
-        "name": case.name,
-        "rows": len(case.records.force),
-        "sha256": case.data_sha256,
-        "notes": list(case.notes),
-    }
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An equal-tailed interval with its median; which probability, says its owner."""
-
-    median: float
-    lo: float
-    hi: float
+    ends = credible_interval(posterior.draws[name] * factor)
+    return ParameterEstimate(**vars(ends), unit=unit, **vars(found or _FIXED))

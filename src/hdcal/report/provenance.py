@@ -1,37 +1,76 @@
 """How a result was made: priors, sampling, versions, command."""
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import (
-    gear_rows,
-)
-from hdcal.report.words import label, prior_words
+from hdcal.report.words import number, with_unit
 
 
-def prior_rows(posterior: Posterior) -> list[dict]:
-    """Return the priors as texts of a table's rows."""
-    shown = [name for name in posterior.priors if name in posterior.draws]
-    return [
-        {
-            "label": label(name),
-            "words": prior_words(name, posterior.priors[name]),
-            "source": posterior.priors[name].source or "the gear file",
-        }
-        for name in shown
-    ]
-
-
-def provenance_rows(posterior: Posterior, summary: dict, command: str) -> list:
+def provenance_rows(posterior: Posterior, command: str) -> list[tuple[str, str]]:
     """Return how a calibration was made, as pairs of name and words."""
-    sampling = summary["sampling"]
+    settings: Mapping[str, Any] = posterior.settings
     rows = [
         *gear_rows(posterior.case, posterior.theory),
         ("effects", ", ".join(effect.name for effect in posterior.effects) or "none"),
         (
             "sampling",
-            f"NUTS, {sampling['chains']} chains of {sampling['draws']} draws after "
-            f"{sampling['warmup']} of warm-up, seed {summary['seed']}",
+            f"NUTS, {settings['chains']} chains of {settings['draws']} draws after "
+            f"{settings['warmup']} of warm-up, seed {settings['seed']}",
         ),
-        ("seconds", f"{sampling['seconds']:.1f}"),
-        ("versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
+        ("seconds", f"{settings['seconds']:.1f}"),
+        ("versions", ", ".join(f"{k} {v}" for k, v in settings["versions"].items())),
     ]
     return rows + ([("command", command)] if command else [])
+
+
+def data_rows(case: Case) -> list[tuple[str, str]]:
+    """Return what was measured, as pairs of name and words."""
+    records, gear = case.records, case.gear
+
+    def ends(values, shown: str) -> str:
+        low, high = number(float(np.min(values))), number(float(np.max(values)))
+        return with_unit(low if low == high else f"{low} … {high}", shown)
+
+    moves = {"loading": 1, "holding": 0, "unloading": -1}
+    count = {
+        word: np.count_nonzero(records.direction == s) for word, s in moves.items()
+    }
+    warmth = ends(records.temperature, "°C")
+    if "temperature" not in records.known:
+        warmth += ", not measured: the reference temperature"
+    rows = [
+        ("rows", str(len(records.force))),
+        ("deformation", f"{ends(records.deformation, 'mm')}, {gear.reading}, as read"),
+        ("force", f"{ends(records.force, 'N')}, as read"),
+        ("temperature", warmth),
+        ("direction", ", ".join(f"{n} {word}" for word, n in count.items() if n)),
+        ("runs", str(len(case.run_labels) or 1)),
+        ("gears", str(len(case.specimen_labels) or 1)),
+    ]
+    if gear.force_resolution:
+        rows.append(("force read in steps of", f"{gear.force_resolution:g} N"))
+    return rows + [("note", note) for note in case.notes]
+
+
+def gear_rows(case: Case, theory: str) -> list[tuple[str, str]]:
+    """Return which gear it was and how it was modelled, as pairs of name and words."""
+    gear = case.gear
+    size = gear.geometry
+    return [
+        ("case", case.name),
+        ("gear", gear.name),
+        ("material", gear.material),
+        (
+            "wall thickness × radius × length",
+            f"{size.wall_thickness:g} × {size.radius:g} × {size.length:g} mm",
+        ),
+        ("load height", f"{size.load_height:g} mm"),
+        ("theory", f"{theory} ({THEORY_WORDS.get(theory, '')})"),
+        ("reference temperature", f"{gear.reference_temperature:g} °C"),
+        ("SHA-256 of the data", case.data_sha256),
+    ]

@@ -1,9 +1,11 @@
 """Numbers, priors and names in the form in which people read them."""
 
 import math
+from collections.abc import Mapping
+from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
-from hdcal.report.parameters import UNITS
+from hdcal.report.parameters import UNITS, Interval
 
 LABELS = {
     "K": "influence coefficient K",
@@ -41,7 +43,7 @@ def number(value: float | None, width: float | None = None) -> str:
         value: what to write; None is a dash.
         width: its interval's width; three digits of it are kept.
     """
-    if value is None or not math.isfinite(value):
+    if not known(value):
         return "–"
     if not width or not math.isfinite(width):
         return f"{value:.4g}"
@@ -57,12 +59,23 @@ def _place(value: float) -> int:
     return math.floor(math.log10(abs(value))) if value else 0
 
 
-def estimate(entry: dict) -> tuple[str, str]:
-    """Return median and interval of a summary entry as two texts."""
-    lo, hi = entry["lo"], entry["hi"]
-    width = None if lo is None or hi is None else hi - lo
-    span = f"{number(lo, width)} … {number(hi, width)}"
-    return number(entry["median"], width), span
+def known(value: float | None) -> TypeGuard[float]:
+    """Tell whether there is a number."""
+    return value is not None and math.isfinite(value)
+
+
+def or_zero(value: float | None) -> float:
+    """Return a number, zero where there is none."""
+    return value if known(value) else 0.0
+
+
+def estimate(entry: Interval | Mapping) -> tuple[str, str]:
+    """Return median and interval as two texts."""
+    if not isinstance(entry, Interval):
+        entry = Interval(*(entry[name] for name in ("median", "lo", "hi")))
+    width = None if entry.lo is None or entry.hi is None else entry.hi - entry.lo
+    span = f"{number(entry.lo, width)} … {number(entry.hi, width)}"
+    return number(entry.median, width), span
 
 
 def unit(name: str) -> str:
@@ -105,19 +118,19 @@ def hypothesis(name: str) -> str:
 
 def likely(probabilities: dict[str, float], share: float = 0.9) -> list[str]:
     """Return the fewest hypotheses that hold a share of the probability."""
-    ranked = sorted(probabilities, key=lambda name: -(probabilities[name] or 0.0))
+    ranked = sorted(probabilities, key=lambda name: -or_zero(probabilities[name]))
     total, chosen = 0.0, []
     for name in ranked:
         if total >= share:
             break
-        total += probabilities[name] or 0.0
+        total += or_zero(probabilities[name])
         chosen.append(name)
     return chosen
 
 
 def percent(share: float | None) -> str:
     """Return a share or probability; never a certainty that nobody has."""
-    if share is None:
+    if not known(share):
         return "–"
     if 0.995 <= share < 1.0 + 1e-9:
         return "> 99 %"
@@ -126,18 +139,17 @@ def percent(share: float | None) -> str:
     return f"{round(100.0 * share)} %"
 
 
-def percent_span(entry: dict) -> str:
+def percent_span(entry: Interval) -> str:
     """Return a share with its interval."""
-    low, high = entry["lo"], entry["hi"]
-    if low is None or high is None:
-        return percent(entry["median"])
-    ends = f"{percent(low).removesuffix(' %')} … {percent(high)}"
-    return f"{percent(entry['median'])} ({ends})"
+    if not (known(entry.lo) and known(entry.hi)):
+        return percent(entry.median)
+    ends = f"{percent(entry.lo).removesuffix(' %')} … {percent(entry.hi)}"
+    return f"{percent(entry.median)} ({ends})"
 
 
 def newton(value: float | None) -> str:
     """Return a force with two digits, or all those before the point."""
-    if value is None:
+    if not known(value):
         return "– N"
     rounded = float(f"{value:.2g}")
     return f"{value:.0f} N" if abs(rounded) >= 10.0 else f"{rounded:g} N"

@@ -2,13 +2,13 @@
 
 import click
 
+from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import force_option, json_option
+from hdcal.cli.options import json_option, out_option
 
 
-@click.command(short_help="The article's claims against its own numbers.")
-@click.option("--out", metavar="DIR", help="Also write a folder with a report.")
-@force_option
+@command(short_help="The article's claims against its own numbers.")
+@out_option
 @json_option
 @click.pass_obj
 def audit(console: Console, out, force):
@@ -17,20 +17,16 @@ def audit(console: Console, out, force):
     Everything is computed here, from its formula and its Table 2; only what the
     article itself prints is given.
     """
-    from hdcal.report.folder import check_target
-
-    if out is not None:
-        check_target(out, force=force)
+    with console.wrong:
+        console.check_target(out, force)
     from hdcal.classical.audit.audit import audit as check_claims
-    from hdcal.classical.audit.audit import summarise_audit
-    from hdcal.classical.audit.document import audit_sheet, write_audit
-    from hdcal.report.sheet import sheet_words
+    from hdcal.classical.audit.document import audit_document
+    from hdcal.classical.audit.summary import audit_answer
 
-    found = summarise_audit(check_claims())
-    console.table(*sheet_words(audit_sheet(found)))
+    found = audit_answer(check_claims())
+    document = audit_document(found)
     if out is not None:
-        write_audit(found, out, force=force)
-        console.words(f"the result: {out}  (open report.html)")
-    if console.json:
-        console.data(found)
-    return 0
+        from hdcal.report.write import write_report
+
+        write_report(out, document, {"audit.json": found}, force=force)
+    return console.answer(document, found, out)

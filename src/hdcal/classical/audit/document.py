@@ -1,70 +1,54 @@
-"""The audit for a reader, and its result folder."""
+"""The audit in words."""
 
-from pathlib import Path
+from collections.abc import Mapping
 
-from hdcal.report.folder import whole_folder
-from hdcal.report.plain import as_json
-from hdcal.report.sheet import Section, Sheet, sheet_page
+from hdcal.classical.audit.answer import AuditAnswer, AuditedFit, PrintedCurve
+from hdcal.report.document import Document, Section, Table, Text
 from hdcal.report.words import number
 
-_COLUMNS = ["", "the article says", "the formula gives", "the data give", "verdict"]
-_FIT_COLUMNS = ["curve", "coefficients", "s [N]", "R²"]
+_PLURAL = {"holds": "hold", "does not hold": "do not hold"}
 
 
-def audit_sheet(found: dict) -> Sheet:
-    """Return the sheet of `hdcal audit`.
+def headline(count: Mapping[str, int]) -> str:
+    """Return how many claims have each verdict, in one sentence."""
+    each = ", ".join(f"{n} {_PLURAL.get(word, word)}" for word, n in count.items())
+    return f"Of {sum(count.values())} claims: {each}."
+
+
+def audit_document(found: AuditAnswer) -> Document:
+    """Return the report of the audit.
 
     Args:
-        found: from `summarise_audit`.
+        found: from `audit_answer`.
     """
-    rows = [
-        [str(c["point"]), c["claim"], c["formula"], c["data"], c["verdict"]]
-        for c in found["claims"]
+    claims = [
+        [str(c.point), c.claim, c.formula, c.data, c.verdict] for c in found.claims
     ]
-    fits = [
-        [
-            one["model"],
-            ", ".join(number(c) for c in one.get("coefficients", [])),
-            f"{one['s_N']:.3f}" if "s_N" in one else f"{one['rms_N']:.2f} (rms)",
-            f"{one['r2']:.5f}",
-        ]
-        for one in found["fits"]
-    ]
-    plural = {"holds": "hold", "does not hold": "do not hold"}
-    count = ", ".join(f"{n} {plural.get(w, w)}" for w, n in found["count"].items())
-    return Sheet(
-        name=found["article"],
+    columns = ["", "the article says", "the formula gives", "the data give", "verdict"]
+    fits = Table(
+        ["curve", "coefficients", "s [N]", "R²"],
+        [_fit_row(one) for one in found.fits],
+        frozenset({"s [N]", "R²"}),
+    )
+    note = Text("The same from `hdcal fit`, with errors and tests.", soft=True)
+    return Document(
+        name=found.article,
         kind="audit",
         subtitle="its claims against its own formula and readings",
-        answers=[f"Of {len(rows)} claims: {count}."],
-        warnings=[],
+        headline=found.headline,
         sections=[
-            Section("Claims", _COLUMNS, rows, frozenset({""})),
-            Section(
-                "Least squares on Table 2 (ω in mm, F in N)",
-                _FIT_COLUMNS,
-                fits,
-                frozenset({"s [N]", "R²"}),
-                ["The same from `hdcal fit`, with errors and tests."],
-            ),
+            Section("Claims", [Table(columns, claims, frozenset({""}))], brief=True),
+            Section("Least squares on Table 2 (ω in mm, F in N)", [fits, note], True),
+        ],
+        provenance=[
+            ("data", found.data.name),
+            ("SHA-256 of the data", found.data.sha256),
         ],
     )
 
 
-def write_audit(found: dict, target: Path | str, *, force: bool = False) -> None:
-    """Write audit.json and report.html, both or neither.
-
-    Args:
-        found: from `summarise_audit`.
-        target: the folder to make.
-        force: replace an older result.
-
-    Raises:
-        InputError: the folder exists or cannot be written.
-    """
-    data = found["data"]
-    facts = [("data", data["name"]), ("SHA-256 of the data", data["sha256"])]
-    page = sheet_page(audit_sheet(found), facts, {})
-    with whole_folder(target, force=force) as folder:
-        (folder / "audit.json").write_text(as_json(found), "utf-8")
-        (folder / "report.html").write_bytes(page.encode("utf-8", "xmlcharrefreplace"))
+def _fit_row(one: AuditedFit | PrintedCurve) -> list[str]:
+    if isinstance(one, PrintedCurve):
+        return [one.model, "", f"{one.rms_N:.2f} (rms)", f"{one.r2:.5f}"]
+    listed = ", ".join(number(c) for c in one.coefficients)
+    return [one.model, listed, f"{one.s_N:.3f}", f"{one.r2:.5f}"]

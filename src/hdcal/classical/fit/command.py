@@ -1,28 +1,21 @@
 """`hdcal fit`: polynomials by least squares, as a curve-fitting tool gives them."""
 
-import shlex
-import sys
-
 import click
 
+from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    case_options,
-    force_option,
-    json_option,
-    read_columns,
-)
-from hdcal.errors import Finding, InputError
+from hdcal.cli.option_types import WHOLE_NUMBERS
+from hdcal.cli.options import case_options, json_option, out_option, read_given
 
 
-@click.command(short_help="Classical polynomial fits, with their errors.")
+@command(short_help="Classical polynomial fits, with their errors.")
 @case_options
 @click.option(
     "--degree",
     "degrees",
+    type=WHOLE_NUMBERS,
     default="1,2,3",
     show_default=True,
-    metavar="LIST",
     help="Degrees of the polynomials, 1 to 9.",
 )
 @click.option(
@@ -41,76 +34,34 @@ from hdcal.errors import Finding, InputError
     metavar="RUN",
     help="Show the answer of a calibration of the same data beside the curves.",
 )
-@click.option("--out", metavar="DIR", help="Also write a folder with a report.")
-@force_option
+@out_option
 @json_option
 @click.pass_obj
-def fit(console: Console, data, gear, columns, theory, out, force, **wanted):
+def fit(console: Console, degrees, through_origin, at, run, out, force, **given):
     """Fit polynomials of force over deformation to DATA by least squares.
 
     For who knows polyfit: the same coefficients, with standard errors, confidence
     intervals, and tests of whether the curve suits the data.
     """
+    from hdcal.classical.fit.document import fit_document
     from hdcal.classical.fit.fit import fit as fit_case
-    from hdcal.classical.fit.summary import summarise_fits
-    from hdcal.data.reading import read_case
-    from hdcal.report.folder import check_target
+    from hdcal.classical.fit.summary import fit_answer
+    from hdcal.cli.sources import load_posterior
 
-    findings, case, fits = [], None, ()
-    try:
-        case = read_case(data, gear, columns=read_columns(columns), theory=theory)
-    except InputError as error:
-        findings += error.findings
-    try:
-        degrees = _read_degrees(wanted["degrees"])
-        if case is not None:
-            fits = fit_case(case, degrees, through_origin=wanted["through_origin"])
-    except InputError as error:
-        findings += error.findings
+    with console.wrong as wrong:
+        case = read_given(console, **given)
+        fits = None
+        if case is not None and degrees is not None:
+            fits = wrong.attempt(fit_case, case, degrees, through_origin=through_origin)
+        console.check_target(out, force)
+    assert case is not None and fits is not None
+    posterior = None if run is None else load_posterior(run)
+    found = fit_answer(case, fits, at=at, posterior=posterior)
+    document = fit_document(case, found, console.command)
     if out is not None:
-        try:
-            check_target(out, force=force)
-        except InputError as error:
-            findings += error.findings
-    if findings or case is None:
-        raise InputError(findings)
-    posterior = _load(wanted["run"])
-    found = summarise_fits(case, fits, at=wanted["at"], posterior=posterior)
-    _show(console, case, fits, found, out, force)
-    return 0
+        from hdcal.classical.fit.figure import fit_figure
+        from hdcal.report.write import write_report
 
-
-def _read_degrees(text: str) -> list[int]:
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError:
-        words = f"'{text[:60]}' is no list of whole numbers"
-        finding = Finding("--degree", words, "Write it like 1,3")
-        raise InputError([finding]) from None
-
-
-def _load(run: str | None):
-    if run is None:
-        return None
-    from hdcal.cli.compilation_cache import keep_compilations
-    from hdcal.inference.posterior import Posterior
-
-    keep_compilations()
-    posterior = Posterior.load(run)
-    posterior.require_usable()
-    return posterior
-
-
-def _show(console: Console, case, fits, found: dict, out, force: bool) -> None:
-    from hdcal.classical.fit.document import fit_sheet
-    from hdcal.report.sheet import sheet_words
-
-    console.table(*sheet_words(fit_sheet(found)))
-    if out is not None:
-        from hdcal.classical.fit.result_folder import write_fits
-
-        command = shlex.join(["hdcal", *sys.argv[1:]])
-        write_fits(case, fits, found, out, command=command, force=force)
-        console.words(f"the result: {out}  (open report.html)")
-    if console.json:
-        console.data(found)
+        figures = {"fit": fit_figure(case, fits)}
+        write_report(out, document, {"fit.json": found}, figures, force=force)
+    return console.answer(document, found, out)

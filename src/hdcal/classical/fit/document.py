@@ -1,127 +1,147 @@
-"""Classical fits for a reader: the numbers of a curve-fitting tool, with errors."""
+"""Classical fits in words: the numbers of a curve-fitting tool, with errors."""
 
-from hdcal.classical.fit.summary import DOUBT, omega
-from hdcal.report.sheet import Section, Sheet
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hdcal.classical.fit.answer import FitAnswer, FittedCurve, ForceAt
+from hdcal.classical.fit.notation import omega
+from hdcal.data.case import Case
+from hdcal.report.document import Document, Picture, Section, Table, Text, notices
+from hdcal.report.parameters import Interval
+from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import estimate, number
 
-_RIGHT = frozenset(
-    {
-        "value",
-        "standard error",
-        "95 % confidence interval",
-        "s [N]",
-        "R²",
-        "adjusted R²",
-        "AICc",
-        "one row out [N]",
-        "one run out [N]",
-        "condition",
-        "F",
-        "p",
-        "force [N]",
-        "95 % interval [N]",
-        "one more reading [N]",
-    }
-)
+# A smaller chance than this says that the curve is too simple.
+DOUBT = 0.05
 
 
-def fit_sheet(found: dict) -> Sheet:
-    """Return the sheet of `hdcal fit`.
+def headline(curves: Sequence[FittedCurve]) -> str:
+    """Return which curve describes the data best, in one sentence."""
+    ranked = [one for one in curves if one.aicc is not None]
+    if len(ranked) < 2:
+        return f"{len(curves)} curve{'s' * (len(curves) > 1)} fitted by least squares."
+    best = min(ranked, key=lambda one: one.aicc or 0.0)
+    close = [one.model for one in ranked if 0.0 < (one.aicc_over_best or 0.0) < 2.0]
+    also = f", and {' and '.join(close)} no worse by a clear margin" if close else ""
+    return f"Of these, {best.model} describes the data best (AICc){also}."
+
+
+def notes(case: Case) -> Iterator[str]:
+    """Yield what the curves leave out of account."""
+    records = case.records
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    if warm - cold > 1.0:
+        yield (
+            f"the temperature went from {cold:g} to {warm:g} °C: no curve here knows it"
+        )
+    if len(np.unique(records.sense)) > 1:
+        yield "loading and unloading are fitted as one curve"
+    for kind, labels in (("run", case.run_labels), ("gear", case.specimen_labels)):
+        if len(labels) > 1:
+            yield (
+                f"{len(labels)} {kind}s are fitted as one: errors within a {kind} are "
+                "then not independent, and intervals are too narrow"
+            )
+    if np.any(records.force_sd):
+        yield "the stated errors of the rows (force_sd) are not used as weights"
+
+
+def fit_document(case: Case, found: FitAnswer, command: str = "") -> Document:
+    """Return the report of classical fits; its picture is called fit.
 
     Args:
-        found: from `summarise_fits`.
+        case: that was fitted.
+        found: from `fit_answer`.
+        command: how the result was made.
     """
-    data = found["data"]
-    sections = [_curves(), _coefficients(found), _quality(found), _too_simple(found)]
-    if found["at_mm"] is not None:
-        sections.append(_compared(found))
-    return Sheet(
-        name=data["gear"],
-        kind="classical fits",
-        subtitle=f"least-squares polynomials on {data['rows']} rows ({data['name']})",
-        answers=_answers(found),
-        warnings=found["notes"],
-        sections=sections,
-    )
-
-
-def _curves() -> Section:
-    return Section(
-        "Data and curves",
-        image="fit",
-        caption="Above the readings with every curve; below what each leaves over.",
-    )
-
-
-def _coefficients(found: dict) -> Section:
-    rows = []
-    for one in found["fits"]:
-        first = one["model"]
-        for item in one["coefficients"]:
-            value, span = estimate({**item, "median": item["value"]})
-            error = number(item["standard_error"])
-            term = omega(item["power"]) if item["power"] else "c"
-            rows.append([first, term, value, error, span, item["unit"]])
-            first = ""
-    lists = [
-        f"polyval([{' '.join(f'{c:.6g}' for c in one['polyfit_order'])}], w)"
-        for one in found["fits"]
+    lacking = [
+        one.model
+        for one in found.fits
+        if one.lack_of_fit is not None and one.lack_of_fit.too_simple
     ]
-    columns = ["curve", "term", "value", "standard error", "95 % confidence interval"]
-    return Section(
-        "Coefficients (deformation ω in mm, force in N)",
-        [*columns, "unit"],
-        rows,
-        _RIGHT,
-        ["The same for polyval, highest power first:", *lists],
+    sections = [
+        _picture(),
+        _coefficients(found),
+        _quality(found),
+        _too_simple(found),
+        *([] if found.at_mm is None else [_compared(found)]),
+    ]
+    provenance = [*gear_rows(case, case.gear.theory), *data_rows(case)]
+    return Document(
+        name=found.data.gear,
+        kind="classical fits",
+        subtitle=f"least-squares polynomials on {found.data.rows} rows "
+        f"({found.data.name})",
+        headline=found.headline,
+        answers=[f"Too simple for these data: {'; '.join(lacking)}."] * bool(lacking),
+        notices=notices(("To be aware of", found.notes)),
+        sections=sections,
+        provenance=provenance + ([("command", command)] if command else []),
     )
 
 
-def _quality(found: dict) -> Section:
-    runs = any(one["held_out_runs_N"] is not None for one in found["fits"])
-    columns = ["curve", "s [N]", "R²", "adjusted R²", "AICc", "one row out [N]"]
-    columns += ["one run out [N]"] * runs + ["condition"]
+def _picture() -> Section:
+    caption = "Above the readings with every curve; below what each leaves over."
+    return Section("Data and curves", [Picture("fit", "Data and curves", caption)])
+
+
+def _coefficients(found: FitAnswer) -> Section:
+    rows = []
+    for one in found.fits:
+        first = one.model
+        for item in one.coefficients:
+            value, span = estimate(Interval(item.value, item.lo, item.hi))
+            error = number(item.standard_error)
+            term = omega(item.power) if item.power else "c"
+            rows.append([first, term, value, error, span, item.unit])
+            first = ""
+    numbers = ("value", "standard error", "95 % confidence interval")
+    table = Table(["curve", "term", *numbers, "unit"], rows, frozenset(numbers))
+    lists = [
+        Text(f"polyval([{' '.join(f'{c:.6g}' for c in one.polyfit_order)}], w)", True)
+        for one in found.fits
+    ]
+    lead = Text("The same for polyval, highest power first:", soft=True)
+    heading = "Coefficients (deformation ω in mm, force in N)"
+    return Section(heading, [table, lead, *lists], brief=True)
+
+
+def _quality(found: FitAnswer) -> Section:
+    runs = any(one.held_out_runs_N is not None for one in found.fits)
+    numbers = ["s [N]", "R²", "adjusted R²", "AICc", "one row out [N]"]
+    numbers += ["one run out [N]"] * runs + ["condition"]
     rows = [
         [
-            one["model"],
-            number(one["s_N"]),
-            _r2(one["r2"]),
-            _r2(one["r2_adjusted"]),
-            "–" if one["aicc"] is None else f"{one['aicc']:.1f}",
-            number(one["held_out_rows_N"]),
-            *([number(one["held_out_runs_N"])] if runs else []),
-            number(one["condition_number"]),
+            one.model,
+            number(one.s_N),
+            _r2(one.r2),
+            _r2(one.r2_adjusted),
+            "–" if one.aicc is None else f"{one.aicc:.1f}",
+            number(one.held_out_rows_N),
+            *([number(one.held_out_runs_N)] if runs else []),
+            number(one.condition_number),
         ]
-        for one in found["fits"]
+        for one in found.fits
     ]
-    words = [
+    words = (
         "s: scatter of the readings about the curve. AICc: smaller is better, by 2 or "
         "more to matter. One row out: typical error on a reading that the curve was "
         "not fitted to. R² is about the mean force for every curve, also through the "
-        "origin; on a ramp it is near 1 for any rising curve.",
-    ]
-    return Section("How well each curve fits", columns, rows, _RIGHT, words)
+        "origin; on a ramp it is near 1 for any rising curve."
+    )
+    table = Table(["curve", *numbers], rows, frozenset(numbers))
+    return Section("How well each curve fits", [table, Text(words, soft=True)], True)
 
 
 def _r2(value: float | None) -> str:
     return "–" if value is None else f"{value:.5f}"
 
 
-def _too_simple(found: dict) -> Section:
-    rows, kinds = [], set()
-    for one in found["fits"]:
-        lack = one["lack_of_fit"]
-        if lack is None:
-            rows.append([one["model"], "cannot be tested", "–", "–", "–"])
-            continue
-        kinds.add(lack["against"])
-        words = "too simple" if lack["too_simple"] else "no sign of lack of fit"
-        against = {
-            "pure error": "repeated rows",
-            "next degree": f"degree {one['degree'] + 1}",
-        }[lack["against"]]
-        ratio = f"F({lack['dof'][0]}, {lack['dof'][1]}) = {number(lack['F'])}"
-        rows.append([one["model"], words, against, ratio, f"{lack['p_value']:.2g}"])
+def _too_simple(found: FitAnswer) -> Section:
+    rows = [_lack_row(one) for one in found.fits]
+    kinds = {one.lack_of_fit.against for one in found.fits if one.lack_of_fit}
     words = [f"A curve is called too simple where p is below {DOUBT:g}."]
     if "next degree" in kinds:
         words.append(
@@ -130,56 +150,54 @@ def _too_simple(found: dict) -> Section:
             "of that kind only."
         )
     columns = ["curve", "verdict", "compared with", "F", "p"]
-    return Section("Is the curve too simple?", columns, rows, _RIGHT, words)
+    table = Table(columns, rows, frozenset({"F", "p"}))
+    said = [Text(sentence, soft=True) for sentence in words]
+    return Section("Is the curve too simple?", [table, *said], brief=True)
 
 
-def _compared(found: dict) -> Section:
-    rows = []
-    for one in found["fits"]:
-        rows.append([one["model"], *_at(one["at"]), "confidence, prediction"])
+def _lack_row(one: FittedCurve) -> list[str]:
+    lack = one.lack_of_fit
+    if lack is None:
+        return [one.model, "cannot be tested", "–", "–", "–"]
+    words = "too simple" if lack.too_simple else "no sign of lack of fit"
+    against = {
+        "pure error": "repeated rows",
+        "next degree": f"degree {one.degree + 1}",
+    }[lack.against]
+    ratio = f"F({lack.dof[0]}, {lack.dof[1]}) = {number(lack.F)}"
+    return [one.model, words, against, ratio, f"{lack.p_value:.2g}"]
+
+
+def _compared(found: FitAnswer) -> Section:
+    rows = [
+        [one.model, *_at(one.at), "confidence, prediction"]
+        for one in found.fits
+        if one.at is not None
+    ]
     words = []
-    if found["bayesian"] is not None:
-        other = found["bayesian"]
-        kind = "credible, predictive"
-        rows.append(["calibration (Bayesian)", *_at(other["at"]), kind])
-        middle, span = estimate(other["stiffness_N_per_mm"])
+    other = found.bayesian
+    if other is not None and other.at is not None:
+        rows.append(["calibration (Bayesian)", *_at(other.at), "credible, predictive"])
+        middle, span = estimate(other.stiffness_N_per_mm)
         words.append(
             f"The calibration's stiffness is {middle} N/mm, 95 % credible interval "
             f"{span} N/mm: to be compared with the slope of c + a ω."
         )
-        if not other["at"]["tested"]:
+        if not other.at.tested:
             words.append("This deformation or temperature was not tested.")
     words.append(
         "A confidence interval would hold the true value in 95 % of repeated tests if "
         "the curve is right; a credible interval holds it with 95 % probability, given "
         "these data, the model and the priors."
     )
-    columns = ["answer", "force [N]", "95 % interval [N]", "one more reading [N]"]
-    heading = f"Force at {found['at_mm']:g} mm"
-    return Section(heading, [*columns, "kind of interval"], rows, _RIGHT, words)
+    numbers = ["force [N]", "95 % interval [N]", "one more reading [N]"]
+    columns = ["answer", *numbers, "kind of interval"]
+    said = [Text(sentence, soft=True) for sentence in words]
+    table = Table(columns, rows, frozenset(numbers))
+    return Section(f"Force at {found.at_mm:g} mm", [table, *said], brief=True)
 
 
-def _at(at: dict) -> list[str]:
-    force, span = estimate(
-        {"median": at["force_N"], "lo": at["lo_N"], "hi": at["hi_N"]}
-    )
-    ends = {"median": None, "lo": at["reading_lo_N"], "hi": at["reading_hi_N"]}
-    return [force, span, estimate(ends)[1]]
-
-
-def _answers(found: dict) -> list[str]:
-    ranked = [one for one in found["fits"] if one["aicc"] is not None]
-    if len(ranked) < 2:
-        return []
-    best = min(ranked, key=lambda one: one["aicc"])
-    close = [one["model"] for one in ranked if 0.0 < one["aicc"] - best["aicc"] < 2.0]
-    also = f", and {' and '.join(close)} no worse by a clear margin" if close else ""
-    lacking = [
-        one["model"]
-        for one in found["fits"]
-        if one["lack_of_fit"] and one["lack_of_fit"]["too_simple"]
-    ]
-    words = [f"Of these, {best['model']} describes the data best (AICc){also}."]
-    if lacking:
-        words.append(f"Too simple for these data: {'; '.join(lacking)}.")
-    return words
+def _at(at: ForceAt) -> list[str]:
+    force, span = estimate(Interval(at.force_N, at.lo_N, at.hi_N))
+    reading = Interval(math.nan, at.reading_lo_N, at.reading_hi_N)
+    return [force, span, estimate(reading)[1]]

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from hdcal.classical.fit.fit import PolynomialFit
-from hdcal.classical.fit.summary import model_name
+from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
 from hdcal.report.canvas import CYCLE, DARK, heading, style, thinned
 

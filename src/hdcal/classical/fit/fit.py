@@ -7,6 +7,7 @@ experiments under independent normal errors of one size.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -33,7 +34,7 @@ class LackOfFit:
         p_value: chance of a ratio as large if the curve is right.
     """
 
-    against: str
+    against: Literal["pure error", "next degree"]
     F: float
     dof: tuple[int, int]
     p_value: float
@@ -150,12 +151,12 @@ def fit(
 
 def _check(name: str, deformation, degrees, wanted) -> None:
     findings = [
-        Finding("--degree", f"{degree} is out of range", f"Use 1 to {MOST_DEGREE}")
+        Finding("degrees", f"{degree} is out of range", f"Use 1 to {MOST_DEGREE}")
         for degree in degrees
         if not 1 <= degree <= MOST_DEGREE
     ]
     if not degrees:
-        findings.append(Finding("--degree", "is empty", "Write it like 1,3"))
+        findings.append(Finding("degrees", "is empty", "Write it like 1,3"))
     if findings:
         raise InputError(findings)
     distinct = np.unique(deformation)

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from hdcal.diagnosis.verdict import Shrink, Verdict
+from hdcal.diagnosis.verdict import Closure, Verdict
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -37,7 +37,7 @@ def shrink_figure(verdict: Verdict) -> Figure:
     return figure
 
 
-def _draw_ladder(axes: Axes, shrink: Shrink) -> None:
+def _draw_ladder(axes: Axes, shrink: Closure) -> None:
     heading(axes, "What is left, rung by rung")
     rungs = [r for r in shrink.ladder if np.isfinite(r.rms_N)]
     sizes = np.array([rung.rms_N for rung in rungs])
@@ -89,8 +89,8 @@ def _rung(model: str) -> str:
     )
 
 
-def _draw_closed(axes: Axes, shrink: Shrink) -> None:
-    heading(axes, "Share of the gap closed")
+def _draw_closed(axes: Axes, shrink: Closure) -> None:
+    heading(axes, "CovariateShare of the gap closed")
     if shrink.closed is None or not np.isfinite(shrink.closed.median):
         _say(axes, shrink.reason or "not computed")
         return
@@ -112,7 +112,7 @@ def _draw_closed(axes: Axes, shrink: Shrink) -> None:
     axes.grid(False, axis="y")
 
 
-def _rows(shrink: Shrink) -> list[tuple]:
+def _rows(shrink: Closure) -> list[tuple]:
     """Return (words, value, interval or None, colour) of every mark, top first."""
     assert shrink.closed is not None
     closed = shrink.closed

@@ -1,0 +1,67 @@
+"""The JSON schemas of all answers: a directive that lists them, and their files."""
+
+import json
+import pkgutil
+from importlib import import_module
+from pathlib import Path
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+import hdcal
+from hdcal.report.answer import Answer, json_schema
+
+FOLDER = "schemas"
+
+
+def answers() -> dict[str, type[Answer]]:
+    """Return every answer of the package by the name of its format."""
+    for module in pkgutil.walk_packages(hdcal.__path__, "hdcal."):
+        if module.name.rpartition(".")[2] == "answer":
+            import_module(module.name)
+    waiting, found = [Answer], {}
+    for answer in waiting:  # grows while it is walked along
+        waiting += answer.__subclasses__()
+        schema = getattr(answer, "schema", None)
+        if isinstance(schema, str):
+            assert schema not in found, f"two answers are called {schema}"
+            found[schema] = answer
+    return dict(sorted(found.items()))
+
+
+def file_name(schema: str) -> str:
+    """Return the name of a schema's file: hdcal.margin/1 → hdcal.margin-1.json."""
+    return f"{schema.replace('/', '-')}.json"
+
+
+class SchemaList(SphinxDirective):
+    """List every answer with what it is and the schema that it obeys."""
+
+    def run(self) -> list[nodes.Node]:
+        """Return the list."""
+        listed = nodes.bullet_list()
+        for schema, answer in answers().items():
+            first = (answer.__doc__ or "").splitlines()[0]
+            link = nodes.reference("", schema, refuri=f"{FOLDER}/{file_name(schema)}")
+            words = nodes.paragraph("", "", link, nodes.Text(f": {first}"))
+            listed += nodes.list_item("", words)
+        return [listed]
+
+
+def write_schemas(app: Sphinx, error: Exception | None) -> None:
+    """Write the schema of every answer beside the pages."""
+    if error is not None:
+        return
+    folder = Path(app.outdir) / FOLDER
+    folder.mkdir(exist_ok=True)
+    for schema, answer in answers().items():
+        text = json.dumps(json_schema(answer), indent=2) + "\n"
+        (folder / file_name(schema)).write_text(text, "utf-8")
+
+
+def setup(app: Sphinx) -> dict:
+    """Register both with Sphinx."""
+    app.add_directive("json-schemas", SchemaList)
+    app.connect("build-finished", write_schemas)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

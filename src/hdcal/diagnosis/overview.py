@@ -1,0 +1,68 @@
+"""Many diagnoses at once: their answer, and a table with a row for each."""
+
+from collections.abc import Mapping
+
+from hdcal.diagnosis.answer import VerdictAnswer, VerdictsAnswer
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.words import count_words, verdict_word
+from hdcal.report.document import Document, Section, Table
+from hdcal.report.words import hypothesis, known, newton, percent
+
+
+def document_and_answer(
+    found: Mapping[str, VerdictAnswer],
+) -> tuple[Document, VerdictAnswer | VerdictsAnswer]:
+    """Return what a command shows: of one case its verdict, of many an overview.
+
+    Args:
+        found: answers by the names of the cases.
+    """
+    if len(found) == 1:
+        (one,) = found.values()
+        return verdict_document(one), one
+    together = verdicts_answer(found)
+    return overview_document(together), together
+
+
+def verdicts_answer(found: Mapping[str, VerdictAnswer]) -> VerdictsAnswer:
+    """Return the answer about many cases, by the names of the cases."""
+    failed = [name for name, one in found.items() if one.status != "ok"]
+    return VerdictsAnswer(
+        status="failed" if failed else "ok",
+        reasons=tuple(f"{name}: failed" for name in failed),
+        headline=count_words(found),
+        next_step=None,
+        cases=dict(found),
+    )
+
+
+def overview_document(found: VerdictsAnswer) -> Document:
+    """Return one table with a row for each of many cases."""
+    numbers = ("probability", "gap", "closed")
+    rows = [_overview_row(name, one) for name, one in found.cases.items()]
+    table = Table(["case", "verdict", "cause", *numbers], rows, frozenset(numbers))
+    return Document(
+        name=f"{len(rows)} cases",
+        kind="diagnoses",
+        subtitle="diagnosed one by one",
+        headline=f"{found.headline}.",
+        sections=[Section("Verdicts", [table], brief=True)],
+    )
+
+
+def _overview_row(name: str, found: VerdictAnswer) -> list[str]:
+    which, closed = found.which, found.shrink.closed
+    size = found.gap.rms_N.median
+    if found.status != "ok":
+        return [name, verdict_word(found), "", "", "", ""]
+    word = which.verdict
+    cause = word if which.effect is None else which.effect
+    chance = which.inclusion.get(cause, which.probabilities.get(cause))
+    return [
+        name,
+        word,
+        "–" if word == "none" else hypothesis(cause),
+        percent(chance),
+        newton(size) if known(size) else "–",
+        "–" if closed is None else percent(closed.median),
+    ]

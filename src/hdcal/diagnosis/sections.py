@@ -1,0 +1,184 @@
+"""Sections of a diagnosis' report: where the gap lies, which effect, how far."""
+
+from collections.abc import Iterator, Sequence
+
+from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer
+from hdcal.diagnosis.verdict import Closure, Gap
+from hdcal.diagnosis.words import held_out, one_reading
+from hdcal.report.document import (
+    Block,
+    Facts,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Text,
+)
+from hdcal.report.words import (
+    estimate,
+    hypothesis,
+    known,
+    likely,
+    newton,
+    number,
+    or_zero,
+    percent,
+    percent_span,
+)
+
+_MOST_ROWS = 12
+
+
+def where_section(found: VerdictAnswer) -> Section:
+    """Return where the gap lies; its picture is called where."""
+    facts = Table(["", "found", "meaning"], _gap_rows(found), frozenset({"found"}))
+    caption = (
+        "Bars: mean of measured minus calibrated force in ranges chosen before "
+        "looking. Blue shade: how far noise alone would move them, in 95 % of all "
+        "programs for all ranges together. Red on amber: off. Thin line: the gap. In "
+        "the running sums noise stays in the grey band, a gap keeps its course."
+    )
+    shows = "Measured minus calibrated force over everything that was measured"
+    picture = Picture("where", shows, caption, tall=True)
+    shares = ", ".join(
+        f"{percent_span(each.share)} with {each.covariate}"
+        for each in found.where.shares
+    )
+    varies = [Text(f"The gap varies {shares}.")] if shares else []
+    regions = _regions(found.where.regions)
+    return Section("Where the gap lies", [facts, picture, *regions, *varies])
+
+
+def _gap_rows(found: VerdictAnswer) -> list[tuple[str, str, str]]:
+    gap, p = found.gap, found.where.p_value
+    chance = f"p = {number(p)}"
+    words = "a gap is seen" if gap.detected else "no gap is seen"
+    seen = ("seen", chance, f"{words}; how often noise alone looks like this")
+    if known(gap.rounding_N):
+        steps = f"in steps of {newton(gap.rounding_N)}"
+        seen = ("seen", "rounding", f"{steps}; nothing else is seen ({chance})")
+    noise = f"standard deviation of {one_reading(found)}"
+    return [
+        seen,
+        ("probability", percent(gap.probability), "that anything is missing"),
+        *_size_rows(gap),
+        ("noise", newton(gap.noise_sd_N), noise),
+    ]
+
+
+def _size_rows(gap: Gap) -> list[tuple[str, str, str]]:
+    if not known(gap.rms_N.median):
+        return [("size", "–", "of what is not seen there is no size")]
+    middle, span = estimate(gap.rms_N)
+    share = percent(gap.share_of_full_scale)
+    return [
+        ("size", f"{middle} N", f"root mean square; 90 % interval {span} N"),
+        ("of full scale", share, "size over the largest force tested"),
+    ]
+
+
+def _regions(regions: Sequence[CellAnswer]) -> Iterator[Block]:
+    if not regions:
+        yield Text("No range is off by more than noise alone would make it.")
+        return
+    numbers = ("rows", "measured − model [N]", "in standard errors", "share of the gap")
+    rows = [_region_row(cell) for cell in regions[:_MOST_ROWS]]
+    yield Table(["off", "in", *numbers], rows, frozenset(numbers))
+    hidden = len(regions) - _MOST_ROWS
+    if hidden > 0:
+        yield Text(f"{hidden} more are in verdict.json.", soft=True)
+
+
+def _region_row(cell: CellAnswer) -> list[str]:
+    bias = cell.bias_N
+    width = bias.hi - bias.lo if known(bias.hi) else None
+    return [
+        cell.covariate,
+        cell.label,
+        str(cell.rows),
+        number(bias.median, width),
+        number(cell.z, 10.0),
+        percent(cell.share),
+    ]
+
+
+def which_section(found: VerdictAnswer) -> Section:
+    """Return which effect causes it; its picture is called which."""
+    which = found.which
+    chances, evidence = which.probabilities, which.log_evidence
+    together = likely(chances)
+    ranked = sorted(chances, key=lambda name: -or_zero(chances[name]))[:_MOST_ROWS]
+    rows = [
+        [hypothesis(name), percent(chances[name]), number(evidence.get(name), 10.0)]
+        for name in ranked
+    ]
+    numbers = ("probability", "log evidence over no gap")
+    strong = frozenset(i for i, name in enumerate(ranked) if name in together)
+    table = Table(["hypothesis", *numbers], rows, frozenset(numbers), strong=strong)
+    others = len(chances) - _MOST_ROWS
+    rest = f"{others} less probable ones are in verdict.json. " if others > 0 else ""
+    note = (
+        f"Bold: the fewest that make up 90 %. {rest}Log evidence in nats: three are a "
+        "factor of twenty."
+    )
+    caption = (
+        "Every hypothesis was weighed against the same data. “Something outside the "
+        "library” is a free shape; it wins where no effect fits."
+    )
+    picture = Picture("which", "Probability of each hypothesis", caption)
+    robust = list(_robustness(found))
+    more = [Sentences(robust)] if robust else []
+    blocks = [picture, table, Text(note, soft=True), *more]
+    return Section("Which effect causes it", blocks)
+
+
+def _robustness(found: VerdictAnswer) -> Iterator[str]:
+    which = found.which
+    if which.sensitivity:
+        texts = [
+            f"{percent(value)} ({name.replace('_', ' ')})"
+            for name, value in which.sensitivity.items()
+        ]
+        yield (
+            "With other beliefs about the size of effects, the first cause would have "
+            f"{', '.join(texts)}."
+        )
+    if known(which.stability):
+        share = percent(which.stability)
+        yield f"With other readings of the same kind, the ranking's top stays: {share}."
+
+
+def shrink_section(shrink: Closure) -> Section:
+    """Return how far the gap shrinks; its picture is called shrink."""
+    caption = (
+        "Left: what each model leaves over (root mean square). Right: how much of the "
+        "gap is closed on readings that were not used in fitting. A free curve with as "
+        "many parameters is the placebo: an effect should do better, above all where "
+        "the largest deformations are held out."
+    )
+    shows = (
+        "Root mean square of measured minus model, from the nominal model to the noise"
+    )
+    picture = Picture("shrink", shows, caption)
+    closed = (
+        Text(f"Not computed: {shrink.reason}.")
+        if shrink.closed is None
+        else Facts(list(_closed_rows(shrink)))
+    )
+    return Section("How far the gap shrinks", [picture, closed])
+
+
+def _closed_rows(shrink: Closure) -> Iterator[tuple[str, str]]:
+    if shrink.closed is not None:
+        yield f"closed on {held_out(shrink)}", percent_span(shrink.closed)
+    if known(shrink.extrapolated_closed):
+        share = percent(shrink.extrapolated_closed)
+        yield "with the largest deformations held out", share
+    if known(shrink.placebo_closed):
+        share = percent(shrink.placebo_closed)
+        yield "by a free curve instead (placebo)", share
+    for name, share in shrink.bars.items():
+        yield f"by {hypothesis(name)}", percent(share)
+    if shrink.remainder_N is not None:
+        middle, span = estimate(shrink.remainder_N)
+        yield "left after it", f"{middle} N, 90 % interval {span} N"

@@ -1,0 +1,99 @@
+"""The rows of a case and the linearised base model: whitening and projection."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+# AR(1) coefficients of the noise within a run that are integrated over; more would
+# explain slow physics as noise.
+CORRELATIONS = (0.0, 0.2, 0.4, 0.6)
+
+
+@dataclass(frozen=True)
+class LinearRows:
+    """The data of one case and the linear base model that every hypothesis contains.
+
+    Attributes:
+        reading: measured force less the prior mean of the base model [N].
+        base: columns of the base model [N per prior sd of each coefficient].
+        precision: prior precision of the coefficients times the noise variance.
+        before: index of the row before in the same run, −1 for a run's first.
+        weight: one over the relative noise sd of each row [-].
+        correlations: AR(1) coefficients.
+        tolerance: smooth functions of unit mean square, shape (j, n), with which an
+            effect's shape may differ from the library's.
+    """
+
+    reading: Float[np.ndarray, " n"]
+    base: Float[np.ndarray, "n p"]
+    precision: Float[np.ndarray, " p"]
+    before: Int[np.ndarray, " n"]
+    weight: Float[np.ndarray, " n"]
+    correlations: Float[np.ndarray, " r"]
+    tolerance: Float[np.ndarray, "j n"]
+
+
+def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndarray:
+    """Return columns in which the noise is independent and of equal sd.
+
+    Args:
+        rows: order and weights of the rows.
+        columns: with the rows along their first axis.
+        correlation: AR(1) coefficient of the noise within a run.
+    """
+    trailing = (1,) * (columns.ndim - 1)
+    scaled = columns * rows.weight.reshape(-1, *trailing)
+    lagged = (scaled - correlation * scaled[rows.before]) / np.sqrt(
+        1.0 - correlation**2
+    )
+    return np.where((rows.before < 0).reshape(-1, *trailing), scaled, lagged)
+
+
+def log_det_whitening(rows: LinearRows, correlation: float) -> float:
+    """Return log |d whitened / d reading|."""
+    following = np.sum(rows.before >= 0)
+    return float(
+        np.sum(np.log(rows.weight)) - 0.5 * following * np.log(1.0 - correlation**2)
+    )
+
+
+def log_det_projection(rows: LinearRows, correlation: float) -> float:
+    """Return log |P| for P = (I + X S X')⁻¹ in whitened rows.
+
+    The base coefficients have prior precision `rows.precision`/σ²; zero columns change
+    nothing.
+    """
+    base = whiten(rows, rows.base, correlation)
+    factor = np.linalg.cholesky(base.T @ base + np.diag(rows.precision))
+    prior = np.sum(np.log(rows.precision))
+    return float(prior - 2.0 * np.sum(np.log(np.diag(factor))))
+
+
+def remove_base(
+    rows: LinearRows, curves: Float[np.ndarray, "g n"]
+) -> Float[np.ndarray, "g n"]:
+    """Return what of each curve the base model cannot absorb: its visible size [N].
+
+    As far as its priors let it: no zero of the deformation makes up for a drift with
+    temperature.
+    """
+    base = rows.base
+    gram = base.T @ base + np.diag(rows.precision)
+    return curves - (curves @ base) @ np.linalg.solve(gram, base.T)
+
+
+def project(
+    rows: LinearRows, correlation: float, curves: Float[np.ndarray, "g n"]
+) -> Float[np.ndarray, "g n+p"]:
+    """Return curves whose inner products are those of P, not of P P.
+
+    P = (I + X S X')⁻¹ is no projection where the priors hold the base coefficients
+    back: what this costs is kept in as many further entries as the base has columns.
+    """
+    base = whiten(rows, rows.base, correlation)
+    gram = base.T @ base + np.diag(rows.precision)
+    white = whiten(rows, curves.T, correlation).T
+    fitted = np.linalg.solve(gram, base.T @ white.T).T
+    held = np.sqrt(rows.precision) * fitted
+    return np.concatenate([white - fitted @ base.T, held], axis=1)

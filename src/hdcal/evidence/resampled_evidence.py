@@ -1,0 +1,80 @@
+"""The evidence on resampled half cycles: does the name depend on a few rows?"""
+
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.evidence.case_evidence import CaseEvidence
+from hdcal.evidence.closed_form import base_evidence, cell_evidence
+from hdcal.evidence.inner_products import CommonTerms, PieceProducts
+from hdcal.evidence.linear_rows import whiten
+from hdcal.evidence.row_features import half_cycle_blocks
+
+_SAMPLES = 20
+
+
+def resampled_evidence(
+    evidence: CaseEvidence, rng: np.random.Generator
+) -> Float[np.ndarray, "s m"]:
+    """Return the log evidence of none and each single effect on resampled blocks.
+
+    Inner products add over blocks, so that no row is visited twice.
+
+    Args:
+        evidence: of the whole data.
+        rng: source of randomness.
+
+    Returns:
+        Shape (samples, 1 + effects).
+    """
+    block = half_cycle_blocks(evidence.prepared.records)
+    count = int(block.max()) + 1
+    picked = rng.multinomial(count, np.full(count, 1.0 / count), size=_SAMPLES)
+    ee, eu, uu = _products(evidence, picked[:, block].astype(float))
+    nothing = np.zeros((_SAMPLES, ee.shape[1] - 1, 0))
+    products = PieceProducts(
+        ee[:, 1:], eu[:, 1:], np.maximum(uu, 0.0)[:, 1:], nothing, nothing, nothing
+    )
+    sigma = evidence.prepared.priors["sigma"]
+    common = CommonTerms(np.zeros(_SAMPLES), float(len(block)))
+    exact = evidence.single.parts[0]
+    found, _, _ = cell_evidence(common, products, exact.cells, sigma)
+    totals = [base_evidence(common, ee[:, 0], sigma)]
+    for effect in range(len(evidence.piecewise)):
+        mine = found[:, exact.owner == effect]
+        totals.append(np.logaddexp.reduce(mine, axis=1))
+    return np.stack(totals, axis=1)
+
+
+def _products(evidence: CaseEvidence, weight: np.ndarray):
+    """Return ee, eu and uu of no effect and of all pieces, for weights of the rows.
+
+    Args:
+        evidence: of the whole data.
+        weight: how often each row counts, [sample, row].
+    """
+    rows, effects = evidence.prepared.rows, evidence.piecewise
+    correlation = _likeliest_correlation(evidence)
+    nothing = np.zeros((1, len(rows.reading)))
+    offsets = np.concatenate([nothing, *(each.offsets for each in effects)])
+    slopes = np.concatenate([nothing, *(each.slopes for each in effects)])
+    base, left, slope = (
+        whiten(rows, columns, correlation)
+        for columns in (rows.base, (rows.reading - offsets).T, slopes.T)
+    )
+    weighted_base = weight[:, :, None] * base
+    xx = np.einsum("snp,nq->spq", weighted_base, base, optimize=True)
+    xe = np.einsum("snp,ng->spg", weighted_base, left, optimize=True)
+    xu = np.einsum("snp,ng->spg", weighted_base, slope, optimize=True)
+    gram = xx + np.diag(rows.precision)
+    fitted_e, fitted_u = np.linalg.solve(gram, xe), np.linalg.solve(gram, xu)
+    return (
+        weight @ left**2 - np.sum(xe * fitted_e, axis=1),
+        weight @ (left * slope) - np.sum(xu * fitted_e, axis=1),
+        weight @ slope**2 - np.sum(xu * fitted_u, axis=1),
+    )
+
+
+def _likeliest_correlation(evidence: CaseEvidence) -> float:
+    whole = np.stack(list(evidence.table.values()))
+    index = int(np.argmax(np.logaddexp.reduce(whole, axis=0)))
+    return float(evidence.prepared.rows.correlations[index])

@@ -1,0 +1,125 @@
+"""The part of a JSON answer that tells of a sampled posterior."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from hdcal.data.case import Theory
+from hdcal.inference.checks import Check
+from hdcal.inference.posterior import Posterior
+from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences
+from hdcal.report.parameters import (
+    INTERVAL,
+    Interval,
+    ParameterEstimate,
+    credible_interval,
+    parameter_estimates,
+)
+
+_OneOrMore = Annotated[int, Promise(minimum=1)]
+_NAME = "[A-Za-z_][A-Za-z0-9_]*"
+ParameterName = Annotated[str, Promise(pattern=f"^{_NAME}(\\.{_NAME})?$")]
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How the draws were come by."""
+
+    chains: Annotated[int, Promise(minimum=2)]
+    warmup: _OneOrMore
+    draws: _OneOrMore
+    target_acceptance: float
+    seconds: Annotated[float, Promise(minimum=0)]
+    divergences: Count
+
+
+@dataclass(frozen=True)
+class CalibratedGear:
+    """Which gear it was, and by which formula it was modelled."""
+
+    name: str
+    material: str
+    theory: Theory
+
+
+@dataclass(frozen=True)
+class CalibratedData:
+    """Which data it was; notes are from reading them."""
+
+    name: str
+    rows: _OneOrMore
+    sha256: Digest
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosteriorAnswer(Answer):
+    """What every calibration answers.
+
+    Attributes:
+        warnings: sentences to be aware of.
+        parameters: by name, those that were fixed last.
+        stiffness_N_per_mm: at the reference temperature, per mm as read.
+        flat_directions: what the data cannot see or tell apart, in sentences.
+        interval: probability that every interval holds.
+        interval_kind: what kind of interval it is.
+        checks: all of them.
+        sampling: how the draws were come by.
+        seed: of the draws.
+        versions: of the packages that made them.
+        gear: that was calibrated.
+        data: that it was calibrated with.
+    """
+
+    warnings: Sentences
+    parameters: dict[ParameterName, ParameterEstimate]
+    stiffness_N_per_mm: Interval
+    flat_directions: Sentences
+    interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
+    interval_kind: str
+    checks: Annotated[tuple[Check, ...], Promise(minItems=1)]
+    sampling: Sampling
+    seed: Count
+    versions: Annotated[dict[str, str], Promise(required=["hdcal"])]
+    gear: CalibratedGear
+    data: CalibratedData
+
+
+def posterior_entries(posterior: Posterior) -> dict[str, Any]:
+    """Return what a `PosteriorAnswer` holds, but for headline and next step."""
+    case, settings = posterior.case, posterior.settings
+    return {
+        "status": "ok" if posterior.usable else "failed",
+        "reasons": posterior.reasons,
+        "warnings": _warnings(posterior),
+        "parameters": parameter_estimates(posterior),
+        "stiffness_N_per_mm": credible_interval(posterior.draws["stiffness"]),
+        "flat_directions": tuple(
+            check.words for check in posterior.checks if check.outcome == "note"
+        ),
+        "interval": INTERVAL,
+        "interval_kind": "equal-tailed credible interval",
+        "checks": posterior.checks,
+        "sampling": _sampling(posterior),
+        "seed": settings["seed"],
+        "versions": settings["versions"],
+        "gear": CalibratedGear(case.gear.name, case.gear.material, posterior.theory),
+        "data": CalibratedData(
+            case.name, len(case.records.force), case.data_sha256, case.notes
+        ),
+    }
+
+
+def _warnings(posterior: Posterior) -> tuple[str, ...]:
+    """Return the warnings of the checks as sentences."""
+    return tuple(
+        check.words[:1].upper() + check.words[1:]
+        for check in posterior.checks
+        if check.outcome == "warning"
+    )
+
+
+def _sampling(posterior: Posterior) -> Sampling:
+    stats = posterior.tree["sample_stats"].to_dataset()
+    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
+    settings: dict[str, Any] = {name: posterior.settings[name] for name in names}
+    return Sampling(**settings, divergences=int(stats["diverging"].sum()))
