@@ -1,46 +1,8 @@
 """A finding about a parameter is printed as one about the option."""
 
-import click
 import pytest
-from click.testing import CliRunner
 from commands import Hdcal
 from moving import still_posterior
-
-from hdcal.cli.findings import options_named
-from hdcal.errors import Finding, InputError
-
-
-@pytest.mark.parametrize(
-    ("named", "printed"),
-    [
-        ("limit_force", "--limit-force"),
-        # Click's own name of an option, and another than either.
-        ("drive", "--force"),
-        ("force", "--force"),
-        ("rates", "--spring-rate"),
-        # No option of this command.
-        ("run", "run"),
-        ("gear.toml", "gear.toml"),
-        ("confidence", "confidence"),
-    ],
-)
-def test_a_parameter_is_called_by_its_option(named: str, printed: str):
-    caught = []
-
-    @click.command()
-    @click.argument("run")
-    @click.option("--limit-force", "-l")
-    @click.option("--force", "drive")
-    @click.option("--spring-rate")
-    def command(**_):
-        try:
-            with options_named(rates="--spring-rate"):
-                raise InputError([Finding(named, "is wrong", "mend it", row=3)])
-        except InputError as error:
-            caught.extend(error.findings)
-
-    assert CliRunner().invoke(command, ["run"]).exit_code == 0
-    assert caught == [Finding(printed, "is wrong", "mend it", row=3)]
 
 
 @pytest.mark.parametrize(

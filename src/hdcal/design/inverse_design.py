@@ -9,7 +9,7 @@ there. Solved by sequential quadratic programming on the logarithms of the sizes
 exact derivatives of the model.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +34,7 @@ from hdcal.design.sizes import (
     named,
     with_reference,
 )
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.sizes import SIZES
 
@@ -128,18 +128,17 @@ def inverse_design(
     at = draws.nominal_deformation if deformation is None else deformation
     levels = with_reference(draws, temperatures)
     limits = Limits(limit_force, limit_stress, probability)
-    findings = _findings(draws, vary, at, levels, limits, materials)
-    listed = materials or [draws.material]
-    made = [attempt(findings, draws.of_material, name, seed) for name in listed]
-    gear = attempt(findings, next_gear, draws, tolerances, seed)
-    if findings or gear is None or at is None:
-        raise InputError(findings)
-    own = [one for one in made if one is not None]
-    return _nearest_design(draws, own, gear, vary, (at, levels, limits))
+    with Findings() as wrong:
+        wrong += _findings(draws, vary, at, levels, limits, materials)
+        listed = materials or [draws.material]
+        made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
+        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+    assert gear is not None
+    return _nearest_design(draws, filter(None, made), gear, vary, (at, levels, limits))
 
 
 def _nearest_design(
-    draws: DesignDraws, made: Sequence[DesignDraws], gear: NextGear, vary, place
+    draws: DesignDraws, made: Iterable[DesignDraws], gear: NextGear, vary, place
 ) -> InverseDesign:
     """Return the nearest of the designs of all materials.
 
@@ -151,16 +150,12 @@ def _nearest_design(
         place: deformation [mm], temperatures [°C] and limits.
     """
     at, levels, limits = place
-    targets = [Target.of(one, gear, *place) for one in made]
-    found = [
-        best_candidate(one, target, vary)
-        for one, target in zip(made, targets, strict=True)
-    ]
-    met = [i for i, one in enumerate(found) if one.met]
+    found = [best_candidate(one, Target.of(one, gear, *place), vary) for one in made]
+    met = [one for one in found if one.met]
     if not met:
         raise InputError([_unmet(found, vary, at, limits)])
-    best = min(met, key=lambda i: found[i].change)
-    chosen, kept = found[best], targets[best]
+    chosen = min(met, key=lambda one: one.change)
+    kept = Target.of(chosen.basis, gear, *place)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
     return InverseDesign(
         basis=draws,

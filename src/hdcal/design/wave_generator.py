@@ -12,7 +12,7 @@ from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.sentences import beyond_tested
 from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 
 # Default range of the spring rate, relative to the gear's own stiffness.
@@ -103,10 +103,10 @@ def wave_generator(
     """
     draws = design_draws(source, seed=seed)
     levels = with_reference(draws, temperatures)
-    findings = _findings(draws, window, levels, probability, setting_sd, rates)
-    gear = attempt(findings, next_gear, draws, tolerances, seed)
-    if findings or gear is None:
-        raise InputError(findings)
+    with Findings() as wrong:
+        wrong += _findings(draws, window, levels, probability, setting_sd, rates)
+        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+    assert gear is not None
     return _generator(draws, gear, window, levels, probability, setting_sd, rates, seed)
 
 

@@ -17,7 +17,7 @@ from hdcal.design.checks import (
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import geometry_with
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.forces import gear_forces
@@ -94,12 +94,11 @@ def study(
     draws = design_draws(source, seed=seed)
     axes = {name: np.atleast_1d(np.asarray(v, float)) for name, v in vary.items()}
     axes = _with_place(draws, axes, deformation, temperature)
-    findings = _findings(draws, axes, materials, interval)
-    listed = materials or [draws.material]
-    tried = [attempt(findings, draws.of_material, name, seed) for name in listed]
-    if findings:
-        raise InputError(findings)
-    return _tabulated(draws, [one for one in tried if one], axes, interval)
+    with Findings() as wrong:
+        wrong += _findings(draws, axes, materials, interval)
+        listed = materials or [draws.material]
+        made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
+    return _tabulated(draws, list(filter(None, made)), axes, interval)
 
 
 def _with_place(draws: DesignDraws, axes, deformation, temperature) -> dict:
@@ -222,7 +221,7 @@ def force_quantiles(
 def is_linear(draws: DesignDraws) -> bool:
     """Tell whether the force is proportional to stiffness and deformation."""
     bent = any(effect.stage == "force" for effect in draws.problem.effects)
-    return not bent and draws.problem.gap is None
+    return not bent and draws.problem.discrepancy is None
 
 
 def general_quantiles(draws, factor, deformation, temperature, shares) -> np.ndarray:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.errors import Finding, InputError
-from hdcal.physics.forcing import Chirp, Forcing, Sine, Step, Table
+from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Sine, Step
 
 SHAPES = ("step", "sine", "chirp")
 MOST_POINTS = 100_001
@@ -73,25 +73,26 @@ def make_request(
         _check_table(drive, find)
     if findings:
         raise InputError(findings)
+    return _request(drive, amplitude, tones, length, points)
+
+
+def _request(
+    drive: Drive, amplitude: float, tones: list[float], length: float, points: int
+) -> Request:
     if not isinstance(drive, str):
-        return _sampled(drive, points)
-    return _shaped(drive, amplitude, tones, np.linspace(0.0, length, points))
-
-
-def _shaped(shape: str, amplitude: float, tones: list[float], times) -> Request:
-    if shape == "step":
+        time, force = (np.asarray(part, dtype=float) for part in drive)
+        words = f"a sampled force of {len(time)} rows, linear between them"
+        return Request(
+            SampledForce(time, force), words, np.linspace(time[0], time[-1], points)
+        )
+    times = np.linspace(0.0, length, points)
+    if drive == "step":
         return Request(Step(amplitude), f"a step of {amplitude:g} N", times)
-    if shape == "sine":
+    if drive == "sine":
         words = f"a sine of {amplitude:g} N at {tones[0]:g} Hz"
         return Request(Sine(amplitude, tones[0]), words, times)
     words = f"a sweep of {amplitude:g} N from {tones[0]:g} to {tones[1]:g} Hz"
-    return Request(Chirp(amplitude, *tones, float(times[-1])), words, times)
-
-
-def _sampled(drive, points: int) -> Request:
-    time, force = (np.asarray(part, dtype=float) for part in drive)
-    words = f"a sampled force of {len(time)} rows, linear between them"
-    return Request(Table(time, force), words, np.linspace(time[0], time[-1], points))
+    return Request(Chirp(amplitude, tones[0], tones[1], length), words, times)
 
 
 def _tones(drive, frequency, duration: float, points: int, find) -> list[float]:

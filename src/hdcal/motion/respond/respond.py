@@ -10,10 +10,11 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
-from hdcal.errors import Finding, InputError, NotUsable, attempt
+from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
@@ -69,9 +70,7 @@ class Response:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
-        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
-        names += ("deformation_hi_mm", "tested")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
 
     def _repr_html_(self) -> str:
         from hdcal.motion.respond.document import response_document
@@ -119,27 +118,28 @@ def respond(
         InputError: what was asked makes no sense.
     """
     posterior.require_usable()
-    findings: list[Finding] = []
-    asked = force, amplitude, frequency, duration, points
-    request = attempt(findings, make_request, *asked)
-    findings += _problems(posterior, temperature, mass, damping, draws)
-    if findings or request is None:
-        raise InputError(findings)
-    at = usual_temperature(posterior.case) if temperature is None else temperature
+    with Findings() as wrong:
+        request = wrong.attempt(
+            make_request, force, amplitude, frequency, duration, points
+        )
+        wrong += _problems(posterior, temperature, mass, damping, draws)
+    assert request is not None
+    return _move(posterior, request, temperature, mass, damping, draws, seed)
+
+
+def _move(
+    posterior: Posterior, request: Request, temperature, mass, damping, draws, seed
+) -> Response:
+    """Integrate every gear of the posterior, and say what its motion rests on."""
+    usual = usual_temperature(posterior.case)
+    at = usual if temperature is None else float(temperature)
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
-    _check_reach(posterior, request, values, moved)
-    values |= {"_mass": moved, "_ratio": ratio}
-    return _integrated(posterior, request, values, float(at), mass, damping)
-
-
-def _integrated(
-    posterior: Posterior, request: Request, values: dict, at: float, mass, damping
-) -> Response:
-    """Return the response of every draw at a temperature [°C]."""
     kept, left = acting(without_scatter(posterior.effects))
     reading = case_reading(posterior.case)
-    states, facts, done = integrate_all(kept, reading, values, at, damping, request)
+    whole = {**values, "_mass": moved, "_ratio": ratio}
+    _check_reach(posterior, request, values, moved)
+    states, facts, done = integrate_all(kept, reading, whole, at, damping, request)
     lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
     estimates = {
@@ -207,8 +207,10 @@ def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
 def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> None:
     """Refuse what is a slip of the unit: to fold the gear, or to swing for hours."""
     findings = []
-    per_read = case_reading(posterior.case).radial_per_read
-    limit = posterior.case.gear.geometry.radius / per_read
+    limit = (
+        posterior.case.gear.geometry.radius
+        / case_reading(posterior.case).radial_per_read
+    )
     static = float(request.force.largest()) / np.median(values["stiffness"])
     if static >= limit:
         words = f"would deform the gear by {static:.3g} mm even at rest"

@@ -158,7 +158,7 @@ def _quantiles(causes: Sequence[Cause], records: Records, tails, seed: int):
     else:
         weights = np.concatenate([cause.weights for cause in causes])
         found = [draw_quantiles(table, weights, tails) for table in tables]
-    if all(cause.problem.gap is None for cause in causes):
+    if all(cause.problem.discrepancy is None for cause in causes):
         found[1] = np.full_like(found[1], np.nan)
     return np.stack(found)
 

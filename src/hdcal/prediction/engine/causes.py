@@ -59,7 +59,7 @@ class Cause:
     def name(self) -> str:
         """What the model is called among the hypotheses of a diagnosis."""
         effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
-        return effects or ("none" if self.problem.gap is None else "unknown")
+        return effects or ("none" if self.problem.discrepancy is None else "unknown")
 
     def driver(self, name: str) -> Driver:
         """Return whether data or prior determine a parameter."""

@@ -96,9 +96,9 @@ def leftover_of(problem: Problem, values: Values, deformation) -> Float[Array, "
 
     Zero where none was fitted; beyond the tested range the fit simply goes on.
     """
-    if problem.gap is None:
+    if problem.discrepancy is None:
         return jnp.zeros(len(deformation))
-    return problem.gap.columns(deformation) @ values["gap_weights"]
+    return problem.discrepancy.columns(deformation) @ values["gap_weights"]
 
 
 @jax.jit

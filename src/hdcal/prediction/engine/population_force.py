@@ -211,8 +211,8 @@ def leftover(problem: Problem, value: Values, conditions: Conditions):
     tells; both from the prior where no discrepancy was fitted.
     """
     found = leftover_sd(value, conditions) * value[SCORES][2]
-    if problem.gap is None or "gap_weights" not in value:
+    if problem.discrepancy is None or "gap_weights" not in value:
         return found
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)
-    columns = problem.gap.columns_beyond(at, value["gap_length"])
+    columns = problem.discrepancy.columns_beyond(at, value["gap_length"])
     return found + (columns @ value["gap_weights"])[0]

@@ -39,9 +39,9 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
         sd = np.asarray(leftover_sd(cause.values, where))
         yield say.untested_deformation(
             float(at),
-            (low, high),
+            (float(low), float(high)),
             leftover=float(np.sqrt(np.mean(sd**2))),
-            fitted=cause.problem.gap is not None,
+            fitted=cause.problem.discrepancy is not None,
         )
     if (-1.0 if where.down else 1.0) not in np.asarray(records.sense):
         yield say.untested_direction(down=where.down)
@@ -66,7 +66,7 @@ def remarks(
     """
     first = _main(forces)
     said = list(_of_population(first))
-    if all(force.cause.problem.gap is None for force in forces):
+    if all(force.cause.problem.discrepancy is None for force in forces):
         said += misfits(first.cause.posterior)
     used = sum(force.cause.size for force in forces)
     rare = risk is not None and risk.probability < 1.0 / used

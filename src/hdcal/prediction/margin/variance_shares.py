@@ -144,7 +144,7 @@ def _inputs(forces: Sequence[PopulationForce]) -> dict[str, Driver]:
         found["gear"] = cause.driver("specimen_sd")
     found |= dict.fromkeys(forces[0].tolerances, "given")
     if not where.low <= where.deformation <= where.high:
-        fitted = all(force.cause.problem.gap is not None for force in forces)
+        fitted = all(force.cause.problem.discrepancy is not None for force in forces)
         found["leftover"] = cause.driver("gap_sd") if fitted else "prior"
     return found
 
