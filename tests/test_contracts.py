@@ -22,6 +22,10 @@ VIOLATIONS = {
     "rooms": ("data/records.py", "import hdcal.physics.chain"),
     "blind": ("blind/answer.py", "import hdcal.design.sizes"),
     "diagnosis": ("diagnosis/library.py", "import hdcal.tracking.tracker"),
+    "engine": (
+        "prediction/engine/mixture.py",
+        "import hdcal.prediction.margin.result",
+    ),
     "calibration": ("calibration/summary.py", "import hdcal.classical.fit.fit"),
     "moving": ("motion/summary.py", "import hdcal.classical.fit.fit"),
     "virtual_rig": ("blind/virtual_rig/paths.py", "import hdcal.physics.theory"),

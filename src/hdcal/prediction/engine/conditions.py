@@ -49,29 +49,6 @@ class Conditions(eqx.Module):
     down: bool = eqx.field(static=True)
 
 
-def conditions_of(
-    case: Case,
-    deformation: float,
-    direction: Direction,
-    strata: StiffnessStrata,
-) -> Conditions:
-    """Return the conditions at a deformation [mm], at the usual temperature."""
-    records = case.records
-    low, high = float(records.deformation.min()), float(records.deformation.max())
-    return Conditions(
-        deformation=float(deformation),
-        temperature=usual_temperature(case),
-        # Down from the largest deformation tested, or from where it is asked for.
-        turn=max(high, float(deformation)),
-        known_sd=usual_sd(records),
-        low=low,
-        high=high,
-        scale=1.0,
-        strata=strata,
-        down=direction == "down",
-    )
-
-
 def usual_temperature(case: Case) -> float:
     """Return the tested temperature nearest to the reference [°C]."""
     tested = case.records.temperature

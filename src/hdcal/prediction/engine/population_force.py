@@ -19,7 +19,12 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.prediction.engine.causes import Cause
-from hdcal.prediction.engine.conditions import Conditions, Direction, conditions_of
+from hdcal.prediction.engine.conditions import (
+    Conditions,
+    Direction,
+    usual_sd,
+    usual_temperature,
+)
 from hdcal.prediction.engine.forces import Quantity, force_of, grid_records
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import Population, Whose
@@ -56,10 +61,14 @@ class PopulationForce:
         warm = replace(self.conditions, temperature=jnp.asarray(temperature, float))
         return replace(self, conditions=warm)
 
+    @property
+    def traced(self) -> tuple[Problem, Values, Whose, Conditions]:
+        """What compiled functions are given: structure, draws, whose and where."""
+        return self.cause.problem, self.cause.values, self.whose, self.conditions
+
     def mixture(self) -> Mixture:
         """Return the mixture of every draw [draw, component]."""
-        cause = self.cause
-        return mixtures(cause.problem, cause.values, self.whose, self.conditions)
+        return mixtures(*self.traced)
 
 
 def population_force(
@@ -83,14 +92,24 @@ def population_force(
         tolerances: ± by field of the geometry [mm].
         seed: of what the data leave open about the centre of the population.
     """
-    case, theory = cause.posterior.case, cause.posterior.theory
-    widths = dict(tolerances or {})
-    strata = tolerance_strata(case.gear.geometry, widths, theory)
+    case, records = cause.posterior.case, cause.posterior.case.records
+    widths, high = dict(tolerances or {}), float(records.deformation.max())
     rounded = quantity == "reading" and float(cause.problem.step) > 0.0
     return PopulationForce(
         replace(cause, values=_with_scores(cause, seed)),
         Whose(population, quantity, rounded),
-        conditions_of(case, deformation, direction, strata),
+        Conditions(
+            deformation=float(deformation),
+            temperature=usual_temperature(case),
+            # Down from the largest deformation tested, or from where it is asked for.
+            turn=max(high, float(deformation)),
+            known_sd=usual_sd(records),
+            low=float(records.deformation.min()),
+            high=high,
+            scale=1.0,
+            strata=tolerance_strata(case.gear.geometry, widths, cause.posterior.theory),
+            down=direction == "down",
+        ),
         widths,
     )
 

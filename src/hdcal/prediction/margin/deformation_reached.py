@@ -66,18 +66,7 @@ def deformation_reached(
     low, high, warm = map(float, (where.low, where.high, where.temperature))
     ends = min(0.0, REACH * low), max(0.0, REACH * high)
     shares = jnp.array([criteria.content, 1.0 - criteria.content])
-    parts = [
-        _solve(
-            force.cause.problem,
-            force.cause.values,
-            force.whose,
-            force.conditions,
-            given,
-            shares,
-            ends,
-        )
-        for force in forces
-    ]
+    parts = [_solve(*force.traced, given, shares, ends) for force in forces]
     found = np.concatenate(parts)
     weights = np.concatenate([force.cause.weights for force in forces])
 

@@ -12,7 +12,7 @@ from hdcal.prediction.engine.conditions import (
 )
 from hdcal.prediction.engine.forces import Quantity
 from hdcal.prediction.engine.population import Population, widest
-from hdcal.prediction.engine.population_force import PopulationForce, population_force
+from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
@@ -92,8 +92,13 @@ def _margin(
     warm = request.temperatures(main.posterior.case)
     check_margin(causes, request, warm, criteria)
     whose = request.population or widest(main.problem)
-    widths = {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0}
-    forces = [_force(cause, whose, request, widths) for cause in causes]
+    about = {
+        "quantity": request.quantity,
+        "direction": request.direction,
+        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
+        "seed": request.seed,
+    }
+    forces = [population_force(c, request.deformation, whose, **about) for c in causes]
     draws = population_draws(forces, warm, criteria)
     levels = _levels(draws, main, request, warm, criteria)
     worst = worst_level(draws, criteria, levels)
@@ -125,20 +130,6 @@ def _margin(
         shares=shares,
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, worst.exceedance, criteria),
-    )
-
-
-def _force(
-    cause: Cause, whose: Population, request: MarginRequest, widths: dict[str, float]
-) -> PopulationForce:
-    return population_force(
-        cause,
-        request.deformation,
-        whose,
-        quantity=request.quantity,
-        direction=request.direction,
-        tolerances=widths,
-        seed=request.seed,
     )
 
 
