@@ -87,7 +87,7 @@ def scores_document(
     kinds = found["cases"]["kinds"]
     listed = ", ".join(f"{n} {_KINDS.get(kind, kind)}" for kind, n in kinds.items())
     rows = [bar_row(row) for row in found["bar"]]
-    missed = [row["what"] for row in rows if row["word"].word.startswith("missed")]
+    missed = [str(row["what"]) for row in rows if str(row["word"])[:6] == "missed"]
     groups = {
         "size of the gap": found["by_r"],
         "program": found["by_program"],
