@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hdcal.cli.command import Command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import force_option, json_option
@@ -90,7 +91,9 @@ def make(
     return 0
 
 
-@blind.command(short_help="Diagnose every case of a set, and freeze the answers.")
+@blind.command(
+    cls=Command, short_help="Diagnose every case of a set, and freeze the answers."
+)
 @click.argument("folder", metavar="DIR")
 @click.option(
     "--jobs",

@@ -5,11 +5,11 @@ from typing import Annotated, ClassVar, Literal
 
 from hdcal.diagnosis.verdict import (
     Budget,
+    Closure,
+    CovariateShare,
     Gap,
     NextRun,
-    Share,
-    Shrink,
-    Word,
+    VerdictWord,
 )
 from hdcal.report.answer import (
     Answer,
@@ -61,7 +61,7 @@ class WhereAnswer:
 
     p_value: Probability
     statistics: dict[str, Real]
-    shares: tuple[Share, ...]
+    shares: tuple[CovariateShare, ...]
     regions: tuple[CellAnswer, ...]
     cells: tuple[CellAnswer, ...]
 
@@ -87,7 +87,7 @@ class NotTestable:
 class WhichAnswer:
     """Which unmodelled effect causes the gap; see `Which`."""
 
-    verdict: Word
+    verdict: VerdictWord
     effect: EffectName | None
     second_effect: EffectName | None
     set: Annotated[tuple[EffectName, ...], Promise(uniqueItems=True)]
@@ -163,7 +163,7 @@ class VerdictAnswer(Answer):
     gap: Gap
     where: WhereAnswer
     which: WhichAnswer
-    shrink: Shrink
+    shrink: Closure
     next_test: tuple[NextRun, ...]
     next_test_reason: str
     budget: Budget

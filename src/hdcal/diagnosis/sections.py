@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer
-from hdcal.diagnosis.verdict import Gap, Shrink
+from hdcal.diagnosis.verdict import Closure, Gap
 from hdcal.diagnosis.words import held_out, one_reading
 from hdcal.report.document import (
     Block,
@@ -148,7 +148,7 @@ def _robustness(found: VerdictAnswer) -> Iterator[str]:
         yield f"With other readings of the same kind, the ranking's top stays: {share}."
 
 
-def shrink_section(shrink: Shrink) -> Section:
+def shrink_section(shrink: Closure) -> Section:
     """Return how far the gap shrinks; its picture is called shrink."""
     caption = (
         "Left: what each model leaves over (root mean square). Right: how much of the "
@@ -168,7 +168,7 @@ def shrink_section(shrink: Shrink) -> Section:
     return Section("How far the gap shrinks", [picture, closed])
 
 
-def _closed_rows(shrink: Shrink) -> Iterator[tuple[str, str]]:
+def _closed_rows(shrink: Closure) -> Iterator[tuple[str, str]]:
     if shrink.closed is not None:
         yield f"closed on {held_out(shrink)}", percent_span(shrink.closed)
     if known(shrink.extrapolated_closed):

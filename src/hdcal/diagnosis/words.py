@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from hdcal.diagnosis.answer import VerdictAnswer, WhichAnswer
 from hdcal.diagnosis.places import places
-from hdcal.diagnosis.verdict import Shrink
+from hdcal.diagnosis.verdict import Closure
 from hdcal.report.words import (
     estimate,
     hypothesis,
@@ -208,7 +208,7 @@ def _shrinks(found: VerdictAnswer, what: str) -> Iterator[str]:
     yield f"Adding {what} removes {share} of the gap on {held_out(shrink)}."
 
 
-def held_out(shrink: Shrink) -> str:
+def held_out(shrink: Closure) -> str:
     """Return what the correction was tried on, such as half-cycles not fitted to."""
     name = shrink.held_out
     one = name.removeprefix("leave-one-").removesuffix("-out")

@@ -17,8 +17,9 @@ from jaxtyping import Float
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.evidence.effect_curves import padded_records
+from hdcal.evidence.parameter_grid import quantile_grid
 from hdcal.evidence.prepare import PreparedCase
-from hdcal.inference.distributions import distribution, frozen
+from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
@@ -102,21 +103,24 @@ def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
         return _minus_log_density(point, effect, problem, sigma)
 
     def step(point, _):
-        slope, curve = jax.grad(minus)(point), jax.hessian(minus)(point)
-        strength, axes = jnp.linalg.eigh(curve)
-        strength = jnp.maximum(jnp.abs(strength), _LEAST_CURVATURE)
-        move = axes @ ((axes.T @ slope) / strength)
+        height, slope = jax.value_and_grad(minus)(point)
+        strength, axes = jnp.linalg.eigh(jax.hessian(minus)(point))
+        log_det = jnp.sum(jnp.log(jnp.maximum(strength, _LEAST_CURVATURE)))
+        move = axes @ (
+            (axes.T @ slope) / jnp.maximum(jnp.abs(strength), _LEAST_CURVATURE)
+        )
         tries = jnp.stack([point - move * s for s in (1.0, 0.3, 0.1, 0.0)])
         heights = jax.vmap(minus)(tries)
         heights = jnp.where(jnp.isfinite(heights), heights, jnp.inf)
         # What rounding decides is no descent: then the full step, which converges.
-        return tries[jnp.argmin(jnp.round(heights, _DIGITS))], None
+        after = tries[jnp.argmin(jnp.round(heights, _DIGITS))]
+        return after, (point, height, log_det)
 
-    best, _ = jax.lax.scan(step, start, None, length=_STEPS)
-    strength = jnp.linalg.eigvalsh(jax.hessian(minus)(best))
-    log_det = jnp.sum(jnp.log(jnp.maximum(strength, _LEAST_CURVATURE)))
+    # The last step only looks at where those before have led.
+    _, seen = jax.lax.scan(step, start, None, length=_STEPS + 1)
+    best, height, log_det = (each[-1] for each in seen)
     evidence = (
-        -minus(best)
+        -height
         + 0.5 * jnp.sum(jnp.log(problem.precision))
         + 0.5 * jnp.log(2.0 * jnp.pi)
         - 0.5 * log_det
@@ -184,19 +188,18 @@ def _grid(
 
     A last point follows at which the amplitude is null: the noise is plain there.
     """
-    declared, axes = parameters(effect), []
-    for name, about in declared.items():
-        prior = case.priors[f"{effect.name}.{name}"]
-        count = _SHAPES if about.null is None else _AMPLITUDES
-        quantiles = (np.arange(count) + 0.5) / count
-        fixed = prior.family == "fixed"
-        axes.append(prior.numbers[:1] if fixed else frozen(prior).ppf(quantiles))
-    mesh = np.meshgrid(*map(np.asarray, axes), indexing="ij")
+    declared = parameters(effect)
+    amplitude = next(n for n, about in declared.items() if about.null is not None)
+    priors = {name: case.priors[f"{effect.name}.{name}"] for name in declared}
+    counts = {
+        name: _SHAPES if about.null is None else _AMPLITUDES
+        for name, about in declared.items()
+    }
     values = {}
-    for (name, about), column in zip(declared.items(), mesh, strict=True):
-        plain = column.flat[0] if about.null is None else about.null
-        values[name] = np.append(column.ravel(), plain).astype(float)
-    return values, next(n for n, about in declared.items() if about.null is not None)
+    for name, column in quantile_grid(priors, counts).items():
+        null = declared[name].null
+        values[name] = np.append(column, column[0] if null is None else null)
+    return values, amplitude
 
 
 def _least_squares(problem: NoiseProblem, noise_sd: float) -> np.ndarray:
