@@ -1,5 +1,6 @@
-"""Compiled programs: shared by all processes of a test run, and let go in time."""
+"""Executables: shared by all processes of a test run, and forgotten in time."""
 
+import gc
 import os
 import shutil
 import sys
@@ -17,6 +18,8 @@ def pytest_configure(config: pytest.Config) -> None:
     """Name one cache for this process, its workers and every command they start."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
+    # As commands do: two processes on two cores, each with two threads, only wait.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     config.stash[_OWN] = os.environ["HDCAL_CACHE_DIR"] = tempfile.mkdtemp("-hdcal")
     # What `hdcal.cli.compilation_cache` sets for commands.
     os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{config.stash[_OWN]}/compiled"
@@ -31,10 +34,17 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def few_programs() -> Iterator[None]:
-    """Let compiled programs go between files, as calibrations and diagnoses do."""
-    yield
-    if "jax" in sys.modules:
-        from hdcal.inference.programs import let_go_of_programs
+def few_executables() -> Iterator[None]:
+    """Forget what was compiled between files where memory mappings are scarce.
 
-        let_go_of_programs()
+    A test run compiles for more kinds of problems than one process can hold.
+    """
+    yield
+    if "numpyro" in sys.modules:
+        import jax
+
+        from hdcal.inference.executables import mappings_are_scarce
+
+        if mappings_are_scarce():
+            jax.clear_caches()
+            gc.collect()

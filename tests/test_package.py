@@ -26,6 +26,12 @@ print(hdcal.__file__)
 print(*sorted(entry.name for entry in priors_folder().iterdir()))
 """
 
+READ_TABLES = """
+from hdcal.blind.virtual_rig import mechanics
+
+print(mechanics.__file__, mechanics._curve("cup.csv")(62.0))
+"""
+
 
 def run(*command: str | Path, **options) -> str:
     """Run a command that has to succeed, and return what it prints."""
@@ -68,13 +74,21 @@ def test_the_wheel_holds_the_data(folder: str, wheel: Path):
     assert expected <= set(zipfile.ZipFile(wheel).namelist())
 
 
+def test_the_wheel_holds_every_file_of_the_package(wheel: Path):
+    expected = {
+        n.removeprefix("src/") for n in shipped("src") if "/__pycache__/" not in n
+    }
+    assert any(name.endswith("virtual_rig/cup.csv") for name in expected)
+    assert expected <= set(zipfile.ZipFile(wheel).namelist())
+
+
 def test_the_wheel_holds_nothing_but_the_package(wheel: Path):
     tops = {name.split("/")[0] for name in zipfile.ZipFile(wheel).namelist()}
     assert tops == {"hdcal", f"{'-'.join(wheel.name.split('-')[:2])}.dist-info"}
 
 
 @pytest.mark.parametrize("form", ["installed", "wheel"])
-def test_priors_are_found_away_from_the_checkout(
+def test_data_are_found_away_from_the_checkout(
     form: str, request: pytest.FixtureRequest, tmp_path: Path
 ):
     # A wheel on the path is imported as a zip: no file of it exists on disk.
@@ -86,6 +100,8 @@ def test_priors_are_found_away_from_the_checkout(
     assert printed[0].startswith(str(place))
     names = {Path(name).name for name in shipped("priors")}
     assert set(printed[1].split()) == names
+    printed = run(sys.executable, "-c", READ_TABLES, cwd=tmp_path, env=environment)
+    assert printed.startswith(str(place)) and printed.split()[1] == "1.0"
 
 
 def test_no_file_names_a_machine_or_a_package_index():

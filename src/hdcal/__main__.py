@@ -16,7 +16,7 @@ from hdcal.calibration.effects.command import effects
 from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, usage_error
-from hdcal.design.command import design
+from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import HdcalError, InputError, NotUsable

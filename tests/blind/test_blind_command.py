@@ -14,7 +14,7 @@ from sealing import by_library, key_of, sealed_set
 
 from hdcal.blind.answer import answer_set
 from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
-from hdcal.blind.label import Answer
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import stamped
 from hdcal.errors import InputError
 
@@ -244,7 +244,7 @@ def test_a_set_that_fails_leaves_neither_folder_nor_key(
         yield from sealing.drawn(1)
         raise ZeroDivisionError
 
-    monkeypatch.setattr("hdcal.blind.virtual_rig.mixes.draw_cases", broken)
+    monkeypatch.setattr("hdcal.blind.virtual_rig.cases.draw_cases", broken)
     done = blind("make", "--cases", "2", "--mix", mix(), "--out", "set")
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
     assert not any(tmp_path.iterdir())
@@ -277,7 +277,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
 ):
     answered_cases: list[str] = []
 
-    def interrupted(case, library) -> Answer:
+    def interrupted(case, library) -> CaseAnswer:
         if len(answered_cases) == 2 and case.name not in answered_cases:
             answered_cases.append("interrupted")
             raise KeyboardInterrupt
@@ -611,7 +611,7 @@ def test_the_real_diagnosis_answers(hdcal: Hdcal, tmp_path: Path):
     done = hdcal("blind", "answer", folder, "--json")
     assert done.returncode == 0, done.stderr
     (said,) = json.loads(done.stdout)["answers"]
-    answer = Answer.from_plain(said)
+    answer = CaseAnswer.from_plain(said)
     assert answer.case == "c01" and answer.p_value is not None
     assert sum(answer.probabilities.values()) == pytest.approx(1.0)
     assert {"none", "unknown", "contact_onset"} <= answer.probabilities.keys()

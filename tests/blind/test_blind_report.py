@@ -4,6 +4,7 @@ import json
 import re
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 
 from hdcal.blind.document import write_scores
 from hdcal.blind.figure import bar_figure, confusion_figure
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring.scores import score
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
@@ -25,6 +26,7 @@ NAUGHTY = (
 )
 
 
+@cache
 def made(count: int, rename: str | None = None) -> dict:
     """Return scores of a made-up diagnoser that is right three times in four."""
     rng = np.random.default_rng(4)
@@ -46,7 +48,7 @@ def made(count: int, rename: str | None = None) -> dict:
         word = "none" if quiet else "named"
         effect = None if quiet else said
         own = {said: chances[said]}
-        answer = Answer(
+        answer = CaseAnswer(
             case, word, effect, None, (said, "none"), chances, own, not quiet
         )
         answers.append(answer)

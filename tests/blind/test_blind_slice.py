@@ -6,7 +6,7 @@ import pytest
 from hdcal.blind.answer import answer_set
 from hdcal.blind.open import open_set
 from hdcal.blind.sealed_set import write_set
-from hdcal.blind.virtual_rig.mixes import GEAR_TOML, draw_cases
+from hdcal.blind.virtual_rig.cases import GEAR_TOML, draw_cases
 from hdcal.physics.registry import EFFECTS
 
 # Cases of every size, drawn as the diagnosis expects; enough for scores, not for rates.

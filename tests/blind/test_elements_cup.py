@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from hdcal.blind.virtual_rig.virtual_rig.elements import cup
+from benchmarks.virtual_rig_elements import cup
+from benchmarks.virtual_rig_elements.banded import multiply
+from benchmarks.virtual_rig_elements.cup import Cup, cup_stiffness, harmonic_stiffness
+from benchmarks.virtual_rig_elements.end import End, end_stiffness
 
-from hdcal.blind.virtual_rig.elements.banded import multiply
-from hdcal.blind.virtual_rig.elements.cup import cup_stiffness, harmonic_stiffness
-from hdcal.blind.virtual_rig.elements.end import End, end_stiffness
 from hdcal.data.records import Geometry
 from hdcal.physics import theory
 
@@ -22,13 +22,14 @@ def thin_ring(length: float) -> float:
 
 
 def of_the_wall(base, thickness=WALL, height=HEIGHT, **options) -> float:
-    return cup_stiffness(R, LENGTH, thickness, E, NU, height, base=base, **options)
+    made = Cup(R, LENGTH, thickness, E, NU, base)
+    return cup_stiffness(made, height, **options)
 
 
 def tube_over_ring(length: float) -> float:
     """A free tube loaded all along, over the ring of modulus E/(1 − ν²)."""
-    loaded = {"load_length": length, "base": "free", "elements": int(length / 2)}
-    tube = cup_stiffness(R, length, WALL, E, NU, length / 2, **loaded)
+    loaded = {"load_length": length, "elements": int(length / 2)}
+    tube = cup_stiffness(Cup(R, length, WALL, E, NU, "free"), length / 2, **loaded)
     return tube * (1.0 - NU**2) / thin_ring(length)
 
 
@@ -39,7 +40,7 @@ def assert_a_long_tube_is_a_ring() -> None:
     )
     # The stretch of the ring, 1e-4 of the whole, is there at any length.
     assert missing[0] == pytest.approx(missing[1], rel=0.1)
-    # The Poisson moment is let go over about √(R δ) at either edge.
+    # The Poisson moment vanishes over about √(R δ) at either edge.
     assert 0.0 < missing[1] < np.sqrt(R * WALL)
 
 
@@ -77,7 +78,7 @@ def test_rigid_motion_costs_nothing():
 def test_the_mean_of_the_load_presses_a_tube_on_an_elastic_bed():
     """A ring load q = F/πR on a long tube: w = q β R²/(2 E δ), β⁴ = 3(1 − ν²)/(Rδ)²."""
     fine = {"load_length": 0.1, "elements": 200, "harmonics": 0}
-    found = cup_stiffness(R, 100.0, WALL, E, NU, 50.0, **fine)
+    found = cup_stiffness(Cup(R, 100.0, WALL, E, NU), 50.0, **fine)
     beta = (3.0 * (1.0 - NU**2)) ** 0.25 / np.sqrt(R * WALL)
     exact = 2.0 * np.pi * E * WALL / (R * beta)
     assert found == pytest.approx(exact, rel=1e-3)

@@ -4,18 +4,20 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hdcal.blind.virtual_rig.virtual_rig.elements import ring
-from scipy import integrate
-
-from hdcal.blind.virtual_rig.elements.ring import (
+from benchmarks.virtual_rig_elements import ring
+from benchmarks.virtual_rig_elements.ring import (
+    Ring,
     load_curve,
     stiffness,
     strain_energy,
     toothed_wall,
 )
+from scipy import integrate
+
 from hdcal.errors import NotUsable
 
 R, WALL, LENGTH, E = 40.0, 0.68, 70.0, 210e3
+PLAIN = Ring(R, WALL, LENGTH, E)
 MESHES = np.array([10, 20, 40, 80])
 
 
@@ -39,7 +41,7 @@ def assert_second_order(error: Callable[[int], float], within: float) -> None:
 
 
 def linear_error(elements: int) -> float:
-    return stiffness(R, WALL, LENGTH, E, elements=elements) / stretching_ring(WALL) - 1
+    return stiffness(PLAIN._replace(elements=elements)) / stretching_ring(WALL) - 1
 
 
 def elastica(pressed: float) -> float:
@@ -93,7 +95,7 @@ def test_large_displacements_are_the_elasticas_with_second_order(pressed):
     exact = elastica(pressed) * rigidity / R**2
 
     def error(elements: int) -> float:
-        force = load_curve(R, wall, LENGTH, E, pressed * R, elements=elements)
+        force = load_curve(Ring(R, wall, LENGTH, E, elements), pressed * R)
         return float(force[0] / exact - 1.0)
 
     assert_second_order(error, within=2e-4)
@@ -105,31 +107,34 @@ def test_large_displacements_are_the_elasticas_with_second_order(pressed):
 def test_the_force_is_the_slope_of_the_energy(wall):
     step, pressed = 1e-3, np.array([-3.0, -0.5, 0.3, 2.0, 6.0])
     around = (pressed[:, None] + np.array([-step, step])).ravel()
-    energy = strain_energy(R, wall, LENGTH, E, around).reshape(-1, 2)
+    made = Ring(R, wall, LENGTH, E)
+    energy = strain_energy(made, around).reshape(-1, 2)
     slope = np.diff(energy, axis=1)[:, 0] / (2.0 * step)
-    force = load_curve(R, wall, LENGTH, E, pressed)
+    force = load_curve(made, pressed)
     # Two loads work.
     assert 2.0 * force == pytest.approx(slope, rel=1e-6)
 
 
 def test_the_curve_does_not_depend_on_its_path():
     up = np.linspace(0.0, 0.54, 7)
-    there = load_curve(R, WALL, LENGTH, E, up)
-    back = load_curve(R, WALL, LENGTH, E, [3.0, -2.0, *up[::-1]])[2:][::-1]
+    there = load_curve(PLAIN, up)
+    back = load_curve(PLAIN, [3.0, -2.0, *up[::-1]])[2:][::-1]
     assert there[0] == 0.0
     assert back == pytest.approx(there, rel=1e-8, abs=1e-8)
-    tangent = stiffness(R, WALL, LENGTH, E)
-    assert load_curve(R, WALL, LENGTH, E, 1e-6)[0] == pytest.approx(1e-6 * tangent)
+    tangent = stiffness(PLAIN)
+    assert load_curve(PLAIN, 1e-6)[0] == pytest.approx(1e-6 * tangent)
 
 
 def test_half_a_ring_is_two_quarters():
     wall = WALL * (1.0 + 0.1 * np.cos(2.0 * np.linspace(0.0, np.pi / 2, 30)))
-    both = np.concatenate([wall, wall[::-1]])
-    quarter = load_curve(R, wall, LENGTH, E, [0.5, 4.0])
-    half = load_curve(R, both, LENGTH, E, [0.5, 4.0], part="half")
-    assert half == pytest.approx(quarter, rel=1e-7)
-    assert strain_energy(R, both, LENGTH, E, 4.0, part="half") == pytest.approx(
-        strain_energy(R, wall, LENGTH, E, 4.0), rel=1e-7
+    quarter = Ring(R, wall, LENGTH, E)
+    half = quarter._replace(thickness=np.concatenate([wall, wall[::-1]]), part="half")
+    pressed = [0.5, 4.0]
+    assert load_curve(half, pressed) == pytest.approx(
+        load_curve(quarter, pressed), rel=1e-7
+    )
+    assert strain_energy(half, 4.0) == pytest.approx(
+        strain_energy(quarter, 4.0), rel=1e-7
     )
 
 
@@ -137,8 +142,8 @@ def test_half_a_ring_is_two_quarters():
 def test_teeth_stiffen_by_what_they_take_from_the_compliance(share, height):
     """200 teeth of module 0.4 mm and 1.5 to 2 modules height, on a wall of 0.68 mm."""
     wall = toothed_wall(WALL, height, 200, share=share, per_tooth=20)
-    plain = stiffness(R, WALL, LENGTH, E, elements=len(wall))
-    factor = stiffness(R, wall, LENGTH, E) / plain
+    plain = stiffness(PLAIN._replace(elements=len(wall)))
+    factor = stiffness(PLAIN._replace(thickness=wall)) / plain
     thinner = (WALL / (WALL + height)) ** 3
     assert factor == pytest.approx(1.0 / (1.0 - share + share * thinner), rel=1e-3)
     assert 1.3 < factor < 2.5
@@ -152,10 +157,10 @@ def test_teeth_that_the_quarter_cannot_hold_are_refused(teeth, share):
 
 def test_a_ring_pressed_beyond_its_other_side_is_refused():
     with pytest.raises(NotUsable, match="ring"):
-        load_curve(R, WALL, LENGTH, E, 3.0 * R)
+        load_curve(PLAIN, 3.0 * R)
 
 
 def test_an_iteration_without_end_says_so(monkeypatch):
     monkeypatch.setattr(ring, "MOST_ITERATIONS", 1)
     with pytest.raises(NotUsable, match="no equilibrium"):
-        load_curve(R, WALL, LENGTH, E, 0.5)
+        load_curve(PLAIN, 0.5)

@@ -5,10 +5,10 @@ import math
 from dataclasses import replace
 
 import pytest
-from handmade import KINDS, row, said, scored, truth
+from handmade import KINDS, order_of, row, said, scored, truth
 from honest import FAMILIES, make_check
 
-from hdcal.blind.scoring.scores import order_dependence, score
+from hdcal.blind.scoring.scores import score
 from hdcal.errors import InputError
 
 # Tables
@@ -79,7 +79,7 @@ def test_rivals_stand_beside_the_judged_one():
 
 
 def test_too_few_cases_say_nothing_of_order():
-    assert order_dependence([truth()], [said()])["p_value"] is None
+    assert order_of([truth()], [said()])["p_value"] is None
 
 
 # What must not be passed over

@@ -7,7 +7,7 @@ import pytest
 from handmade import row, said, scored, truth
 
 from hdcal.blind.label import Label
-from hdcal.blind.scoring.judged import Judged, credit
+from hdcal.blind.scoring.scored_case import ScoredCase, credit
 
 # One case
 
@@ -32,11 +32,11 @@ def test_a_tie_counts_its_share_and_nothing_is_no_guess():
     ],
 )
 def test_the_true_hypothesis(label: Label, expected: str | None):
-    assert Judged(label, said()).truth == expected
+    assert ScoredCase(label, said()).truth == expected
 
 
 def test_a_pair_has_one_spelling():
-    judged = Judged(truth(), said(chances={"slack+drift": 0.7, "none": 0.3}))
+    judged = ScoredCase(truth(), said(chances={"slack+drift": 0.7, "none": 0.3}))
     assert judged.probabilities == {"drift+slack": 0.7, "none": 0.3}
     assert judged.top == "drift+slack"
 

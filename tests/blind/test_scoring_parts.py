@@ -9,9 +9,7 @@ from scipy.stats import norm
 
 from hdcal.blind.scoring.detection import ALARM, fit
 from hdcal.blind.scoring.estimates import mean, median, share
-from hdcal.blind.scoring.judged import Judged
 from hdcal.blind.scoring.reliability import bin_of, errors
-from hdcal.blind.scoring.scores import reliability
 
 # Numbers with intervals
 
@@ -100,11 +98,10 @@ def test_calibration_is_taken_over_the_chosen_cases():
 
 def test_the_reliability_table_by_hand():
     chances = {"slack": 0.75, "drift": 0.25}
-    cases = [
-        Judged(truth(str(i), names=(name,)), said(str(i), chances=chances))
-        for i, name in enumerate(["slack", "slack", "drift", "slack"])
-    ]
-    found = reliability(cases, None)
+    names = ["slack", "slack", "drift", "slack"]
+    labels = [truth(str(i), names=(name,)) for i, name in enumerate(names)]
+    answers = [said(label.case, chances=chances) for label in labels]
+    found = scored(labels, answers)["reliability"]
     (own,) = found["top"]["bins"]
     assert (own["stated"], own["true"], own["n"]) == (0.75, 0.75, 4)
     assert found["top"]["floor"]["hi"] >= found["top"]["floor"]["mean"] > 0.0

@@ -3,7 +3,7 @@
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.source_bytes import LONGEST_LINE
+from hdcal.data.text_file import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"
@@ -170,6 +170,15 @@ def test_many_bad_cells_are_counted_after_twenty(folder):
 def test_blank_lines_do_not_shift_the_row_numbers(folder):
     (folder / "data.csv").write_text("\n" + H + "0,0\n\n\n1,1\n2,oops\n3,3\n4,4\n5,5\n")
     check(findings_of(folder), [(7, "force_N", "'oops'")])
+
+
+def test_headers_of_fifty_thousand_blanks(folder):
+    blanks = " " * 50_000
+    content = f"deformation_mm,force[{blanks}x\n" + GOOD
+    (folder / "data.csv").write_text(content)
+    check(findings_of(folder), [(1, "force", "no column")])
+    mapped = findings_of(folder, columns={"force": f"Load{blanks}[{blanks}N"})
+    assert "names a column that is not there" in mapped[0].problem
 
 
 def test_missing_files_are_reported_together(tmp_path):

@@ -2,8 +2,8 @@
 
 import pytest
 
+from hdcal.data.prior import FAMILIES
 from hdcal.data.priors import (
-    FAMILIES,
     MODEL_UNITS,
     SCALE_UNITS,
     effect_priors,

@@ -2,20 +2,26 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import jsonschema
 import pytest
 from browser import PHONE, look
 from commands import XB1, Done, Hdcal
 
+from hdcal.data.gear import read_gear
+from hdcal.design.answer import GeneratorAnswer, InverseAnswer
 from hdcal.design.inverse_design import inverse_design
 from hdcal.design.result_folder import write_generator, write_inverse, write_study
+from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
 from hdcal.design.study.study import study
 from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
+from hdcal.report.answer import Answer, json_schema
 
 WALL = "wall_thickness_mm=0.5:0.8"
 FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
@@ -25,6 +31,13 @@ FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
 def run(calibrated: tuple[Done, Path]) -> Path:
     """The folder of a calibration."""
     return calibrated[1]
+
+
+def valid(text: str, answer: type[Answer]) -> dict:
+    """Return an answer that keeps what its schema promises."""
+    found = json.loads(text)
+    jsonschema.validate(found, json_schema(answer))
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +61,7 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     asked = ["design", run, "--window", "0.38:0.42", "--temperature=-20:80", "--json"]
     done = here(*asked, "--tolerance", "wall_thickness_mm=0.02")
     assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
+    said = valid(done.stdout, GeneratorAnswer)
     folder = tmp_path / "xb1-100-80-design"
     files = {path.name for path in folder.iterdir()}
     assert files == {"design.json", "report.html", *FIGURES}
@@ -61,6 +74,8 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     assert "K is carried over" in done.stderr and "one tested gear" in done.stderr
     force = said["set_point"]["force_N"]
     assert force["lo"] < 0.4 * 209 < force["hi"]
+    assert "N/mm keeps the gear within 0.38 … 0.42 mm" in said["headline"]
+    assert said["next_step"].startswith("Set the free end of a spring of ")
 
 
 def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
@@ -70,7 +85,8 @@ def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
         *("--limit-stress", "0.3 GPa", "--out", out),
     )
     assert done.returncode == 0, done.stderr
-    said = json.loads((out / "design.json").read_text("utf-8"))
+    said = valid((out / "design.json").read_text("utf-8"), InverseAnswer)
+    assert said["answer"][0].startswith(said["headline"])
     assert said["asked"]["limit_force_N"] == 70.0
     assert said["asked"]["limit_stress_MPa"] == 300.0
     assert said["design"]["force_N"]["kept"] == pytest.approx(70.0, rel=1e-5)
@@ -97,9 +113,11 @@ def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
     draws = Posterior.load(run).draws["stiffness"] * 0.4
     assert force[1] == pytest.approx(sorted(draws)[len(draws) // 2], rel=1e-3)
     assert force[0] < force[1] < force[2]
-    told = json.loads((folder / "study.json").read_text("utf-8"))
+    told = valid((folder / "study.json").read_text("utf-8"), StudyAnswer)
     assert told["interval_kind"] == "equal-tailed credible interval"
-    assert "0.68          40" in done.stdout
+    assert told["headline"] == told["answer"][0] and told["next_step"] is None
+    (row,) = re.findall(r"^ .* 0\.68 +40 .*$", done.stdout, re.MULTILINE)
+    assert f"{force[1]:.2f}" in row and f"{force[0]:.2f} … {force[2]:.2f}" in row
 
 
 def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
@@ -107,8 +125,11 @@ def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
     gear = XB1 / "gear.toml"
     done = here("study", "--gear", gear, "--vary", "radius_mm=38,42", "--out", out)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("PRIOR ONLY")
-    told = json.loads((out / "study.json").read_text("utf-8"))
+    first, headline = done.stdout.splitlines()[:2]
+    assert first == "XB1-100-80: Study, theory “ring”."
+    assert headline.startswith("Prior only, no gear was measured: 2 designs")
+    told = valid((out / "study.json").read_text("utf-8"), StudyAnswer)
+    assert told["headline"].startswith("Prior only")
     assert told["basis"] == "prior"
     assert told["interval_kind"] == "equal-tailed prior interval"
     page = (out / "report.html").read_text("utf-8")
@@ -116,10 +137,13 @@ def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
 
 
 def test_the_article_needs_no_run_but_takes_one(run: Path, here: Hdcal):
-    rows = json.loads(here("study", "--article", "--json").stdout)["rows"]
+    rows = valid(here("study", "--article", "--json").stdout, ArticleAnswer)["rows"]
     assert [row["table"] for row in rows] == [3] * 5 + [4] * 5
     assert all(row["calibrated_N"] is None for row in rows)
-    rows = json.loads(here("study", run, "--article", "--json").stdout)["rows"]
+    done = here("study", run, "--article", "--json")
+    rows = valid(done.stdout, ArticleAnswer)["rows"]
+    assert "Table 4 of the article, forces in N" in done.stderr
+    assert "1137.64" in done.stderr and "95 % credible" in done.stderr
     own = rows[6]["calibrated_N"]
     # 92.08 N in Table 4, 78.4 N in its own Table 2.
     assert rows[6]["revised_N"] == 92.08
@@ -204,6 +228,31 @@ def test_bad_input_is_told_and_nothing_written(
     assert all(part in done.stderr for part in words), done.stderr
     assert "Traceback" not in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_the_longest_table_is_cut_and_says_so(folders: dict[str, Path]):
+    gear = read_gear(XB1 / "gear.toml")
+    many = study(gear, {"wall_thickness_mm": [0.6 + 1e-4 * i for i in range(201)]})
+    document, answer = write_study(many, folders["study"].parent / "many")
+    page = (folders["study"].parent / "many" / "report.html").read_text("utf-8")
+    assert page.count("<td>40CrNiMoA</td>") == 200
+    assert "The first 40 of 201" in page and "The first 200 of 201" in page
+    assert len(answer.columns["material"]) == 201
+    brief = [section for section in document.sections if section.brief]
+    assert [len(block.rows) for block in brief[0].blocks[:1]] == [40]
+
+
+def test_a_notebook_shows_what_a_design_comes_to():
+    gear = read_gear(XB1 / "gear.toml")
+    vary = {"wall_thickness_mm": (0.2, 0.8)}
+    for found, words in (
+        (wave_generator(gear, (0.2, 0.6), probability=0.5), "keeps the gear within"),
+        (inverse_design(gear, vary, 90.0, probability=0.5), "keeps 90 N at 0.4 mm"),
+        (study(gear, {"radius_mm": [38, 40]}), "2 designs, varying radius"),
+    ):
+        shown = found._repr_html_()
+        assert "Prior only" in shown and words in shown
+        assert "<html" not in shown
 
 
 def test_names_are_only_text(folders: dict[str, Path]):

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from hdcal.design import wave_generator as module
 from hdcal.design.next_gear import next_gear
 from hdcal.design.springs import best_common, judge, set_points
-from hdcal.design.summary import summarise_generator
+from hdcal.design.summary import generator_answer
 from hdcal.design.wave_generator import gear_forces, wave_generator
 from hdcal.errors import InputError
 
@@ -149,16 +149,16 @@ def test_a_spring_set_badly_has_a_best_rate(given):
 def test_the_adjusting_range_is_that_of_the_gears(given):
     basis = given(known(20_000))
     found = wave_generator(basis.gear, WINDOW, rates=(100.0, 10_000.0))
-    told = summarise_generator(found)
-    low, high = told["adjusted"]["interference_mm"]
+    told = generator_answer(found)
+    low, high = told.adjusted.interference_mm
     stiffness = basis.values["K"] * 207e3 * basis.problem.unit_stiffness
     own = 0.4 + 0.4 * stiffness / found.chosen.rate
     assert low == pytest.approx(np.quantile(own, 0.005), rel=1e-9)
     assert high == pytest.approx(np.quantile(own, 0.995), rel=1e-9)
-    force, more = told["adjusted"]["preload_N"]
+    force, more = told.adjusted.preload_N
     assert more / force == pytest.approx(np.exp(2 * 2.576 * 0.05), rel=0.02)
-    assert told["adjusted"]["probability"] == 1.0
-    rest = told["set_point"]["force_N"]["median"]
+    assert told.adjusted.probability == 1.0
+    rest = told.set_point.force_N.median
     assert rest == pytest.approx(0.4 * np.median(stiffness))
 
 

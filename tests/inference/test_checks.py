@@ -15,7 +15,7 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
-from hdcal.inference.flat_directions import sensitivity
+from hdcal.inference.linearisation import linearise
 from hdcal.inference.problem import build_problem
 from hdcal.physics.registry import EFFECTS
 
@@ -225,5 +225,5 @@ def test_what_moves_no_mean_is_not_called_unseen():
     chosen = (EFFECTS["heteroscedastic_noise"], EFFECTS["outliers"])
     problem = build_problem(case, effect_priors(), chosen)
     values = {n: prior.numbers[0] for n, prior in problem.priors.items()}
-    slopes = sensitivity(problem, values, case.records, None)
+    slopes = linearise(problem, values, case.records).slopes
     assert set(slopes) == {"K", "E0", "alpha", "force_offset", "deformation_offset"}

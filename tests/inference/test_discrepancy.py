@@ -4,11 +4,16 @@ import jax
 import numpy as np
 import pytest
 
-from hdcal.inference.discrepancy import BASIS_SIZE, Gap, build_gap, prior_sd
+from hdcal.inference.discrepancy import (
+    BASIS_SIZE,
+    Discrepancy,
+    build_discrepancy,
+    prior_sd,
+)
 
 
 def test_the_gap_takes_no_offset_and_no_slope(program):
-    gap = build_gap(program.deformation)
+    gap = build_discrepancy(program.deformation)
     basis = np.asarray(gap.columns(program.deformation))
     assert basis.shape == (180, BASIS_SIZE)
     line = np.column_stack([np.ones(180), program.deformation])
@@ -21,7 +26,7 @@ def test_the_gap_takes_no_offset_and_no_slope(program):
 def kernel_error(length, project):
     """Return the largest error of the approximate kernel, as a share of sd²."""
     deformation, sd = np.linspace(0.02, 0.54, 27), 1.7
-    gap = Gap(0.28, 0.26, np.zeros((2, BASIS_SIZE)))
+    gap = Discrepancy(0.28, 0.26, np.zeros((2, BASIS_SIZE)))
     basis = np.asarray(gap.columns(deformation))
     approximate = (basis * np.asarray(prior_sd(sd, length)) ** 2) @ basis.T
     distance = deformation[:, None] - deformation

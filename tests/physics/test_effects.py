@@ -23,6 +23,7 @@ from effect_bench import (
 from jax.flatten_util import ravel_pytree
 
 from hdcal import EFFECTS
+from hdcal.inference.padding import repeat_last_row
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import parameters
 
@@ -110,6 +111,22 @@ def test_pytree_round_trip(name):
     assert eqx.tree_equal(again, effect)
     with pytest.raises(dataclasses.FrozenInstanceError):
         setattr(effect, next(iter(parameters(effect))), 0.0)
+
+
+@everyone
+def test_copies_of_the_last_row_change_nothing_before_them(
+    name, scattered, base, reading
+):
+    """Rows are padded so, that few executables serve data of every size."""
+    records = scattered(9)
+    rows = len(records.force)
+    there, held = (
+        compiled_chain(base, (typical(name),), seen, reading)
+        for seen in (records, repeat_last_row(records, rows + 8))
+    )
+    np.testing.assert_allclose(held[0][:rows], there[0], rtol=1e-13, atol=1e-12)
+    np.testing.assert_allclose(held[1].sd[:, :rows], there[1].sd, rtol=1e-13)
+    np.testing.assert_array_equal(held[1].log_weight, there[1].log_weight)
 
 
 def mirrored(records):

@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from importlib.resources import files
 from pathlib import Path
 
 import h5py
@@ -16,6 +15,8 @@ from verdicts import ambiguous, failed
 from hdcal.diagnosis.result_folder import write_verdict
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.causes import ORIGIN, read_models
+from hdcal.prediction.margin.answer import MarginAnswer
+from hdcal.report.answer import json_schema
 
 FILES = {"margin.json", "report.html"} | {
     f"{name}.{kind}" for name in ("margin", "tornado") for kind in ("svg", "png")
@@ -42,9 +43,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def schema() -> dict:
-    path = files("hdcal.report") / "schemas" / "margin-1.schema.json"
-    return json.loads(path.read_text("utf-8"))
+SCHEMA = json_schema(MarginAnswer)
 
 
 def test_the_folder_is_whole_and_what_json_prints(here: Hdcal, runs: Path, tmp_path):
@@ -55,7 +54,7 @@ def test_the_folder_is_whole_and_what_json_prints(here: Hdcal, runs: Path, tmp_p
     assert {path.name for path in folder.iterdir()} == FILES
     found = json.loads((folder / "margin.json").read_text("utf-8"))
     assert json.loads(done.stdout) == found
-    jsonschema.validate(found, schema())
+    jsonschema.validate(found, SCHEMA)
     assert found["population"] == "specimens" and found["basis"] == "A-basis"
     assert len(found["levels"]) == 11 and found["worst"]["temperature_C"] == -20.0
     page = (folder / "report.html").read_text("utf-8")
@@ -68,11 +67,63 @@ def test_the_folder_is_whole_and_what_json_prints(here: Hdcal, runs: Path, tmp_p
     assert again.returncode == 0
 
 
-@pytest.mark.parametrize("key", schema()["required"])
+@pytest.mark.parametrize("key", SCHEMA["required"])
 def test_the_schema_misses_every_key_that_is_left_out(key: str):
-    jsonschema.Draft202012Validator.check_schema(schema())
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
     with pytest.raises(jsonschema.ValidationError, match=f"'{key}' is a required"):
-        jsonschema.validate({n: 0 for n in schema()["required"] if n != key}, schema())
+        jsonschema.validate({n: 0 for n in SCHEMA["required"] if n != key}, SCHEMA)
+
+
+def answered(here: Hdcal, run: Path, *asked: object) -> dict:
+    done = here("margin", run, *ASK, *asked, "--json")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+# Changes of a true answer that its schema has to refuse, by the key it names.
+FALSE = {
+    "content": {"content": 1.0},
+    "confidence": {"confidence": 0},
+    "levels": {"levels": []},
+    "basis": {"basis": "C-basis"},
+    "population": {"population": "readings"},
+    "quantity": {"quantity": "torque"},
+    "seed": {"seed": -1},
+    "status": {"status": "failed"},
+    "reasons": {"reasons": ["it is not ok"]},
+    "headline": {"headline": ""},
+    "interval": {"interval": 0.9},
+    "tolerances_mm": {"tolerances_mm": {"radius_mm": -0.1}},
+    "remarks": {"remarks": [""]},
+    "versions": {"versions": {}},
+}
+
+
+def test_the_schema_refuses_what_no_margin_says(here: Hdcal, runs: Path):
+    found = answered(here, runs / "six", "--limit-force", "90", "--given-force", "80")
+    jsonschema.validate(found, SCHEMA)
+    for key, change in FALSE.items():
+        with pytest.raises(jsonschema.ValidationError) as refused:
+            jsonschema.validate({**found, **change}, SCHEMA)
+        assert key in refused.value.absolute_path, key
+    for place, name in (("force_N", "lo"), ("exceedance", "probability")):
+        worst = {**found["worst"], place: {**found["worst"][place], name: None}}
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**found, "worst": worst}, SCHEMA)
+
+
+def test_the_headline_and_the_next_step_are_for_whoever_fits_the_actuator(
+    here: Hdcal, runs: Path
+):
+    enough = answered(here, runs / "six", "--limit-force", "120")
+    assert enough["headline"].startswith("A capacity of 120 N is enough for 99 % of")
+    assert enough["headline"] in enough["answer"] and enough["next_step"] is None
+    short = answered(here, runs / "six", "--limit-force", "70")
+    assert "NOT enough" in short["headline"]
+    assert short["next_step"].startswith("Provide ")
+    bare = answered(here, runs / "six", "--temperature", "60")
+    assert bare["headline"].startswith("At 0.4 mm 99 % of gears need at most ")
+    assert bare["next_step"].startswith("Measure at 0.4 mm at 60 °C too")
 
 
 def test_without_a_folder_there_are_words_only(here: Hdcal, runs: Path, tmp_path):

@@ -1,10 +1,12 @@
 """A margin says first whether the capacity does."""
 
+from html import unescape
+
 import pytest
 from posteriors import single
 
 import hdcal
-from hdcal.prediction.margin.document import answer, chance
+from hdcal.prediction.margin.sentences import answer, chance, headline
 
 
 @pytest.fixture(scope="module")
@@ -15,6 +17,7 @@ def posterior():
 def verdict(posterior, limit: float) -> str:
     found = hdcal.margin(posterior, 0.4, limit_force=limit)
     (said,) = (words for words in answer(found) if words.startswith("A capacity of"))
+    assert said == headline(found)
     return said
 
 
@@ -26,6 +29,13 @@ def test_enough_not_surely_and_not(posterior):
     between = verdict(posterior, 0.5 * (sure + expected))
     assert "expected to be enough" in between and "but not with 95 %" in between
     assert "is NOT enough" in verdict(posterior, expected - 0.1)
+
+
+def test_a_notebook_shows_the_answer(posterior):
+    found = hdcal.margin(posterior, 0.4, limit_force=120.0, temperature=60.0)
+    shown = found._repr_html_()
+    assert headline(found) in shown and found.extrapolated[0] in unescape(shown)
+    assert "<script" not in shown and "<html" not in shown
 
 
 def test_a_probability_has_no_more_digits_than_it_can_have():

@@ -1,6 +1,8 @@
 """Labels and answers in a few words, for examples that a hand can reckon."""
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
+from hdcal.blind.scoring.file_order import order_dependence
+from hdcal.blind.scoring.scored_case import match_answers
 from hdcal.blind.scoring.scores import score
 
 KINDS = {"slack": "rig", "friction": "rig", "drift": "time"}
@@ -11,17 +13,23 @@ def truth(case="a", kind="effect", names=("slack",), r=1.0, **more) -> Label:
     return Label(case, kind, names, r=r, sigma=1.0, **{**plain, **more})
 
 
-def said(case="a", verdict="named", effect="slack", chances=None, **more) -> Answer:
+def said(case="a", verdict="named", effect="slack", chances=None, **more) -> CaseAnswer:
     chances = chances or {effect or "none": 1.0}
     inclusion = {n: p for n, p in chances.items() if n not in ("none", "unknown")}
     plain = {"inclusion": inclusion, "detected": True, "set": tuple(chances)}
-    return Answer(
+    return CaseAnswer(
         case, verdict, effect, None, probabilities=chances, **{**plain, **more}
     )
 
 
 def scored(labels, answers, **more) -> dict:
     return score(labels, {"hdcal": answers}, KINDS, **more)
+
+
+def order_of(labels, answers) -> dict:
+    """Return how answers go with the order of the files."""
+    cases = match_answers(labels, answers, name="answers", all_of_them=False)
+    return order_dependence(cases)
 
 
 def row(found: dict, key: str) -> dict:

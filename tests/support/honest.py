@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import gammaln, ive, logsumexp, softmax
 from scipy.stats import chi2
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 
 FAMILIES = {
     "friction": "rig",
@@ -25,7 +25,7 @@ PAIRS = ("drift+friction", "slack+stiffening")
 DIMENSIONS, ROWS = 8, 144
 SIZES = (0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
 PRIOR = {"none": 0.2, "unknown": 0.15, "pair": 0.05, "effect": 0.6}
-GATE = 0.02
+ALARM = 0.02
 # Between any two of them the cosine is 0.5: alike, but not the same.
 SHAPES = np.sqrt(0.5) * (np.eye(DIMENSIONS)[: len(EFFECTS)] + np.eye(DIMENSIONS)[-1])
 
@@ -35,7 +35,7 @@ class Check:
     """A set of cases with honest answers to it."""
 
     labels: list[Label]
-    answers: list[Answer]
+    answers: list[CaseAnswer]
     closures: dict[str, float]
     mixed: set[str]
 
@@ -88,10 +88,10 @@ def _anywhere(seen: np.ndarray, lengths: np.ndarray) -> float:
     return float(logsumexp(log_mean - 0.5 * lengths**2))
 
 
-def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> Answer:
+def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> CaseAnswer:
     """Return the honest answer to what was seen."""
     return worded(
-        Answer(
+        CaseAnswer(
             case=case,
             verdict="none",
             effect=None,
@@ -99,12 +99,12 @@ def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> Answer
             set=(),
             probabilities=posterior(seen, withheld),
             inclusion={},
-            detected=bool(chi2.sf(seen @ seen, DIMENSIONS) < GATE),
+            detected=bool(chi2.sf(seen @ seen, DIMENSIONS) < ALARM),
         )
     )
 
 
-def worded(answer: Answer) -> Answer:
+def worded(answer: CaseAnswer) -> CaseAnswer:
     """Return an answer with words, set and inclusion that follow its probabilities."""
     chances = answer.probabilities
     inclusion = {
@@ -214,7 +214,7 @@ def _finished(label: Label, seen: np.ndarray) -> Label:
     )
 
 
-def _sized(answer: Answer, label: Label, seen, closure, rng) -> Answer:
+def _sized(answer: CaseAnswer, label: Label, seen, closure, rng) -> CaseAnswer:
     own = directions()
     sd = ROWS**-0.5
     if answer.effect is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.sealed_set import write_set
 
 GEAR = """[gear]
@@ -58,27 +58,27 @@ def key_of(folder: Path) -> Path:
     return folder.with_name(folder.name + ".key")
 
 
-def by_library(case, library) -> Answer:
+def by_library(case, library) -> CaseAnswer:
     """Answer by what was in the library and in the data, so that both are seen."""
     first = float(case.records.force[0])
     chances = dict.fromkeys(library, 0.0) | {"none": 1.0, "unknown": 0.0}
     given = {"detected": False, "p_value": 0.5, "noise_sd": abs(first)}
-    return Answer(case.name, "none", None, None, ("none",), chances, {}, **given)
+    return CaseAnswer(case.name, "none", None, None, ("none",), chances, {}, **given)
 
 
-def slowly(case, library) -> Answer:
+def slowly(case, library) -> CaseAnswer:
     """Answer after a while, so that there is time to be killed."""
     time.sleep(0.3)
     return by_library(case, library)
 
 
-def deadly(case, library) -> Answer:
+def deadly(case, library) -> CaseAnswer:
     """Kill whoever answers."""
     os.kill(os.getpid(), signal.SIGKILL)
     raise AssertionError
 
 
-def wrong(case, library) -> Answer:
+def wrong(case, library) -> CaseAnswer:
     """Break on one case."""
     if case.name == "c02":
         raise ZeroDivisionError("by nothing")

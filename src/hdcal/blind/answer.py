@@ -1,17 +1,16 @@
 """Answer a blind check: case by case, each kept as soon as it is there."""
 
 import tempfile
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.answers import Answers
+from hdcal.blind.answer_files import AnswerFiles
 from hdcal.blind.diagnosers import (
     DIAGNOSERS,
     Diagnoser,
-    check_libraries,
     families,
     fingerprint,
     withheld_from,
@@ -22,14 +21,14 @@ from hdcal.cli.processes import completed
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.library import choose_library
 from hdcal.errors import Finding, HdcalError, InputError
+from hdcal.inference.sample import Progress
 
 # Name of the case, its answer, and what is wrong: of the last two one is empty.
-Outcome = tuple[str, dict[str, Any], tuple[Finding, ...]]
-Progress = Callable[[int, int], None]
+CaseOutcome = tuple[str, dict[str, Any], tuple[Finding, ...]]
 
 
 @dataclass(frozen=True)
-class Task:
+class CaseTask:
     """How one case is to be answered, wherever that happens.
 
     Attributes:
@@ -57,8 +56,7 @@ def answer_set(
 ) -> dict[str, Any]:
     """Answer every case of a set and freeze the answers.
 
-    An answer is kept as soon as it is there: the same call after an interruption
-    goes on where the first one stopped.
+    The same call after an interruption goes on where the first one stopped.
 
     Args:
         folder: the set.
@@ -67,7 +65,7 @@ def answer_set(
         library: `minus:NAME[,NAME]`, withheld from every case.
         jobs: processes on this machine.
         scheduler: address of a Dask scheduler whose workers answer instead.
-        progress: is told how many cases of how many are answered.
+        progress: called with how many cases of how many are answered.
 
     Returns:
         The frozen answers as plain data.
@@ -80,15 +78,14 @@ def answer_set(
         raise refusal("--by", words, f"Known are: {known}")
     choose_library(library)
     found = read_set(folder)
+    _check_libraries(found)
     entries = {entry.case: entry for entry in found.manifest.cases}
-    asked = {entry.library for entry in entries.values()}
-    check_libraries(asked, str(found.folder / SET))
-    answers, made_by = Answers(found, by), fingerprint(library)
+    answers, made_by = AnswerFiles(found, by), fingerprint(library)
     answers.check_free()
     kept = answers.kept(made_by)
     made = diagnosers[by], library, digest(canonical(made_by))
-    tasks = [Task(entries[case], *made) for case in entries if case not in kept]
-    # Closed whatever happens: nobody works on for an answer that nobody takes.
+    tasks = [CaseTask(entries[case], *made) for case in entries if case not in kept]
+    # Closed whatever happens: no process works on for an answer that is not kept.
     with closing(_outcomes(found, tasks, jobs, scheduler)) as outcomes:
         for done, (case, answer, findings) in enumerate(outcomes, len(kept) + 1):
             if findings:
@@ -99,9 +96,22 @@ def answer_set(
     return answers.freeze(made_by, families(), library or "")
 
 
+def _check_libraries(found: BlindSet) -> None:
+    """Check that this library holds what the cases of a set withhold."""
+    libraries = {entry.library for entry in found.manifest.cases}
+    for library in sorted(filter(None, libraries)):
+        try:
+            choose_library(library)
+        except InputError as error:
+            words = f"asks for the library '{library}', which hdcal cannot make: "
+            words += error.findings[0].problem
+            remedy = "Answer it with the version of hdcal that made it"
+            raise refusal(found.folder / SET, words, remedy) from None
+
+
 def _outcomes(
-    found: BlindSet, tasks: list[Task], jobs: int, scheduler: str | None
-) -> Generator[Outcome, None, None]:
+    found: BlindSet, tasks: list[CaseTask], jobs: int, scheduler: str | None
+) -> Generator[CaseOutcome, None, None]:
     if not tasks:
         return
     if scheduler is not None:
@@ -116,14 +126,14 @@ def _outcomes(
         yield outcome
 
 
-def _travelling(found: BlindSet, tasks: list[Task]) -> Iterator[tuple]:
+def _travelling(found: BlindSet, tasks: list[CaseTask]) -> Iterator[tuple]:
     """Yield tasks with their data, read only when a worker is about to be free."""
     gear = found.gear()
     for task in tasks:
         yield task, found.csv(task.entry), gear
 
 
-def answer_here(found: BlindSet, task: Task) -> Outcome:
+def answer_here(found: BlindSet, task: CaseTask) -> CaseOutcome:
     """Answer a case that this machine's disk holds."""
     try:
         csv, gear = found.csv(task.entry), found.gear()
@@ -132,7 +142,7 @@ def answer_here(found: BlindSet, task: Task) -> Outcome:
     return answer_bytes(task, csv, gear)
 
 
-def answer_there(task: Task, csv: bytes, gear: bytes) -> Outcome:
+def answer_there(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
     """Answer a case on a worker of a cluster, which shares no disk with anyone."""
     from hdcal.cli.compilation_cache import keep_compilations
 
@@ -140,7 +150,7 @@ def answer_there(task: Task, csv: bytes, gear: bytes) -> Outcome:
     return answer_bytes(task, csv, gear)
 
 
-def answer_bytes(task: Task, csv: bytes, gear: bytes) -> Outcome:
+def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
     """Answer a case from the bytes of its files."""
     name = task.entry.case
     if digest(canonical(fingerprint(task.library))) != task.fingerprint:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.rival_methods import own_form_closure
 from hdcal.blind.sealed_set import CASES, GEAR, BlindSet
 from hdcal.data.reading import read_case
@@ -16,7 +16,7 @@ _SMALLEST = 0.5
 
 
 def closures(
-    found: BlindSet, labels: Sequence[Label], answers: Iterable[Answer]
+    found: BlindSet, labels: Sequence[Label], answers: Iterable[CaseAnswer]
 ) -> dict[str, float]:
     """Return the largest share of the gap that the true effect's own form can close.
 

@@ -67,15 +67,16 @@ def make(
     key = _beside(out) if key is None else Path(key)
     check_free(out, key, force=force)
     if source is None:
-        from hdcal.blind.sealed_measurement import program_at
-        from hdcal.blind.virtual_rig.mixes import GEAR_TOML, MIXES, draw_cases
+        from hdcal.blind.sealed_measurement import loading_at
+        from hdcal.blind.virtual_rig.cases import GEAR_TOML, draw_cases
+        from hdcal.blind.virtual_rig.mixes import MIXES
         from hdcal.data.toml_file import nearest
 
         if mix not in MIXES:
             words, remedy = f"no mix is called '{mix[:60]}'", nearest(mix, list(MIXES))
             raise InputError([Finding("--mix", words, remedy)])
         seed = secrets.randbits(_SEED_BITS) if seed is None else seed
-        path = None if program is None else program_at(program)
+        path = None if program is None else loading_at(program)
         drawn, gear = draw_cases(mix, cases, seed, path), GEAR_TOML
         about = {"mix": mix, "seed": seed}
     else:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.blind.label import Answer, Span
+from hdcal.blind.label import CaseAnswer, Span
 from hdcal.blind.rival_methods import fit_each
 from hdcal.blind.seal import canonical, digest
 from hdcal.data.case import Case
@@ -18,7 +18,6 @@ from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.library import choose_library
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.where import FALSE_ALARM
-from hdcal.errors import Finding, InputError
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.inference.posterior import versions
 from hdcal.physics.effect import Effect, parameters
@@ -26,29 +25,31 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.report.parameters import Interval
 
 Library = Mapping[str, type[Effect]]
-Diagnoser = Callable[[Case, Library], Answer]
+Diagnoser = Callable[[Case, Library], CaseAnswer]
 
 
-def by_hdcal(case: Case, library: Library) -> Answer:
+def by_hdcal(case: Case, library: Library) -> CaseAnswer:
     """Answer as `hdcal diagnose --quick` does."""
     return answer_of(diagnose(case, library=library, quick=True))
 
 
-def always_none(case: Case, library: Library) -> Answer:
+def always_none(case: Case, library: Library) -> CaseAnswer:
     """Answer that nothing is missing, whatever the data say."""
     impossible = dict.fromkeys(library, 0.0)
     chances = {NONE: 1.0, UNKNOWN: 0.0, **impossible}
-    return Answer(case.name, "none", None, None, (NONE,), chances, impossible, False)
+    return CaseAnswer(
+        case.name, "none", None, None, (NONE,), chances, impossible, False
+    )
 
 
-def by_r2(case: Case, library: Library) -> Answer:
+def by_r2(case: Case, library: Library) -> CaseAnswer:
     """Answer with the effect that fits best in sample, as R² ranks them."""
     found = fit_each(case, library)
     best = min((n for n in found if n != NONE), key=lambda n: found[n].square)
     return _certain(case, library, {best: 1.0})
 
 
-def by_bic(case: Case, library: Library) -> Answer:
+def by_bic(case: Case, library: Library) -> CaseAnswer:
     """Answer with the weights of the Bayesian information criterion."""
     found = fit_each(case, library)
     least = min(each.bic for each in found.values())
@@ -57,11 +58,11 @@ def by_bic(case: Case, library: Library) -> Answer:
     return _certain(case, library, {n: w / total for n, w in weight.items()})
 
 
-def _certain(case: Case, library: Library, chances: dict[str, float]) -> Answer:
+def _certain(case: Case, library: Library, chances: dict[str, float]) -> CaseAnswer:
     """Return the answer of who knows neither pairs nor the unknown."""
     best = max(chances, key=lambda name: chances[name])
     nothing = dict.fromkeys((NONE, UNKNOWN, *library), 0.0)
-    return Answer(
+    return CaseAnswer(
         case.name,
         "none" if best == NONE else "named",
         None if best == NONE else best,
@@ -81,10 +82,10 @@ DIAGNOSERS: dict[str, Diagnoser] = {
 }
 
 
-def answer_of(verdict: Verdict) -> Answer:
+def answer_of(verdict: Verdict) -> CaseAnswer:
     """Return what a verdict says, in the words that are scored."""
     which, gap, size = verdict.which, verdict.gap, verdict.which.amplitude
-    return Answer(
+    return CaseAnswer(
         case=verdict.case.name,
         verdict=which.verdict,
         effect=which.effect,
@@ -117,22 +118,6 @@ def withheld_from(*libraries: str | None) -> str | None:
     for library in filter(None, libraries):
         names += library.removeprefix("minus:").split(",")
     return "minus:" + ",".join(dict.fromkeys(names)) if names else None
-
-
-def check_libraries(libraries: set[str], file: str) -> None:
-    """Check that this library holds what the cases of a set withhold.
-
-    Raises:
-        InputError: it does not.
-    """
-    for library in sorted(filter(None, libraries)):
-        try:
-            choose_library(library)
-        except InputError as error:
-            words = f"asks for the library '{library}', which hdcal cannot make: "
-            words += error.findings[0].problem
-            remedy = "Answer it with the version of hdcal that made it"
-            raise InputError([Finding(file, words, remedy)]) from None
 
 
 @cache

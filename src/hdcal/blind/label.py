@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-Kind = Literal["null", "effect", "pair", "outside", "real"]
+CaseKind = Literal["null", "effect", "pair", "outside", "real"]
 Span = tuple[float, float, float]
 
 
@@ -16,7 +16,7 @@ class Label:
         kind: null (nothing is missing), effect (one of the library's), pair (two of
             them), outside (in no library), real (measured data with a stated cause).
         truth: names of what was switched on; of real data, of what may be answered.
-        program: name of the loading program.
+        program: name of the loading.
         rows: number of readings n.
         r: RMS of what the effect leaves beside the base model, over the noise sd.
         noise: iid or ar (serial).
@@ -34,7 +34,7 @@ class Label:
     """
 
     case: str
-    kind: Kind
+    kind: CaseKind
     truth: tuple[str, ...]
     program: str
     rows: int
@@ -66,7 +66,7 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CaseAnswer:
     """What a diagnoser says of one case; the words are those of verdict.json.
 
     Attributes:
@@ -77,8 +77,8 @@ class Answer:
         set: smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; they sum to 1.
         inclusion: of each effect over singles and pairs.
-        detected: whether the gate was passed.
-        p_value: of the gate.
+        detected: whether the residual test found a gap.
+        p_value: of the residual test.
         gap: RMS of the gap, quantiles .5, .05, .95 [N].
         amplitude: value of a parameter `effect.parameter`, quantiles .5, .05, .95.
         closed: share closed on held-out rows, quantiles .5, .05, .95.
@@ -104,7 +104,7 @@ class Answer:
         return asdict(self)
 
     @classmethod
-    def from_plain(cls, data: dict[str, Any]) -> "Answer":
+    def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":
         """Return the answer of plain data."""
         spans = {k: data[k] and tuple(data[k]) for k in ("gap", "closed") if k in data}
         sizes = {k: tuple(v) for k, v in data.get("amplitude", {}).items()}

@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.answers import Answers, frozen_names
+from hdcal.blind.answer_files import AnswerFiles, frozen_names
 from hdcal.blind.closures import closures
 from hdcal.blind.document import write_scores
-from hdcal.blind.label import Answer
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.scoring.scores import JUDGED, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
@@ -21,8 +21,8 @@ RESULT = "result"
 
 
 @dataclass(frozen=True)
-class Opening:
-    """What an opened set says.
+class OpenedSet:
+    """The result of an opened set.
 
     Attributes:
         folder: where the result is.
@@ -35,11 +35,11 @@ class Opening:
     folder: Path
     result: dict[str, Any]
     secret: Sealed
-    answers: dict[str, list[Answer]]
+    answers: dict[str, list[CaseAnswer]]
     families: dict[str, str]
 
 
-def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> Opening:
+def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet:
     """Verify set and answers, decrypt the labels, score, and write the result.
 
     Args:
@@ -53,7 +53,7 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> Opening:
     found = read_set(folder)
     # Whoever is not scored today was blind all the same, and is recorded as such.
     everyone = frozen_names(found) if not by else _present(found, by)
-    frozen = {name: Answers(found, name).frozen() for name in everyone}
+    frozen = {name: AnswerFiles(found, name).frozen() for name in everyone}
     hashes = {name: data["sha256"] for name, (data, _) in frozen.items()}
     before = _read_opened(found)
     first = hashes if before is None else before["answers"]
@@ -82,9 +82,9 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> Opening:
             judged,
         ),
     }
-    opening = Opening(found.folder / RESULT, result, secret, answers, families)
-    _write(found, opening, hashes if before is None else None)
-    return opening
+    opened = OpenedSet(found.folder / RESULT, result, secret, answers, families)
+    _write(found, opened, hashes if before is None else None)
+    return opened
 
 
 def _present(found: BlindSet, by: Sequence[str]) -> list[str]:
@@ -128,9 +128,9 @@ def _read_opened(found: BlindSet) -> dict[str, Any] | None:
     return data
 
 
-def _write(found: BlindSet, opening: Opening, hashes: dict[str, str] | None) -> None:
+def _write(found: BlindSet, opened: OpenedSet, hashes: dict[str, str] | None) -> None:
     """Write the record of a first opening, then the result."""
-    check_target(opening.folder, force=True)
+    check_target(opened.folder, force=True)
     if hashes is not None:
         record = {
             "schema": OPENED_SCHEMA,
@@ -140,11 +140,11 @@ def _write(found: BlindSet, opening: Opening, hashes: dict[str, str] | None) -> 
         }
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(record)))
-    with whole_folder(opening.folder, force=True) as building:
-        write_scores(opening.result["scores"], building)
-        about = {n: v for n, v in opening.result.items() if n != "scores"}
+    with whole_folder(opened.folder, force=True) as building:
+        write_scores(opened.result["scores"], building)
+        about = {n: v for n, v in opened.result.items() if n != "scores"}
         for name, data in (
             ("opening.json", about),
-            ("labels.json", opening.secret.plain()),
+            ("labels.json", opened.secret.plain()),
         ):
             (building / name).write_text(as_json(data), "utf-8")

@@ -5,8 +5,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from hdcal.blind.label import Label
-from hdcal.blind.virtual_rig.loadings import Program, program_of
-from hdcal.blind.virtual_rig.mixes import GEAR_TOML
+from hdcal.blind.virtual_rig.cases import GEAR_TOML
+from hdcal.blind.virtual_rig.loadings import Loading, loading_of
 from hdcal.calibration.calibrate import check_names
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, InputError
@@ -64,7 +64,7 @@ def sealed_measurement(
     return Path(source).read_bytes(), Path(gear).read_bytes(), label
 
 
-def program_at(source: str) -> Program:
+def loading_at(source: str) -> Loading:
     """Return what a measurement's rig did, to be done again by the virtual one.
 
     Raises:
@@ -73,8 +73,8 @@ def program_at(source: str) -> Program:
     with TemporaryDirectory() as folder:
         gear = Path(folder) / "gear.toml"
         gear.write_text(GEAR_TOML, "utf-8")
-        # A name of its own: the rig's programs have theirs.
-        return replace(program_of(read_case(source, gear)), name="given")
+        # A name of its own: the rigs' loadings have theirs.
+        return replace(loading_of(read_case(source, gear)), name="given")
 
 
 def _names(text: str) -> tuple[str, ...]:

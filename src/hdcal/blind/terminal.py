@@ -8,7 +8,7 @@ from rich.console import RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.words import bar_row, measured_row
 from hdcal.report.plain import harmless
 
@@ -19,7 +19,7 @@ _KINDS = {"null": "without a gap", "pair": "with two effects", "real": "measured
 def opening_words(
     scores: dict[str, Any],
     labels: Sequence[Label],
-    answers: Mapping[str, Sequence[Answer]],
+    answers: Mapping[str, Sequence[CaseAnswer]],
     folder: str,
 ) -> Iterator[RenderableType]:
     """Yield every row of the bar, and what was said of measured data.
@@ -58,7 +58,7 @@ def _bar(rows: list[dict]) -> Table:
 
 
 def _measured(
-    labels: Sequence[Label], answers: Mapping[str, Sequence[Answer]]
+    labels: Sequence[Label], answers: Mapping[str, Sequence[CaseAnswer]]
 ) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for heading in ("by", "stated", "verdict", "set", "holds it"):

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from hdcal.blind.label import Answer, Label
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.report.words import hypothesis, number, percent
 
 _MET = {True: "met", False: "missed", None: "–"}
@@ -105,7 +105,7 @@ def limit_row(curve: dict[str, Any]) -> dict[str, str]:
     }
 
 
-def measured_row(label: Label, answer: Answer) -> dict[str, str]:
+def measured_row(label: Label, answer: CaseAnswer) -> dict[str, str]:
     """Return what was stated of a measurement and what was answered, as texts."""
     chances = {**answer.probabilities, **answer.inclusion}
     found = [f"{hypothesis(name)} {percent(chances.get(name))}" for name in answer.set]

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 
 import jax
@@ -12,38 +11,15 @@ from hdcal.data.case import Case, Theory
 from hdcal.data.priors import effect_priors
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.checks import (
-    Check,
-    bound_check,
-    conflict_check,
-    identification_checks,
-    rounding_check,
-    sampling_checks,
-)
-from hdcal.inference.density import (
-    MEMBER_SD,
-    MEMBERS,
-    log_likelihood,
-    log_prior,
-    predict_rows,
-)
-from hdcal.inference.diagnostics import diagnose_parameters, mixing
-from hdcal.inference.flat_directions import (
-    beside_members,
-    dead_parameters,
-    flat_directions,
-    member_columns,
-    sensitivity,
-)
-from hdcal.inference.posterior import (
-    Posterior,
-    build_tree,
-    gap_columns,
-    versions,
-)
-from hdcal.inference.prior_draws import draw_priors
+from hdcal.inference.assembly import Specifics, assemble, run_settings
+from hdcal.inference.checks import rounding_check
+from hdcal.inference.density import MEMBER_SD, MEMBERS
+from hdcal.inference.executables import bound_executables
+from hdcal.inference.flat_directions import remove_members
+from hdcal.inference.linearisation import linearise
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
-from hdcal.inference.programs import let_go_of_programs
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
@@ -142,9 +118,7 @@ def calibrate(
     registry: Mapping[str, type[Effect]] = EFFECTS,
     progress: Progress | None = None,
 ) -> Posterior:
-    """Calibrate the force model against a case.
-
-    The result depends on the arguments only: the same seed gives the same draws.
+    """Calibrate the force model against a case; the same seed gives the same draws.
 
     Args:
         case: from `read_case`.
@@ -165,92 +139,44 @@ def calibrate(
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
     check_settings(chains, warmup, draws)
-    let_go_of_programs()
+    bound_executables()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)
-    theory = theory or case.gear.theory
-    shipped = effect_priors()
-    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
+    theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
+    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
     of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
     whitening = laplace.fit(problem, of_fit)
-    found = sample(
-        problem,
-        whitening,
-        of_draws,
-        chains=chains,
-        warmup=warmup,
-        draws=draws,
-        progress=progress,
-    )
-    settings = {
-        "seed": seed,
-        "chains": chains,
-        "warmup": warmup,
-        "draws": draws,
-        "with_gap": with_gap,
-        "target_acceptance": found.target_acceptance,
-        "versions": versions(),
-    }
-    posterior = _assemble(
-        case, theory, chosen, priors, problem, found, of_prior, settings
-    )
-    seconds = round(time.perf_counter() - began, 3)
-    return replace(posterior, settings={**settings, "seconds": seconds})
+    size = {"chains": chains, "warmup": warmup, "draws": draws}
+    found = sample(problem, whitening, of_draws, progress=progress, **size)
+    own = _specifics(case, problem, found)
+    parts = assemble(case, priors, problem, found, own, of_prior)
+    settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
+    settings["seconds"] = round(time.perf_counter() - began, 3)
+    return Posterior(case, theory, chosen, priors, *parts, settings)
 
 
-@jax.jit
-def _densities(problem: Problem, values):
-    def both(one):
-        return log_prior(problem, one), log_likelihood(problem, one)
-
-    return jax.vmap(jax.vmap(both))(values)
-
-
-def _assemble(
-    case: Case, theory, effects, priors, problem: Problem, found: Draws, key, settings
-) -> Posterior:
-    of_prior, of_data = map(np.asarray, _densities(problem, found.values))
-    sampled = {
-        name: prior
-        for name, prior in priors.items()
-        if name in found.values and prior.family != "fixed"
-    }
-    scalars = {name: found.values[name] for name in sampled}
-    diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
-    tree = build_tree(case, problem, found, draw_priors(sampled, key), of_data)
-    checks = (
-        *sampling_checks(
-            tree["sample_stats"].to_dataset(),
-            diagnoses | mixing(_beside_parameters(problem, found)),
-        ),
-        rounding_check(float(problem.step), problem.rounded, found.values["sigma"]),
-        conflict_check(scalars, sampled),
-        bound_check(scalars, sampled),
-        *_identification(case, problem, found),
-    )
-    return Posterior(case, theory, effects, priors, tree, diagnoses, checks, settings)
-
-
-def _identification(case: Case, problem: Problem, found: Draws) -> tuple[Check, ...]:
+def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
+    """Return what the model of the force adds to what every calibration has."""
     centre = {
         name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
     }
-    records, columns = case.records, gap_columns(problem, case)
-    _, noise = predict_rows(problem, centre, records, columns)
-    sd = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
-    members = member_columns(problem, centre, records, columns)[0] / sd[:, None]
-    slopes = {
-        name: beside_members(slope / sd, members)
-        for name, slope in sensitivity(problem, centre, records, columns).items()
-    }
-    dead = dead_parameters(slopes, problem)
-    alive = {name: slope for name, slope in slopes.items() if name not in dead}
-    return identification_checks(dead, flat_directions(alive, problem))
+    near = linearise(problem, centre, case.records)
+    members = near.members / near.sd[:, None]
+    sigma = found.values["sigma"]
+    return Specifics(
+        log_likelihood=force_log_likelihood(case, problem, found),
+        slopes={
+            name: remove_members(slope / near.sd, members)
+            for name, slope in near.slopes.items()
+        },
+        mixed=_other_quantities(problem, found),
+        checks=[rounding_check(float(problem.step), problem.rounded, sigma)],
+    )
 
 
-def _beside_parameters(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
+def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     """Return what else must have mixed: the headline, and members that were sampled."""
     others = {"stiffness": found.values["stiffness"]}
     for kind, name in MEMBERS.items():

@@ -1,77 +1,41 @@
-"""Options that several commands share, and how their texts are read."""
+"""Options that several commands share."""
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
+from click.core import ParameterSource
 
 from hdcal.cli.console import Console
-from hdcal.errors import Finding, InputError
+from hdcal.cli.option_types import (
+    read_all,
+    read_columns,
+    read_list,
+    read_named,
+    read_quantity,
+)
+from hdcal.data.theory_names import Theory
+from hdcal.errors import Finding
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
 
-MOST_POINTS = 100_000
-_THEORIES = ("ring", "cup", "article")
 
-
-T = TypeVar("T")
-
-
-class Parsed(click.ParamType):
-    """An option's text, read by hdcal; what cannot be read is said with all else.
+def repeated_option(
+    *names: str, metavar: str, read: Callable[[Sequence[str], str], Any], help: str
+) -> Callable[[Callable], Callable]:
+    """Add an option that may be repeated.
 
     Args:
-        name: shown in the help.
-        read: called with the text and the option's name; raises `InputError`.
+        names: of the option and of its parameter.
+        metavar: form of its text.
+        read: called with all texts and the option's name; raises `InputError`.
+        help: what it means.
     """
-
-    def __init__(self, name: str, read: Callable[[str, str], Any]):
-        self.name = name
-        self._read = read
-
-    def convert(self, value, param, ctx):
-        """Return what was read, or None where the text cannot be."""
-        if not isinstance(value, str) or param is None or ctx is None:
-            return value
-        return ctx.obj.wrong.attempt(self._read, value, param.opts[0])
-
-
-def read_all(read: Callable[[Sequence[str], str], T]):
-    """Return a callback that reads all texts of an option that may be repeated.
-
-    Args:
-        read: called with the texts and the option's name; raises `InputError`.
-    """
-
-    def callback(context: click.Context, option: click.Parameter, texts) -> T | None:
-        return context.obj.wrong.attempt(read, texts, option.opts[0])
-
-    return callback
-
-
-def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:
-    """Read every QUANTITY=HEADER.
-
-    Raises:
-        InputError: one of them has no such form, or a quantity comes twice.
-    """
-    found: dict[str, str] = {}
-    findings = []
-    for text in texts:
-        quantity, sign, header = (part.strip() for part in text.partition("="))
-        if not (quantity and sign and header):
-            remedy = "Write it like force=Load[kgf]"
-            findings.append(Finding(option, f"'{text}' names no header", remedy))
-        elif quantity in found:
-            words = f"'{quantity}' is given twice"
-            findings.append(Finding(option, words, "Keep one of them"))
-        found[quantity] = header
-    if findings:
-        raise InputError(findings)
-    return found
+    return click.option(
+        *names, metavar=metavar, multiple=True, callback=read_all(read), help=help
+    )
 
 
 def case_options(command: Callable) -> Callable:
@@ -84,15 +48,14 @@ def reading_options(command: Callable) -> Callable:
     for add in (
         click.option(
             "--theory",
-            type=click.Choice(_THEORIES),
+            type=click.Choice(get_args(Theory)),
             help="Stiffness formula that K multiplies; overrides the gear file.",
         ),
-        click.option(
+        repeated_option(
             "--column",
             "columns",
             metavar="QUANTITY=HEADER",
-            multiple=True,
-            callback=read_all(read_columns),
+            read=read_columns,
             help="Read a quantity from a header of your own: force=Load[kgf].",
         ),
         click.option(
@@ -124,10 +87,21 @@ def json_option(command: Callable) -> Callable:
     return option(command)
 
 
-def out_option(command: Callable) -> Callable:
-    """Add --out and --force, for a command that writes a folder where it is asked."""
-    words = "Also write a folder with a report."
-    return click.option("--out", metavar="DIR", help=words)(force_option(command))
+def folder_options(help: str) -> Callable[[Callable], Callable]:
+    """Add --out and --force.
+
+    Args:
+        help: which folder --out names, and which one it is by default.
+    """
+
+    def add(command: Callable) -> Callable:
+        return click.option("--out", metavar="DIR", help=help)(force_option(command))
+
+    return add
+
+
+# For a command that writes a folder where it is asked to.
+out_option = folder_options("Also write a folder with a report.")
 
 
 def force_option(command: Callable) -> Callable:
@@ -147,6 +121,31 @@ def direction_option(command: Callable) -> Callable:
     )(command)
 
 
+def start_options(command: Callable) -> Callable:
+    """Add RUN and --gear, for a command that needs one of the two."""
+    words = "Without RUN: a gear of which priors are known."
+    option = click.option("--gear", metavar="GEAR.toml", help=words)
+    return click.argument("run", metavar="RUN", required=False)(option(command))
+
+
+def material_option(help: str) -> Callable[[Callable], Callable]:
+    """Add --material."""
+    return repeated_option(
+        "--material", "materials", metavar="NAME", read=read_list, help=help
+    )
+
+
+def tolerance_option(command: Callable) -> Callable:
+    """Add --tolerance."""
+    return repeated_option(
+        "--tolerance",
+        "tolerances",
+        metavar="SIZE_mm=±",
+        read=partial(read_named, read=partial(read_quantity, unit="mm")),
+        help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
+    )(command)
+
+
 def seed_option(command: Callable) -> Callable:
     """Add --seed."""
     return click.option(
@@ -158,69 +157,18 @@ def seed_option(command: Callable) -> Callable:
     )(command)
 
 
-def read_whole_numbers(text: str, option: str) -> list[int]:
-    """Read a list of whole numbers.
+def is_given(name: str) -> bool:
+    """Tell whether a parameter stands on the command line, readable or not."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is ParameterSource.COMMANDLINE
 
-    Raises:
-        InputError: it is none.
+
+def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:
+    """Return a finding for each parameter that was given in spite of an option.
+
+    Args:
+        names: of parameters that do not go with it.
+        mode: the option.
     """
-    try:
-        return [int(part) for part in text.split(",")]
-    except ValueError:
-        words = f"'{text[:60]}' is no list of whole numbers"
-        raise InputError([Finding(option, words, "Write it like 1,3")]) from None
-
-
-def read_grid(text: str, option: str) -> list[float]:
-    """Read start:stop:count or a comma list of numbers.
-
-    Raises:
-        InputError: it is neither, or too long.
-    """
-    try:
-        numbers = _range(text) if ":" in text else [float(x) for x in text.split(",")]
-    except ValueError:
-        numbers = []
-    if not numbers or not all(map(math.isfinite, numbers)):
-        words = f"'{text[:60]}' is neither start:stop:count nor a list of numbers"
-        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, with at most {MOST_POINTS} points"
-        raise InputError([Finding(option, words, remedy)])
-    return numbers
-
-
-def _range(text: str) -> list[float]:
-    first, last, many = text.split(":")
-    start, stop, count = float(first), float(last), int(many)
-    if not 1 <= count <= MOST_POINTS:
-        raise ValueError(many)
-    if count == 1:
-        return [start]
-    # The ends are met exactly, which start + i·step would not promise.
-    return [
-        (start * (count - 1 - i) + stop * i) / (count - 1)
-        if 0 < i < count - 1
-        else (start if i == 0 else stop)
-        for i in range(count)
-    ]
-
-
-# Temperatures over which a window is spread.
-_WINDOW = 11
-
-
-def read_window(text: str, option: str = "--temperature") -> list[float]:
-    """Read from:to, from:to:count or a comma list of numbers.
-
-    Raises:
-        InputError: it is none of them, or an empty window.
-    """
-    if text.count(":") != 1:
-        return read_grid(text, option)
-    first, last = text.split(":")
-    ends = read_grid(f"{first or 'x'},{last or 'x'}", option)
-    if ends[1] < ends[0]:
-        words = f"'{text[:60]}' is an empty window"
-        raise InputError([Finding(option, words, "Give the lower end first")])
-    return read_grid(
-        f"{ends[0]}:{ends[1]}:{_WINDOW if ends[1] > ends[0] else 1}", option
-    )
+    words = f"has no meaning with {mode}"
+    return [Finding(name, words, "leave it out") for name in names if is_given(name)]

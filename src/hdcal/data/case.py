@@ -3,10 +3,9 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from hdcal.data.priors import Prior
+from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
-
-Theory = Literal["ring", "cup", "article"]
+from hdcal.data.theory_names import Theory
 
 
 @dataclass(frozen=True)

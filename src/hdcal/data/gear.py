@@ -4,27 +4,25 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import ValidationError
-
 from hdcal.data.case import Gear, Theory
-from hdcal.data.gear_schema import GearFile, size_findings, translate
+from hdcal.data.gear_schema import GearFile, check_schema, size_findings
+from hdcal.data.prior import Prior
+from hdcal.data.prior_entry import read_prior
 from hdcal.data.priors import (
     DYNAMIC_UNITS,
     MATERIAL_UNITS,
     MODEL_UNITS,
     SCALE_UNITS,
-    Prior,
     dynamic_priors,
     material_names,
     material_priors,
     read_effect_priors,
-    read_prior,
     read_priors,
     rig_priors,
 )
 from hdcal.data.records import Geometry
 from hdcal.data.toml_file import TomlFile, nearest, read_toml
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 
 
 def read_gear(path: Path | str, theory: str | None = None) -> Gear:
@@ -43,38 +41,30 @@ def read_gear(path: Path | str, theory: str | None = None) -> Gear:
     """
     path = Path(path)
     toml = read_toml(path, str(path))
-    findings = []
-    model: GearFile | None = None
-    try:
-        model = GearFile.model_validate(toml.table)
-    except ValidationError as error:
-        findings += [translate(dict(item), toml) for item in error.errors()]
-    findings += size_findings(toml)
-    if theory is not None and theory not in get_args(Theory):
-        remedy = nearest(theory, list(get_args(Theory)))
-        findings.append(Finding("--theory", f"unknown theory '{theory}'", remedy))
-    table = toml.table.get("gear")
-    material = table.get("material", "steel") if isinstance(table, dict) else "steel"
-    facts, wrong = _material(material, path, toml)
-    findings += wrong
-    given, effects, wrong = _overrides(toml)
-    findings += wrong
-    if findings or model is None:
-        raise InputError(findings)
-    return _assemble(model, theory, facts, given, effects, path, toml)
+    with Findings() as wrong:
+        model = wrong.attempt(check_schema, toml)
+        wrong += size_findings(toml)
+        if theory is not None and theory not in get_args(Theory):
+            remedy = nearest(theory, list(get_args(Theory)))
+            wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
+        facts = wrong.attempt(_material, toml, path.parent)
+        given = wrong.attempt(_given_priors, toml)
+    assert model is not None and facts is not None and given is not None
+    return _assemble(model, theory, facts, given, path, toml)
 
 
 def _assemble(
     model: GearFile,
     theory: str | None,
     facts: dict[str, Prior],
-    given: dict[str, Prior],
-    effects: dict[str, Prior],
+    own: tuple[dict[str, Prior], dict[str, Prior]],
     path: Path,
     toml: TomlFile,
 ) -> Gear:
     sizes, measurement = model.gear, model.measurement
+    given, effects = own
     merged = rig_priors() | facts | given
+    moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     geometry = Geometry(
         wall_thickness=sizes.wall_thickness_mm,
         radius=sizes.radius_mm,
@@ -97,24 +87,20 @@ def _assemble(
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=effects,
-        dynamic_priors=dynamic_priors() | _part(given, DYNAMIC_UNITS),
+        dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
     )
 
 
-def _part(priors: dict[str, Prior], units: dict[str, str]) -> dict[str, Prior]:
-    return {name: prior for name, prior in priors.items() if name in units}
-
-
-def _material(
-    name: object, gear_path: Path, toml: TomlFile
-) -> tuple[dict[str, Prior], list[Finding]]:
-    key = "gear.material"
+def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
+    """Priors and facts of the material that the gear file names."""
+    table = toml.table.get("gear")
+    name = table.get("material", "steel") if isinstance(table, dict) else "steel"
     if not isinstance(name, str) or not 0 < len(name) <= 1000:
-        return {}, []  # reported with the other types
+        return {}  # reported with the other types
     shipped = material_names()
     if name in shipped:
-        return material_priors(name), []
+        return material_priors(name)
     if not name.endswith(".toml"):
         words = f"unknown material '{name[:60]}'"
         # A slip of the pen only: the nearest name may be quite another steel.
@@ -122,44 +108,40 @@ def _material(
         hint = f"Did you mean '{near[0]}'? " if near else ""
         known = f"Shipped are: {', '.join(shipped)}"
         remedy = f"{hint}{known}; for another one give the path of a .toml file"
-        return {}, [toml.finding(words, remedy, key)]
-    try:
-        facts = read_priors(gear_path.parent / name, MATERIAL_UNITS, name)
-    except InputError as error:
-        return {}, list(error.findings)
+        raise toml.error(words, remedy, "gear.material")
+    facts = read_priors(folder / name, MATERIAL_UNITS, name)
     lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
-    words = "the material says nothing of " + " and ".join(lacking)
     if lacking:
+        words = "the material says nothing of " + " and ".join(lacking)
         remedy = 'Write a table for each, such as [poisson] family = "fixed"'
-        return {}, [Finding(name, words, remedy)]
+        raise InputError([Finding(name, words, remedy)])
     ratio = facts["poisson"]
     if ratio.family != "fixed" or not ratio.numbers[0] < 0.5:
         words, remedy = "is not a number below 0.5", 'Write family = "fixed"'
-        return {}, [Finding(name, words, remedy, None, "poisson")]
-    return facts, []
+        raise InputError([Finding(name, words, remedy, None, "poisson")])
+    return facts
 
 
-def _overrides(
-    toml: TomlFile,
-) -> tuple[dict[str, Prior], dict[str, Prior], list[Finding]]:
+def _given_priors(toml: TomlFile) -> tuple[dict[str, Prior], dict[str, Prior]]:
+    """Priors of the table [priors]: the gear's and the rig's, and the effects'."""
     given: dict[str, Prior] = {}
-    effects: dict[str, dict] = {}
-    findings: list[Finding] = []
+    tables: dict[str, dict] = {}
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
     table = toml.table.get("priors")
-    for name, entry in table.items() if isinstance(table, dict) else ():
-        effect, dot, parameter = name.partition(".")
-        if name in units:
-            prior, wrong = read_prior(entry, f"priors.{name}", toml, units[name])
-            findings += wrong
-            if prior is not None:
-                given[name] = prior
-        elif dot:
-            effects.setdefault(effect, {})[parameter] = entry
-        elif isinstance(entry, dict) and "family" not in entry:
-            effects.setdefault(name, {}).update(entry)
-        else:
-            remedy = nearest(name, list(units)) + "; or a table [priors.EFFECT]"
-            findings.append(toml.finding("unknown key", remedy, f"priors.{name}"))
-    found, wrong = read_effect_priors(effects, "priors", toml)
-    return given, found, findings + wrong
+    with Findings() as wrong:
+        for name, entry in table.items() if isinstance(table, dict) else ():
+            key = f"priors.{name}"
+            effect, dot, parameter = name.partition(".")
+            if name in units:
+                if prior := wrong.attempt(read_prior, entry, key, toml, units[name]):
+                    given[name] = prior
+            elif dot:
+                tables.setdefault(effect, {})[parameter] = entry
+            elif isinstance(entry, dict) and "family" not in entry:
+                tables.setdefault(name, {}).update(entry)
+            else:
+                remedy = nearest(name, list(units)) + "; or a table [priors.EFFECT]"
+                wrong.append(toml.finding("unknown key", remedy, key))
+        effects = wrong.attempt(read_effect_priors, tables, "priors", toml)
+    assert effects is not None
+    return given, effects

@@ -1,14 +1,14 @@
 """The schema of the gear file, and its errors in the user's words."""
 
 import math
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, get_args
+import re
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hdcal.data.case import Theory
 from hdcal.data.toml_file import TomlFile, nearest
-from hdcal.errors import Finding
+from hdcal.errors import Finding, InputError
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 _Size = Annotated[float, Field(gt=0.0, le=1e5)]
@@ -46,21 +46,32 @@ class GearFile(BaseModel):
     priors: dict[str, Any] = {}
 
 
-def translate(error: dict, toml: TomlFile) -> Finding:
+def check_schema(toml: TomlFile) -> GearFile:
+    """Return the tables of a gear file, typed.
+
+    Raises:
+        InputError: holds everything that is missing, unknown or of a wrong type.
+    """
+    try:
+        return GearFile.model_validate(toml.table)
+    except ValidationError as error:
+        findings = [_translate(dict(item), toml) for item in error.errors()]
+        raise InputError(findings) from None
+
+
+def _translate(error: dict, toml: TomlFile) -> Finding:
     """One of pydantic's errors in the words of the gear file."""
     key = ".".join(str(part) for part in error["loc"])
     kind, value = error["type"], error["input"]
     if kind == "extra_forbidden":
-        remedy = nearest(str(error["loc"][-1]), _known(error["loc"][:-1]))
-        return toml.finding("unknown key", remedy, key)
+        *table, name = error["loc"]
+        model: Any = GearFile.model_fields[table[0]].annotation if table else GearFile
+        return toml.finding("unknown key", nearest(name, list(model.model_fields)), key)
     if kind == "missing":
         return toml.finding("is missing", f"Add it: {_example(key)}", key)
     if kind == "literal_error":
-        choices = {"gear.theory": list(get_args(Theory))}
-        known = choices.get(key, ["radial", "diametral"])
-        return toml.finding(
-            f"unknown choice {value!r:.60}", nearest(str(value), known), key
-        )
+        remedy = nearest(str(value), re.findall(r"'(\w+)'", error["ctx"]["expected"]))
+        return toml.finding(f"unknown choice {value!r:.60}", remedy, key)
     if kind in ("greater_than", "greater_than_equal") and "temperature" in key:
         return toml.finding("is below absolute zero", "Write it in °C", key)
     if kind == "greater_than":
@@ -71,15 +82,6 @@ def translate(error: dict, toml: TomlFile) -> Finding:
         return toml.finding(words, "Check the number and its unit", key)
     words = error["msg"][:1].lower() + error["msg"][1:]
     return toml.finding(words, f"Write it like {_example(key)}", key)
-
-
-def _known(place: Sequence[object]) -> list[str]:
-    tables: dict[str, type[BaseModel]] = {
-        "gear": GearTable,
-        "measurement": MeasurementTable,
-    }
-    model = tables.get(str(place[0]), GearFile) if place else GearFile
-    return list(model.model_fields)
 
 
 def _example(key: str) -> str:

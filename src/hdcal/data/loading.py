@@ -44,10 +44,8 @@ class Motion:
 
 @dataclass(frozen=True)
 class _Move:
-    """One movement between two reversals: rows [start, stop) of its run."""
+    """One movement between two reversals."""
 
-    start: int
-    stop: int
     sign: int
     travel: float
     speed: float
@@ -113,7 +111,7 @@ def _one_run(
             rate[rows[part][own]] = np.where(moving, sign * local, 0.0)[own]
             speed = _typical(local[moving])
         travel = float(rising[-1] - rising[0])
-        moves.append(_Move(start, stop + 1, sign, travel, speed))
+        moves.append(_Move(sign, travel, speed))
         sign = -sign
     return moves
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.toml_file import TomlFile, nearest
 from hdcal.data.units import UnitError, to_code
-from hdcal.errors import Finding
+from hdcal.errors import Findings, InputError
 
 # A modulus of 207 is meant in GPa, a thermal coefficient of 3 in 1e-4/K and a mass of
 # 0.03 in kg, so these are never read without their unit.
@@ -25,7 +25,7 @@ _WORDS = ("family", "unit", "source", "note")
 
 def read_prior(
     entry: object, key: str, toml: TomlFile, unit: str | None = None
-) -> tuple[Prior | None, list[Finding]]:
+) -> Prior:
     """Read one entry such as `{ family = "normal", mean = 0.0, sd = 5.0 }`.
 
     Args:
@@ -35,27 +35,29 @@ def read_prior(
         unit: code unit of the parameter; None accepts any.
 
     Returns:
-        The prior in code units, or None and what is wrong.
+        The prior in code units.
+
+    Raises:
+        InputError: holds everything that is wrong with the entry.
     """
     if not isinstance(entry, dict):
         example = f'{{ family = "normal", mean = 0.0, sd = 1.0, unit = "{unit or 1}" }}'
         words = "is not a table with a family and its numbers"
-        return None, [toml.finding(words, f"Write {example}", key)]
+        raise toml.error(words, f"Write {example}", key)
     family = entry.get("family")
     if not isinstance(family, str) or family not in FAMILIES:
         words = "names no family" if family is None else f"unknown family '{family}'"
-        remedy = nearest(str(family), list(FAMILIES))
-        return None, [toml.finding(words, remedy, f"{key}.family")]
-    numbers, findings = _numbers(entry, family, key, toml)
-    scale, name, wrong = _unit(entry, key, toml, unit)
-    findings += wrong
-    if not findings and unit is not None:
-        findings += _support(family, numbers, key, toml)
-    if not findings and family == "beta" and scale != 1.0:
-        words, remedy = "a beta prior lies between 0 and 1", 'Write unit = "1"'
-        findings.append(toml.finding(words, remedy, f"{key}.unit"))
-    if findings:
-        return None, findings
+        raise toml.error(words, nearest(str(family), list(FAMILIES)), f"{key}.family")
+    with Findings() as wrong:
+        numbers = wrong.attempt(_numbers, entry, family, key, toml)
+        conversion = wrong.attempt(_conversion, entry, key, toml, unit)
+    assert numbers is not None and conversion is not None
+    scale, name = conversion
+    if unit is not None:
+        _check_sign(family, numbers, key, toml)
+    if family == "beta" and scale != 1.0:
+        words = "a beta prior lies between 0 and 1"
+        raise toml.error(words, 'Write unit = "1"', f"{key}.unit")
     said = [str(entry[word]) for word in ("source", "note") if word in entry]
     source = ". ".join(said) or f"given in {Path(toml.file).name}"
     # a logarithm's spread does not change with the unit
@@ -63,12 +65,11 @@ def read_prior(
         number if size in ("log_sd", "a", "b") else number * scale
         for size, number in zip(FAMILIES[family], numbers, strict=True)
     )
-    return Prior(family, scaled, name, source), []
+    return Prior(family, scaled, name, source)
 
 
-def _numbers(
-    entry: dict, family: str, key: str, toml: TomlFile
-) -> tuple[list[float], list[Finding]]:
+def _numbers(entry: dict, family: str, key: str, toml: TomlFile) -> list[float]:
+    """The family's numbers in their order, as written."""
     wanted = FAMILIES[family]
     findings = [
         toml.finding(
@@ -79,24 +80,23 @@ def _numbers(
         for extra in entry
         if extra not in (*wanted, *_WORDS)
     ]
-    numbers: list[float] = []
-    for size in wanted:
-        here = f"{key}.{size}"
-        number = _finite(entry.get(size))
-        numbers.append(number)
+    numbers = [_finite(entry.get(size)) for size in wanted]
+    for size, number in zip(wanted, numbers, strict=True):
         if size not in entry:
-            words = f"a {family} prior needs '{size}'"
-            findings.append(toml.finding(words, f"Write {size} = …", here))
+            words, remedy = f"a {family} prior needs '{size}'", f"Write {size} = …"
         elif math.isnan(number):
             words, remedy = "is not a finite number", "Write a plain number"
-            findings.append(toml.finding(words, remedy, here))
         elif size in _SIZES and number <= 0.0:
             words, remedy = f"{number:g} is not positive", "Write its size"
-            findings.append(toml.finding(words, remedy, here))
+        else:
+            continue
+        findings.append(toml.finding(words, remedy, f"{key}.{size}"))
     if family == "uniform" and not findings and numbers[0] >= numbers[1]:
         words = "low is not below high"
         findings.append(toml.finding(words, "Exchange them", f"{key}.low"))
-    return numbers, findings
+    if findings:
+        raise InputError(findings)
+    return numbers
 
 
 def _finite(value: object) -> float:
@@ -109,42 +109,38 @@ def _finite(value: object) -> float:
     return number if math.isfinite(number) else math.nan
 
 
-def _unit(
+def _conversion(
     entry: dict, key: str, toml: TomlFile, unit: str | None
-) -> tuple[float, str, list[Finding]]:
+) -> tuple[float, str]:
+    """Factor to the code unit, and its name."""
     here = f"{key}.unit"
     given = entry.get("unit")
     if given is None:
         example = _UNIT_NEEDED.get(key.rpartition(".")[2])
         if example is None or unit is None:
-            return 1.0, unit or "", []
-        words = "is given without a unit"
-        return 1.0, "", [toml.finding(words, f'Write unit = "{example}"', key)]
+            return 1.0, unit or ""
+        raise toml.error("is given without a unit", f'Write unit = "{example}"', key)
     try:
         if not isinstance(given, str):
             raise UnitError("the unit is not a text")
         scale, name = to_code(given)
     except UnitError as error:
         remedy = f'Write unit = "{unit}"' if unit else 'Write one such as "N/mm"'
-        return 1.0, "", [toml.finding(str(error), remedy, here)]
+        raise toml.error(str(error), remedy, here) from None
     if unit is not None and name != unit:
         words = f"'{given}' does not measure this"
-        remedy = f'Write a unit that converts to "{unit}"'
-        return 1.0, "", [toml.finding(words, remedy, here)]
-    return scale, name, []
+        raise toml.error(words, f'Write a unit that converts to "{unit}"', here)
+    return scale, name
 
 
-def _support(
-    family: str, numbers: list[float], key: str, toml: TomlFile
-) -> list[Finding]:
+def _check_sign(family: str, numbers: list[float], key: str, toml: TomlFile) -> None:
     """A parameter that is positive by nature gets no prior centred below zero."""
-    place = {"normal": 0, "fixed": 0, "uniform": 0}.get(family)
     name = key.rpartition(".")[2]
-    if place is None or name in _SIGNED:
-        return []
-    lowest = numbers[place]
+    if family not in ("normal", "fixed", "uniform") or name in _SIGNED:
+        return
+    lowest = numbers[0]
     if lowest > 0.0 or (family == "uniform" and lowest == 0.0):
-        return []
-    size = FAMILIES[family][place]
+        return
+    size = FAMILIES[family][0]
     words = f"{name} is positive, but {size} is {lowest:g}"
-    return [toml.finding(words, "Write a positive number", f"{key}.{size}")]
+    raise toml.error(words, "Write a positive number", f"{key}.{size}")

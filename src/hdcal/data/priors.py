@@ -1,30 +1,14 @@
 """Prior tables: a family, its numbers, a unit and a source for every parameter."""
 
+from functools import cache
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior import Prior as Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
 from hdcal.data.toml_file import TomlFile, nearest, read_toml
-from hdcal.errors import Finding, InputError
-
-__all__ = [
-    "DYNAMIC_UNITS",
-    "FAMILIES",
-    "MATERIAL_UNITS",
-    "MODEL_UNITS",
-    "SCALE_UNITS",
-    "Prior",
-    "dynamic_priors",
-    "effect_priors",
-    "material_names",
-    "material_priors",
-    "read_effect_priors",
-    "read_prior",
-    "read_priors",
-    "rig_priors",
-]
+from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
 
@@ -76,67 +60,69 @@ def read_priors(
     """
     toml = read_toml(source, file or source.name)
     found: dict[str, Prior] = {}
-    findings: list[Finding] = []
-    for key, entry in toml.table.items():
-        if key in ("name", "description"):
-            continue
-        if key not in units:
-            words = "unknown parameter"
-            findings.append(toml.finding(words, nearest(key, list(units)), key))
-            continue
-        prior, wrong = read_prior(entry, key, toml, units[key])
-        findings += wrong
-        if prior is not None:
-            found[key] = prior
-    if findings:
-        raise InputError(findings)
+    with Findings() as wrong:
+        for key, entry in toml.table.items():
+            if key in ("name", "description"):
+                continue
+            if key not in units:
+                remedy = nearest(key, list(units))
+                wrong.append(toml.finding("unknown parameter", remedy, key))
+            elif prior := wrong.attempt(read_prior, entry, key, toml, units[key]):
+                found[key] = prior
     return found
+
+
+@cache
+def _shipped(name: str) -> dict[str, Prior]:
+    moving = DYNAMIC_UNITS | {"mass_ratio": "1"}
+    units = {"rig": MODEL_UNITS | SCALE_UNITS, "dynamics": moving}
+    source = priors_folder() / f"{name}.toml"
+    return read_priors(source, units.get(name, MATERIAL_UNITS))
 
 
 def rig_priors() -> dict[str, Prior]:
     """Shipped priors of what is not the material: `MODEL_UNITS` and `SCALE_UNITS`."""
-    return read_priors(priors_folder() / "rig.toml", MODEL_UNITS | SCALE_UNITS)
+    return _shipped("rig").copy()
 
 
 def dynamic_priors() -> dict[str, Prior]:
     """Shipped priors of the moving gear: `DYNAMIC_UNITS`, mass as `mass_ratio`."""
-    units = {**DYNAMIC_UNITS, "mass_ratio": "1"}
-    return read_priors(priors_folder() / "dynamics.toml", units)
+    return _shipped("dynamics").copy()
 
 
 def effect_priors() -> dict[str, Prior]:
     """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
     toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
-    found, findings = read_effect_priors(toml.table, "", toml)
-    if findings:
-        raise InputError(findings)
-    return found
+    return read_effect_priors(toml.table, "", toml)
 
 
-def read_effect_priors(
-    tables: dict, prefix: str, toml: TomlFile
-) -> tuple[dict[str, Prior], list[Finding]]:
-    """Read tables of effects; their names are the business of a higher floor.
+def read_effect_priors(tables: dict, prefix: str, toml: TomlFile) -> dict[str, Prior]:
+    """Read tables of effects; physics knows their names, not this reader.
 
     Args:
         tables: effect -> parameter -> entry.
         prefix: dotted key of the tables, empty at the top.
         toml: the file they stand in.
+
+    Returns:
+        The priors by `effect.parameter`.
+
+    Raises:
+        InputError: holds everything that is wrong with the tables.
     """
     found: dict[str, Prior] = {}
-    findings: list[Finding] = []
-    for effect, parameters in tables.items():
-        key = ".".join(filter(None, (prefix, effect)))
-        if not isinstance(parameters, dict):
-            words, remedy = "is not a table of parameters", f"Write [{key}]"
-            findings.append(toml.finding(words, remedy, key))
-            continue
-        for parameter, entry in parameters.items():
-            prior, wrong = read_prior(entry, f"{key}.{parameter}", toml)
-            findings += wrong
-            if prior is not None:
-                found[f"{effect}.{parameter}"] = prior
-    return found, findings
+    with Findings() as wrong:
+        for effect, parameters in tables.items():
+            key = ".".join(filter(None, (prefix, effect)))
+            if not isinstance(parameters, dict):
+                words, remedy = "is not a table of parameters", f"Write [{key}]"
+                wrong.append(toml.finding(words, remedy, key))
+                continue
+            for parameter, entry in parameters.items():
+                place = f"{key}.{parameter}"
+                if prior := wrong.attempt(read_prior, entry, place, toml):
+                    found[f"{effect}.{parameter}"] = prior
+    return found
 
 
 def material_names() -> list[str]:
@@ -155,4 +141,4 @@ def material_priors(name: str) -> dict[str, Prior]:
     if name not in material_names():
         remedy = nearest(name, material_names())
         raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
-    return read_priors(priors_folder() / f"{name}.toml", MATERIAL_UNITS)
+    return _shipped(name).copy()

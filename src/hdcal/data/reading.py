@@ -1,17 +1,17 @@
 """Read one case: a table of measurements and the gear it was taken on."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hdcal.data.case import Case, Gear
+from hdcal.data.columns import Columns
 from hdcal.data.gear import read_gear
 from hdcal.data.loading import derive_motion
+from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
-from hdcal.data.table import Table, read_csv
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
@@ -39,39 +39,33 @@ def read_case(
     folder = data.is_dir()
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
-    findings: list[Finding] = []
-    table = found = None
-    try:
-        table = read_csv(csv_path, columns)
-    except InputError as error:
-        findings += error.findings
-    try:
+    with Findings() as wrong:
+        measured = wrong.attempt(read_measurements, csv_path, columns)
+        found = None
         if gear is None and not gear_path.exists():
-            raise InputError([_no_gear(data)])
-        found = read_gear(gear_path, theory)
-    except InputError as error:
-        findings += error.findings
-    if table is not None and found is not None:
-        findings += _too_far(table, found, str(csv_path))
-    if findings or table is None or found is None:
-        raise InputError(findings)
+            wrong.append(_no_gear(data))
+        else:
+            found = wrong.attempt(read_gear, gear_path, theory)
+        if measured is not None and found is not None:
+            wrong += _too_far(measured.columns, found)
+    assert measured is not None and found is not None
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
         gear=found,
-        records=_records(table, found),
-        run_labels=table.run_labels,
-        specimen_labels=table.specimen_labels,
-        data_sha256=table.sha256,
-        notes=table.notes + _off_scale(table.values["force"], found),
+        records=_records(measured, found),
+        run_labels=measured.run.names,
+        specimen_labels=measured.specimen.names,
+        data_sha256=measured.columns.sha256,
+        notes=(*_left_out(measured.columns), *_off_scale(measured, found)),
     )
 
 
-def _records(table: Table, gear: Gear) -> Records:
-    values, size = table.values, len(table.rows)
-    zeros = np.zeros(size)
-    motion = derive_motion(values["deformation"], table.run, values.get("time"))
+def _records(measured: Measurements, gear: Gear) -> Records:
+    values, run = measured.columns.values, measured.run.index
+    zeros = np.zeros(len(run))
+    motion = derive_motion(values["deformation"], run, values.get("time"))
     # NumPy arrays: JAX takes them when it computes, and reading starts no device
-    fields: dict[str, Any] = dict(
+    return Records(
         deformation=values["deformation"],
         temperature=values.get("temperature", zeros + gear.reference_temperature),
         time=values.get("time", zeros),
@@ -79,52 +73,57 @@ def _records(table: Table, gear: Gear) -> Records:
         direction=motion.direction,
         sense=motion.sense,
         rate=motion.rate,
-        run=table.run,
-        specimen=table.specimen,
+        run=run,
+        specimen=measured.specimen.index,
         force=values["force"],
         force_sd=values.get("force_sd", zeros),
+        known=motion.features | _known(measured),
     )
-    return Records(**fields, known=motion.features | _measured(table))
 
 
-def _measured(table: Table) -> frozenset[str]:
-    columns = ("temperature", "time", "angle", "force_sd")
-    known = {name for name in columns if name in table.values}
-    if "force_sd" in known and not table.values["force_sd"].any():
+def _known(measured: Measurements) -> frozenset[str]:
+    values = measured.columns.values
+    known = {"temperature", "time", "angle", "force_sd"} & values.keys()
+    if "force_sd" in known and not values["force_sd"].any():
         known.remove("force_sd")  # a column of zeros says that nothing is known
-    for name, labels in (
-        ("run", table.run_labels),
-        ("specimen", table.specimen_labels),
-    ):
-        if len(labels) > 1:
+    for name, labels in (("run", measured.run), ("specimen", measured.specimen)):
+        if len(labels.names) > 1:
             known.add(name)
-        if len(labels) >= MANY:
+        if len(labels.names) >= MANY:
             known.add(name + "s")
     return frozenset(known)
 
 
-def _too_far(table: Table, gear: Gear, file: str) -> list[Finding]:
+def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
     limit = float(gear.geometry.radius) * (2 if gear.reading == "diametral" else 1)
-    size = np.abs(table.values["deformation"])
+    size = np.abs(columns.values["deformation"])
     if size.max() < limit:
         return []
     words = (
         f"a deformation of {size.max():g} mm on a radius of {gear.geometry.radius:g} mm"
     )
     remedy = "Check the unit of the column and the radius in the gear file"
-    row = int(table.rows[int(size.argmax())])
-    return [Finding(file, words, remedy, row, table.headers["deformation"])]
+    row = int(columns.table.rows[int(size.argmax())])
+    file, header = columns.findings.file, columns.used["deformation"].header
+    return [Finding(file, words, remedy, row, header)]
 
 
-def _off_scale(force: np.ndarray, gear: Gear) -> tuple[str, ...]:
-    step = gear.force_resolution
-    if not step:
-        return ()
-    counts = force / step
-    off = int((np.abs(counts - np.round(counts)) > 0.02).sum())
-    if not off:
-        return ()
-    return (f"{off} of {force.size} forces are not multiples of {step:g} N",)
+def _left_out(columns: Columns) -> Iterator[str]:
+    positions = {column.position for column in columns.used.values()}
+    headers = enumerate(columns.table.headers)
+    extra = [f"'{header}'" for place, header in headers if place not in positions]
+    if extra:
+        yield f"columns not used: {', '.join(extra)}"
+    if skipped := columns.table.skipped:
+        yield f"{skipped} empty lines between the readings were skipped"
+
+
+def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:
+    step, force = gear.force_resolution, measured.columns.values["force"]
+    if step:
+        off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
+        if off:
+            yield f"{off} of {force.size} forces are not multiples of {step:g} N"
 
 
 def _no_gear(data: Path) -> Finding:

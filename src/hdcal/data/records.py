@@ -6,20 +6,45 @@ are consistent, so nothing below the reading edge converts.
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float, Int
-
-# The one place where double precision is switched on: every module that computes
-# imports the records first. A product of stiffness and deformation with relative
-# error 1e-7 is larger than the posterior sd at a million rows.
-jax.config.update("jax_enable_x64", True)
 
 # Measured on the reading edge as NumPy arrays, traced as JAX arrays.
 Array = jax.Array | np.ndarray
 
 
+def _use_double_precision(made: eqx.Module) -> None:
+    """Switch JAX to double precision for the whole process, unless it already is.
+
+    A product of stiffness and deformation with relative error 1e-7 is larger than the
+    posterior sd at a million rows. Importing hdcal changes nothing: every computation
+    begins with a `Geometry` or `Records`, and making one of those calls this.
+
+    Args:
+        made: the object that is being made.
+
+    Raises:
+        RuntimeError: it is made within what JAX compiles or differentiates, whose
+            arguments are in single precision already.
+    """
+    if jax.config.read("jax_enable_x64"):
+        return
+    leaves = [jnp.zeros(()), *jax.tree.leaves(made)]
+    if any(isinstance(leaf, Tracer) for leaf in leaves):
+        raise RuntimeError(
+            f"a {type(made).__name__} switches JAX to double precision, too late "
+            "within what is compiled or differentiated: make one before, or call "
+            'jax.config.update("jax_enable_x64", True)'
+        )
+    jax.config.update("jax_enable_x64", True)
+
+
 class Geometry(eqx.Module):
     """Size of the flexspline; every leaf may be differentiated.
+
+    Making one switches JAX to double precision.
 
     Attributes:
         wall_thickness: δ [mm].
@@ -35,9 +60,14 @@ class Geometry(eqx.Module):
     load_height: Float[Array, ""] | float
     poisson: Float[Array, ""] | float
 
+    def __check_init__(self) -> None:
+        _use_double_precision(self)
+
 
 class Records(eqx.Module):
     """Rows in the order they were taken; absent covariates hold neutral values.
+
+    Making one switches JAX to double precision.
 
     Attributes:
         deformation: as read [mm], radial or diametral by the gear file.
@@ -68,3 +98,6 @@ class Records(eqx.Module):
     force: Float[Array, " n"]
     force_sd: Float[Array, " n"]
     known: frozenset[str] = eqx.field(static=True)
+
+    def __check_init__(self) -> None:
+        _use_double_precision(self)

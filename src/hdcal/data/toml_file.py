@@ -4,6 +4,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
@@ -11,8 +12,9 @@ from hdcal.errors import Finding, InputError
 
 LARGEST = 1 << 20
 
-_TABLE = re.compile(r"\s*\[\[?\s*(?P<name>[^\[\]]+?)\s*\]\]?\s*(#.*)?")
-_KEY = re.compile(r"\s*(?P<name>[\w.\"'-]+(\s*\.\s*[\w\"'-]+)*)\s*=")
+# of lines without blanks around them
+_TABLE = re.compile(r"\[\[?(?P<name>[^\[\]]+)\]\]?\s*(#.*)?")
+_KEY = re.compile(r"[\w\"'-]+")
 _PLACE = re.compile(r"\s*\(at line (?P<row>\d+), column \d+\)")
 
 
@@ -23,30 +25,42 @@ class TomlFile:
     Attributes:
         file: how the user named it.
         table: its content.
-        lines: its text.
+        text: as it stands in the file.
     """
 
     file: str
     table: dict
-    lines: tuple[str, ...]
+    text: str
 
     def finding(self, problem: str, remedy: str, key: str) -> Finding:
         """A finding about a dotted key, with its line where that is found."""
         return Finding(self.file, problem, remedy, self.row(key), key)
 
+    def error(self, problem: str, remedy: str, key: str) -> InputError:
+        """An error of that one finding."""
+        return InputError([self.finding(problem, remedy, key)])
+
     def row(self, key: str) -> int | None:
         """Line of a dotted key, or of the innermost table around it."""
-        best, row, table = "", None, ""
-        for number, line in enumerate(self.lines, 1):
-            if match := _TABLE.fullmatch(line):
-                table = here = _bare(match["name"])
-            elif match := _KEY.match(line):
-                here = ".".join(filter(None, (table, _bare(match["name"]))))
+        while key and key not in self._rows:
+            key = key.rpartition(".")[0]
+        return self._rows.get(key)
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        rows: dict[str, int] = {}
+        table = ""
+        for number, line in enumerate(map(str.strip, self.text.splitlines()), 1):
+            name, sign, _ = line.partition("=")
+            if header := _TABLE.fullmatch(line):
+                here = table = _bare(header["name"])
+            elif sign and all(_KEY.fullmatch(part.strip()) for part in name.split(".")):
+                here = ".".join(filter(None, (table, _bare(name))))
             else:
                 continue
-            if len(here) > len(best) and (key == here or key.startswith(here + ".")):
-                best, row = here, number
-        return row
+            if here:
+                rows.setdefault(here, number)
+        return rows
 
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
@@ -87,7 +101,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
         raise _refusal(file, words, "Mend that line", row) from None
-    return TomlFile(file, table, tuple(text.splitlines()))
+    return TomlFile(file, table, text)
 
 
 def nearest(name: str, known: list[str], what: str = "Known are") -> str:

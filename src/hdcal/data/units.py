@@ -1,11 +1,12 @@
-"""The one place where units are converted: at the edge, into mm, N, s, K, rad.
+"""The one place where units are read and converted: at the edge, by Pint.
 
-Units that hdcal's own files and columns use stand in a table, so that the usual
-case never pays for importing pint; pint answers for every other name.
+Inside hdcal everything is in mm, N, s, K (a temperature in °C) and rad.
 """
 
 import math
 import re
+from collections.abc import Iterable
+from fractions import Fraction
 from functools import cache
 from typing import Any
 
@@ -29,35 +30,10 @@ _ALIASES = {
     "°F": "F",
     "°": "deg",
 }
+_PINT_NAMES = {"C": "degC", "F": "degF"}  # coulomb and farad to Pint
 
-Powers = tuple[int, int, int, int]  # of N, mm, s, K
-
-_ATOMS: dict[str, tuple[float, Powers]] = {
-    "N": (1.0, (1, 0, 0, 0)),
-    "kN": (1e3, (1, 0, 0, 0)),
-    "kgf": (9.80665, (1, 0, 0, 0)),
-    "lbf": (4.4482216152605, (1, 0, 0, 0)),
-    "mm": (1.0, (0, 1, 0, 0)),
-    "um": (1e-3, (0, 1, 0, 0)),
-    "m": (1e3, (0, 1, 0, 0)),
-    "in": (25.4, (0, 1, 0, 0)),
-    "s": (1.0, (0, 0, 1, 0)),
-    "ms": (1e-3, (0, 0, 1, 0)),
-    "min": (60.0, (0, 0, 1, 0)),
-    "K": (1.0, (0, 0, 0, 1)),
-    # in a prior's unit a degree is a difference, never a point on the scale
-    "degC": (1.0, (0, 0, 0, 1)),
-    "°C": (1.0, (0, 0, 0, 1)),
-    "degF": (5 / 9, (0, 0, 0, 1)),
-    "rad": (1.0, (0, 0, 0, 0)),
-    "deg": (math.pi / 180, (0, 0, 0, 0)),
-    "%": (1e-2, (0, 0, 0, 0)),
-    "Pa": (1e-6, (1, -2, 0, 0)),
-    "MPa": (1.0, (1, -2, 0, 0)),
-    "GPa": (1e3, (1, -2, 0, 0)),
-    "kg": (1e-3, (1, -1, 2, 0)),
-}
-
+_CODE_UNITS = ("N", "mm", "s", "K")
+_DIMENSIONS = ("[mass]", "[length]", "[time]", "[temperature]")
 _NUMBER = re.compile(r"\d+(\.\d*)?([eE][+-]?\d{1,2})?", re.ASCII)
 _FACTOR = re.compile(r"(?P<name>[^\W\d]+|°C|%)((\^|\*\*)(?P<power>-?[1-9]))?")
 
@@ -67,9 +43,12 @@ class UnitError(ValueError):
 
 
 def known_unit(quantity: str, unit: str) -> str | None:
-    """Canonical spelling of a column's unit, or None when it is not one."""
+    """Canonical spelling of a column's unit, or None when it is not one.
+
+    A quantity without units, such as a label, has the empty one.
+    """
     unit = _ALIASES.get(unit, unit)
-    return unit if unit in COLUMN_UNITS[quantity] else None
+    return unit if unit in COLUMN_UNITS.get(quantity, ("",)) else None
 
 
 def column_to_code(values: np.ndarray, quantity: str, unit: str) -> np.ndarray:
@@ -83,16 +62,20 @@ def column_to_code(values: np.ndarray, quantity: str, unit: str) -> np.ndarray:
     Returns:
         Values in mm, N, °C, s or rad, shape (n,).
     """
-    if quantity == "temperature":
-        if unit == "K":
-            return values - 273.15
-        return (values - 32.0) * (5 / 9) if unit == "F" else values
-    factor = _ATOMS[unit][0]
-    return values if factor == 1.0 else values * factor
+    code = COLUMN_UNITS[quantity][0]
+    if unit == code:
+        return values
+    here, there = (_PINT_NAMES.get(name, name) for name in (unit, code))
+    quantity_of = _registry().Quantity
+    zero = quantity_of(Fraction(0), there).to(here).magnitude
+    scale = quantity_of(zero + 1, here).to(there).magnitude
+    return (values - float(zero)) * float(scale)
 
 
 def to_code(unit: str) -> tuple[float, str]:
     """Read a unit such as `GPa`, `1e-4/K` or `N*s/mm^2`.
+
+    A degree is a difference here, never a point on the scale.
 
     Returns:
         The factor that takes a number in `unit` to code units, and the name of
@@ -103,7 +86,7 @@ def to_code(unit: str) -> tuple[float, str]:
     """
     if len(unit) > 60:
         raise UnitError("the unit is longer than any unit can be")
-    factor, powers = 1.0, np.zeros(4, int)
+    factor, powers = 1.0, np.zeros(len(_CODE_UNITS), int)
     sign = 1
     text = unit.replace(" ", "").replace("·", "*")
     # "**" is a power, a single "*" or "/" joins factors
@@ -111,68 +94,66 @@ def to_code(unit: str) -> tuple[float, str]:
         if part in ("*", "/"):
             sign = 1 if part == "*" else -1
             continue
-        scale, exponents = _factor(part, unit)
+        scale, own = _factor(part, unit)
         factor *= scale**sign
-        powers += sign * np.array(exponents)
+        powers += sign * own
     if not (0.0 < factor < math.inf):
         raise UnitError(f"'{unit}' is not a usable scale")
     return factor, _name(powers)
 
 
-def _factor(part: str, unit: str) -> tuple[float, Powers]:
+def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
+    """Scale of one factor, and its powers of the code units.
+
+    The grammar is that of a product and no more: Pint would evaluate any sum.
+    """
     if _NUMBER.fullmatch(part):
         scale = float(part)
         if not scale > 0.0:
             raise UnitError(f"'{unit}' has a scale of zero")
-        return scale, (0, 0, 0, 0)
+        return scale, np.zeros(len(_CODE_UNITS), int)
     match = _FACTOR.fullmatch(part)
     if match is None:
         raise UnitError(f"'{unit}' is not a unit")
     scale, powers = _atom(match["name"])
     power = int(match["power"] or 1)
-    a, b, c, d = powers
-    return scale**power, (a * power, b * power, c * power, d * power)
-
-
-def _atom(name: str) -> tuple[float, Powers]:
-    name = name if name == "°C" else _ALIASES.get(name, name)
-    if name in _ATOMS:
-        return _ATOMS[name]
-    return _from_pint(name)
-
-
-def _from_pint(name: str) -> tuple[float, Powers]:
-    import pint
-
-    try:
-        unit: Any = _registry().parse_units(name)
-        base = (1.0 * unit).to_base_units()
-        scale = float(base.magnitude)
-        dimension = {k: int(v) for k, v in base.dimensionality.items()}
-    except (pint.PintError, AttributeError, ValueError, TypeError, KeyError) as error:
-        raise UnitError(f"'{name}' is not a unit") from error
-    mass, length = dimension.pop("[mass]", 0), dimension.pop("[length]", 0)
-    time, kelvin = dimension.pop("[time]", 0), dimension.pop("[temperature]", 0)
-    if dimension:
-        raise UnitError(f"'{name}' is not a mechanical unit")
-    # kg = 1e-3 N s²/mm and m = 1e3 mm
-    scale *= 1e-3**mass * 1e3**length
-    return scale, (mass, length - mass, time + 2 * mass, kelvin)
+    return scale**power, powers * power
 
 
 @cache
-def _registry():
+def _atom(name: str) -> tuple[float, np.ndarray]:
     import pint
 
-    return pint.UnitRegistry()
+    quantity = _registry().Quantity
+    try:
+        # from zero to one of the unit: for degrees the zero is not the absolute one
+        zero, one = (quantity(Fraction(n), name).to_root_units() for n in (0, 1))
+        step, dimensions = one - zero, dict(one.dimensionality)
+    except (pint.PintError, AttributeError, ValueError, TypeError, KeyError) as error:
+        raise UnitError(f"'{name}' is not a unit") from error
+    mass, length, time, kelvin = (dimensions.pop(key, 0) for key in _DIMENSIONS)
+    powers = [mass, length - mass, time + 2 * mass, kelvin]
+    if dimensions or any(power % 1 for power in powers):
+        raise UnitError(f"'{name}' is not a mechanical unit")
+    # exact until this last step, which rounds once
+    return float(step.to(_name(powers)).magnitude), np.array(powers, int)
 
 
-def _name(powers: np.ndarray) -> str:
+def _name(powers: Iterable[int]) -> str:
+    """The code unit of these powers of N, mm, s and K."""
     if tuple(powers) == (1, -2, 0, 0):
         return "MPa"
     above, below = [], []
-    for name, power in zip(("N", "mm", "s", "K"), powers, strict=True):
+    for name, power in zip(_CODE_UNITS, powers, strict=True):
         size = "" if abs(power) == 1 else f"^{abs(power)}"
         if power:
             (above if power > 0 else below).append(name + size)
     return "/".join(["*".join(above) or "1", *below])
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    exact: Any = Fraction  # Pint's own hint says float
+    return pint.UnitRegistry(non_int_type=exact)

@@ -1,147 +1,234 @@
-"""What a design comes to, in sentences for somebody who designs gears."""
+"""The reports of a wave generator and of an inverse design."""
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 
-from hdcal.design.sizes import named
-from hdcal.report.words import estimate, number, percent
+from hdcal.design.answer import (
+    CandidateAnswer,
+    DesignAnswer,
+    GeneratorAnswer,
+    InverseAnswer,
+)
+from hdcal.design.sentences import generator_words, inverse_details, nearness
+from hdcal.report.document import (
+    Document,
+    Facts,
+    Notice,
+    Picture,
+    Section,
+    Table,
+    Text,
+    notices,
+)
+from hdcal.report.parameters import Interval
+from hdcal.report.provenance import THEORY_WORDS
+from hdcal.report.words import estimate, unit
 
-
-def generator_words(found: dict) -> Iterator[str]:
-    """Yield what the wave generator has to be.
-
-    Args:
-        found: from `summarise_generator`.
-    """
-    asked, spring, aim = found["asked"], found["spring"], found["set_point"]
-    low, high = asked["window_mm"]
-    middle, span = estimate(aim["force_N"])
-    yield (
-        f"To hold the gear at {aim['deformation_mm']:.4g} mm each side has to press "
-        f"with {middle} N ({percent(found['interval'])} {_kind(found)} {span} N) at "
-        f"{aim['temperature_C']:g} °C."
-    )
-    softest = "any spring does, down to the softest considered: "
-    if not spring["softest_considered"]:
-        softest = "the softest spring that does it has "
-    yield (
-        f"With one set point for every gear, {softest}"
-        f"{number(spring['rate_N_per_mm'])} N/mm, {number(spring['rate_over_gear'])} "
-        f"times the gear's own stiffness. Its free end stands "
-        f"{number(spring['interference_mm'])} mm beyond the undeformed gear."
-    )
-    yield (
-        f"It keeps {low:g} … {high:g} mm at {_warmth(asked['temperature_C'])} with "
-        f"probability {_chance(spring)} (required {asked['probability']:g}): no "
-        f"backlash {_share(spring['zero_backlash'])}, no jam "
-        f"{_share(spring['no_jam'])}."
-    )
-    yield _adjusting(found)
-    yield _stress(found["stress"], f"At {high:g} mm")
-
-
-def _adjusting(found: dict) -> str:
-    own = found["adjusted"]
-    (x, y), (force, more) = own["interference_mm"], own["preload_N"]
-    share = percent(own["share_of_gears"])
-    return (
-        f"Adjusted gear by gear with that spring, the set point has to reach from "
-        f"{number(x, y - x)} to {number(y, y - x)} mm, that is a preload of "
-        f"{number(force, more - force)} to {number(more, more - force)} N, to serve "
-        f"{share} of the gears; the window is then kept with probability "
-        f"{_share(own['probability'])}."
-    )
+HEADINGS = {
+    "material": "material",
+    "wall_thickness_mm": "wall thickness [mm]",
+    "radius_mm": "radius [mm]",
+    "length_mm": "length [mm]",
+    "load_height_mm": "load height [mm]",
+    "deformation_mm": "deformation [mm]",
+    "temperature_C": "temperature [°C]",
+}
+_BALANCE = (
+    "Left: force of gear and spring over deformation; they rest where the lines cross. "
+    "Right: probability that the gear stays in the window at all temperatures. A soft "
+    "spring holds the force, so that every gear finds its own deformation; a stiff one "
+    "holds the deformation, and passes on every error of its own."
+)
+_LIMIT = (
+    "Force over the free sizes, the limit, and the design that keeps it with the least "
+    "change. Of three sizes and more, the first two at the chosen value of the others."
+)
+_PROFILE = (
+    "The ring that two opposed loads deform: displacement, bending moment and stress "
+    "over half a turn. Lines: closed form; dots: the series cut after three terms."
+)
 
 
-def inverse_words(found: dict) -> Iterator[str]:
-    """Yield which sizes keep the limit.
+def generator_document(found: GeneratorAnswer, command: str = "") -> Document:
+    """Return the report of a wave generator; its pictures are design and profile.
 
     Args:
-        found: from `summarise_inverse`.
+        found: from `generator_answer`.
+        command: how the result was made.
     """
-    asked, best, tested = found["asked"], found["design"], found["tested"]
-    sizes = ", ".join(
-        f"{name.replace('_', ' ')} {value:.4g} mm"
-        for name, value in best["sizes_mm"].items()
-    )
-    what = " with ".join(filter(None, (best["material"], sizes)))
-    yield (
-        f"{what} keeps {asked['limit_force_N']:g} N at {asked['deformation_mm']:g} mm "
-        f"and {_warmth(asked['temperature_C'])} with probability {_chance(best)} "
-        f"(required {asked['probability']:g}). Of all that keep the limits its sizes "
-        f"are the nearest to those of {_own(found)}."
-    )
-    middle, span = estimate(best["force_N"])
-    yield (
-        f"Its force is {middle} N ({percent(found['interval'])} {_kind(found)} {span} "
-        f"N). {_own(found).capitalize()} takes {estimate(tested['force_N'])[0]} N and "
-        f"keeps the limit with probability {_share(tested['probability'])}."
-    )
-    yield _stress(best, f"At {asked['deformation_mm']:g} mm")
-    if asked["limit_stress_MPa"] is not None:
-        yield f"The stress was kept below {asked['limit_stress_MPa']:g} MPa."
-    elif best["yield_MPa"] is None:
-        yield (
-            "The material's file names no yield strength: the stress was not limited. "
-            "Say --limit-stress."
-        )
-    slopes = found["elasticities"]
-    parts = [
-        f"{name.removesuffix('_mm').replace('_', ' ')} {value:+.2f} %"
-        for name, value in slopes.items()
-        if abs(value) > 1e-9
+    sections = [
+        _about(found.population),
+        picture("design", "Spring and gear", _BALANCE),
+        picture("profile", "Shape, moment and stress", _PROFILE),
+        _by_temperature(found),
+        _asked(asdict(found.asked)),
     ]
-    yield f"One per cent more of each changes this force by: {', '.join(parts)}."
-
-
-def _stress(entry: dict, where: str) -> str:
-    middle, span = estimate(entry["stress_MPa"])
-    text = (
-        f"{where} the smooth wall bends with {middle} MPa under the load ({span} MPa)"
-    )
-    if entry["utilisation"] is not None:
-        text += f", {percent(entry['utilisation']['median'])} of its yield strength"
-    return (
-        f"{text}. This is from the imposed shape; notches at the teeth are not in it."
+    return design_document(
+        found, "elastic wave generator", list(generator_words(found)), sections, command
     )
 
 
-def study_words(found: dict) -> Iterator[str]:
-    """Yield what the study spans.
+def inverse_document(found: InverseAnswer, command: str = "") -> Document:
+    """Return the report of an inverse design; its pictures are design and profile.
 
     Args:
-        found: from `summarise_study`.
+        found: from `inverse_answer`.
+        command: how the result was made.
     """
-    force = found["columns"]["force_median_N"]
-    varied = " and ".join(map(named, found["varied"])) or "nothing"
-    yield (
-        f"{len(force)} designs, varying {varied}: median force "
-        f"{number(min(force))} … {number(max(force))} N."
+    free = [picture("design", "Force and limit", _LIMIT)] if found.asked.bounds else []
+    sections = [
+        _about(found.population),
+        *free,
+        picture("profile", "Shape, moment and stress", _PROFILE),
+        _candidates(found),
+        _asked(asdict(found.asked)),
+    ]
+    words = [nearness(found), *inverse_details(found)]
+    return design_document(found, "inverse geometry", words, sections, command)
+
+
+def design_document(
+    found: DesignAnswer,
+    kind: str,
+    answers: Sequence[str],
+    sections: Sequence[Section],
+    command: str,
+) -> Document:
+    """Return the report of a design or study.
+
+    Args:
+        found: tells the gear, what is taken for granted and what is extrapolated.
+        kind: what it is.
+        answers: sentences after the headline.
+        sections: the evidence.
+        command: how the result was made.
+    """
+    gear = found.gear
+    prior = (
+        "No gear was measured. Every number on this page is what is believed before "
+        "any data."
     )
-    yield f"Bands are {percent(found['interval'])} {found['interval_kind']}s."
-
-
-def _own(found: dict) -> str:
-    return (
-        "the tested gear" if found["basis"] == "posterior" else "the gear of the file"
+    facts = [
+        ("gear", gear.name),
+        ("material", gear.material),
+        ("theory", f"{gear.theory} ({THEORY_WORDS.get(gear.theory, '')})"),
+        ("draws", f"{found.draws} of the {found.basis}"),
+    ]
+    return Document(
+        name=gear.name,
+        kind=kind,
+        subtitle=f"{kind.capitalize()}, theory “{gear.theory}”.",
+        headline=found.headline,
+        answers=answers,
+        next_steps=[] if found.next_step is None else [found.next_step],
+        notices=[
+            *notices(
+                ("Prior only", [prior] if found.basis == "prior" else []),
+                ("To be aware of", found.warnings),
+            ),
+            Notice("What this takes for granted", found.assumptions, "good"),
+        ],
+        sections=sections,
+        provenance=facts + ([("command", command)] if command else []),
     )
 
 
-def _kind(found: dict) -> str:
-    return found["interval_kind"].removeprefix("equal-tailed ")
+def picture(name: str, heading: str, caption: str) -> Section:
+    """Return a section of one picture."""
+    return Section(heading, [Picture(name, heading, caption)])
 
 
-def _warmth(levels) -> str:
-    low, high = min(levels), max(levels)
-    return f"{low:g} °C" if low == high else f"{low:g} … {high:g} °C"
+def band(found: DesignAnswer) -> str:
+    """Return what the intervals are called."""
+    return f"{100 * found.interval:g} % {found.interval_kind}"
 
 
-def _chance(entry: dict) -> str:
-    error = entry["standard_error"]
-    return _share(entry["probability"]) + (f" ± {error:.2g}" if error else "")
+def _about(population: str) -> Section:
+    return Section("About", [Text(population)], brief=True)
 
 
-def _share(value: float) -> str:
-    """Return a probability; what was always so among the draws is not certain."""
-    if value > 0.9995:
-        return "above 0.999"
-    return "below 0.001" if value < 0.0005 else f"{value:.4g}"
+def _by_temperature(found: GeneratorAnswer) -> Section:
+    rows = [
+        [
+            f"{force.temperature_C:g} °C",
+            *map(_with_span, (force.at_lo, force.at_middle, force.at_hi)),
+            *(f"{p:.4g}" for p in (place.zero_backlash, place.no_jam, place.inside)),
+        ]
+        for force, place in zip(found.force_N, found.at_temperature, strict=True)
+    ]
+    low, high = found.asked.window_mm
+    numbers = [
+        f"force at {low:g} mm [N]",
+        "in the middle [N]",
+        f"at {high:g} mm [N]",
+        "no backlash",
+        "no jam",
+        "inside",
+    ]
+    table = Table(["temperature", *numbers], rows, frozenset(numbers))
+    words = f"Median : {band(found)}; probabilities with one set point for all."
+    return Section("By temperature", [table, Text(words, soft=True)])
+
+
+def _with_span(interval: Interval) -> str:
+    return " : ".join(estimate(interval))
+
+
+def _candidates(found: InverseAnswer) -> Section:
+    names = list(found.asked.bounds)
+    listed = [("tested gear", found.tested)]
+    listed += [
+        ("chosen" if one == found.design else "considered", one)
+        for one in found.candidates
+    ]
+    numbers = [
+        *(HEADINGS[name] for name in names),
+        "force [N]",
+        "keeps the limit",
+        "stress [MPa]",
+        "of yield",
+    ]
+    table = Table(
+        ["", "material", *numbers, "met"],
+        [[what, *_candidate(one, names)] for what, one in listed],
+        frozenset(numbers),
+    )
+    note = Text(f"Median : {band(found)}.", soft=True)
+    return Section("Designs", [table, note])
+
+
+def _candidate(one: CandidateAnswer, names: Sequence[str]) -> list[str]:
+    sizes = [one.sizes_mm.get(name.removesuffix("_mm")) for name in names]
+    used = one.utilisation
+    return [
+        one.material,
+        *("as tested" if size is None else f"{size:.4g}" for size in sizes),
+        _with_span(one.force_N),
+        f"{one.probability:.4g}",
+        _with_span(one.stress_MPa),
+        "–" if used is None else f"{100 * used.median:.3g} %",
+        "yes" if one.met else "no",
+    ]
+
+
+def _asked(asked: Mapping[str, object]) -> Section:
+    rows = [(_name(name), _value(value)) for name, value in asked.items()]
+    return Section("What was asked", [Facts(rows)])
+
+
+def _name(name: str) -> str:
+    words, _, last = name.rpartition("_")
+    if last not in ("mm", "C", "N", "MPa"):
+        return name.replace("_", " ")
+    return f"{words.replace('_', ' ')} [{unit(last)}]"
+
+
+def _value(value) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, Mapping):
+        ranges = (f"{n.replace('_', ' ')} {_value(v)}" for n, v in value.items())
+        return "; ".join(ranges) or "–"
+    if isinstance(value, tuple):
+        return " … ".join(f"{v:g}" for v in value)
+    return f"{value:g}"

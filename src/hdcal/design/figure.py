@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from hdcal.data.records import Geometry
 from hdcal.design.candidate import spreads
+from hdcal.design.design_draws import Basis
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sizes import named
 from hdcal.design.wave_generator import WaveGenerator, gear_forces
@@ -29,6 +30,32 @@ from hdcal.report.canvas import (
 _TAILS = (0.025, 0.5, 0.975)
 # Points along a curve, and along each side of a map.
 _FINE, _COARSE = 41, 21
+
+
+def generator_figures(found: WaveGenerator) -> dict[str, Figure]:
+    """Return the figures of a wave generator by name.
+
+    Args:
+        found: from `wave_generator`.
+    """
+    ring, at = found.basis.gear.geometry, 0.5 * sum(found.window)
+    shape = profile_figure(ring, _modulus(found.basis), at)
+    return {"design": generator_figure(found), "profile": shape}
+
+
+def inverse_figures(found: InverseDesign) -> dict[str, Figure]:
+    """Return the figures of an inverse design by name.
+
+    Args:
+        found: from `inverse_design`; where no size is free there is no map.
+    """
+    modulus = _modulus(found.chosen.basis)
+    shape = {"profile": profile_figure(found.drawing, modulus, found.deformation)}
+    return ({"design": inverse_figure(found)} if found.bounds else {}) | shape
+
+
+def _modulus(basis: Basis) -> float:
+    return float(np.median(np.asarray(basis.values["E0"])))
 
 
 def generator_figure(found: WaveGenerator) -> Figure:

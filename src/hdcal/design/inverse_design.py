@@ -28,10 +28,9 @@ from hdcal.design.checks import (
 from hdcal.design.design_draws import Basis, basis_of
 from hdcal.design.force_limit import Target
 from hdcal.design.next_gear import NextGear, next_gear
+from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import (
     SIZES,
-    beyond_tested,
-    far_from_tested,
     geometry_with,
     named,
     with_reference,
@@ -80,6 +79,13 @@ class InverseDesign:
     def drawing(self) -> Geometry:
         """The chosen gear's sizes [mm]."""
         return geometry_with(self.basis.gear.geometry, self.chosen.sizes)
+
+    def _repr_html_(self) -> str:
+        from hdcal.design.document import inverse_document
+        from hdcal.design.summary import inverse_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(inverse_document(inverse_answer(self)))
 
 
 def inverse_design(

@@ -1,36 +1,65 @@
-"""Designs and studies as plain data, ready for JSON."""
+"""Designs as answers."""
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 
+from hdcal.design.answer import (
+    CandidateAnswer,
+    CandidateForce,
+    ChosenSpring,
+    DesignAnswer,
+    GearByGear,
+    GeneratorAnswer,
+    InverseAnswer,
+    LimitAsked,
+    SetPoint,
+    SpringCurve,
+    StressAtWindow,
+    WindowAsked,
+    WindowForces,
+    WindowKept,
+)
 from hdcal.design.candidate import Candidate
 from hdcal.design.design_draws import Basis
 from hdcal.design.inverse_design import InverseDesign
-from hdcal.design.study.article_tables import SCHEMA as ARTICLE_SCHEMA
-from hdcal.design.study.article_tables import ArticleRow
-from hdcal.design.study.study import SCHEMA as STUDY_SCHEMA
-from hdcal.design.study.study import Study
+from hdcal.design.sentences import (
+    generator_headline,
+    generator_words,
+    inverse_headline,
+    inverse_words,
+    next_step,
+)
 from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
-from hdcal.report.parameters import INTERVAL, interval
+from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.posterior_answer import CalibratedGear
 
-SCHEMA = "hdcal.design/1"
+D = TypeVar("D", bound=DesignAnswer)
 
 
-def _origin(basis: Basis) -> dict:
+def origin(basis: Basis, interval: float, interval_kind: str) -> dict[str, Any]:
+    """Return what every design answer says of the draws it rests on."""
     return {
-        "gear": {
-            "name": basis.gear.name,
-            "material": basis.gear.material,
-            "theory": basis.theory,
-        },
+        "reasons": (),
+        # In words once the numbers are there, see `in_words`.
+        "headline": "",
+        "next_step": None,
+        "answer": (),
+        "gear": CalibratedGear(basis.gear.name, basis.gear.material, basis.theory),
         "basis": basis.kind,
         "draws": basis.size,
-        "interval": INTERVAL,
-        "interval_kind": basis.interval_kind,
+        "interval": interval,
+        "interval_kind": interval_kind,
     }
+
+
+def in_words(found: D, headline: str, words: Iterable[str]) -> D:
+    """Return an answer with its sentences."""
+    step = next_step(found)
+    return replace(found, headline=headline, next_step=step, answer=tuple(words))
 
 
 def _error(probability: float, draws: int) -> float:
@@ -38,51 +67,58 @@ def _error(probability: float, draws: int) -> float:
     return float(np.sqrt(probability * (1.0 - probability) / draws))
 
 
-def summarise_generator(found: WaveGenerator) -> dict:
-    """Return an elastic wave generator as plain data.
+def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
+    """Return an elastic wave generator as an answer, ready for JSON.
 
     Args:
         found: from `wave_generator`.
     """
+    levels = range(len(found.temperatures))
+    told = GeneratorAnswer(
+        **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
+        asked=WindowAsked(
+            window_mm=found.window,
+            temperature_C=_numbers(found.temperatures),
+            probability=found.required,
+            setting_sd_mm=found.setting_sd,
+        ),
+        population=found.gear.words,
+        spring=_spring(found),
+        set_point=_set_point(found),
+        force_N=tuple(_forces(found, level) for level in levels),
+        at_temperature=tuple(_kept(found, level) for level in levels),
+        adjusted=_adjusted(found),
+        curve=SpringCurve(
+            rate_N_per_mm=tuple(one.rate for one in found.springs),
+            common=tuple(one.together for one in found.springs),
+            zero_backlash=tuple(one.no_backlash for one in found.springs),
+            no_jam=tuple(one.no_jam for one in found.springs),
+            adjusted=tuple(one.adjusted for one in found.springs),
+        ),
+        stress=_window_stress(found),
+        assumptions=tuple(found.basis.assumptions),
+        warnings=found.warnings,
+    )
+    return in_words(told, generator_headline(told), generator_words(told))
+
+
+def _numbers(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(values.tolist())
+
+
+def _spring(found: WaveGenerator) -> ChosenSpring:
     spring = found.chosen
-    return {
-        "schema": SCHEMA,
-        "status": "ok",
-        "kind": "wave_generator",
-        **_origin(found.basis),
-        "interval_kind": found.gear.interval_kind(found.basis),
-        "asked": {
-            "window_mm": list(found.window),
-            "temperature_C": found.temperatures,
-            "probability": found.required,
-            "setting_sd_mm": found.setting_sd,
-        },
-        "population": found.gear.words,
-        "spring": {
-            "rate_N_per_mm": spring.rate,
-            "softest_considered": spring.rate == found.springs[0].rate,
-            "rate_over_gear": spring.rate / _gear_rate(found),
-            "interference_mm": spring.interference,
-            "probability": spring.together,
-            "standard_error": _error(spring.together, found.basis.size),
-            "zero_backlash": spring.no_backlash,
-            "no_jam": spring.no_jam,
-        },
-        "set_point": _set_point(found),
-        "force_N": [_forces(found, i) for i in range(len(found.temperatures))],
-        "at_temperature": [_place(found, i) for i in range(len(found.temperatures))],
-        "adjusted": _adjusted(found),
-        "curve": {
-            "rate_N_per_mm": [one.rate for one in found.springs],
-            "common": [one.together for one in found.springs],
-            "zero_backlash": [one.no_backlash for one in found.springs],
-            "no_jam": [one.no_jam for one in found.springs],
-            "adjusted": [one.adjusted for one in found.springs],
-        },
-        "stress": _stress(found),
-        "assumptions": found.basis.assumptions,
-        "warnings": list(found.warnings),
-    }
+    own = np.median(found.forces[1, _reference(found)]) / _middle(found)
+    return ChosenSpring(
+        rate_N_per_mm=spring.rate,
+        softest_considered=spring.rate == found.springs[0].rate,
+        rate_over_gear=spring.rate / float(own),
+        interference_mm=spring.interference,
+        probability=spring.together,
+        standard_error=_error(spring.together, found.basis.size),
+        zero_backlash=spring.no_backlash,
+        no_jam=spring.no_jam,
+    )
 
 
 def _middle(found: WaveGenerator) -> float:
@@ -95,64 +131,58 @@ def _reference(found: WaveGenerator) -> int:
     return int(np.argmin(off))
 
 
-def _gear_rate(found: WaveGenerator) -> float:
-    return float(np.median(found.forces[1, _reference(found)]) / _middle(found))
-
-
-def _set_point(found: WaveGenerator) -> dict:
+def _set_point(found: WaveGenerator) -> SetPoint:
     """Return the aim: the middle of the window at the reference temperature."""
     level = _reference(found)
-    return {
-        "deformation_mm": _middle(found),
-        "temperature_C": float(found.temperatures[level]),
-        "force_N": interval(found.forces[1, level]),
-    }
+    return SetPoint(
+        deformation_mm=_middle(found),
+        temperature_C=float(found.temperatures[level]),
+        force_N=credible_interval(found.forces[1, level]),
+    )
 
 
-def _forces(found: WaveGenerator, level: int) -> dict:
-    names = ("at_lo", "at_middle", "at_hi")
-    parts = zip(names, found.forces[:, level], strict=True)
-    return {
-        "temperature_C": float(found.temperatures[level]),
-        **{name: interval(force) for name, force in parts},
-    }
+def _forces(found: WaveGenerator, level: int) -> WindowForces:
+    ends = map(credible_interval, found.forces[:, level])
+    return WindowForces(float(found.temperatures[level]), *ends)
 
 
-def _place(found: WaveGenerator, level: int) -> dict:
+def _kept(found: WaveGenerator, level: int) -> WindowKept:
     low, high = found.intervals(level)
     x = found.chosen.interference + found.error
-    return {
-        "temperature_C": float(found.temperatures[level]),
-        "zero_backlash": float(np.mean(x >= low)),
-        "no_jam": float(np.mean(x <= high)),
-        "inside": float(np.mean((x >= low) & (x <= high))),
-    }
+    return WindowKept(
+        temperature_C=float(found.temperatures[level]),
+        zero_backlash=float(np.mean(x >= low)),
+        no_jam=float(np.mean(x <= high)),
+        inside=float(np.mean((x >= low) & (x <= high))),
+    )
 
 
-def _adjusted(found: WaveGenerator) -> dict:
+def _adjusted(found: WaveGenerator) -> GearByGear:
     """Return the range of set points when each gear is given its own."""
     low, high = found.intervals()
     own = 0.5 * (low + high)
     ends = np.array([0.5 - found.required / 2.0, 0.5 + found.required / 2.0])
     reach = np.quantile(own, ends)
-    return {
-        "probability": found.chosen.adjusted,
-        "share_of_gears": found.required,
-        "interference_mm": reach,
-        "preload_N": found.chosen.rate * (reach - _middle(found)),
-    }
+    first, last = _numbers(reach)
+    soft, firm = _numbers(found.chosen.rate * (reach - _middle(found)))
+    return GearByGear(
+        probability=found.chosen.adjusted,
+        share_of_gears=found.required,
+        interference_mm=(first, last),
+        preload_N=(soft, firm),
+    )
 
 
-def _stress(found: WaveGenerator) -> dict:
-    basis = found.basis
+def _window_stress(found: WaveGenerator) -> StressAtWindow:
+    basis, at = found.basis, found.window[1]
     rise = found.temperatures - basis.gear.reference_temperature
     warm = np.max(1.0 - np.asarray(basis.values["alpha"])[:, None] * rise, axis=1)
     modulus = np.asarray(basis.values["E0"]) * warm
-    draws = np.asarray(peak_stress(basis.gear.geometry, modulus, found.window[1]))
-    return {"deformation_mm": found.window[1], **stress_entry(basis, draws)}
+    draws = np.asarray(peak_stress(basis.gear.geometry, modulus, at))
+    return StressAtWindow(deformation_mm=at, **_stress(basis, draws))
 
 
-def stress_entry(basis: Basis, draws: np.ndarray) -> dict:
+def _stress(basis: Basis, draws: np.ndarray) -> dict[str, Any]:
     """Return hoop bending stress and yield utilisation as intervals.
 
     Args:
@@ -162,82 +192,49 @@ def stress_entry(basis: Basis, draws: np.ndarray) -> dict:
     strength = basis.yield_strength
     known = strength is not None
     return {
-        "stress_MPa": interval(draws),
-        "yield_MPa": interval(strength) if known else None,
-        "utilisation": interval(draws / strength) if known else None,
+        "stress_MPa": credible_interval(draws),
+        "yield_MPa": credible_interval(strength) if known else None,
+        "utilisation": credible_interval(draws / strength) if known else None,
     }
 
 
-def summarise_inverse(found: InverseDesign) -> dict:
-    """Return an inverse design as plain data.
+def inverse_answer(found: InverseDesign) -> InverseAnswer:
+    """Return an inverse design as an answer, ready for JSON.
 
     Args:
         found: from `inverse_design`.
     """
-    return {
-        "schema": SCHEMA,
-        "status": "ok",
-        "kind": "inverse_geometry",
-        **_origin(found.basis),
-        "interval_kind": found.gear.interval_kind(found.basis),
-        "asked": {
-            "deformation_mm": found.deformation,
-            "temperature_C": found.temperatures,
-            "limit_force_N": found.limit_force,
-            "limit_stress_MPa": found.limit_stress,
-            "probability": found.required,
-            "bounds": {name: list(ends) for name, ends in found.bounds.items()},
-        },
-        "population": found.gear.words,
-        "design": _candidate(found.chosen),
-        "tested": _candidate(found.tested),
-        "candidates": [_candidate(one) for one in found.candidates],
-        "elasticities": dict(found.elasticities),
-        "assumptions": found.chosen.basis.assumptions,
-        "warnings": list(found.warnings),
-    }
+    told = InverseAnswer(
+        **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
+        asked=LimitAsked(
+            deformation_mm=found.deformation,
+            temperature_C=_numbers(found.temperatures),
+            limit_force_N=found.limit_force,
+            limit_stress_MPa=found.limit_stress,
+            probability=found.required,
+            bounds=found.bounds,
+        ),
+        population=found.gear.words,
+        design=_candidate(found.chosen),
+        tested=_candidate(found.tested),
+        candidates=tuple(map(_candidate, found.candidates)),
+        elasticities=found.elasticities,
+        assumptions=tuple(found.chosen.basis.assumptions),
+        warnings=found.warnings,
+    )
+    return in_words(told, inverse_headline(told), inverse_words(told))
 
 
-def _candidate(one: Candidate) -> dict:
-    return {
-        "material": one.basis.material,
-        "sizes_mm": {name.removesuffix("_mm"): v for name, v in one.sizes.items()},
-        "met": one.met,
-        "change": one.change,
-        "force_N": {**interval(one.forces), "kept": one.force},
-        "probability": one.kept,
-        "standard_error": _error(one.kept, len(one.forces)),
-        **stress_entry(one.basis, one.stresses),
-        "utilisation_kept": one.utilisation,
-    }
-
-
-def summarise_study(found: Study) -> dict:
-    """Return a study as plain data, its table by column.
-
-    Args:
-        found: from `study`.
-    """
-    return {
-        "schema": STUDY_SCHEMA,
-        "status": "ok",
-        **_origin(found.basis),
-        "interval": found.interval,
-        "varied": list(found.varied),
-        "columns": {name: list(column) for name, column in found.columns.items()},
-        "assumptions": list(found.assumptions),
-        "warnings": list(found.warnings),
-    }
-
-
-def summarise_article(rows: Sequence[ArticleRow]) -> dict:
-    """Return the article's tables as plain data.
-
-    Args:
-        rows: from `article_rows`.
-    """
-    return {
-        "schema": ARTICLE_SCHEMA,
-        "status": "ok",
-        "rows": [asdict(row) for row in rows],
-    }
+def _candidate(one: Candidate) -> CandidateAnswer:
+    span = credible_interval(one.forces)
+    return CandidateAnswer(
+        material=one.basis.material,
+        sizes_mm={name.removesuffix("_mm"): v for name, v in one.sizes.items()},
+        met=one.met,
+        change=one.change,
+        force_N=CandidateForce(**vars(span), kept=one.force),
+        probability=one.kept,
+        standard_error=_error(one.kept, len(one.forces)),
+        **_stress(one.basis, one.stresses),
+        utilisation_kept=one.utilisation,
+    )

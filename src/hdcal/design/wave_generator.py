@@ -9,7 +9,8 @@ from hdcal.data.case import Gear
 from hdcal.design.checks import place_findings, probability_findings
 from hdcal.design.design_draws import Basis, basis_of
 from hdcal.design.next_gear import NextGear, next_gear
-from hdcal.design.sizes import beyond_tested, with_reference
+from hdcal.design.sentences import beyond_tested
+from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
 from hdcal.design.study.study import all_forces
 from hdcal.errors import Finding, InputError, attempt
@@ -59,6 +60,13 @@ class WaveGenerator:
         """
         forces = self.forces if level is None else self.forces[:, level : level + 1]
         return set_points(self.chosen.rate, self.window, forces)
+
+    def _repr_html_(self) -> str:
+        from hdcal.design.document import generator_document
+        from hdcal.design.summary import generator_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(generator_document(generator_answer(self)))
 
 
 def wave_generator(

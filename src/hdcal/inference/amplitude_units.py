@@ -1,6 +1,7 @@
 """How finely the data see each amplitude: the unit of its sampling coordinate."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import jax
 import numpy as np
@@ -8,12 +9,14 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
-from hdcal.physics.chain import Base, Reading, linear_columns, predict_reading
+from hdcal.inference.padding import pad_records
+from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
 
 
 def amplitude_units(
     records: Records,
+    columns: np.ndarray,
     reading: Reading,
     effects: Sequence[type[Effect]],
     priors: Mapping[str, Prior],
@@ -26,38 +29,50 @@ def amplitude_units(
 
     Args:
         records: the rows.
+        columns: of the base model at the rows, from `linear_columns`, shape (n, 4).
         reading: how the rig reads.
         effects: effects in the model.
         priors: by site name.
         noise_sd: pilot noise [N].
     """
-    columns = np.asarray(linear_columns(records, reading))
     slope = np.polyfit(records.deformation, records.force, 1)[0]
     base = Base(slope / reading.radial_per_read, 0.0, 0.0, 0.0, noise_sd)
-    units = {}
+    padded, units = pad_records(records), {}
     for effect in effects:
+        own = {field: priors[f"{effect.name}.{field}"] for field in parameters(effect)}
         values = {
-            field: float(_median(priors[f"{effect.name}.{field}"], spec.null))
+            field: float(_median(own[field], spec.null))
             for field, spec in parameters(effect).items()
         }
-        for field in values:
-            prior = priors[f"{effect.name}.{field}"]
-            if prior.family != "half_normal":
-                continue
-
-            def mean(size, effect=effect, field=field, values=values):
-                one = effect(**{**values, field: size})
-                return predict_reading(base, (one,), records, reading)[0]
-
-            # A tenth of the prior sd: at zero itself an effect may have no slope.
-            near = float(prior.numbers[0]) / 10.0
-            column = np.asarray(jax.jvp(mean, (near,), (1.0,))[1])
+        widest = {
+            field: float(prior.numbers[0])
+            for field, prior in own.items()
+            if prior.family == "half_normal"
+        }
+        slopes = _slopes(effect, base, values, widest, padded, reading)
+        for field, column in slopes.items():
+            column = np.asarray(column)[: len(columns)]
             fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
             seen = np.linalg.norm(column - fitted)
-            widest = float(prior.numbers[0])
-            finest = noise_sd / seen if seen > 0.0 else widest
-            units[f"{effect.name}.{field}"] = min(widest, finest) or widest
+            finest = noise_sd / seen if seen > 0.0 else widest[field]
+            unit = min(widest[field], finest) or widest[field]
+            units[f"{effect.name}.{field}"] = unit
     return units
+
+
+@partial(jax.jit, static_argnames="effect")
+def _slopes(effect: type[Effect], base: Base, values, prior_sds, records, reading):
+    """Return the derivative of the reading by each amplitude near its null."""
+
+    def slope(field, sd):
+        def mean(size):
+            one = effect(**{**values, field: size})
+            return predict_reading(base, (one,), records, reading)[0]
+
+        # A tenth of the prior sd: at zero itself an effect may have no slope.
+        return jax.jvp(mean, (sd / 10.0,), (1.0,))[1]
+
+    return {field: slope(field, sd) for field, sd in prior_sds.items()}
 
 
 def _median(prior: Prior, null: float | None) -> float:

@@ -15,6 +15,7 @@ from numpyro.contrib.hsgp.spectral_densities import (
 )
 
 from hdcal.data.records import Array
+from hdcal.inference.padding import bucket_size, repeat_last_row
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
 # tested deformation: enough for length-scales down to a tenth of the range.
@@ -22,7 +23,7 @@ BASIS_SIZE = 20
 BOUNDARY = 2.0
 
 
-class Gap(eqx.Module):
+class Discrepancy(eqx.Module):
     """Where the discrepancy lives, and what was projected off its basis.
 
     Attributes:
@@ -66,7 +67,7 @@ def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
 
-def build_gap(deformation: Float[Array, " n"]) -> Gap:
+def build_discrepancy(deformation: Float[Array, " n"]) -> Discrepancy:
     """Project the basis off an offset and a slope at the tested rows.
 
     Args:
@@ -74,9 +75,26 @@ def build_gap(deformation: Float[Array, " n"]) -> Gap:
     """
     low, high = float(np.min(deformation)), float(np.max(deformation))
     centre, half_range = (low + high) / 2.0, (high - low) / 2.0
-    scaled = (np.asarray(deformation) - centre) / half_range
-    line, basis = np.asarray(_line(scaled)), np.asarray(_basis(scaled))
-    return Gap(centre, half_range, np.linalg.lstsq(line, basis, rcond=None)[0])
+    rows = len(deformation)
+    padded = repeat_last_row(np.asarray(deformation), bucket_size(rows))
+    scaled = (padded - centre) / half_range
+    line, basis = np.asarray(_line(scaled))[:rows], np.asarray(_basis(scaled))[:rows]
+    absorbed = np.linalg.lstsq(line, basis, rcond=None)[0]
+    return Discrepancy(centre, half_range, absorbed)
+
+
+def discrepancy_columns(
+    discrepancy: Discrepancy | None, deformation: Float[Array, " n"]
+) -> np.ndarray | None:
+    """Return the projected basis at padded deformations; None without a discrepancy.
+
+    Args:
+        discrepancy: of the problem, or None.
+        deformation: as read [mm], of a bucket's length.
+    """
+    if discrepancy is None:
+        return None
+    return np.asarray(discrepancy.columns(deformation))
 
 
 def prior_sd(sd, length) -> Float[Array, " m"]:

@@ -15,11 +15,17 @@ from hdcal.data.case import Case, Gear, Theory
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import Values
-from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.density import Values, log_likelihood
 from hdcal.inference.distributions import scaled
 from hdcal.inference.model import model, sample_influence, sample_site
-from hdcal.inference.problem import bare, case_reading, influence_prior, unit_stiffness
+from hdcal.inference.padding import measured, pad_records
+from hdcal.inference.problem import (
+    case_reading,
+    influence_prior,
+    unit_stiffness,
+    without_texts,
+)
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.linear_response import linear_response
 
@@ -42,9 +48,10 @@ class DynamicProblem(Sampled):
         priors: by site name, in code units; K under the problem's own theory.
         unit_stiffness: k_theory/E per displacement as read [mm].
         rise: T − T_ref of the test [K].
-        time: since the first row [s], shape (n,).
-        force: on the gear, as read [N], shape (n,).
-        deformation: as read [mm], shape (n,).
+        time: since the first row [s], padded: it goes on with the last step.
+        force: on the gear, as read [N], padded: it is held.
+        deformation: as read [mm], padded.
+        count: measured rows.
     """
 
     priors: dict[str, Prior]
@@ -53,6 +60,7 @@ class DynamicProblem(Sampled):
     time: Float[Array, " n"]
     force: Float[Array, " n"]
     deformation: Float[Array, " n"]
+    count: int
 
 
 def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
@@ -96,13 +104,17 @@ def build_dynamic(case: Case, priors: Mapping[str, Prior], theory: Theory):
     """
     records, reading = case.records, case_reading(case)
     rise = float(np.mean(records.temperature)) - reading.reference_temperature
+    padded, count = pad_records(records), len(records.force)
+    time = np.asarray(records.time) - records.time[0]
+    beyond = np.arange(1, len(padded.force) - count + 1) * (time[-1] - time[-2])
     return DynamicProblem(
-        priors=bare(priors),
+        priors=without_texts(priors),
         unit_stiffness=unit_stiffness(case, theory) * reading.radial_per_read,
         rise=rise,
-        time=np.asarray(records.time) - records.time[0],
-        force=np.asarray(records.force),
-        deformation=np.asarray(records.deformation),
+        time=np.concatenate([time, time[-1] + beyond]),
+        force=padded.force,
+        deformation=padded.deformation,
+        count=count,
     )
 
 
@@ -124,7 +136,7 @@ def oscillation(problem: DynamicProblem, values: Values) -> dict:
 
 
 def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
-    """Return the mean reading of the deformation at the rows [mm]."""
+    """Return the mean reading of the deformation at the padded rows [mm]."""
     own = oscillation(problem, values)
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
     states = linear_response(
@@ -139,10 +151,16 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
 
 
 def pointwise(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
-    """Return the log likelihood of each row [log 1/mm]."""
+    """Return the log likelihood of each padded row [log 1/mm]."""
     sd = values["deformation_sigma"]
     error = (problem.deformation - predict_motion(problem, values)) / sd
     return -0.5 * (error**2 + jnp.log(2.0 * jnp.pi)) - jnp.log(sd)
+
+
+@log_likelihood.register
+def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
+    each = pointwise(problem, values)
+    return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 
 @model.register
@@ -153,4 +171,4 @@ def _(problem: DynamicProblem) -> None:
     values |= {name: sample_site(name, priors[name]) for name in SITES}
     for name, value in oscillation(problem, values).items():
         numpyro.deterministic(name, value)
-    numpyro.factor("deformation", jnp.sum(pointwise(problem, values)))
+    numpyro.factor("deformation", log_likelihood(problem, values))

@@ -1,93 +1,20 @@
 """Which parameters the data cannot tell apart, said in words."""
 
+from collections.abc import Mapping
 from itertools import combinations
 
-import jax
 import numpy as np
 
-from hdcal.data.records import Records
-from hdcal.inference.density import predict_rows
-from hdcal.inference.density_protocol import Sampled
-from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.distributions import frozen
-from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 
-# Parameters of the mean that are compared; sigma is not one of them, nor is any
-# parameter of an effect on the noise.
-_MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset")
 # A leftover direction is named with the parameters that carry this part of it.
 _SHARE = 0.3
-_MOST_MEMBERS = 200
 # A parameter moves the mean less than this many noise sds over its whole prior: dead.
 _DEAD = 1e-3
 
 
-def sensitivity(
-    problem: Problem, values: dict, records: Records, columns
-) -> dict[str, np.ndarray]:
-    """Return by how much each parameter moves the mean reading of each row.
-
-    Args:
-        problem: structure.
-        values: one set of parameters, in code units.
-        records: the rows.
-        columns: basis of the gap, or None.
-
-    Returns:
-        Derivatives [N per unit of the parameter], shape (n,), by parameter.
-    """
-    of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
-    sizes = [name for name in values if name.partition(".")[0] in of_mean]
-    names = [n for n in (*_MEAN, *sizes) if n in values]
-    moved = {name: values[name] for name in names if _varies(problem, name)}
-
-    def mean(part):
-        return predict_rows(problem, {**values, **part}, records, columns)[0]
-
-    slopes = jax.jacfwd(mean)(moved)
-    return {name: np.asarray(slope) for name, slope in slopes.items()}
-
-
-def member_columns(
-    problem: Problem, values: dict, records: Records, columns
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return what runs, specimens and the gap can take up, per prior sd of each.
-
-    Args:
-        problem: structure.
-        values: one set of parameters, in code units.
-        records: the rows.
-        columns: basis of the gap, or None.
-
-    Returns:
-        Contributions to the mean reading [N], shape (n, m), and where the values
-        stand, in prior sds, shape (m,). Members by the hundred are left out: one by
-        one none of them matters.
-    """
-    table, place = [np.zeros((len(records.force), 0))], [np.zeros(0)]
-
-    def stiffer(share):
-        stiff = {**values, "K": values["K"] * (1.0 + share)}
-        return predict_rows(problem, stiff, records, columns)[0]
-
-    if 0 < problem.runs <= _MOST_MEMBERS:
-        sd = values["run_offset_sd"]
-        table.append(sd * (records.run[:, None] == np.arange(problem.runs)))
-        place.append(values["run_offset"] / sd)
-    if 0 < problem.specimens <= _MOST_MEMBERS:
-        sd = values["specimen_sd"]
-        each = np.asarray(jax.jvp(stiffer, (0.0,), (1.0,))[1])
-        own = records.specimen[:, None] == np.arange(problem.specimens)
-        table.append(sd * each[:, None] * own)
-        place.append(values["specimen_deviation"] / sd)
-    if columns is not None:
-        scale = np.asarray(prior_sd(values["gap_sd"], values["gap_length"]))
-        table.append(np.asarray(columns) * scale)
-        place.append(values["gap_weights"] / scale)
-    return np.concatenate(table, axis=1), np.concatenate(place)
-
-
-def beside_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
+def remove_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
     """Return what of a column the members leave, the unit priors of theirs included.
 
     The squared length of the result is the information on the column's parameter
@@ -95,22 +22,18 @@ def beside_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
 
     Args:
         column: in noise sds, shape (n,).
-        members: from `member_columns`, in noise sds, shape (n, m).
+        members: from `linearise`, in noise sds, shape (n, m).
     """
     size = members.shape[1]
     taken = np.linalg.solve(np.eye(size) + members.T @ members, members.T @ column)
     return np.concatenate([column - members @ taken, -taken])
 
 
-def _varies(problem: Problem, name: str) -> bool:
-    return problem.priors[name].family != "fixed"
-
-
-def dead_parameters(slopes: dict, problem: Sampled) -> list[str]:
+def dead_parameters(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[str]:
     """Return the parameters that these data cannot see at all.
 
     Args:
-        slopes: from `sensitivity`, in noise sds.
+        slopes: from `linearise`, in noise sds.
         problem: priors.
     """
     dead = []
@@ -121,14 +44,14 @@ def dead_parameters(slopes: dict, problem: Sampled) -> list[str]:
     return dead
 
 
-def flat_directions(slopes: dict, problem: Sampled) -> list[str]:
+def flat_directions(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[str]:
     """Name what the data leave to the prior: parameters, pairs, then the rest.
 
     A direction is flat when the data say less along it than the priors do: with J the
     sensitivity in noise sds and S the prior sds, where ‖J v‖² < ‖v/S‖².
 
     Args:
-        slopes: from `sensitivity`, in noise sds and beside the members, dead
+        slopes: from `linearise`, in noise sds and without the members, dead
             parameters left out.
         problem: priors.
 

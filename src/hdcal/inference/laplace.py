@@ -14,10 +14,10 @@ from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
 from hdcal.data.records import Array
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 
 Position = dict[str, Any]
 
@@ -53,34 +53,50 @@ def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
 def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return the potential whose minimum is a typical place, not only the mode.
 
-    Members that are sampled can shrink with their scale, and a gap can interpolate
-    while sigma vanishes: there the density is highest, in next to no volume, and a
-    sampler that starts there stays. The volume is counted in: the scale to the number
-    of what shrinks with it.
+    Members that are sampled can tend to zero with their scale, and a discrepancy can
+    interpolate while sigma vanishes: there the density is highest, in next to no
+    volume, and a sampler that starts there stays. The volume is counted in: the scale
+    to the power of the number of parameters that tend to zero with it.
     """
     value = potential(problem, position)
     if not isinstance(problem, Problem):
         return value
-    shrinking = {}
-    if problem.gap is not None and "gap" not in problem.integrated:
-        shrinking["sigma"] = BASIS_SIZE
+    vanishing = {}
+    if problem.discrepancy is not None and "discrepancy" not in problem.integrated:
+        vanishing["sigma"] = BASIS_SIZE
     if "_run_offset" in position:
-        shrinking["run_offset_sd"] = (problem.runs - 1) / 2
+        vanishing["run_offset_sd"] = (problem.runs - 1) / 2
     if "_specimen_deviation" in position:
-        shrinking["specimen_sd"] = (problem.specimens - 1) / 2
-    if shrinking:
+        vanishing["specimen_sd"] = (problem.specimens - 1) / 2
+    if vanishing:
         values = constrain_fn(
             model, (problem,), {}, position, return_deterministic=True
         )
-        for name, count in shrinking.items():
+        for name, count in vanishing.items():
             value = value - count * jnp.log(values[name])
     return value
 
 
 @jax.jit
-def _expand(problem: Sampled, position: Position):
-    """Return the typical potential with its flat gradient and Hessian."""
-    flat, unravel = ravel_pytree(position)
+def _flatten(position: Position):
+    return ravel_pytree(position)[0]
+
+
+@jax.jit
+def _unflatten(like: Position, flat):
+    return ravel_pytree(like)[1](flat)
+
+
+@jax.jit
+def _expand(problem: Sampled, like: Position, flat):
+    """Return the typical potential with its gradient and Hessian.
+
+    Args:
+        problem: the inference problem.
+        like: any position of the problem.
+        flat: where to expand, flattened.
+    """
+    _, unravel = ravel_pytree(like)
 
     def slope(x):
         value, gradient = jax.value_and_grad(lambda x: _typical(problem, unravel(x)))(x)
@@ -114,6 +130,10 @@ def _moved(problem: Sampled, position: Position, values) -> Position:
     return unconstrain_fn(model, (problem,), {}, known)
 
 
+# What is compiled anew for each kind of problem and takes many memory mappings.
+COMPILED = (_expand, _prior_median, _moved)
+
+
 def fit(
     problem: Sampled,
     key: Key[Array, ""],
@@ -132,9 +152,9 @@ def fit(
     place = _prior_median(problem, key)
     if start:
         place = _moved(problem, place, dict(start))
-    flat, unravel = ravel_pytree(place)
+    flat = np.asarray(_flatten(place))
     cache: dict[bytes, tuple] = {}
-    _, _, hessian = (np.asarray(part) for part in _expand(problem, place))
+    hessian = np.asarray(_expand(problem, place, flat)[2])
     # Parameters differ by many orders in scale: a trust region wants them alike.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 
@@ -142,7 +162,7 @@ def fit(
         point = u.tobytes()
         if point not in cache:
             cache.clear()
-            value, slope, curve = _expand(problem, unravel(flat + scale * u))
+            value, slope, curve = _expand(problem, place, flat + scale * u)
             slope, curve = np.asarray(slope) * scale, np.asarray(curve) * scale
             if all(np.isfinite(part).all() for part in (value, slope, curve)):
                 cache[point] = float(value), slope, curve * scale[:, None]
@@ -159,10 +179,8 @@ def fit(
         options={"gtol": _TOLERANCE, "maxiter": 300, "max_trust_radius": 1e4},
     )
     factor = scale[:, None] * _inverse_root(expand(found.x)[2])
-    centre = {
-        name: np.asarray(v) for name, v in unravel(flat + scale * found.x).items()
-    }
-    return Whitening(centre, factor)
+    centre = _unflatten(place, flat + scale * found.x)
+    return Whitening({name: np.asarray(v) for name, v in centre.items()}, factor)
 
 
 def _inverse_root(hessian: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
 
-from hdcal.data.records import Array
+from hdcal.data.records import Array, Records
 
 Tree = TypeVar("Tree")
 
@@ -48,6 +48,11 @@ def repeat_last_row(tree: Tree, size: int) -> Tree:
         size: rows in all, as `bucket_size` gives it.
     """
     return jax.tree.map(lambda array: _pad(array, size, "edge"), tree)
+
+
+def pad_records(records: Records) -> Records:
+    """Return records with their last row repeated up to the size of their bucket."""
+    return repeat_last_row(records, bucket_size(len(records.force)))
 
 
 def append_zeros(tree: Tree, size: int) -> Tree:

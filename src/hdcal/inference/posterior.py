@@ -3,31 +3,25 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from importlib import metadata
 from pathlib import Path
 from typing import ClassVar
 
-import jax
 import numpy as np
 import xarray as xr
-from arviz_base import from_dict
 
 from hdcal.data.case import Case, Theory
 from hdcal.data.priors import Prior
 from hdcal.errors import Finding, InputError, NotUsable
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
-from hdcal.inference.density import pointwise_log_likelihood
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.sample import Draws
 from hdcal.physics.effect import Effect
 
 FILE_NAME = "posterior.nc"
 _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
-# Above this many numbers the log likelihood of every row and draw is not kept.
-_MOST_LOG_LIKELIHOODS = 8_000_000
 
 
 @dataclass(frozen=True, repr=False)
@@ -112,15 +106,15 @@ class Posterior:
         """Write the posterior as a NetCDF file that ArviZ opens."""
         tree = self.tree.copy()
         tree.attrs = {
-            "hdcal_format": archive.FORMAT,
+            "hdcal_format": posterior_file.FORMAT,
             "status": "ok" if self.usable else "failed",
-            "case": archive.describe_case(self.case),
+            "case": posterior_file.describe_case(self.case),
             "model": json.dumps(
                 {
                     "theory": self.theory,
                     "effects": [effect.name for effect in self.effects],
                     "priors": {
-                        name: archive.describe_prior(prior)
+                        name: posterior_file.describe_prior(prior)
                         for name, prior in self.priors.items()
                     },
                     "settings": dict(self.settings),
@@ -129,7 +123,7 @@ class Posterior:
                 }
             ),
         }
-        tree.attrs[archive.DIGEST] = archive.digest(tree)
+        tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
         tree.to_netcdf(path, engine="h5netcdf")
 
     @classmethod
@@ -149,13 +143,13 @@ class Posterior:
         """
         path = Path(path)
         file = path / FILE_NAME if path.is_dir() else path
-        tree = archive.open_tree(file)
-        archive.check_unchanged(tree, file)
+        tree = posterior_file.open_tree(file)
+        posterior_file.check_unchanged(tree, file)
         try:
             model = json.loads(tree.attrs["model"])
             if model["settings"].get("kind", "static") != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
-            case = archive.restore_case(
+            case = posterior_file.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
                 tree["observed_data"].to_dataset()["force"],
@@ -165,7 +159,7 @@ class Posterior:
                 theory=model["theory"],
                 effects=_look_up(model["effects"], effects, file),
                 priors={
-                    name: archive.restore_prior(prior)
+                    name: posterior_file.restore_prior(prior)
                     for name, prior in model["priors"].items()
                 },
                 tree=tree,
@@ -174,7 +168,7 @@ class Posterior:
                 settings=model["settings"],
             )
         except (KeyError, ValueError, TypeError) as error:
-            raise InputError([archive.not_a_posterior(file)]) from error
+            raise InputError([posterior_file.not_a_posterior(file)]) from error
 
 
 def _of_another_kind(file, wanted: str) -> Finding:
@@ -199,84 +193,6 @@ def _look_up(names, library, file) -> tuple[type[Effect], ...]:
             for name in unknown
         )
     return tuple(library[name] for name in names)
-
-
-def gap_columns(problem: Problem, case: Case):
-    """Return the basis of the gap at the rows of the case, or None."""
-    return (
-        None if problem.gap is None else problem.gap.columns(case.records.deformation)
-    )
-
-
-@jax.jit
-def _pointwise(problem, values, records, columns):
-    one = partial(pointwise_log_likelihood, problem)
-    inner = jax.vmap(one, in_axes=(0, None, None))
-    return jax.vmap(inner, in_axes=(0, None, None))(values, records, columns)
-
-
-def build_tree(
-    case: Case,
-    problem: Problem,
-    draws: Draws,
-    prior_draws: Mapping[str, np.ndarray],
-    log_likelihood: np.ndarray,
-) -> xr.DataTree:
-    """Collect everything in ArviZ' groups.
-
-    Args:
-        case: data and gear.
-        problem: what was sampled.
-        draws: from the sampler.
-        prior_draws: by parameter, each (draw,).
-        log_likelihood: total of each draw, (chain, draw).
-    """
-    records = case.records
-    size = log_likelihood.size * len(records.force)
-    by_row = {"total": log_likelihood}
-    if size <= _MOST_LOG_LIKELIHOODS:
-        columns = gap_columns(problem, case)
-        by_row = {"force": _pointwise(problem, draws.values, records, columns)}
-    tree = from_dict(
-        {
-            "posterior": draws.values,
-            "prior": {name: values[None] for name, values in prior_draws.items()},
-            "sample_stats": sampler_statistics(draws),
-            "observed_data": {"force": np.asarray(records.force)},
-            "constant_data": archive.covariates(records),
-            "log_likelihood": {n: np.asarray(v) for n, v in by_row.items()},
-        },
-        dims={
-            "force": ["row"],
-            **{name: ["row"] for name in archive.UNITS},
-            "run_offset": ["run_label"],
-            "specimen_deviation": ["specimen_label"],
-            "gap_weights": ["basis"],
-        },
-        coords={
-            "run_label": list(case.run_labels),
-            "specimen_label": list(case.specimen_labels),
-        },
-    )
-    if size > _MOST_LOG_LIKELIHOODS:
-        tree["log_likelihood"].attrs["note"] = (
-            f"{size} values by row and draw are not kept; this is the log likelihood "
-            "of all rows, runs, specimens and gap integrated out where they were"
-        )
-    return tree
-
-
-def sampler_statistics(draws: Draws) -> dict[str, np.ndarray]:
-    """Return what ArviZ wants to know of the sampler, (chain, draw) each."""
-    return {
-        "energy": draws.energy,
-        "lp": -draws.potential,
-        "diverging": draws.diverging,
-        "n_steps": draws.n_steps,
-        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
-        "acceptance_rate": draws.acceptance,
-        "step_size": draws.step_size,
-    }
 
 
 def versions() -> dict[str, str]:

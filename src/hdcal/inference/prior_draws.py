@@ -1,15 +1,15 @@
 """Draws of each parameter from its prior."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import jax
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.density import (
-    POSITIVE,
-)
+from hdcal.inference.density import POSITIVE
 from hdcal.inference.distributions import distribution
+from hdcal.inference.problem import without_texts
 
 _PRIOR_DRAWS = 2000
 
@@ -18,8 +18,11 @@ def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
     """Return draws of each parameter from its prior, (draw,) each."""
     keys = jax.random.split(key, len(priors))
     return {
-        name: np.asarray(
-            distribution(prior, positive=name in POSITIVE).sample(k, (_PRIOR_DRAWS,))
-        )
-        for k, (name, prior) in zip(keys, priors.items(), strict=True)
+        name: np.asarray(_draw(prior, k, positive=name in POSITIVE))
+        for k, (name, prior) in zip(keys, without_texts(priors).items(), strict=True)
     }
+
+
+@partial(jax.jit, static_argnames="positive")
+def _draw(prior: Prior, key, *, positive: bool):
+    return distribution(prior, positive=positive).sample(key, (_PRIOR_DRAWS,))

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -11,10 +12,16 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
-from hdcal.inference.compress import Blocks, compress, group_rows
-from hdcal.inference.density_protocol import Sampled
-from hdcal.inference.discrepancy import Gap, build_gap
+from hdcal.inference.compress import CompressedRows, keep_or_compress
+from hdcal.inference.discrepancy import (
+    BASIS_SIZE,
+    Discrepancy,
+    build_discrepancy,
+)
 from hdcal.inference.distributions import scaled
+from hdcal.inference.padding import pad_records
+from hdcal.inference.padding_check import check_padding
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
@@ -22,8 +29,6 @@ from hdcal.physics.theory import THEORIES
 
 # Below this many rows the rounding likelihood is always exact: it is cheap there.
 _FEW_ROWS = 500
-# Up to this many rows of triangular factors cost little, whatever they replace.
-_MANY_FACTOR_ROWS = 10_000
 # Largest rounding step, in noise sds, for which Sheppard's correction is used: the
 # noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
 _FINE_STEP = 1.3
@@ -31,6 +36,8 @@ _FINE_STEP = 1.3
 # Steps below this many residual sds are no rounding: the exact form would only lose
 # digits in the difference of two nearly equal probabilities.
 _NO_STEP = 1e-3
+
+_base_columns = jax.jit(linear_columns)
 
 
 class Problem(Sampled):
@@ -41,16 +48,17 @@ class Problem(Sampled):
         units: of the sampling coordinate of each half-normal amplitude.
         unit_stiffness: k_theory/E, radial [mm].
         reading: how the rig reads.
-        records: all rows, or None when they are compressed.
+        records: all rows, padded, or None when they are compressed.
         blocks: compressed rows, or None.
-        columns: basis of the gap at the rows, or None.
-        gap: the leftover discrepancy, or None.
+        columns: basis of the discrepancy at the padded rows, or None.
+        discrepancy: the leftover one, or None.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
-        integrated: which of "run", "specimen", "gap" are integrated out exactly.
+        integrated: which of "run", "specimen", "discrepancy" are integrated out.
+        count: measured rows; `records` and `columns` have padding after them.
     """
 
     priors: dict[str, Prior]
@@ -58,19 +66,20 @@ class Problem(Sampled):
     unit_stiffness: Float[Array, ""] | float
     reading: Reading
     records: Records | None
-    blocks: Blocks | None
+    blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
-    gap: Gap | None
+    discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: frozenset[str] = eqx.field(static=True)
+    count: int = 0
 
     @property
     def rows(self) -> Records:
-        """The kept rows.
+        """The kept rows, padded.
 
         Raises:
             ValueError: they were compressed.
@@ -80,7 +89,7 @@ class Problem(Sampled):
         return self.records
 
 
-def bare(priors: Mapping[str, Prior]) -> dict[str, Prior]:
+def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
     """Return priors without their texts.
 
     Text is static: left in, another source line would mean another compilation.
@@ -203,64 +212,72 @@ def build_problem(
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: effects in the model. Those of scatter must have what they need and
-            then change nothing: the model's own members carry them.
+        effects: in the model. Those of scatter must have what they need and then
+            change nothing: the model's own members carry them.
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
 
     Raises:
-        InputError: an effect lacks its covariates or a prior.
+        InputError: an effect lacks its covariates or a prior, or bears no padding.
     """
     _check_needs(case, effects)
     effects = without_scatter(effects)
     theory = theory or case.gear.theory
-    records = case.records
     priors = problem_priors(case, effects, shipped, theory)
-    reading = case_reading(case)
-    base_columns = np.asarray(linear_columns(records, reading))
-    noise_sd = pilot_noise(records)
-    runs = len(case.run_labels) if "run" in records.known else 0
-    specimens = len(case.specimen_labels) if "specimen" in records.known else 0
-    members = {
-        kind
-        for kind, present in (("run", runs), ("specimen", specimens), ("gap", with_gap))
-        if present
-    }
-    step = case.gear.force_resolution
-    few = len(records.force) <= _FEW_ROWS and not members
-    rounded = step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
-    gap = build_gap(records.deformation) if with_gap else None
-    columns = None if gap is None else np.asarray(gap.columns(records.deformation))
-    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
-    design = base_columns if columns is None else np.hstack([base_columns, columns])
-    # One factor per row (an sd of its own in each) would be larger than the rows.
-    factor_rows = len(distinct) * (design.shape[1] + 1)
-    many = factor_rows > max(len(design), _MANY_FACTOR_ROWS)
-    keep_rows = bool(effects) or rounded or many
-    blocks = None
-    if not keep_rows:
-        blocks = compress(design, records.force, distinct, group)
-    else:
-        # Through an effect the force need not be linear in the stiffness.
-        members.discard("specimen")
-    gaussian = not rounded and all(effect.stage != "noise" for effect in effects)
-    integrated = frozenset(members if gaussian else ())
+    records, reading = case.records, case_reading(case)
+    check_padding(effects, records, reading)
+    noise_sd, members = pilot_noise(records), _member_counts(case, with_gap)
+    rounded = _is_rounded(case, noise_sd, members)
+    leftover = build_discrepancy(records.deformation) if with_gap else None
+    columns = _columns(records, reading)
+    rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
+    linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     return Problem(
-        priors=bare(priors),
-        units=amplitude_units(records, reading, effects, priors, noise_sd),
+        priors=without_texts(priors),
+        units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
-        records=records if keep_rows else None,
-        blocks=blocks,
-        columns=columns if keep_rows else None,
-        gap=gap,
-        step=step,
+        discrepancy=leftover,
+        step=case.gear.force_resolution,
         effects=effects,
         rounded=rounded,
-        runs=runs,
-        specimens=specimens,
-        integrated=integrated,
+        runs=members.get("run", 0),
+        specimens=members.get("specimen", 0),
+        integrated=linear & members.keys(),
+        **rows,
     )
+
+
+def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:
+    """Return the kinds of members that enter a Gaussian likelihood linearly."""
+    if rounded or any(effect.stage == "noise" for effect in effects):
+        return frozenset()
+    # Through an effect the force need not be linear in the stiffness.
+    return frozenset({"run", "discrepancy", *(["specimen"] if compressed else [])})
+
+
+def _columns(records: Records, reading: Reading) -> np.ndarray:
+    """Return the columns of the base model at the measured rows, shape (n, 4)."""
+    columns = _base_columns(pad_records(records), reading)
+    return np.asarray(columns)[: len(records.force)]
+
+
+def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
+    """Return how many members of each kind have a parameter of their own."""
+    known = case.records.known
+    counts = {
+        "run": len(case.run_labels) if "run" in known else 0,
+        "specimen": len(case.specimen_labels) if "specimen" in known else 0,
+        "discrepancy": BASIS_SIZE if with_gap else 0,
+    }
+    return {kind: count for kind, count in counts.items() if count}
+
+
+def _is_rounded(case: Case, noise_sd: float, members: Mapping[str, int]) -> bool:
+    """Return whether the exact rounding likelihood is needed, or cheap."""
+    step = case.gear.force_resolution
+    few = len(case.records.force) <= _FEW_ROWS and not members
+    return step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
 
 
 def case_reading(case: Case) -> Reading:

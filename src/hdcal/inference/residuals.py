@@ -7,9 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.inference.density import predict_rows
+from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
-from hdcal.inference.flat_directions import member_columns, sensitivity
-from hdcal.inference.posterior import Posterior, gap_columns
+from hdcal.inference.linearisation import Linearisation, linearise
+from hdcal.inference.padding import pad_records
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_shapes import (
     Structure,
     Whitened,
@@ -52,22 +54,23 @@ class Residuals:
 def residuals(posterior: Posterior) -> Residuals:
     """Return the residuals of a calibration and the shapes found in them."""
     problem, records = posterior.problem, posterior.case.records
+    padded = pad_records(records)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
+    fitted = _fit(problem, _thinned(posterior.draws), padded, columns)
+    fitted = np.asarray(fitted)[: len(records.force)]
+    residual = np.asarray(records.force) - fitted
     centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
-    columns = gap_columns(problem, posterior.case)
-    _, noise = predict_rows(problem, centre, records, columns)
-    fitted = _fit(problem, _thinned(posterior.draws), records, columns)
-    residual = np.asarray(records.force) - np.asarray(fitted)
-    sd = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    near = linearise(problem, centre, records)
     return Residuals(
         deformation=np.asarray(records.deformation),
         temperature=np.asarray(records.temperature),
         direction=np.asarray(records.sense),
         run=np.asarray(records.run),
         measured=np.asarray(records.force),
-        fitted=np.asarray(fitted),
+        fitted=fitted,
         residual=residual,
-        standardised=residual / sd,
-        structure=find_structure(_whiten(posterior, centre, columns, residual, sd), sd),
+        standardised=residual / near.sd,
+        structure=find_structure(_whiten(posterior, centre, near, residual), near.sd),
     )
 
 
@@ -87,12 +90,11 @@ def _fit(problem, values, records, columns):
     return total / len(values["K"])
 
 
-def _whiten(posterior: Posterior, centre, columns, residual, sd) -> Whitened:
+def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whitened:
     """Bring residuals, sensitivities and shapes to noise and prior sds."""
-    problem, records = posterior.problem, posterior.case.records
-    members, place = member_columns(problem, centre, records, columns)
-    table, pull = [members], [-place]
-    for name, slope in sensitivity(problem, centre, records, columns).items():
+    records, sd = posterior.case.records, near.sd
+    table, pull = [near.members], [-near.place]
+    for name, slope in near.slopes.items():
         law = frozen(posterior.priors[name])
         table.append(slope[:, None] * law.std())
         pull.append(np.array([(law.mean() - centre[name]) / law.std()]))
@@ -119,7 +121,7 @@ def misfits(posterior: Posterior) -> tuple[str, ...]:
     Args:
         posterior: from `calibrate`.
     """
-    if posterior.problem.gap is not None:
+    if posterior.problem.discrepancy is not None:
         return ()
     return tuple(
         "This takes the model's shape for right, but its residuals have one. "

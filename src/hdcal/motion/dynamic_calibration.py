@@ -1,7 +1,7 @@
 """Calibrate mass, damping and stiffness against a gear that was seen to move."""
 
 import time
-from dataclasses import replace
+from functools import partial
 
 import jax
 import numpy as np
@@ -10,26 +10,18 @@ from scipy import stats
 from hdcal.data.case import Case, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.checks import (
-    Check,
-    bound_check,
-    conflict_check,
-    identification_checks,
-    sampling_checks,
-)
-from hdcal.inference.density import log_prior
-from hdcal.inference.diagnostics import diagnose_parameters, mixing
-from hdcal.inference.dynamic_posterior import DynamicPosterior, build_dynamic_tree
+from hdcal.inference.assembly import Specifics, assemble, run_settings
+from hdcal.inference.checks import Check
+from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import (
     DynamicProblem,
     build_dynamic,
     dynamic_site_priors,
+    pointwise,
     predict_motion,
 )
-from hdcal.inference.dynamic_start import scan
-from hdcal.inference.flat_directions import dead_parameters, flat_directions
-from hdcal.inference.posterior import versions
-from hdcal.inference.prior_draws import draw_priors
+from hdcal.inference.executables import bound_executables
+from hdcal.inference.frequency_scan import scan
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 
 FEWEST_ROWS = 20
@@ -77,6 +69,7 @@ def calibrate_dynamic(
     """
     check_settings(chains, warmup, draws)
     check_motion(case)
+    bound_executables()
     began = time.perf_counter()
     theory = theory or case.gear.theory
     priors = dynamic_site_priors(case, theory)
@@ -85,48 +78,28 @@ def calibrate_dynamic(
     whitening, rival = highest_peak(problem, of_fit)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
-    settings = {
-        "kind": DynamicPosterior.kind,
-        "seed": seed,
-        **size,
-        "with_gap": False,
-        "target_acceptance": found.target_acceptance,
-        "versions": versions(),
-    }
-    posterior = _assemble(
-        case, theory, priors, problem, found, rival, of_prior, settings
-    )
-    seconds = round(time.perf_counter() - began, 3)
-    return replace(posterior, settings={**settings, "seconds": seconds})
+    settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
+    settings |= run_settings(found)
+    own = _specifics(problem, found, rival)
+    parts = assemble(case, priors, problem, found, own, of_prior)
+    settings["seconds"] = round(time.perf_counter() - began, 3)
+    return DynamicPosterior(case, theory, (), priors, *parts, settings)
 
 
-def _assemble(
-    case: Case,
-    theory: Theory,
-    priors,
-    problem,
-    found: Draws,
-    rival: Check,
-    key,
-    settings,
-) -> DynamicPosterior:
-    sampled = {name: p for name, p in priors.items() if p.family != "fixed"}
-    scalars = {name: found.values[name] for name in sampled}
-    tree = build_dynamic_tree(case, problem, found, draw_priors(sampled, key))
-    of_prior = np.asarray(_log_prior(problem, found.values))
-    of_data = tree["log_likelihood"]["deformation"].to_numpy().sum(-1)
-    diagnoses = diagnose_parameters(scalars, sampled, of_prior, of_data)
-    derived = mixing({name: found.values[name] for name in _DERIVED})
-    checks = (
-        *sampling_checks(tree["sample_stats"].to_dataset(), diagnoses | derived),
-        rival,
-        whiteness_check(problem, found),
-        sampling_rate_check(problem, found),
-        conflict_check(scalars, sampled),
-        bound_check(scalars, sampled),
-        *_identification(problem, found),
+def _specifics(problem: DynamicProblem, found: Draws, rival: Check) -> Specifics:
+    """Return what the model of the motion adds to what every calibration has."""
+    each = np.asarray(_pointwise(problem, found.values))[..., : problem.count]
+    return Specifics(
+        log_likelihood={"deformation": each},
+        slopes=_slopes_in_sds(problem, found),
+        mixed={name: found.values[name] for name in _DERIVED},
+        checks=[
+            rival,
+            whiteness_check(problem, found),
+            sampling_rate_check(problem, found),
+        ],
+        observed=("force", "deformation"),
     )
-    return DynamicPosterior(case, theory, (), priors, tree, diagnoses, checks, settings)
 
 
 def check_motion(case: Case) -> None:
@@ -162,10 +135,10 @@ def check_motion(case: Case) -> None:
 
 
 def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
-    """Climb from every peak of the scan; return the highest, and say how lonely it is.
+    """Search from every peak of the scan; return the highest, and check the next one.
 
-    Chains start around one peak and never cross to another, so that no R-hat could
-    tell of it.
+    Chains start around one peak and never cross to another, so that no R-hat would
+    show a second one.
     """
     fits = [laplace.fit(problem, key, start) for start in scan(problem, _PEAKS)]
     fits = fits or [laplace.fit(problem, key)]
@@ -198,14 +171,11 @@ def _slopes(problem: DynamicProblem, values, part):
 
 
 @jax.jit
-def _log_prior(problem: DynamicProblem, values):
-    def one(each):
-        return log_prior(problem, each)
-
-    return jax.vmap(jax.vmap(one))(values)
+def _pointwise(problem: DynamicProblem, values):
+    return jax.vmap(jax.vmap(partial(pointwise, problem)))(values)
 
 
-def centre(found: Draws) -> dict[str, np.ndarray]:
+def _best_draw(found: Draws) -> dict[str, np.ndarray]:
     """Return the draw of the highest posterior density."""
     place = np.unravel_index(np.argmin(found.potential), found.potential.shape)
     return {name: values[place] for name, values in found.values.items()}
@@ -217,8 +187,9 @@ def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
     The test is Ljung and Box's over twenty lags (fewer in short records).
     """
     name = "residuals are noise"
-    values = centre(found)
-    left = np.asarray(problem.deformation - _predict(problem, values))
+    values = _best_draw(found)
+    left = problem.deformation - np.asarray(_predict(problem, values))
+    left = left[: problem.count]
     left = left - left.mean()
     rows = len(left)
     lags = np.arange(1, min(_LAGS, rows // 4) + 1)
@@ -241,7 +212,9 @@ def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
     """Warn where rows are too far apart for a force that is linear between them."""
     name = "rows follow the vibration"
     frequency = float(np.median(found.values["natural_frequency"]))
-    per_period = 1.0 / (frequency * float(np.median(np.diff(problem.time))))
+    per_period = 1.0 / (
+        frequency * float(np.median(np.diff(problem.time[: problem.count])))
+    )
     words = f"{per_period:.1f} rows per period of {frequency:.4g} Hz"
     if per_period >= 6.0:
         return Check(name, "passed", words)
@@ -249,18 +222,14 @@ def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
     return Check(name, "warning", f"{words}: {remedy}")
 
 
-def _identification(problem: DynamicProblem, found: Draws) -> tuple[Check, ...]:
-    values = centre(found)
+def _slopes_in_sds(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
+    """Return by how much each parameter moves the measured rows, in noise sds."""
+    values = _best_draw(found)
     names = [
         name
         for name, prior in problem.priors.items()
         if prior.family != "fixed" and name != "deformation_sigma"
     ]
-    part = {name: values[name] for name in names}
-    slopes = {
-        name: np.asarray(slope) / float(values["deformation_sigma"])
-        for name, slope in _slopes(problem, values, part).items()
-    }
-    dead = dead_parameters(slopes, problem)
-    alive = {name: slope for name, slope in slopes.items() if name not in dead}
-    return identification_checks(dead, flat_directions(alive, problem))
+    slopes = _slopes(problem, values, {name: values[name] for name in names})
+    sd = float(values["deformation_sigma"])
+    return {n: np.asarray(slope)[: problem.count] / sd for n, slope in slopes.items()}

@@ -135,8 +135,9 @@ def force(
         force_offset: b [N].
 
     Returns:
-        Force [N], broadcast over the arguments.
+        Force [N] in double precision, broadcast over the arguments.
     """
+    deformation = jnp.asarray(deformation, dtype=float)
     warm = modulus * (1.0 - alpha * temperature_rise)
     stiffness = influence * THEORIES[theory](geometry, warm)
-    return jnp.asarray(stiffness * (deformation - deformation_offset) + force_offset)
+    return stiffness * (deformation - deformation_offset) + force_offset

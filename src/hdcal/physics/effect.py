@@ -103,6 +103,9 @@ class Effect(eqx.Module):
     def apply(self, signal: Any, rows: Rows) -> Any:
         """Return the signal of this effect's stage as the effect leaves it.
 
+        A row may depend on itself and on rows before it, never on the number of rows:
+        copies of the last one may follow, and must change nothing before them.
+
         Args:
             signal: radial deformation [mm] on the deformation stage, force [N] on
                 the force and sensor stages, `Noise` on the noise stage.

@@ -32,23 +32,3 @@ def check_population(asked: str | None, problem: Problem) -> list[Finding]:
     words = f"the data hold one {what}, which says nothing of how much others differ"
     remedy = f"Measure two or more, or ask for --population {widest(problem)}"
     return [Finding("--population", words, remedy)]
-
-
-def population_words(population: Population, problem: Problem) -> str:
-    """Return in one sentence whose forces the numbers are about."""
-    if population == "readings":
-        gears = "the tested gears on average" if problem.specimens else "this one gear"
-        place = "mountings on average" if problem.runs else "mounting"
-        return (
-            f"Single readings of {gears} in the tested {place}. Another gear or "
-            "another mounting may need a force outside these bounds."
-        )
-    runs = f", each in a new mounting ({problem.runs} were tested)"
-    if population == "mountings":
-        gears = "the tested gears on average" if problem.specimens else "this one gear"
-        return (
-            f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
-            "Another gear may need a force outside these bounds."
-        )
-    place = runs if problem.runs else ", in the tested mounting"
-    return f"New gears of this kind ({problem.specimens} were tested){place}."

@@ -1,60 +1,34 @@
-"""The bar: what was promised before the seal was opened, row by row."""
+"""The bar: what was promised before the seal was opened, and what was found."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from hdcal.blind.scoring.estimates import Estimate, mean, share
-from hdcal.blind.scoring.judged import Judged
-from hdcal.blind.scoring.order import order_dependence
-from hdcal.blind.scoring.reliability import (
-    LEAST_STATED,
-    calibration,
-    effect_statements,
-    top_statements,
-)
-from hdcal.blind.scoring.sizes import (
-    amplitude_rows,
-    closed_errors,
-    gap_rows,
-)
-
-Direction = Literal["at least", "at most", "within"]
-Target = float | tuple[float, float] | None
+from hdcal.blind.scoring.reliability import Reliability
+from hdcal.blind.scoring.scored_case import UNKNOWN, Cases, null_cases
+from hdcal.blind.scoring.sizes import amplitude_sizes, closed_errors, gap_sizes
+from hdcal.blind.scoring.tables import precision
 
 
 @dataclass(frozen=True)
-class Row:
+class BarRow:
     """One promise.
 
     Attributes:
-        key: by which code knows it.
         what: in words.
-        found: what came out.
-        target: a number, two of them where the value must lie between, or None.
         direction: on which side of the target the value must lie.
+        target: a number, two of them where the value must lie between, or None.
         unit: share, points, effects or p.
     """
 
-    key: str
     what: str
-    found: Estimate
-    target: Target = None
-    direction: Direction | None = None
+    direction: Literal["at least", "at most", "within"] | None = None
+    target: float | tuple[float, float] | None = None
     unit: str = "share"
 
-    @property
-    def met(self) -> bool | None:
-        """Whether the value, not its interval, is on the right side."""
-        return self._holds(self.found.value)
-
-    @property
-    def firm(self) -> bool | None:
-        """Whether the whole interval is on the side where the value is."""
-        ends = [self._holds(end) for end in (self.found.lo, self.found.hi)]
-        return None if None in ends else ends == [self.met, self.met]
-
-    def _holds(self, value: float | None) -> bool | None:
+    def met_by(self, value: float | None) -> bool | None:
+        """Tell whether a value is on the right side; None without one or a target."""
         if value is None or self.target is None:
             return None
         if isinstance(self.target, tuple):
@@ -63,180 +37,148 @@ class Row:
             return value >= self.target - 1e-9
         return value <= self.target + 1e-9
 
-    def plain(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        target = list(self.target) if isinstance(self.target, tuple) else self.target
+    def compared(self, key: str, found: Estimate) -> dict[str, Any]:
+        """Return promise and estimate as plain data for JSON.
+
+        `met` compares the value itself with the target; `firm` tells whether the whole
+        interval is on the same side.
+        """
+        met = self.met_by(found.value)
+        ends = [self.met_by(found.lo), self.met_by(found.hi)]
         return {
-            "key": self.key,
+            "key": key,
             "what": self.what,
-            **self.found.plain(),
-            "target": target,
+            **found.plain(),
+            "target": [*self.target] if isinstance(self.target, tuple) else self.target,
             "direction": self.direction,
             "unit": self.unit,
-            "met": self.met,
-            "firm": self.firm,
+            "met": met,
+            "firm": None if None in ends else ends == [met, met],
         }
 
 
+_LISTED = "outside the library, of the list given beforehand"
+_CHOSEN = "outside the library, chosen blind"
+_SERIAL = "false alarms without a gap, serial noise up to 0.5"
+_R1, _R05 = "at r = 1, rich program", "at r = 0.5, rich program"
+_TOP = "calibration error of the most probable hypothesis"
+_EACH = "calibration error of single effects given 5 % or more"
+_ORDER = "answers depend on file order: p-value that they do not"
+ROWS = {
+    "false_alarm_iid": BarRow(
+        "false alarms without a gap, independent noise", "at most", 0.05
+    ),
+    "false_alarm_ar": BarRow(_SERIAL, "at most", 0.05),
+    "named_on_null": BarRow("an effect named without a gap", "at most", 0.01),
+    "detected": BarRow("effects detected from r√n = 5 on", "at least", 0.9),
+    "top1_rich_r1": BarRow(f"true effect first {_R1}", "at least", 0.9),
+    "oracle_r1": BarRow(f"short of the oracle {_R1}", "at most", 0.04, "points"),
+    "top1_rich_r0.5": BarRow(f"true effect first {_R05}", "at least", 0.7),
+    "oracle_r0.5": BarRow(f"short of the oracle {_R05}", "at most", 0.08, "points"),
+    "top1_r1_2": BarRow(
+        "true effect first at r = 1 to 2, all programs", "at least", 0.85
+    ),
+    "top1_r5": BarRow("true effect first at r = 5, all programs", "at least", 0.7),
+    "set_holds": BarRow("90 % set holds the true effect, r ≥ 0.5", "at least", 0.9),
+    "set_size": BarRow("size of the 90 % set at r = 1", "at most", 1.6, "effects"),
+    "precision": BarRow(
+        "a named effect is a true one, all kinds of cases", "at least", 0.95
+    ),
+    "unknown_spanned": BarRow(f"{_LISTED}: called unknown", "at least", 0.9),
+    "named_spanned": BarRow(f"{_LISTED}: an effect named", "at most", 0.05),
+    "unknown_unspanned": BarRow(f"{_CHOSEN}: called unknown", "at least", 0.7),
+    "named_unspanned": BarRow(f"{_CHOSEN}: an effect named", "at most", 0.1),
+    "named_withheld": BarRow(
+        "true effect withheld, r = 1: another named", "at most", 0.2
+    ),
+    "amplitude": BarRow("error of the amplitude", "at most", 0.07),
+    "amplitude_holds": BarRow(
+        "90 % interval holds the amplitude", "within", (0.85, 0.95)
+    ),
+    "gap": BarRow("error of the gap's size"),
+    "gap_holds": BarRow("90 % interval holds the gap's size"),
+    "closed": BarRow(
+        "error of the closed share, true effect named", "at most", 0.08, "points"
+    ),
+    "calibration_top": BarRow(_TOP, "at most", 0.05),
+    "calibration_effects": BarRow(_EACH, "at most", 0.05),
+    "order": BarRow(_ORDER, "at least", 0.01, "p"),
+}
+
+
 def bar(
-    cases: Sequence[Judged],
+    cases: Cases,
     closures: Mapping[str, float],
-    calibration_cases: set[str] | None,
-) -> list[Row]:
-    """Return every row of the bar.
+    stated: Mapping[str, Reliability],
+    order: Mapping[str, Any],
+) -> list[dict[str, Any]]:
+    """Return every row of the bar with what was found, as plain data for JSON.
 
     Args:
-        cases: of the judged diagnoser.
+        cases: of the diagnoser whose answers are held against it.
         closures: true closed share of the best fit of the true effect's own form.
-        calibration_cases: cases drawn as the prior says; None for all.
+        stated: from `reliabilities`.
+        order: from `order_dependence`.
     """
-    return [
-        *gate_rows(cases),
-        *cause_rows(cases),
-        *set_rows(cases),
-        *foreign_rows(cases),
-        *size_rows(cases, closures),
-        *calibration_rows(cases, calibration_cases),
-        order_row(cases),
-    ]
+    p = order["p_value"]
+    n = order["n"] if p is not None else 0
+    found = {
+        **_detections(cases),
+        **_causes(cases),
+        **_sizes(cases, closures),
+        "calibration_top": stated["top"].error,
+        "calibration_effects": stated["effects"].error,
+        "order": Estimate(p, None, None, n, "permutation test"),
+    }
+    return [row.compared(key, found[key]) for key, row in ROWS.items()]
 
 
-def quiet(cases: Sequence[Judged], noise: str) -> list[Judged]:
-    """Return the cases without a gap in one kind of noise, serial up to .5."""
-    own = [c for c in cases if c.label.kind == "null" and c.label.noise == noise]
-    return [c for c in own if noise != "ar" or c.label.correlation <= 0.5 + 1e-9]
+def _detections(cases: Cases) -> dict[str, Estimate]:
+    null = [c for c in cases if c.label.kind == "null"]
+    effects = [c for c in cases if c.label.kind == "effect"]
+    large = [c for c in effects if c.label.r * c.label.rows**0.5 >= 5.0]
+    return {
+        "false_alarm_iid": share(c.answer.detected for c in null_cases(cases, "iid")),
+        "false_alarm_ar": share(c.answer.detected for c in null_cases(cases, "ar")),
+        "named_on_null": share(c.named for c in null),
+        "detected": share(c.answer.detected for c in large),
+    }
 
 
-def gate_rows(cases: Sequence[Judged]) -> list[Row]:
-    """Return the rows on gaps seen where there is none, and missed where there is."""
-    iid = share(c.answer.detected for c in quiet(cases, "iid"))
-    serial = share(c.answer.detected for c in quiet(cases, "ar"))
-    named = share(c.named for c in cases if c.label.kind == "null")
-    seen = share(
-        c.answer.detected
-        for c in cases
-        if c.label.kind == "effect" and c.label.r * c.label.rows**0.5 >= 5.0
+def _causes(cases: Cases) -> dict[str, Estimate]:
+    known = [c for c in cases if c.plain_effect]
+    at_1, some = (
+        [c for c in known if c.at(1.0)],
+        [c for c in known if c.label.r >= 0.475],
     )
-    white = "false alarms without a gap, independent noise"
-    words = "false alarms without a gap, serial noise up to 0.5"
-    return [
-        Row("false_alarm_iid", white, iid, 0.05, "at most"),
-        Row("false_alarm_ar", words, serial, 0.05, "at most"),
-        Row("named_on_null", "an effect named without a gap", named, 0.01, "at most"),
-        Row("detected", "effects detected from r√n = 5 on", seen, 0.9, "at least"),
-    ]
-
-
-def cause_rows(cases: Sequence[Judged]) -> list[Row]:
-    """Return the rows on the true effect being the most probable one."""
-    known = [c for c in cases if c.plain_effect]
-    rows = []
-    for r, target, most in ((1.0, 0.9, 0.04), (0.5, 0.7, 0.08)):
+    found = {
+        "top1_r1_2": share(c.credit for c in known if c.between(1.0, 2.0)),
+        "top1_r5": share(c.credit for c in known if c.at(5.0)),
+        "set_holds": share(c.label.truth[0] in c.answer.set for c in some),
+        "set_size": mean([float(len(c.answer.set)) for c in at_1]),
+        "precision": precision(cases),
+        "named_withheld": share(c.named for c in cases if c.withheld and c.at(1.0)),
+    }
+    for r in (1.0, 0.5):
         own = [c for c in known if c.at(r) and c.label.program == "rich"]
-        oracle = [c for c in own if c.label.oracle]
-        words, key = f"at r = {r:g}, rich program", f"r{r:g}"
-        found = share(c.credit for c in own)
-        away = mean([c.oracle_credit - c.credit for c in oracle])
-        what = f"true effect first {words}"
-        rows.append(Row(f"top1_rich_{key}", what, found, target, "at least"))
-        what = f"short of the oracle {words}"
-        rows.append(Row(f"oracle_{key}", what, away, most, "at most", "points"))
-    middle = share(c.credit for c in known if c.between(1.0, 2.0))
-    large = share(c.credit for c in known if c.at(5.0))
-    words = "true effect first at r = 1 to 2, all programs"
-    rows.append(Row("top1_r1_2", words, middle, 0.85, "at least"))
-    words = "true effect first at r = 5, all programs"
-    rows.append(Row("top1_r5", words, large, 0.7, "at least"))
-    return rows
+        short = [c.oracle_credit - c.credit for c in own if c.label.oracle]
+        found[f"top1_rich_r{r:g}"] = share(c.credit for c in own)
+        found[f"oracle_r{r:g}"] = mean(short)
+    outside = [c for c in cases if c.label.kind == "outside" and c.label.r >= 0.95]
+    for word, spanned in (("spanned", True), ("unspanned", False)):
+        own = [c for c in outside if c.label.spanned is spanned]
+        found[f"unknown_{word}"] = share(c.answer.verdict == UNKNOWN for c in own)
+        found[f"named_{word}"] = share(c.named for c in own)
+    return found
 
 
-def set_rows(cases: Sequence[Judged]) -> list[Row]:
-    """Return the rows on the 90 % set, and on how far a name can be relied on."""
-    known = [c for c in cases if c.plain_effect]
-    held = share(c.label.truth[0] in c.answer.set for c in known if c.label.r >= 0.475)
-    size = mean([float(len(c.answer.set)) for c in known if c.at(1.0)])
-    name = share(c.named_right for c in cases if c.named and not c.label.withheld)
-    words = "90 % set holds the true effect, r ≥ 0.5"
-    what = "a named effect is a true one, all kinds of cases"
-    return [
-        Row("set_holds", words, held, 0.9, "at least"),
-        Row(
-            "set_size", "size of the 90 % set at r = 1", size, 1.6, "at most", "effects"
-        ),
-        Row("precision", what, name, 0.95, "at least"),
-    ]
-
-
-def foreign_rows(cases: Sequence[Judged]) -> list[Row]:
-    """Return the rows on causes that the library does not hold."""
-    rows = []
-    for spanned, least, most in ((True, 0.9, 0.05), (False, 0.7, 0.1)):
-        own = [
-            c
-            for c in cases
-            if c.label.kind == "outside"
-            and c.label.spanned is spanned
-            and c.label.r >= 0.95
-        ]
-        key = "spanned" if spanned else "unspanned"
-        words = "outside the library, " + (
-            "of the list given beforehand" if spanned else "chosen blind"
-        )
-        unknown = share(c.answer.verdict == "unknown" for c in own)
-        named = share(c.named for c in own)
-        what = f"{words}: called unknown"
-        rows.append(Row(f"unknown_{key}", what, unknown, least, "at least"))
-        what = f"{words}: an effect named"
-        rows.append(Row(f"named_{key}", what, named, most, "at most"))
-    taken = share(c.named for c in cases if c.withheld and c.at(1.0))
-    what = "true effect withheld, r = 1: another named"
-    return [*rows, Row("named_withheld", what, taken, 0.2, "at most")]
-
-
-def size_rows(cases: Sequence[Judged], closures: Mapping[str, float]) -> list[Row]:
-    """Return the rows on sizes, at r = 1."""
+def _sizes(cases: Cases, closures: Mapping[str, float]) -> dict[str, Estimate]:
     own = [c for c in cases if c.at(1.0)]
-    amplitude, gap = amplitude_rows(own), gap_rows(own)
-    return [
-        Row("amplitude", "error of the amplitude", amplitude.error, 0.07, "at most"),
-        Row(
-            "amplitude_holds",
-            "90 % interval holds the amplitude",
-            amplitude.held,
-            (0.85, 0.95),
-            "within",
-        ),
-        Row("gap", "error of the gap's size", gap.error),
-        Row("gap_holds", "90 % interval holds the gap's size", gap.held),
-        Row(
-            "closed",
-            "error of the closed share, true effect named",
-            closed_errors(own, closures),
-            0.08,
-            "at most",
-            "points",
-        ),
-    ]
-
-
-def calibration_rows(cases: Sequence[Judged], chosen: set[str] | None) -> list[Row]:
-    """Return the rows on stated probabilities."""
-    own = [c for c in cases if chosen is None or c.label.case in chosen]
-    top, _ = calibration(top_statements(own))
-    each, _ = calibration(effect_statements(own, least=LEAST_STATED))
-    words = "calibration error of the most probable hypothesis"
-    what = "calibration error of single effects given 5 % or more"
-    return [
-        Row("calibration_top", words, top, 0.05, "at most"),
-        Row("calibration_effects", what, each, 0.05, "at most"),
-    ]
-
-
-def order_row(cases: Sequence[Judged]) -> Row:
-    """Return the row on answers that go with the order of the files."""
-    found = order_dependence(cases)
-    p = found["p_value"]
-    n = found["n"] if p is not None else 0
-    words = "answers depend on file order: p-value that they do not"
-    estimate = Estimate(p, None, None, n, "permutation test")
-    return Row("order", words, estimate, 0.01, "at least", "p")
+    amplitude, gap = amplitude_sizes(own), gap_sizes(own)
+    return {
+        "amplitude": amplitude.error,
+        "amplitude_holds": amplitude.held,
+        "gap": gap.error,
+        "gap_holds": gap.held,
+        "closed": closed_errors(own, closures),
+    }

@@ -1,13 +1,12 @@
 """From which size on a gap is detected, by effect."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from scipy.special import expit
 
 from hdcal.blind.scoring.estimates import share
-from hdcal.blind.scoring.judged import Judged
+from hdcal.blind.scoring.scored_case import Cases
 
 METHOD = (
     "Fraction detected = 5 % + 95 % logistic(s (log r - m)), 5 % being the gate's own "
@@ -19,14 +18,14 @@ ALARM = 0.05
 _WANTED = 0.9
 
 
-def detection(cases: Sequence[Judged]) -> list[dict[str, Any]]:
+def detection(cases: Cases) -> list[dict[str, Any]]:
     """Return the detection curve of every effect, of those in the library and not."""
     own = [c for c in cases if c.one_effect and c.label.r > 0.0]
     names = sorted({case.label.truth[0] for case in own})
     return [_curve(n, [c for c in own if c.label.truth[0] == n]) for n in names]
 
 
-def _curve(name: str, cases: Sequence[Judged]) -> dict[str, Any]:
+def _curve(name: str, cases: Cases) -> dict[str, Any]:
     r = np.array([case.label.r for case in cases])
     hit = np.array([case.answer.detected for case in cases], dtype=float)
     fitted = fit(r, hit)

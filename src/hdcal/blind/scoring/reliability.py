@@ -10,7 +10,6 @@ sum p (1 - p) / n_b². `floor` is what a perfectly calibrated diagnoser who stat
 same would show by the same estimator: mean and 95 % point of simulations.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +17,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from hdcal.blind.scoring.estimates import BOOTSTRAP, SEED, Estimate, share
-from hdcal.blind.scoring.judged import Judged
+from hdcal.blind.scoring.scored_case import Cases
 
 ESTIMATOR = (
     "Expected calibration error over at most ten bins of equal counts (twenty "
@@ -27,7 +26,7 @@ ESTIMATOR = (
     "about the value; floor: what a perfectly calibrated diagnoser would show who "
     "states the same about as many cases."
 )
-LEAST_STATED = 0.05
+_LEAST_STATED = 0.05
 _MOST_BINS, _LEAST_IN_BIN, _REPEATS = 10, 20, 500
 
 
@@ -46,7 +45,7 @@ class Statements:
     true: np.ndarray
 
 
-def top_statements(cases: Sequence[Judged]) -> Statements:
+def top_statements(cases: Cases) -> Statements:
     """Return what is said of the most probable hypothesis."""
     rows = [
         (index, case.probabilities.get(case.top, 0.0), case.top == case.truth)
@@ -57,7 +56,7 @@ def top_statements(cases: Sequence[Judged]) -> Statements:
 
 
 def effect_statements(
-    cases: Sequence[Judged], effect: str | None = None, least: float = 0.0
+    cases: Cases, effect: str | None = None, least: float = 0.0
 ) -> Statements:
     """Return what is said of each effect, alone or beside another.
 
@@ -119,22 +118,65 @@ def errors(
     return plug_in, max(0.0, 2.0 * plug_in - float(part @ again))
 
 
-def calibration(found: Statements) -> tuple[Estimate, dict[str, Any]]:
-    """Return the debiased calibration error, and the table that it comes from."""
-    places, n = bin_of(found.stated), len(found.stated)
-    cases = len(np.unique(found.case))
+@dataclass(frozen=True)
+class Reliability:
+    """Whether statements hold as often as stated.
+
+    Attributes:
+        error: the debiased calibration error.
+        table: what it comes from, as plain data.
+    """
+
+    error: Estimate
+    table: dict[str, Any]
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        return {**self.error.plain(), **self.table}
+
+
+def reliabilities(cases: Cases) -> dict[str, Reliability]:
+    """Return the reliability of what is said first, and of each effect given 5 %."""
+    return {
+        "top": reliability(top_statements(cases)),
+        "effects": reliability(effect_statements(cases, least=_LEAST_STATED)),
+    }
+
+
+def reliability(found: Statements) -> Reliability:
+    """Return the calibration error of statements, and the table it comes from."""
+    n, error = len(found.stated), calibration_error(found)
     if not n:
-        none = Estimate(None, None, None, 0, BOOTSTRAP)
-        return none, {"plug_in": None, "floor": None, "statements": 0, "bins": []}
-    plug_in, value = errors(places, found.stated, found.true, np.ones(n))
-    low, high = _spread(places, found, value) if cases > 1 else (None, None)
+        nothing = {"plug_in": None, "floor": None, "statements": 0, "bins": []}
+        return Reliability(error, nothing)
+    places = bin_of(found.stated)
     table = {
-        "plug_in": plug_in,
+        "plug_in": errors(places, found.stated, found.true, np.ones(n))[0],
         "floor": _floor(places, found),
         "statements": n,
         "bins": [_bin(found, places == place) for place in range(places.max() + 1)],
     }
-    return Estimate(value, low, high, cases, BOOTSTRAP), table
+    return Reliability(error, table)
+
+
+def calibration_error(found: Statements) -> Estimate:
+    """Return the debiased calibration error of statements."""
+    places, n = bin_of(found.stated), len(found.stated)
+    cases = len(np.unique(found.case))
+    if not n:
+        return Estimate(None, None, None, 0, BOOTSTRAP)
+    _, value = errors(places, found.stated, found.true, np.ones(n))
+    low, high = _spread(places, found, value) if cases > 1 else (None, None)
+    return Estimate(value, low, high, cases, BOOTSTRAP)
+
+
+def effect_errors(cases: Cases) -> list[dict[str, Any]]:
+    """Return the calibration error of each effect alone, as plain data."""
+    names = sorted({name for case in cases for name in case.answer.inclusion})
+    return [
+        {"effect": name, **calibration_error(effect_statements(cases, name)).plain()}
+        for name in names
+    ]
 
 
 def _spread(places, found: Statements, value: float) -> tuple[float, float]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hdcal.blind.label import Span
 from hdcal.blind.scoring.estimates import Estimate, median, share
-from hdcal.blind.scoring.judged import Judged
+from hdcal.blind.scoring.scored_case import Cases
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Sizes:
     held: Estimate
 
 
-def amplitude_rows(cases: Iterable[Judged]) -> Sizes:
+def amplitude_sizes(cases: Cases) -> Sizes:
     """Compare amplitudes, wherever truth and answer speak of the same parameter."""
     return _compare(
         (true, case.answer.amplitude[name])
@@ -27,17 +27,16 @@ def amplitude_rows(cases: Iterable[Judged]) -> Sizes:
     )
 
 
-def gap_rows(cases: Iterable[Judged]) -> Sizes:
+def gap_sizes(cases: Cases) -> Sizes:
     """Compare the size of the gap with the root mean square of what was put in."""
     return _compare(
-        (rms(case.label.curve), case.answer.gap)
+        (_rms(case.label.curve), case.answer.gap)
         for case in cases
         if case.label.curve and case.answer.gap is not None
     )
 
 
-def rms(values: Sequence[float]) -> float:
-    """Return a root mean square."""
+def _rms(values: Sequence[float]) -> float:
     return math.sqrt(math.fsum(v * v for v in values) / len(values))
 
 
@@ -54,7 +53,7 @@ def _compare(rows: Iterable[tuple[float, Span]]) -> Sizes:
     )
 
 
-def closed_errors(cases: Iterable[Judged], closures: Mapping[str, float]) -> Estimate:
+def closed_errors(cases: Cases, closures: Mapping[str, float]) -> Estimate:
     """Return the median error of the closed share where the true effect is named."""
     return median(
         [

@@ -1,20 +1,24 @@
-"""Tables: who is taken for whom, and the same numbers by size, program and noise."""
+"""Tables: who is taken for whom, two effects at once, and the rivals side by side."""
 
-import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from hdcal.blind.scoring.bar import quiet
-from hdcal.blind.scoring.estimates import mean, share
-from hdcal.blind.scoring.judged import NONE, UNKNOWN, Judged
-from hdcal.blind.scoring.proper import log_score
-from hdcal.blind.scoring.sizes import amplitude_rows, closed_errors, gap_rows
+from hdcal.blind.scoring.estimates import Estimate, share
+from hdcal.blind.scoring.proper_scores import log_score
+from hdcal.blind.scoring.reliability import Reliability
+from hdcal.blind.scoring.scored_case import (
+    NONE,
+    UNKNOWN,
+    Cases,
+    ScoredCase,
+    null_cases,
+)
 
 PAIR, OUTSIDE, WITHHELD, REAL = "pair", "outside", "withheld", "real"
 
 
-def confusion(cases: Sequence[Judged], families: Mapping[str, str]) -> dict[str, Any]:
+def confusion(cases: Cases, families: Mapping[str, str]) -> dict[str, Any]:
     """Return how often each truth got each hypothesis as the most probable one.
 
     Args:
@@ -32,7 +36,7 @@ def confusion(cases: Sequence[Judged], families: Mapping[str, str]) -> dict[str,
     }
 
 
-def _row(case: Judged) -> str:
+def _row(case: ScoredCase) -> str:
     if case.label.kind == "null":
         return NONE
     if case.plain_effect:
@@ -64,92 +68,11 @@ def mix_ups(table: Mapping[str, Any], most: int = 12) -> list[dict[str, Any]]:
     return sorted(found, key=lambda row: -row["n"])[:most]
 
 
-def numbers(
-    cases: Sequence[Judged], families: Mapping[str, str], closures: Mapping[str, float]
-) -> dict[str, Any]:
-    """Return the numbers that every table shows, of some cases."""
-    known = [c for c in cases if c.plain_effect]
-    amplitude, gap = amplitude_rows(cases), gap_rows(cases)
-    found = {
-        "top1": share(c.credit for c in known),
-        "family": share(_family_right(c, families) for c in known),
-        "oracle": share(c.oracle_credit for c in known if c.label.oracle),
-        "false_alarms": share(c.answer.detected for c in cases if _empty(c)),
-        "detected": share(c.answer.detected for c in cases if c.label.kind == "effect"),
-        "named": share(c.named for c in known),
-        "precision": share(c.named_right for c in cases if _counts(c)),
-        "set_holds": share(c.label.truth[0] in c.answer.set for c in known),
-        "set_size": mean([float(len(c.answer.set)) for c in known]),
-        "amplitude": amplitude.error,
-        "amplitude_holds": amplitude.held,
-        "gap": gap.error,
-        "gap_holds": gap.held,
-        "closed": closed_errors(cases, closures),
-        "log_score": log_score(cases),
-    }
-    return {"n": len(cases), **{key: value.plain() for key, value in found.items()}}
-
-
-def _empty(case: Judged) -> bool:
-    return case.label.kind == "null"
-
-
-def _counts(case: Judged) -> bool:
-    return case.named and not case.label.withheld
-
-
-def _family_right(case: Judged, families: Mapping[str, str]) -> bool:
-    first, truth = case.top_effect, case.label.truth[0]
-    return first is not None and families.get(first, first) == families.get(
-        truth, truth
-    )
-
-
-def by(
-    cases: Sequence[Judged], word: Callable[[Judged], str], summed: Callable[..., dict]
-) -> list[dict[str, Any]]:
-    """Return the numbers of each group of cases.
-
-    Args:
-        cases: of one diagnoser.
-        word: the group's name.
-        summed: from cases to numbers.
-    """
-    names = sorted({word(case) for case in cases})
-    return [
-        {"name": name, **summed([c for c in cases if word(c) == name])}
-        for name in names
-    ]
-
-
-def by_size(
-    cases: Sequence[Judged], summed: Callable[..., dict]
-) -> list[dict[str, Any]]:
-    """Return the numbers by size of the gap, sizes within a factor of 2 together."""
-    sized = [c for c in cases if c.label.r > 0.0 and math.isfinite(c.label.r)]
-    groups: dict[int, list[Judged]] = {}
-    for case in sized:
-        groups.setdefault(round(math.log2(case.label.r)), []).append(case)
-    rows = []
-    for place in sorted(groups):
-        sizes = sorted(case.label.r for case in groups[place])
-        span = (sizes[0], sizes[-1])
-        name = " to ".join(dict.fromkeys(f"{r:.2g}" for r in span))
-        rows.append({"name": f"r = {name}", "r": span, **summed(groups[place])})
-    return rows
-
-
-def noise_word(case: Judged) -> str:
-    """Return the kind of noise in words."""
-    words = {"iid": "independent", "ar": "serially correlated"}
-    return words.get(case.label.noise, case.label.noise)
-
-
-def pairs(cases: Sequence[Judged]) -> dict[str, Any]:
-    """Return how often two effects at once are told."""
+def pairs(cases: Cases) -> dict[str, Any]:
+    """Return how often two effects at once are found."""
     own = [c for c in cases if c.label.kind == "pair" and not c.label.withheld]
 
-    def both(case: Judged) -> set[str | None]:
+    def both(case: ScoredCase) -> set[str | None]:
         return {case.answer.effect, case.answer.second_effect}
 
     found = {
@@ -158,35 +81,46 @@ def pairs(cases: Sequence[Judged]) -> dict[str, Any]:
         "both_named": share(both(c) == set(c.label.truth) for c in own),
         "one_named_wrong": share(c.named and not c.named_right for c in own),
     }
-    return {"n": len(own), **{key: value.plain() for key, value in found.items()}}
+    return {"n": len(own), **plain(found)}
 
 
-def rival_row(name: str, cases: Sequence[Judged]) -> dict[str, Any]:
-    """Return what one diagnoser achieves, as a row beside the others."""
-    known = [c for c in cases if c.plain_effect]
-    silent = [*quiet(cases, "iid"), *quiet(cases, "ar")]
-    found = {
-        "top1_r1": share(c.credit for c in known if c.at(1.0)),
-        "top1_r0.5": share(c.credit for c in known if c.at(0.5)),
-        "top1": share(c.credit for c in known),
-        "false_alarms": share(c.answer.detected for c in silent),
-        "precision": share(c.named_right for c in cases if _counts(c)),
-        "log_score": log_score(cases),
-    }
-    plain = {key: value.plain() for key, value in found.items()}
-    return {"name": name, "n": len(cases), **plain}
+def rivals(found: Mapping[str, Cases], own: Cases) -> list[dict[str, Any]]:
+    """Return what each diagnoser achieves, and the bound that the oracle sets.
+
+    Args:
+        found: cases by diagnoser.
+        own: of the judged one, for the oracle, who knows that an effect acts.
+    """
+    rows = []
+    for name, cases in found.items():
+        silent = [*null_cases(cases, "iid"), *null_cases(cases, "ar")]
+        numbers = {
+            **_first([c for c in cases if c.plain_effect], lambda c: c.credit),
+            "false_alarms": share(c.answer.detected for c in silent),
+            "precision": precision(cases),
+            "log_score": log_score(cases),
+        }
+        rows.append({"name": name, "n": len(cases), **plain(numbers)})
+    known = [c for c in own if c.plain_effect and c.label.oracle]
+    bound = plain(_first(known, lambda c: c.oracle_credit))
+    unknown = dict.fromkeys(("false_alarms", "precision", "log_score"))
+    return [*rows, {"name": "oracle bound", "n": len(known), **bound, **unknown}]
 
 
-def oracle_row(cases: Sequence[Judged]) -> dict[str, Any]:
-    """Return the bound that the oracle sets; it knows that an effect acts."""
-    known = [c for c in cases if c.plain_effect and c.label.oracle]
+def _first(cases: Cases, credit: Callable[[ScoredCase], float]) -> dict[str, Estimate]:
+    """Return how often the true effect comes first, by size of the gap."""
     return {
-        "name": "oracle bound",
-        "n": len(known),
-        "top1_r1": share(c.oracle_credit for c in known if c.at(1.0)).plain(),
-        "top1_r0.5": share(c.oracle_credit for c in known if c.at(0.5)).plain(),
-        "top1": share(c.oracle_credit for c in known).plain(),
-        "false_alarms": None,
-        "precision": None,
-        "log_score": None,
+        "top1_r1": share(credit(c) for c in cases if c.at(1.0)),
+        "top1_r0.5": share(credit(c) for c in cases if c.at(0.5)),
+        "top1": share(credit(c) for c in cases),
     }
+
+
+def precision(cases: Cases) -> Estimate:
+    """Return how often a named effect is one that acts, none withheld."""
+    return share(c.named_right for c in cases if c.named and not c.label.withheld)
+
+
+def plain(found: Mapping[str, Estimate | Reliability]) -> dict[str, Any]:
+    """Return plain data for JSON."""
+    return {key: value.plain() for key, value in found.items()}

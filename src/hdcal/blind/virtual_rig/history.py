@@ -5,6 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+FULL = 0.54  # largest deformation of the rigs' own loadings [mm]
+
 
 @dataclass(frozen=True)
 class History:
@@ -23,16 +27,16 @@ class History:
         force: of the gear itself [N]; zero before anything is simulated.
     """
 
-    deformation: NDArray[np.float64]
-    temperature: NDArray[np.float64]
-    time: NDArray[np.float64]
-    angle: NDArray[np.float64]
-    direction: NDArray[np.float64]
-    sense: NDArray[np.float64]
+    deformation: Floats
+    temperature: Floats
+    time: Floats
+    angle: Floats
+    direction: Floats
+    sense: Floats
     cycle: NDArray[np.int64]
     run: NDArray[np.int64]
     specimen: NDArray[np.int64]
-    force: NDArray[np.float64]
+    force: Floats
 
     @property
     def order(self) -> NDArray[np.int64]:
@@ -40,17 +44,22 @@ class History:
         return np.arange(len(self.deformation))
 
     @property
-    def rise(self) -> NDArray[np.float64]:
+    def rise(self) -> Floats:
         """Temperature above the reference of 20 °C [K]."""
         return self.temperature - 20.0
 
     @property
-    def relative_deformation(self) -> NDArray[np.float64]:
+    def warmer(self) -> Floats:
+        """Temperature above the record's mean [K]."""
+        return self.temperature - np.mean(self.temperature)
+
+    @property
+    def relative_deformation(self) -> Floats:
         """Deformation as a share of the record's largest."""
         return self.deformation / np.max(self.deformation)
 
     @property
-    def run_starts(self) -> NDArray[np.bool_]:
+    def run_starts(self) -> Flags:
         """True where a run begins."""
         return np.diff(self.run, prepend=self.run[0] - 1) != 0
 
@@ -61,12 +70,12 @@ class History:
         return np.cumsum(turns | self.run_starts) - 1
 
     @property
-    def steps(self) -> NDArray[np.float64]:
+    def steps(self) -> Floats:
         """Seconds since the row before, none across a change of run."""
         return np.where(self.run_starts, 0.0, np.diff(self.time, prepend=0.0))
 
     @property
-    def travel(self) -> NDArray[np.float64]:
+    def travel(self) -> Floats:
         """Way that the drive has gone since the start, both ways [mm]."""
         return np.cumsum(np.abs(np.diff(self.deformation, prepend=0.0)))
 
@@ -75,3 +84,8 @@ class History:
         """Duration of the longest run [s]; one where the clock stands still."""
         longest = float(np.max(self.time) - np.min(self.time))
         return longest if longest > 0.0 else 1.0
+
+
+def last_true(rows: Flags) -> NDArray[np.int64]:
+    """Return, for each row, the last one up to it that is true; 0 before any."""
+    return np.maximum.accumulate(np.where(rows, np.arange(len(rows)), 0))

@@ -1,18 +1,27 @@
-"""Loading programs: what each rig of the blind check does and writes down."""
+"""Loadings: what each rig of the blind check does and writes down."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from hdcal.blind.virtual_rig.history import History
+from hdcal.blind.virtual_rig.history import FULL, History, last_true
 from hdcal.data.case import Case
 
-LOWEST, HIGHEST = 0.02, 0.54
+LOWEST = 0.02  # deformation where the rigs' own loadings begin [mm]
+# array of the history: column of the file, how a value is written
+_COLUMNS = {
+    "temperature": ("temperature_C", lambda v: f"{v:.2f}"),
+    "time": ("time_s", lambda v: f"{v:.2f}"),
+    "angle": ("angle_deg", lambda v: f"{np.rad2deg(v):.2f}"),
+    "run": ("run", lambda v: str(v + 1)),
+    "specimen": ("specimen", lambda v: str(v + 1)),
+}
 
 
 @dataclass(frozen=True)
-class Program:
+class Loading:
     """A history and the columns that the rig writes beside deformation and force."""
 
     name: str
@@ -21,49 +30,44 @@ class Program:
 
     @property
     def features(self) -> frozenset[str]:
-        """What can be told from the columns: they themselves, and how they vary."""
-        told, found = self.history, set(self.columns)
-        if np.any(told.direction < 0.0):
+        """What the columns can show: they themselves, and how they vary."""
+        history, found = self.history, set(self.columns)
+        if np.any(history.direction < 0.0):
             found.add("unloading")
-        if np.any(told.direction == 0.0):
+        if np.any(history.direction == 0.0):
             found.add("holds")
-        step, seconds = np.diff(told.deformation), np.diff(told.time)
+        step, seconds = np.diff(history.deformation), np.diff(history.time)
         moves = (step != 0.0) & (seconds > 0.0)
         speed = np.abs(step[moves]) / seconds[moves]
         if "time" in found and moves.any() and speed.max() > 1.5 * speed.min():
             found.add("rates")
-        for gear in np.unique(told.specimen):
-            if np.ptp(told.cycle[told.specimen == gear]) > 0:
+        for gear in np.unique(history.specimen):
+            if np.ptp(history.cycle[history.specimen == gear]) > 0:
                 found.add("cycles")
         for label in ("run", "specimen"):
-            if label in found and len(np.unique(getattr(told, label))) >= 3:
+            if label in found and len(np.unique(getattr(history, label))) >= 3:
                 found.add(f"{label}s")
         return frozenset(found)
 
     def csv(self, force: np.ndarray) -> str:
         """Return the measurement file of these readings [N], shape (n,)."""
-        told = self.history
-        table = {"deformation_mm": [f"{v:.5f}" for v in told.deformation]}
-        table["force_N"] = [f"{v:.4f}" for v in force]
-        if "temperature" in self.columns:
-            table["temperature_C"] = [f"{v:.2f}" for v in told.temperature]
-        if "time" in self.columns:
-            table["time_s"] = [f"{v:.2f}" for v in told.time]
-        if "angle" in self.columns:
-            table["angle_deg"] = [f"{v:.2f}" for v in np.rad2deg(told.angle)]
-        for label in ("run", "specimen"):
-            if label in self.columns:
-                table[label] = [str(v + 1) for v in getattr(told, label)]
+        table = {
+            "deformation_mm": [f"{v:.5f}" for v in self.history.deformation],
+            "force_N": [f"{v:.4f}" for v in force],
+        }
+        for name, (column, written) in _COLUMNS.items():
+            if name in self.columns:
+                table[column] = [written(v) for v in getattr(self.history, name)]
         lines = [",".join(table), *map(",".join, zip(*table.values(), strict=True))]
         return "\n".join(lines) + "\n"
 
 
-def ramp() -> Program:
+def ramp() -> Loading:
     """One loading in 60 readings; nothing but deformation and force is written."""
-    return Program("ramp", _history(np.linspace(LOWEST, HIGHEST, 60), 5.0))
+    return Loading("ramp", _history(np.linspace(LOWEST, FULL, 60), 5.0))
 
 
-def rich() -> Program:
+def rich() -> Loading:
     """Three mountings, three temperatures out of order, two rates, six angles."""
     return _loops(
         "rich",
@@ -75,7 +79,7 @@ def rich() -> Program:
     )
 
 
-def lean() -> Program:
+def lean() -> Loading:
     """One mounting at one rate: the rig warms up while the gear is turned."""
     return _loops(
         "lean",
@@ -85,29 +89,31 @@ def lean() -> Program:
     )
 
 
-def rates() -> Program:
+def rates() -> Loading:
     """Six loads and unloads at four rates, all else constant."""
     return _loops("rates", seconds=(0.5, 10.0, 2.0, 0.5, 40.0, 10.0), columns=("time",))
 
 
-def holds() -> Program:
+def holds() -> Loading:
     """Long holds at the top and the bottom."""
     return _loops("holds", hold=90.0, columns=("time",))
 
 
-def angles() -> Program:
+def angles() -> Loading:
     """Twelve loads and unloads, each at an angle of its own."""
-    turned = tuple(30.0 * np.array([0, 5, 10, 3, 8, 1, 6, 11, 4, 9, 2, 7]))
-    return _loops("angles", angle=turned, points=7, hold=0.0, columns=("time", "angle"))
+    turned = 30.0 * np.array([0, 5, 10, 3, 8, 1, 6, 11, 4, 9, 2, 7])
+    return _loops(
+        "angles", count=12, angle=turned, points=7, hold=0.0, columns=("time", "angle")
+    )
 
 
-def fleet() -> Program:
+def fleet() -> Loading:
     """Six gears, each mounted, loaded and unloaded once."""
-    each = tuple(range(6))
+    each = np.arange(6)
     return _loops("fleet", run=each, specimen=each, columns=("time", "run", "specimen"))
 
 
-PROGRAMS: dict[str, Callable[[], Program]] = {
+LOADINGS: dict[str, Callable[[], Loading]] = {
     "ramp": ramp,
     "rich": rich,
     "lean": lean,
@@ -118,101 +124,90 @@ PROGRAMS: dict[str, Callable[[], Program]] = {
 }
 
 
-def program_of(case: Case) -> Program:
-    """Return the program that a measured case went through."""
-    told = case.records
-    unloaded = (np.diff(told.sense, prepend=told.sense[0]) > 0).astype(int)
-    columns = {"temperature", "time", "angle", "run", "specimen"} & told.known
+def loading_of(case: Case) -> Loading:
+    """Return the loading that a measured case went through."""
+    records = case.records
+    unloaded = (np.diff(records.sense, prepend=records.sense[0]) > 0).astype(int)
+    columns = _COLUMNS.keys() & records.known
+    floats = ("deformation", "temperature", "time", "angle")
     history = History(
-        *(
-            np.asarray(getattr(told, name), dtype=float)
-            for name in ("deformation", "temperature", "time", "angle")
-        ),
-        direction=np.asarray(told.direction),
-        sense=np.asarray(told.sense),
+        **{name: np.asarray(getattr(records, name), dtype=float) for name in floats},
+        direction=np.asarray(records.direction),
+        sense=np.asarray(records.sense),
         cycle=np.cumsum(unloaded),
-        run=np.asarray(told.run),
-        specimen=np.asarray(told.specimen),
-        force=np.zeros(len(told.force)),
+        run=np.asarray(records.run),
+        specimen=np.asarray(records.specimen),
+        force=np.zeros(len(records.force)),
     )
-    return Program(case.name, history, tuple(sorted(columns)))
+    return Loading(case.name, history, tuple(sorted(columns)))
 
 
 def _loops(
     name: str,
     *,
-    temperature=(20.0,) * 6,
-    seconds=(5.0,) * 6,
-    angle=(0.0,) * 6,
-    run=(0,) * 6,
-    specimen=(0,) * 6,
+    columns: tuple[str, ...],
+    count: int = 6,
+    temperature: ArrayLike = 20.0,
+    seconds: ArrayLike = 5.0,
+    angle: ArrayLike = 0.0,
+    run: ArrayLike = 0,
+    specimen: ArrayLike = 0,
     points: int = 13,
     hold: float = 20.0,
-    columns: tuple[str, ...],
-) -> Program:
+) -> Loading:
     """Return loads and unloads with two rows of a hold at the top and the bottom.
 
     Args:
-        name: of the program.
-        temperature: of each loop [°C].
-        seconds: between rows of each loop.
-        angle: of each loop [deg].
-        run: of each loop.
-        specimen: of each loop.
+        name: of the loading.
+        columns: that are written down.
+        count: of loops.
+        temperature: of each loop, or of all [°C].
+        seconds: between rows of each loop, or of all.
+        angle: of each loop, or of all [deg].
+        run: of each loop, or of all.
+        specimen: of each loop, or of all.
         points: of each half loop.
         hold: seconds of a row of a hold; without it there is none.
-        columns: that are written down.
     """
     still = 2 if hold else 0
-    up = np.linspace(LOWEST, HIGHEST, points)
-    top, bottom = np.full(still, HIGHEST), np.full(still, LOWEST)
+    up = np.linspace(LOWEST, FULL, points)
+    top, bottom = np.full(still, FULL), np.full(still, LOWEST)
     # Without a hold no row is taken twice at a turn.
     down = up[::-1] if hold else up[-2:0:-1]
     loop = np.concatenate([up, top, down, bottom])
-    count, rows = len(angle), len(loop)
 
-    def each(values):
-        values = tuple(values)
-        return np.repeat(
-            (values * count)[:count] if len(values) < count else values, rows
-        )
+    def by_row(values: ArrayLike) -> np.ndarray:
+        return np.repeat(np.broadcast_to(values, count), len(loop))
 
     path = np.tile(loop, count)
-    move = np.diff(path, prepend=0.0)
-    step = np.where(move == 0.0, hold, each(seconds))
-    run = each(run)
+    moves = np.diff(path, prepend=0.0) != 0.0
     history = _history(
         path,
-        step,
-        temperature=each(temperature).astype(float),
-        angle=np.deg2rad(each(angle)),
-        cycle=np.repeat(np.arange(count), rows),
-        run=run,
-        specimen=each(specimen),
+        np.where(moves, by_row(seconds), hold),
+        temperature=by_row(temperature),
+        angle=np.deg2rad(by_row(angle)),
+        cycle=by_row(np.arange(count)),
+        run=by_row(run),
+        specimen=by_row(specimen),
     )
-    return Program(name, history, columns)
+    return Loading(name, history, columns)
 
 
-def _history(path: np.ndarray, step, **known) -> History:
+def _history(path: np.ndarray, step: ArrayLike, **known: np.ndarray) -> History:
     """Return a history; what is not known stays constant."""
     size = len(path)
     run = known.get("run", np.zeros(size, int))
     begins = np.diff(run, prepend=-1) != 0
     direction = np.where(begins, 1.0, np.sign(np.diff(path, prepend=0.0)))
-    sense = direction.copy()
-    for row in range(1, size):
-        if sense[row] == 0.0:
-            sense[row] = sense[row - 1]
     elapsed = np.cumsum(np.broadcast_to(step, size))
-    first = np.maximum.accumulate(np.where(begins, np.arange(size), 0))
     zeros = np.zeros(size)
     return History(
         deformation=path,
         temperature=known.get("temperature", zeros + 20.0),
-        time=elapsed - elapsed[first],
+        time=elapsed - elapsed[last_true(begins)],
         angle=known.get("angle", zeros),
         direction=direction,
-        sense=sense,
+        sense=direction[last_true(direction != 0.0)],
         cycle=known.get("cycle", zeros.astype(int)),
         run=run,
         specimen=known.get("specimen", zeros.astype(int)),

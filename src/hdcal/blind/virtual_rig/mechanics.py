@@ -5,19 +5,23 @@ rigs show. Sources are named where a form is somebody's.
 """
 
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from hdcal.blind.virtual_rig.elements.cup import cup_stiffness
-from hdcal.blind.virtual_rig.elements.end import End
-from hdcal.blind.virtual_rig.elements.ring import load_curve, stiffness
-from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
+from hdcal.blind.virtual_rig.history import FULL
+from hdcal.blind.virtual_rig.mechanism import (
+    Mechanism,
+    RigState,
+    Shape,
+    bent_line,
+    draw_bend,
+    draw_members,
+)
 
-FULL = 0.54  # deformation that the rigs reach [mm]
 
-
-def clearance(x, rig: Rig, size: float, shape: Shape):
+def clearance(x, state: RigState, size: float, shape: Shape):
     """Three seats of a mounting close one after the other; size: mean clearance [mm].
 
     Each carries a third of the load and yields smoothly over its own roughness.
@@ -34,12 +38,12 @@ def _seats(rng) -> Shape:
     return {"places": places, "rough": rng.uniform(0.04, 0.25, 3)}
 
 
-def asperities(force, rig: Rig, size: float, shape: Shape):
+def asperities(force, state: RigState, size: float, shape: Shape):
     """Rough pads in series with the gear close by h ln(1 + F/P); size: h [mm].
 
     Exponential heights of the asperities: Greenwood and Williamson (1966).
     """
-    stiffness = float(np.mean(rig.stiffness))
+    stiffness = float(np.mean(state.stiffness))
     grid = np.linspace(0.0, 1.5 * np.max(np.abs(force)) + 1.0, 2000)
     closing = size * np.log1p(grid / (shape["load"] * stiffness * FULL))
     whole = grid / stiffness + closing
@@ -48,19 +52,13 @@ def asperities(force, rig: Rig, size: float, shape: Shape):
     return np.sign(force) * (carried - np.abs(force))
 
 
-def frame_growth(x, rig: Rig, size: float, shape: Shape):
-    """The frame grows, not quite linearly; size: slope to 30 K above [mm/K]."""
-    rise = rig.history.rise
-    return size * rise * (1.0 + shape["bend"] * (rise - 30.0))
-
-
-def transducer(x, rig: Rig, size: float, shape: Shape):
+def transducer(x, state: RigState, size: float, shape: Shape):
     """A transformer gauge off its middle: quadratic and some cubic error; size [mm]."""
     place = x / FULL
     return size * (place**2 + shape["cubic"] * place**3)
 
 
-def lead_screw(x, rig: Rig, size: float, shape: Shape):
+def lead_screw(x, state: RigState, size: float, shape: Shape):
     """Once-per-turn error with a second harmonic, growing with wear; size [mm]."""
     turn = 2.0 * np.pi * x / shape["pitch"] + shape["phase"]
     wear = 1.0 + shape["wear"] * x / FULL
@@ -82,66 +80,56 @@ def _screw(rng) -> Shape:
 
 
 @cache
-def _height_law() -> PchipInterpolator:
-    """Return how stiff the cup is where it is loaded [mm], relative to 62 mm."""
-    heights = np.linspace(44.0, 68.0, 9)
-    zones, end = ((50.0, 0.68), (70.0, 0.83)), End(2.5, 20.0)
-    found = [
-        cup_stiffness(40.0, 70.0, zones, 207e3, 0.29, height, base=end)
-        for height in heights
-    ]
-    return PchipInterpolator(heights, np.array(found) / found[-3])
+def _curve(table: str) -> PchipInterpolator:
+    """Return the curve through a table of finite-element results.
+
+    The first lines of a table say what it holds. `python -m
+    benchmarks.virtual_rig_elements` in a checkout makes it.
+    """
+    text = (files("hdcal.blind.virtual_rig") / table).read_text("utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return PchipInterpolator(*np.loadtxt(lines[1:], delimiter=",").T)
 
 
-def contact_line(force, rig: Rig, size: float, shape: Shape):
+def contact_line(force, state: RigState, size: float, shape: Shape):
     """The line of contact moves down the cup, which is stiffer there; size [mm].
 
     Size is how far it has moved at full deformation; the stiffness is that of the
     finite-element cup.
     """
-    moved = size * (np.maximum(rig.deformation, 0.0) / FULL) ** shape["power"]
-    return force * (_height_law()(62.0 - moved) - 1.0)
+    moved = size * (np.maximum(state.deformation, 0.0) / FULL) ** shape["power"]
+    return force * (_curve("cup.csv")(62.0 - moved) - 1.0)
 
 
-@cache
-def _ring_law() -> PchipInterpolator:
-    """Return F/(kω) of the finite-element ring at ω/R."""
-    radius, depth = 40.0, np.arange(-10, 36) / 100.0
-    sizes = (radius, 0.68, 70.0, 207e3)
-    force = load_curve(*sizes, depth * radius)
-    straight = stiffness(*sizes) * np.where(depth == 0.0, 1.0, depth * radius)
-    return PchipInterpolator(depth, np.where(depth == 0.0, 1.0, force / straight))
-
-
-def large_displacement(force, rig: Rig, size: float, shape: Shape):
+def large_displacement(force, state: RigState, size: float, shape: Shape):
     """The ring leaves its small-displacement shape; size: 1/R [1/mm]."""
-    return force * (_ring_law()(rig.deformation * size) - 1.0)
+    return force * (_curve("ring.csv")(state.deformation * size) - 1.0)
 
 
-def yielding(force, rig: Rig, size: float, shape: Shape):
+def yielding(force, state: RigState, size: float, shape: Shape):
     """The wall yields and hardens for good; size: permanent set at full load [mm].
 
     What has flowed once never flows back: the set is the largest so far, by specimen.
     """
-    over = np.maximum(rig.deformation / FULL - shape["begin"], 0.0)
+    over = np.maximum(state.deformation / FULL - shape["begin"], 0.0)
     flow = (over / (1.0 - shape["begin"])) ** shape["power"]
-    for gear in np.unique(rig.history.specimen):
-        own = rig.history.specimen == gear
+    for gear in np.unique(state.history.specimen):
+        own = state.history.specimen == gear
         flow[own] = np.maximum.accumulate(flow[own])
-    return -size * rig.stiffness * flow
+    return -size * state.stiffness * flow
 
 
-def fatigue(force, rig: Rig, size: float, shape: Shape):
+def fatigue(force, state: RigState, size: float, shape: Shape):
     """Stiffness falls with the cycles, fast at first; size: loss over ten cycles."""
-    told = rig.history
-    first = [told.cycle[told.specimen == gear][0] for gear in np.unique(told.specimen)]
-    count = (told.cycle - np.asarray(first)[told.specimen]) / 9.0
-    return -size * rig.stiffness * rig.deformation * count ** shape["power"]
+    cycle, gear = state.history.cycle, state.history.specimen
+    first = [cycle[gear == each][0] for each in np.unique(gear)]
+    count = (cycle - np.asarray(first)[gear]) / 9.0
+    return -size * state.stiffness * state.deformation * count ** shape["power"]
 
 
-def wall(force, rig: Rig, size: float, shape: Shape):
+def wall(force, state: RigState, size: float, shape: Shape):
     """The wall is thicker on one side and oval; size: relative thickness."""
-    angle = rig.history.angle
+    angle = state.history.angle
     once = shape["once"] * np.cos(angle - shape["first"])
     twice = shape["twice"] * np.cos(2.0 * (angle - shape["second"]))
     thrice = 0.15 * np.cos(3.0 * (angle - shape["third"]))
@@ -160,24 +148,16 @@ def _oval(rng) -> Shape:
     }
 
 
-def softening(force, rig: Rig, size: float, shape: Shape):
+def softening(force, state: RigState, size: float, shape: Shape):
     """Seat and pads lose stiffness with temperature beside the steel; size [1/K]."""
-    rise = rig.history.rise
+    rise = state.history.rise
     return force * size * rise * (1.0 + shape["bend"] * rise)
 
 
-def gears_differ(force, rig: Rig, size: float, shape: Shape):
+def gears_differ(force, state: RigState, size: float, shape: Shape):
     """Walls of the gears scatter in thickness, δ³ in stiffness; size: relative sd."""
-    thickness = 1.0 + size * shape["members"][rig.history.specimen]
+    thickness = 1.0 + size * shape["members"][state.history.specimen]
     return force * (thickness**3 - 1.0)
-
-
-def _bend(rng) -> Shape:
-    return {"bend": rng.uniform(-0.006, 0.006)}
-
-
-def _members(rng) -> Shape:
-    return {"members": rng.uniform(-1.7, 1.7, 64)}
 
 
 def _flow(rng) -> Shape:
@@ -188,12 +168,13 @@ MECHANICS: dict[str, Mechanism] = {
     "seating_slack": Mechanism(
         "table", clearance, 0.12, draw=_seats, amplitude="seating_slack.clearance"
     ),
+    # The frame grows [mm/K].
     "thermal_expansion": Mechanism(
         "table",
-        frame_growth,
+        bent_line,
         0.004,
         frozenset({"temperature"}),
-        draw=_bend,
+        draw=draw_bend,
         signed=True,
         amplitude="thermal_expansion.slope",
     ),
@@ -224,9 +205,14 @@ MECHANICS: dict[str, Mechanism] = {
     ),
     "ovality": Mechanism("gear", wall, 0.05, frozenset({"angle"}), draw=_oval),
     "thermal_stiffness": Mechanism(
-        "gear", softening, 0.0015, frozenset({"temperature"}), draw=_bend, signed=True
+        "gear",
+        softening,
+        0.0015,
+        frozenset({"temperature"}),
+        draw=draw_bend,
+        signed=True,
     ),
     "specimen_variation": Mechanism(
-        "gear", gears_differ, 0.06, frozenset({"specimens"}), draw=_members
+        "gear", gears_differ, 0.06, frozenset({"specimens"}), draw=draw_members
     ),
 }

@@ -5,30 +5,25 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hdcal.blind.virtual_rig.history import History
+from hdcal.blind.virtual_rig.history import Floats, History
 
-Stage = Literal["table", "gear", "path", "reading"]
 Shape = dict[str, Any]
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Rig:
-    """The rig at one stage of its chain.
+class RigState:
+    """What a mechanism can see of the rig.
 
     Attributes:
         history: what the rig does.
         stiffness: of the gear in each row [N/mm], shape (n,).
         deformation: that the gear sees [mm], shape (n,).
-        radius: of the gear's neutral surface [mm].
     """
 
     history: History
     stiffness: Floats
     deformation: Floats
-    radius: float = 40.0
 
 
 def _no_shape(rng: np.random.Generator) -> Shape:
@@ -45,18 +40,34 @@ class Mechanism:
 
     Attributes:
         stage: where it acts.
-        adds: (signal, rig, size, shape) → what it adds to the signal, shape (n,).
+        adds: (signal, state, size, shape) → what it adds to the signal, shape (n,).
         largest: size beyond which it is not plausible on a real rig.
-        needs: features of a program without which nobody can tell it.
+        needs: features of a loading without which nobody can tell it.
         draw: draws the shape; random numbers of members are drawn here too.
         signed: whether the size may be negative.
         amplitude: library parameter that has this very meaning, in the same unit.
     """
 
-    stage: Stage
-    adds: Callable[[Floats, Rig, float, Shape], Floats]
+    stage: Literal["table", "gear", "path", "reading"]
+    adds: Callable[[Floats, RigState, float, Shape], Floats]
     largest: float
     needs: frozenset[str] = frozenset()
     draw: Callable[[np.random.Generator], Shape] = field(default=_no_shape)
     signed: bool = False
     amplitude: str = ""
+
+
+def draw_bend(rng: np.random.Generator) -> Shape:
+    """Draw how far a law of temperature is from a straight line [1/K]."""
+    return {"bend": rng.uniform(-0.006, 0.006)}
+
+
+def draw_members(rng: np.random.Generator) -> Shape:
+    """Draw a standard size for each of up to 64 mountings or gears, shape (64,)."""
+    return {"members": rng.uniform(-1.7, 1.7, 64)}
+
+
+def bent_line(signal: Floats, state: RigState, size: float, shape: Shape) -> Floats:
+    """What grows with temperature, not quite linearly; size: slope to 30 K above."""
+    rise = state.history.rise
+    return size * rise * (1.0 + shape["bend"] * (rise - 30.0))

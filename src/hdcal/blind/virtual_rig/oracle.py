@@ -11,48 +11,49 @@ from functools import cache
 import numpy as np
 from scipy.special import logsumexp
 
-from hdcal.blind.virtual_rig.loadings import PROGRAMS, Program
+from hdcal.blind.virtual_rig.history import Floats
+from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
 from hdcal.blind.virtual_rig.mechanism import Shape
 from hdcal.blind.virtual_rig.virtual_rig import (
     ALPHA,
     ALPHA_SD,
     MECHANISMS,
-    Bench,
-    Switched,
+    ActiveMechanism,
+    VirtualRig,
 )
 
 _DRAWS, _SEED = 40, 20
 _TRIAL = 0.2  # of the largest size
 
 
-def judge(
-    program: Program,
-    bench: Bench,
-    reading: np.ndarray,
+def oracle_probabilities(
+    loading: Loading,
+    rig: VirtualRig,
+    reading: Floats,
     *,
     truth: str,
-    curve: np.ndarray,
+    curve: Floats,
     r: float,
     correlation: float,
 ) -> dict[str, float]:
     """Return the oracle's probability of each mechanism.
 
     Args:
-        program: what the rig did.
-        bench: the true rig without a mechanism.
+        loading: one of `LOADINGS`.
+        rig: the true rig without a mechanism.
         reading: force as read [N], shape (n,).
         truth: name of the mechanism.
         curve: what it added [N], shape (n,).
-        r: how visible it is.
+        r: its gap over the noise.
         correlation: AR(1) coefficient of the noise.
     """
-    precision = _precision(bench, correlation)
-    # Nobody tells it how much of the modulus this rig loses.
-    weighted = precision @ (reading - replace(bench, alpha=ALPHA).plain)
+    precision = _precision(rig, correlation)
+    # How much of the modulus this rig loses the oracle has to infer.
+    weighted = precision @ (reading - replace(rig, alpha=ALPHA).fault_free)
     found = {}
-    for name, bank in curves(program.name).items():
-        scale = r / bench.visible(bank)
-        shapes = scale[:, None] * bank
+    for name, drawn in drawn_curves(loading.name).items():
+        scale = r / rig.gap_over_noise(drawn)
+        shapes = scale[:, None] * drawn
         if name == truth:
             shapes = np.concatenate([shapes, curve[None]])
         energy = np.einsum("sn,nm,sm->s", shapes, precision, shapes, optimize=True)
@@ -64,38 +65,39 @@ def judge(
 
 
 @cache
-def curves(program: str) -> dict[str, np.ndarray]:
-    """Return drawn curves of every mechanism that a program shows, each (s, n) [N]."""
-    made = PROGRAMS[program]()
-    bench, rng, found = Bench(made.history), np.random.default_rng(_SEED), {}
+def drawn_curves(name: str) -> dict[str, Floats]:
+    """Return drawn curves of every mechanism that a loading shows, each (s, n) [N]."""
+    loading = LOADINGS[name]()
+    rig, rng, found = VirtualRig(loading.history), np.random.default_rng(_SEED), {}
     for name, mechanism in MECHANISMS.items():
-        if mechanism.needs - made.features:
+        if mechanism.needs - loading.features:
             continue
         shapes = [mechanism.draw(rng) for _ in range(_DRAWS)]
         signs = (1.0, -1.0) if mechanism.signed else (1.0,)
         found[name] = np.stack(
-            [_moderate(bench, name, sign, shape) for sign in signs for shape in shapes]
+            [_moderate(rig, name, sign, shape) for sign in signs for shape in shapes]
         )
     return found
 
 
-def _moderate(bench: Bench, name: str, sign: float, shape: Shape) -> np.ndarray:
+def _moderate(rig: VirtualRig, name: str, sign: float, shape: Shape) -> Floats:
     """Return a curve near r = ½, where few mechanisms are far from linear."""
     size = _TRIAL * MECHANISMS[name].largest
-    seen = float(bench.visible(bench.curve(Switched(name, sign * size, shape))))
-    size *= np.clip(0.5 / max(seen, 1e-6), 0.01, 1.0 / _TRIAL)
-    return bench.curve(Switched(name, sign * size, shape))
+    trial = rig.curve(ActiveMechanism(name, sign * size, shape))
+    r = max(float(rig.gap_over_noise(trial)), 1e-6)
+    size *= np.clip(0.5 / r, 0.01, 1.0 / _TRIAL)
+    return rig.curve(ActiveMechanism(name, sign * size, shape))
 
 
-def _precision(bench: Bench, correlation: float) -> np.ndarray:
-    """Return the inverse covariance of readings beside the base, shape (n, n)."""
-    told = bench.history
-    order, run = told.order, told.run
+def _precision(rig: VirtualRig, correlation: float) -> Floats:
+    """Return the inverse covariance of what calibration leaves, shape (n, n)."""
+    history = rig.history
+    order, run = history.order, history.run
     apart = np.abs(order[:, None] - order)
     serial = np.where(run[:, None] == run, float(correlation) ** apart, 0.0)
-    x = told.deformation
-    base = np.stack([x, np.ones_like(x), bench.stiffness * ALPHA_SD * x * told.rise])
-    noise = np.linalg.inv(bench.sigma**2 * serial)
-    # Slope and zero are free, the loss of modulus as far as its prior lets it.
+    x = history.deformation
+    base = np.stack([x, np.ones_like(x), rig.stiffness * ALPHA_SD * x * history.rise])
+    noise = np.linalg.inv(rig.sigma**2 * serial)
+    # Slope and zero are free, the loss of modulus as far as its prior allows.
     gram = base @ noise @ base.T + np.diag([0.0, 0.0, 1.0])
     return noise - noise @ base.T @ np.linalg.solve(gram, base @ noise)

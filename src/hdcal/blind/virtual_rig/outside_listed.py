@@ -6,14 +6,11 @@ much faster or slower than the record would show as noise or as a constant.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hdcal.blind.virtual_rig.history import History
-
-Curve = NDArray[np.float64]
+from hdcal.blind.virtual_rig.history import Floats, History
 
 
-def step_in_mounting(history: History, rng: np.random.Generator) -> Curve:
+def step_in_mounting(history: History, rng: np.random.Generator) -> Floats:
     """The specimen shifts in its seat.
 
     At an unknown moment in the middle of one run the zero jumps, and it stays there
@@ -26,7 +23,7 @@ def step_in_mounting(history: History, rng: np.random.Generator) -> Curve:
     return curve
 
 
-def hum(history: History, rng: np.random.Generator) -> Curve:
+def hum(history: History, rng: np.random.Generator) -> Floats:
     """Mains pick-up, folded down by slow sampling to a period of a few rows.
 
     The logger samples either by its own clock or whenever a position is reached.
@@ -38,7 +35,7 @@ def hum(history: History, rng: np.random.Generator) -> Curve:
     return np.sin(2 * np.pi * (clock / period + rng.random()))
 
 
-def angle_by_temperature(history: History, rng: np.random.Generator) -> Curve:
+def angle_by_temperature(history: History, rng: np.random.Generator) -> Floats:
     """The fixture grips unevenly around the ring, and heat changes the grip.
 
     So the stiffness varies with the mounting angle by an amount that depends on the
@@ -46,39 +43,36 @@ def angle_by_temperature(history: History, rng: np.random.Generator) -> Curve:
     """
     lobes = rng.integers(1, 3)
     around = np.cos(lobes * (history.angle - rng.uniform(0, 2 * np.pi)))
-    warmer = (history.temperature - np.mean(history.temperature)) / 10.0
-    return history.relative_deformation * around * warmer
+    return history.relative_deformation * around * (history.warmer / 10.0)
 
 
-def direction_by_temperature(history: History, rng: np.random.Generator) -> Curve:
+def direction_by_temperature(history: History, rng: np.random.Generator) -> Floats:
     """Grease thins as it warms, so the loop between loading and unloading narrows.
 
     Only the departure from the loop at the mean temperature is given.
     """
     scale = rng.uniform(10.0, 40.0)
-    warmer = history.temperature - np.mean(history.temperature)
     width = history.relative_deformation ** rng.uniform(0.0, 1.0)
-    return history.sense * width * np.expm1(-warmer / scale)
+    return history.sense * width * np.expm1(-history.warmer / scale)
 
 
-def thermal_lag(history: History, rng: np.random.Generator) -> Curve:
+def thermal_lag(history: History, rng: np.random.Generator) -> Floats:
     """The specimen follows the thermometer late, exponentially in time.
 
     The reading is corrected for a temperature that the specimen has not yet reached;
     zero and stiffness share the error.
     """
     constant = history.run_length * np.exp(rng.uniform(np.log(0.04), np.log(0.3)))
-    lag = np.zeros(len(history.order))
+    lag, kept = np.zeros(len(history.order)), np.exp(-history.steps / constant)
     for row in range(1, len(lag)):
-        kept = np.exp(-history.steps[row] / constant)
         change = history.temperature[row] - history.temperature[row - 1]
         # A change is met in full by the row that first shows it; waiting comes after.
-        lag[row] = lag[row - 1] * kept - change
+        lag[row] = lag[row - 1] * kept[row] - change
     share = rng.random()
     return lag / 10.0 * (share + (1 - share) * history.relative_deformation)
 
 
-def crack(history: History, rng: np.random.Generator) -> Curve:
+def crack(history: History, rng: np.random.Generator) -> Floats:
     """A crack opens near the peak of one cycle: the stiffness drops at once.
 
     It never closes again: every later reading has the lower stiffness.
@@ -96,7 +90,7 @@ def crack(history: History, rng: np.random.Generator) -> Curve:
     return -history.relative_deformation * opened
 
 
-def random_walk(history: History, rng: np.random.Generator) -> Curve:
+def random_walk(history: History, rng: np.random.Generator) -> Floats:
     """The zero wanders: each row adds a small independent shift to the last."""
     count = len(history.order)
     return np.cumsum(rng.standard_normal(count)) / np.sqrt(count)

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from hdcal.blind.virtual_rig.mechanics import FULL
-from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
+from hdcal.blind.virtual_rig.history import FULL
+from hdcal.blind.virtual_rig.mechanism import Mechanism, RigState, Shape
 
 
-def second_stop(force, rig: Rig, size: float, shape: Shape):
+def second_stop(force, state: RigState, size: float, shape: Shape):
     """A second stop is touched and stiffens as its spots flatten; size: k₂/k."""
-    depth = rig.deformation - shape["onset"]
+    depth = state.deformation - shape["onset"]
     width = shape["round"]
     depth = width * np.logaddexp(0.0, depth / width)
-    return size * rig.stiffness * FULL * (depth / FULL) ** shape["power"]
+    return size * state.stiffness * FULL * (depth / FULL) ** shape["power"]
 
 
 def _stop(rng) -> Shape:
@@ -19,14 +19,14 @@ def _stop(rng) -> Shape:
     return {"onset": onset, "power": power, "round": rng.uniform(0.002, 0.02)}
 
 
-def guide(force, rig: Rig, size: float, shape: Shape):
+def guide(force, state: RigState, size: float, shape: Shape):
     """Friction of the guide, with a short elastic way before it slips; size [N].
 
     Dahl (1968): dz = (1 − sgn(dx) z) dx / reach.
     """
-    x, z = rig.deformation, np.zeros(len(force))
+    x, z = state.deformation, np.zeros(len(force))
     reach, last, before = shape["reach"], 0.0, 0.0
-    for row, (here, begins) in enumerate(zip(x, rig.history.run_starts, strict=True)):
+    for row, (here, begins) in enumerate(zip(x, state.history.run_starts, strict=True)):
         last, before = (0.0, 0.0) if begins else (last, before)
         way = here - before
         target = np.sign(way)
@@ -35,13 +35,13 @@ def guide(force, rig: Rig, size: float, shape: Shape):
     return size * z
 
 
-def sliding_cells(force, rig: Rig, size: float, shape: Shape):
+def sliding_cells(force, state: RigState, size: float, shape: Shape):
     """Maxwell-slip cells of unequal strength; size: force when all of them slip [N]."""
     reach, share = shape["reach"], shape["share"]
     stretch, before = np.zeros(len(reach)), 0.0
     total = np.zeros(len(force))
     for row, (here, begins) in enumerate(
-        zip(rig.deformation, rig.history.run_starts, strict=True)
+        zip(state.deformation, state.history.run_starts, strict=True)
     ):
         if begins:
             stretch, before = np.zeros(len(reach)), 0.0
@@ -56,29 +56,30 @@ def _cells(rng) -> Shape:
     return {"reach": reach, "share": rng.dirichlet(np.full(9, 3.0))}
 
 
-def oil_film(force, rig: Rig, size: float, shape: Shape):
+def oil_film(force, state: RigState, size: float, shape: Shape):
     """Shear-thinning oil, F = c sgn(v) |v|ᵐ; size: force at 0.04 mm/s [N]."""
-    told = rig.history
-    step = np.diff(told.deformation, prepend=0.0)
-    seconds = np.diff(told.time, prepend=0.0)
-    seconds = np.where(told.run_starts | (seconds <= 0.0), np.inf, seconds)
+    history = state.history
+    step = np.diff(history.deformation, prepend=0.0)
+    seconds = np.diff(history.time, prepend=0.0)
+    seconds = np.where(history.run_starts | (seconds <= 0.0), np.inf, seconds)
     speed = step / seconds / 0.04
     return size * np.sign(speed) * np.abs(speed) ** shape["thinning"]
 
 
-def solid(force, rig: Rig, size: float, shape: Shape):
+def solid(force, state: RigState, size: float, shape: Shape):
     """Three Prony arms over a decade and a half; size: share that relaxes."""
-    told, lost = rig.history, np.zeros(len(force))
+    starts, time = state.history.run_starts, state.history.time
+    lost = np.zeros(len(force))
     tau = shape["tau"] * np.array([0.2, 1.0, 5.0])
     held, before, then = np.zeros(3), 0.0, 0.0
-    drive = rig.stiffness * rig.deformation
+    drive = state.stiffness * state.deformation
     for row in range(len(force)):
-        if told.run_starts[row]:
-            held, before, then = np.zeros(3), 0.0, told.time[row]
-        decay = np.exp(-(told.time[row] - then) / tau)
+        if starts[row]:
+            held, before, then = np.zeros(3), 0.0, time[row]
+        decay = np.exp(-(time[row] - then) / tau)
         held = held * decay + (drive[row] - before) * 0.5 * (1.0 + decay)
         lost[row] = drive[row] - shape["share"] @ held
-        before, then = drive[row], told.time[row]
+        before, then = drive[row], time[row]
     return -size * lost
 
 

@@ -4,52 +4,54 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
+from hdcal.blind.virtual_rig.history import FULL
+from hdcal.blind.virtual_rig.mechanism import (
+    Mechanism,
+    RigState,
+    Shape,
+    bent_line,
+    draw_bend,
+    draw_members,
+)
 
 
-def charge_amplifier(force, rig: Rig, size: float, shape: Shape):
+def charge_amplifier(force, state: RigState, size: float, shape: Shape):
     """Charge leaks off, a part of it five times slower; size: rate at first [1/s].
 
     The circuit is a feedback capacitor whose dielectric has a second, slower arm; it
     is exact where the force is linear in time between rows, and reset in each run.
     """
-    told, slow = rig.history, shape["slow"]
+    starts, time, slow = state.history.run_starts, state.history.time, shape["slow"]
     rate = size / (1.0 - 0.8 * slow) * np.array([1.0, 0.2])
     part, charge, read = np.array([1.0 - slow, slow]), np.zeros(2), force.copy()
     before = then = 0.0
     for row in range(len(force)):
-        if told.run_starts[row]:
-            charge, before, then = np.zeros(2), 0.0, told.time[row]
-        lost = rate * (told.time[row] - then)
+        if starts[row]:
+            charge, before, then = np.zeros(2), 0.0, time[row]
+        lost = rate * (time[row] - then)
         arrived = -np.expm1(-lost) / np.maximum(lost, 1e-12)
         arrived = np.where(lost > 0.0, arrived, 1.0)
         charge = charge * np.exp(-lost) + part * (force[row] - before) * arrived
-        read[row], before, then = charge.sum(), force[row], told.time[row]
+        read[row], before, then = charge.sum(), force[row], time[row]
     return read - force
 
 
-def bias_current(force, rig: Rig, size: float, shape: Shape):
+def bias_current(force, state: RigState, size: float, shape: Shape):
     """A bias current charges a leaking capacitor; size: mean rate of a run [N/s]."""
-    told, settle = rig.history, shape["settle"]
-    whole = told.run_length
-    return size * whole * np.expm1(-told.time / settle) / np.expm1(-whole / settle)
+    history, settle = state.history, shape["settle"]
+    whole = history.run_length
+    return size * whole * np.expm1(-history.time / settle) / np.expm1(-whole / settle)
 
 
-def bridge_zero(force, rig: Rig, size: float, shape: Shape):
-    """The bridge's zero moves, not quite linearly; size: slope to 30 K above [N/K]."""
-    rise = rig.history.rise
-    return size * rise * (1.0 + shape["bend"] * (rise - 30.0))
-
-
-def clipping(force, rig: Rig, size: float, shape: Shape):
+def clipping(force, state: RigState, size: float, shape: Shape):
     """The amplifier compresses near its limit; size: full scale over the limit."""
-    place = size * np.abs(force) / (np.mean(rig.stiffness) * 0.54)
+    place = size * np.abs(force) / (np.mean(state.stiffness) * FULL)
     return force * ((1.0 + place ** shape["power"]) ** (-1.0 / shape["power"]) - 1.0)
 
 
-def remounting(force, rig: Rig, size: float, shape: Shape):
+def remounting(force, state: RigState, size: float, shape: Shape):
     """Every mounting has a zero of its own; size: sd [N]."""
-    return size * shape["members"][rig.history.run]
+    return size * shape["members"][state.history.run]
 
 
 _TIME, _TEMPERATURE = frozenset({"time"}), frozenset({"temperature"})
@@ -72,12 +74,13 @@ SENSING: dict[str, Mechanism] = {
         signed=True,
         amplitude="amplifier_drift.rate",
     ),
+    # The zero of the bridge moves [N/K].
     "thermal_zero_drift": Mechanism(
         "reading",
-        bridge_zero,
+        bent_line,
         0.6,
         _TEMPERATURE,
-        draw=lambda rng: {"bend": rng.uniform(-0.006, 0.006)},
+        draw=draw_bend,
         signed=True,
         amplitude="thermal_zero_drift.slope",
     ),
@@ -89,7 +92,7 @@ SENSING: dict[str, Mechanism] = {
         remounting,
         6.0,
         frozenset({"runs"}),
-        draw=lambda rng: {"members": rng.uniform(-1.7, 1.7, 64)},
+        draw=draw_members,
     ),
 }
 

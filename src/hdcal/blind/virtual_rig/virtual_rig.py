@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq
 
-from hdcal.blind.virtual_rig.history import History
+from hdcal.blind.virtual_rig.history import Floats, History
 from hdcal.blind.virtual_rig.mechanics import MECHANICS
-from hdcal.blind.virtual_rig.mechanism import Mechanism, Rig, Shape
+from hdcal.blind.virtual_rig.mechanism import Mechanism, RigState, Shape
 from hdcal.blind.virtual_rig.paths import PATHS
 from hdcal.blind.virtual_rig.sensing import SENSING
 
@@ -21,12 +21,12 @@ MECHANISMS: dict[str, Mechanism] = {**MECHANICS, **PATHS, **SENSING}
 # True spread of the loss of modulus per kelvin; the gear file's prior states the same.
 ALPHA, ALPHA_SD = 3e-4, 4e-5
 _STAGES = ("table", "gear", "path", "reading")
-# Smallest size in shares of the largest, and what counts as not seen at all.
-_SMALLEST, _UNSEEN = 1e-4, 1e-9
+# Smallest size in shares of the largest, and what counts as no gap at all.
+_SMALLEST, _NO_GAP = 1e-4, 1e-9
 
 
 @dataclass(frozen=True)
-class Switched:
+class ActiveMechanism:
     """One mechanism of drawn shape at a size in its own unit."""
 
     name: str
@@ -35,7 +35,7 @@ class Switched:
 
 
 @dataclass(frozen=True)
-class Bench:
+class VirtualRig:
     """A rig on which nothing is wrong, and its noise.
 
     Attributes:
@@ -54,72 +54,78 @@ class Bench:
     shift: float = 0.0
     sigma: float = 0.5
 
-    def read(self, switched: Sequence[Switched] = ()) -> np.ndarray:
+    def readings(self, active: Sequence[ActiveMechanism] = ()) -> Floats:
         """Return readings without noise [N], shape (n,)."""
         stiffness = self.stiffness * (1.0 - self.alpha * self.history.rise)
-        seen = self.history.deformation - self.shift
-        rig = Rig(self.history, stiffness, seen)
-        signal = seen
+        signal = self.history.deformation - self.shift
+        state = RigState(self.history, stiffness, signal)
         for stage in _STAGES:
             if stage == "gear":
-                rig = replace(rig, deformation=signal)
-                signal = rig.stiffness * signal
-            for each in switched:
-                made = MECHANISMS[each.name]
-                if made.stage == stage:
-                    signal = signal + made.adds(signal, rig, each.size, each.shape)
+                state = replace(state, deformation=signal)
+                signal = state.stiffness * signal
+            for one in active:
+                mechanism = MECHANISMS[one.name]
+                if mechanism.stage == stage:
+                    signal = signal + mechanism.adds(signal, state, one.size, one.shape)
         return signal + self.zero
 
     @cached_property
-    def plain(self) -> np.ndarray:
-        """Readings without noise of the rig on which nothing is wrong [N]."""
-        return self.read()
+    def fault_free(self) -> Floats:
+        """Readings without noise and without any mechanism [N], shape (n,)."""
+        return self.readings()
 
     @cached_property
-    def base(self) -> np.ndarray:
-        """What a calibration absorbs: slope, zero, loss of modulus by its prior."""
+    def absorbed(self) -> Floats:
+        """What a calibration absorbs, shape (n, 3).
+
+        Slope and zero are free; the loss of modulus is in units of its prior's sd.
+        """
         x, rise = self.history.deformation, self.history.rise
         warm = self.stiffness * ALPHA_SD * x * rise / self.sigma
         return np.stack([x, np.ones_like(x), warm], axis=1)
 
-    def left(self, curves: np.ndarray) -> np.ndarray:
-        """Return what curves (…, n) leave beside the base."""
-        gram = self.base.T @ self.base + np.diag([1e-9, 1e-9, 1.0])
-        return curves - (curves @ self.base) @ np.linalg.solve(gram, self.base.T)
+    def gap(self, curves: Floats) -> Floats:
+        """Return what a calibration leaves of curves [N], shape (…, n)."""
+        gram = self.absorbed.T @ self.absorbed + np.diag([1e-9, 1e-9, 1.0])
+        fitted = (curves @ self.absorbed) @ np.linalg.solve(gram, self.absorbed.T)
+        return curves - fitted
 
-    def visible(self, curves: np.ndarray) -> np.ndarray:
-        """Return r of curves (…, n): RMS of what they leave, over the noise sd."""
-        return np.sqrt(np.mean(self.left(curves) ** 2, axis=-1)) / self.sigma
+    def gap_over_noise(self, curves: Floats) -> Floats:
+        """Return r of curves (…, n): RMS of the gap over the sd of the noise."""
+        return np.sqrt(np.mean(self.gap(curves) ** 2, axis=-1)) / self.sigma
 
-    def curve(self, switched: Switched) -> np.ndarray:
+    def curve(self, active: ActiveMechanism) -> Floats:
         """Return what one mechanism adds to the readings [N], shape (n,)."""
-        return self.read([switched]) - self.plain
+        return self.readings([active]) - self.fault_free
 
-    def at_size(self, name: str, r: float, rng: np.random.Generator) -> Switched | None:
-        """Return a mechanism of drawn shape and sign that is visible as r.
+    def draw_mechanism(
+        self, name: str, r: float, rng: np.random.Generator
+    ) -> ActiveMechanism | None:
+        """Draw shape and sign of a mechanism, and size it to a gap over noise of r.
 
         Returns:
-            None where no plausible size reaches r on this program.
+            None where no plausible size reaches r on this loading.
         """
-        made = MECHANISMS[name]
-        shape = made.draw(rng)
-        sign = rng.choice([-1.0, 1.0]) if made.signed else 1.0
-        low, high = np.log(_SMALLEST * made.largest), np.log(made.largest)
+        mechanism = MECHANISMS[name]
+        shape = mechanism.draw(rng)
+        sign = rng.choice([-1.0, 1.0]) if mechanism.signed else 1.0
+        low, high = np.log(_SMALLEST * mechanism.largest), np.log(mechanism.largest)
+
+        def sized(log_size: float) -> ActiveMechanism:
+            return ActiveMechanism(name, sign * float(np.exp(log_size)), shape)
 
         def excess(log_size: float) -> float:
-            switched = Switched(name, sign * float(np.exp(log_size)), shape)
-            seen = self.visible(self.curve(switched))
-            return float(np.log(max(float(seen), _UNSEEN) / r))
+            found = float(self.gap_over_noise(self.curve(sized(log_size))))
+            return float(np.log(max(found, _NO_GAP) / r))
 
         if excess(high) < 0.0 or excess(low) > 0.0:
             return None
-        log_size = float(brentq(excess, low, high, xtol=1e-4))  # type: ignore[arg-type]
-        return Switched(name, sign * float(np.exp(log_size)), shape)
+        return sized(float(brentq(excess, low, high, xtol=1e-4)))  # type: ignore[arg-type]
 
 
-def draw_bench(history: History, rng: np.random.Generator) -> Bench:
+def draw_rig(history: History, rng: np.random.Generator) -> VirtualRig:
     """Draw a rig on which nothing is wrong."""
-    return Bench(
+    return VirtualRig(
         history,
         stiffness=rng.uniform(150.0, 260.0),
         alpha=rng.normal(ALPHA, ALPHA_SD),
@@ -130,13 +136,13 @@ def draw_bench(history: History, rng: np.random.Generator) -> Bench:
 
 
 def draw_noise(
-    bench: Bench, rng: np.random.Generator, correlation: float = 0.0
-) -> np.ndarray:
+    rig: VirtualRig, rng: np.random.Generator, correlation: float = 0.0
+) -> Floats:
     """Return noise with sd σ [N], serially correlated within runs, shape (n,)."""
-    new = rng.normal(size=len(bench.history.run))
-    noise, starts = new.copy(), bench.history.run_starts
+    new = rng.normal(size=len(rig.history.run))
+    noise, starts = new.copy(), rig.history.run_starts
     for row in range(1, len(new)):
         if not starts[row]:
             fresh = np.sqrt(1.0 - correlation**2) * new[row]
             noise[row] = correlation * noise[row - 1] + fresh
-    return bench.sigma * noise
+    return rig.sigma * noise

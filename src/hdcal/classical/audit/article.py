@@ -14,7 +14,6 @@ from hdcal.physics.theory import RING_SERIES
 TITLE = "Study on Flexible Gear Deformation in Harmonic Drive Gear"
 # Table 1, and below Table 4; the load height is not given, no claim here needs it.
 WALL, RADIUS, LENGTH, POISSON = 0.68, 40.0, 70.0, 0.3
-GEAR = Geometry(WALL, RADIUS, LENGTH, load_height=LENGTH, poisson=POISSON)
 MODULUS = 210e3
 DEFORMATION = 0.4
 SLOPE_THEORY, SLOPE_MEASURED, INFLUENCE = 1625.19, 210.41, 0.13
@@ -62,6 +61,11 @@ class Claim:
     numbers: dict[str, float] = field(default_factory=dict)
 
 
+def article_gear() -> Geometry:
+    """Return the sizes of the article's gear."""
+    return Geometry(WALL, RADIUS, LENGTH, load_height=LENGTH, poisson=POISSON)
+
+
 def outcome(holds: bool) -> Outcome:
     """Return the word for a claim that could be checked."""
     return "holds" if holds else "does not hold"
@@ -80,3 +84,12 @@ def printed_slope(gear: Geometry, modulus: float) -> float:
     bending = modulus * float(gear.wall_thickness) ** 3 / plate
     over = plate / (24.0 * float(gear.radius) ** 3)
     return float(np.pi * bending * over * RING_SERIES)
+
+
+def cubic(deformation: np.ndarray) -> np.ndarray:
+    """Return the force of the article's fitted equation [N].
+
+    Args:
+        deformation: [mm], shape (n,).
+    """
+    return np.polyval([*reversed(CUBIC), 0.0], deformation)

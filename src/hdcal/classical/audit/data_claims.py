@@ -9,7 +9,6 @@ from hdcal.classical.audit.article import (
     DEFORMATION,
     ERROR_CLAIMED,
     FORCE_CLAIMED,
-    GEAR,
     INFLUENCE,
     MODULUS,
     RADIUS,
@@ -19,9 +18,10 @@ from hdcal.classical.audit.article import (
     TABLE_4,
     WALL,
     Claim,
+    article_gear,
+    cubic,
     outcome,
 )
-from hdcal.classical.audit.theory_claims import cubic
 from hdcal.classical.fit.fit import PolynomialFit, fit
 from hdcal.data.case import Case
 from hdcal.physics.theory import ring
@@ -127,10 +127,24 @@ def _measured_slope(fits) -> Claim:
     )
 
 
-def _fitted_equation(x, y) -> Claim:
+def cubic_misfit(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Return what the article's cubic leaves of the readings.
+
+    Args:
+        x: deformation [mm], shape (n,).
+        y: force [N], shape (n,).
+
+    Returns:
+        Residuals, shape (n,), and their root mean square [N]; R² about the mean.
+    """
     residual = y - cubic(x)
-    r2 = float(1.0 - residual @ residual / np.sum((y - y.mean()) ** 2))
-    rms, below = float(np.sqrt(np.mean(residual**2))), int(np.sum(residual < 0.0))
+    r2 = 1.0 - residual @ residual / np.sum((y - y.mean()) ** 2)
+    return residual, float(np.sqrt(np.mean(residual**2))), float(r2)
+
+
+def _fitted_equation(x, y) -> Claim:
+    residual, rms, r2 = cubic_misfit(x, y)
+    below = int(np.sum(residual < 0.0))
     return Claim(
         8,
         "The fitted equation is 210.41ω − 15.23ω² + 5.67ω³, with R² above "
@@ -206,7 +220,7 @@ def _resolution(case: Case, line: PolynomialFit, parabola: PolynomialFit) -> Cla
 
 def _influence(line: PolynomialFit, origin: PolynomialFit) -> Iterator[Claim]:
     slopes = (float(line.coefficients[1]), float(origin.coefficients[0]))
-    nominal = float(ring(GEAR, MODULUS))
+    nominal = float(ring(article_gear(), MODULUS))
     article = [slope / SLOPE_THEORY for slope in slopes]
     proper = [slope / nominal for slope in slopes]
     numbers = {

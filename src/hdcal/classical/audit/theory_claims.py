@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.classical.audit.article import (
-    CUBIC,
     DEFORMATION,
-    GEAR,
     LENGTH,
     MODULUS,
     POISSON,
@@ -18,6 +16,7 @@ from hdcal.classical.audit.article import (
     TABLE_4,
     WALL,
     Claim,
+    article_gear,
     outcome,
     printed_slope,
 )
@@ -43,7 +42,7 @@ def _series() -> Claim:
     factor = 1.0 / RING_SERIES**2
     inertia = LENGTH * WALL**3 / 12.0
     by_hand = 2.0 * MODULUS * inertia / (_CASTIGLIANO * RADIUS**3)
-    right = float(ring(GEAR, MODULUS))
+    right = float(ring(article_gear(), MODULUS))
     return Claim(
         1,
         "The force is multiplied by the series S = Σ 1/(n²−1)², n = 2, 4, 6, …",
@@ -63,9 +62,10 @@ def _series() -> Claim:
 
 
 def _length() -> Claim:
-    longer = replace(GEAR, length=2.0 * LENGTH)
-    printed = printed_slope(longer, MODULUS) / printed_slope(GEAR, MODULUS)
-    true = float(ring(longer, MODULUS)) / float(ring(GEAR, MODULUS))
+    gear = article_gear()
+    longer = replace(gear, length=2.0 * LENGTH)
+    printed = printed_slope(longer, MODULUS) / printed_slope(gear, MODULUS)
+    true = float(ring(longer, MODULUS)) / float(ring(gear, MODULUS))
     return Claim(
         2,
         "P is the deforming force of the gear, in newtons",
@@ -78,8 +78,8 @@ def _length() -> Claim:
 
 
 def _slope() -> Claim:
-    per_length = printed_slope(GEAR, MODULUS)
-    right = float(ring(GEAR, MODULUS))
+    per_length = printed_slope(article_gear(), MODULUS)
+    right = float(ring(article_gear(), MODULUS))
     lacking = SLOPE_THEORY / right
     needed = {
         "needed_wall_thickness_mm": WALL * lacking ** (1 / 3),
@@ -108,8 +108,9 @@ def _slope() -> Claim:
 
 
 def _poisson() -> Claim:
-    without = replace(GEAR, poisson=0.0)
-    change = printed_slope(GEAR, MODULUS) / printed_slope(without, MODULUS) - 1.0
+    gear = article_gear()
+    without = replace(gear, poisson=0.0)
+    change = printed_slope(gear, MODULUS) / printed_slope(without, MODULUS) - 1.0
     tube = 1.0 / (1.0 - POISSON**2) - 1.0
     return Claim(
         4,
@@ -125,6 +126,7 @@ def _poisson() -> Claim:
 def _table_3() -> Claim:
     at, original = np.array([row[:2] for row in TABLE_3]).T
     per_mm = original / at
+    right = float(ring(article_gear(), MODULUS))
     return Claim(
         5,
         "Table 3 lists the theoretical force",
@@ -132,7 +134,7 @@ def _table_3() -> Claim:
         f"one slope of {per_mm.mean():.1f} N/mm, the K₁ that its formula does not "
         "give",
         "–",
-        outcome(abs(per_mm.mean() / float(ring(GEAR, MODULUS)) - 1.0) < _SAME),
+        outcome(abs(per_mm.mean() / right - 1.0) < _SAME),
         {"slope_N_per_mm": float(per_mm.mean()), "spread": float(np.ptp(per_mm))},
     )
 
@@ -164,8 +166,3 @@ def _table_4() -> Claim:
             "implied_slope_N_per_mm": implied,
         },
     )
-
-
-def cubic(deformation: np.ndarray) -> np.ndarray:
-    """Return the force of the article's fitted equation [N]."""
-    return np.polyval([*reversed(CUBIC), 0.0], deformation)

@@ -4,14 +4,8 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    Parsed,
-    case_options,
-    json_option,
-    out_option,
-    read_given,
-    read_whole_numbers,
-)
+from hdcal.cli.option_types import WHOLE_NUMBERS
+from hdcal.cli.options import case_options, json_option, out_option, read_given
 
 
 @command(short_help="Classical polynomial fits, with their errors.")
@@ -19,7 +13,7 @@ from hdcal.cli.options import (
 @click.option(
     "--degree",
     "degrees",
-    type=Parsed("LIST", read_whole_numbers),
+    type=WHOLE_NUMBERS,
     default="1,2,3",
     show_default=True,
     help="Degrees of the polynomials, 1 to 9.",

@@ -3,17 +3,17 @@
 Source: "Study on Flexible Gear Deformation in Harmonic Drive Gear".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hdcal.classical.audit.article import (
     DEFORMATION,
-    GEAR,
     INFLUENCE,
     MODULUS,
     TABLE_3,
     TABLE_4,
+    article_gear,
 )
 from hdcal.data.records import Geometry
 from hdcal.design.design_draws import Basis, basis_of
@@ -70,7 +70,8 @@ def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
     basis = None if posterior is None else basis_of(posterior)
     if basis is not None:
         _check_gear(basis)
-    own = float(GEAR.wall_thickness), float(GEAR.radius)
+    gear = article_gear()
+    own = float(gear.wall_thickness), float(gear.radius)
     rows = [(3, at, *own, *forces) for at, *forces in TABLE_3]
     rows += [
         (4, DEFORMATION, wall, radius, *forces, None)
@@ -82,7 +83,7 @@ def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
 def _row(
     basis: Basis | None, table, at, wall, radius, original, revised, measured
 ) -> ArticleRow:
-    geometry = Geometry(wall, radius, GEAR.length, GEAR.load_height, GEAR.poisson)
+    geometry = replace(article_gear(), wall_thickness=wall, radius=radius)
     plotted = float(article(geometry, MODULUS)) * at
     return ArticleRow(
         table=table,
@@ -111,7 +112,7 @@ def _calibrated(basis: Basis, wall, radius, at) -> dict[str, float]:
 
 def _check_gear(basis: Basis) -> None:
     sizes = ("wall_thickness", "radius", "length")
-    theirs = [float(getattr(GEAR, name)) for name in sizes]
+    theirs = [float(getattr(article_gear(), name)) for name in sizes]
     ours = [float(getattr(basis.gear.geometry, name)) for name in sizes]
     if not np.allclose(ours, theirs):
         words = "is a calibration of a gear of other sizes than the article's"

@@ -1,41 +1,34 @@
 """`hdcal study`: the force on gears of many sizes, with its bands."""
 
-import shlex
-import sys
+from functools import partial
 
 import click
 
+from hdcal.cli import options
+from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.options import force_option, json_option, read_grid, seed_option
-from hdcal.cli.quantities import (
-    names_in,
-    read_list,
-    read_named,
-    read_quantity,
-)
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.cli.option_types import LENGTH, read_grid, read_named
+from hdcal.errors import Finding
 
 
-@click.command(short_help="Force over sizes and materials, with bands.")
-@click.argument("run", metavar="RUN", required=False)
-@click.option(
-    "--gear", metavar="GEAR.toml", help="Without RUN: a gear of which priors are known."
-)
-@click.option(
+def _axes() -> tuple[str, ...]:
+    from hdcal.design.study.study import AXES
+
+    return AXES
+
+
+@command(short_help="Force over sizes and materials, with bands.")
+@options.start_options
+@options.repeated_option(
     "--vary",
     metavar="NAME=VALUES",
-    multiple=True,
+    read=partial(read_named, read=read_grid, known=_axes),
     help="wall_thickness_mm=0.6:0.76:5 or radius_mm=35,40,45; may be repeated. Also "
     "length_mm, load_height_mm, deformation_mm, temperature_C.",
 )
-@click.option(
-    "--material",
-    metavar="NAME",
-    multiple=True,
-    help="Materials to compare [default: the gear's].",
-)
-@click.option("--deformation", metavar="MM", help="Radial [default: nominal].")
+@options.material_option("Materials to compare [default: the gear's].")
+@click.option("--deformation", type=LENGTH, help="Radial [default: nominal].")
 @click.option(
     "--temperature", type=float, metavar="C", help="[default: the reference one]"
 )
@@ -44,84 +37,44 @@ from hdcal.errors import Finding, InputError, attempt
     is_flag=True,
     help="Print the article's Tables 3 and 4 beside consistent values instead.",
 )
-@seed_option
-@click.option("--out", metavar="DIR", help="Result folder [default: NAME-study].")
-@force_option
-@json_option
+@options.seed_option
+@options.folder_options("Result folder [default: NAME-study].")
+@options.json_option
 @click.pass_obj
-def study(console: Console, run, gear, article, out, force, **given):
+def study(console: Console, run, gear, article, out, force, **asked):
     """Compute the force for every combination of sizes, from RUN.
 
     RUN is a folder of `hdcal calibrate`.
     """
-    from hdcal.design.sources import open_source
-    from hdcal.report.folder import check_target
-
-    keep_compilations()
     if article:
-        return _article(console, run, gear, out, given)
-    from hdcal.design.checks import name_findings
-    from hdcal.design.study.study import AXES
-
-    findings: list[Finding] = []
-    asked = _read(findings, given)
-    names = names_in(given["vary"])
-    findings += name_findings(names, AXES, "--vary")
-    source, target = open_source(findings, run, gear, out, "study")
-    if target is not None:
-        attempt(findings, lambda: check_target(target, force=force))
-    if findings:
-        raise InputError(findings)
-    return _study(console, source, asked, target, force)
-
-
-def _read(findings: list[Finding], given: dict) -> dict:
-    text = given["deformation"]
-    if not given["vary"] and not given["material"]:
-        words, remedy = "nothing is varied", "Say --vary wall_thickness_mm=0.6:0.76:5"
-        findings.append(Finding("--vary", words, remedy))
-    return {
-        "vary": attempt(findings, read_named, given["vary"], "--vary", read_grid),
-        "materials": read_list(given["material"]),
-        "deformation": None
-        if text is None
-        else attempt(findings, read_quantity, text, "mm", "--deformation"),
-        "temperature": given["temperature"],
-        "seed": given["seed"],
-    }
-
-
-def _study(console: Console, source, asked, target, force) -> int:
+        return _article(console, run)
+    keep_compilations()
     from hdcal.design.result_folder import write_study
+    from hdcal.design.sources import open_source
     from hdcal.design.study.study import study as run_study
-    from hdcal.design.terminal import closing_words
 
-    command = shlex.join(["hdcal", *sys.argv[1:]])
+    with console.wrong as wrong:
+        if not (options.is_given("vary") or options.is_given("materials")):
+            remedy = "Say --vary wall_thickness_mm=0.6:0.76:5"
+            wrong.append(Finding("vary", "nothing is varied", remedy))
+        source, usual = open_source(wrong, run, gear, "study")
+        target = out or usual
+        console.check_target(target, force)
+    assert source is not None and target is not None
     found = run_study(source, **asked)
-    told = write_study(found, target, command=command, force=force)
-    console.table(*closing_words(told, str(target)))
-    if console.json:
-        console.data(told)
-    return 0
+    told = write_study(found, target, command=console.command, force=force)
+    return console.answer(*told, target)
 
 
-def _article(console: Console, run, gear, out, given: dict) -> int:
-    foreign = {"gear": gear, "out": out, **given, "seed": None}
-    findings = [
-        Finding(f"--{name}", "has no meaning with --article", "leave it out")
-        for name, value in foreign.items()
-        if value
-    ]
-    if findings:
-        raise InputError(findings)
+def _article(console: Console, run) -> int:
+    from hdcal.cli.sources import load_posterior
     from hdcal.design.study.article_tables import article_rows
-    from hdcal.design.summary import summarise_article
-    from hdcal.design.terminal import article_words
-    from hdcal.inference.posterior import Posterior
+    from hdcal.design.study.document import article_document
+    from hdcal.design.study.summary import article_answer
 
-    posterior = None if run is None else Posterior.load(run)
-    told = summarise_article(article_rows(posterior))
-    console.table(*article_words(told))
-    if console.json:
-        console.data(told)
-    return 0
+    others = ("gear", "out", "vary", "materials", "deformation", "temperature")
+    with console.wrong as wrong:
+        wrong += options.without_meaning(others, "--article")
+    posterior = None if run is None else load_posterior(run)
+    found = article_answer(article_rows(posterior))
+    return console.answer(article_document(found), found)

@@ -4,22 +4,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hdcal.design.document import HEADINGS
 from hdcal.design.study.study import Study
 from hdcal.report.canvas import BLUE, CYCLE, DARK, heading, plain, style
 
-_LABELS = {
-    "material": "material",
-    "wall_thickness_mm": "wall thickness [mm]",
-    "radius_mm": "radius [mm]",
-    "length_mm": "length [mm]",
-    "load_height_mm": "load height [mm]",
-    "deformation_mm": "deformation [mm]",
-    "temperature_C": "temperature [°C]",
-}
 # Cells of a map up to which their numbers are written in them.
 _MOST_NUMBERS = 80
 _MOST_LINES = 6
-_MOST_TICKS = 9
 
 
 def study_figure(found: Study) -> Figure:
@@ -70,7 +61,7 @@ def _lines(axes: Axes, found: Study, sizes, rows, materials) -> None:
             axes.errorbar(
                 [plain(material)], middle, reach, fmt="o", color=BLUE, capsize=4
             )
-    axes.set_xlabel(_LABELS[sizes[0]] if sizes else "material")
+    axes.set_xlabel(HEADINGS[sizes[0]] if sizes else "material")
     axes.set_ylabel("force [N]")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="best")
@@ -97,8 +88,8 @@ def _maps(found: Study, sizes, rows, materials) -> Figure:
         _ticks(axes, x, y)
         if table.size <= _MOST_NUMBERS:
             _numbers(axes, table, drawn)
-        axes.set_xlabel(_LABELS[sizes[0]])
-        axes.set_ylabel(_LABELS[sizes[1]])
+        axes.set_xlabel(HEADINGS[sizes[0]])
+        axes.set_ylabel(HEADINGS[sizes[1]])
         heading(axes, _title(found) if wide == 1 else plain(material))
         figure.colorbar(drawn, ax=axes, label="median force [N]")
     return figure

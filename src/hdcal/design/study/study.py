@@ -17,10 +17,9 @@ from hdcal.design.checks import (
     unseen_findings,
 )
 from hdcal.design.design_draws import Basis, basis_of
+from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import (
     SIZES,
-    beyond_tested,
-    far_from_tested,
     geometry_with,
     stiffness_factor,
 )
@@ -59,6 +58,13 @@ class Study:
     basis: Basis
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        from hdcal.design.study.document import study_document
+        from hdcal.design.study.summary import study_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(study_document(study_answer(self)))
 
 
 def study(
@@ -211,7 +217,7 @@ def force_quantiles(
 def is_linear(basis: Basis) -> bool:
     """Tell whether the force is proportional to stiffness and deformation."""
     bent = any(effect.stage == "force" for effect in basis.problem.effects)
-    return not bent and basis.problem.gap is None
+    return not bent and basis.problem.discrepancy is None
 
 
 def _linear_quantiles(basis, factor, deformation, temperature, shares) -> np.ndarray:

@@ -2,29 +2,23 @@
 
 import click
 
-from hdcal.cli.compilation_cache import keep_compilations
+from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    direction_option,
-    force_option,
-    json_option,
-    read_grid,
-)
-
-SCHEMA = "hdcal.prediction/1"
+from hdcal.cli.option_types import GRID, NUMBERS
+from hdcal.cli.options import direction_option, force_option, json_option
 
 
-@click.command(short_help="Bands on the force from a result folder.")
+@command(short_help="Bands on the force from a result folder.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--deformation",
+    type=GRID,
     required=True,
-    metavar="START:STOP:COUNT",
     help="Deformations as read [mm]: 0:0.6:61, or a list 0.1,0.2.",
 )
 @click.option(
     "--temperature",
-    metavar="LIST",
+    type=NUMBERS,
     help="Temperatures [°C]: 20,60 [default: the reference one].",
 )
 @direction_option
@@ -38,26 +32,21 @@ SCHEMA = "hdcal.prediction/1"
 @click.pass_obj
 def predict(console: Console, run, deformation, temperature, direction, out, force):
     """Predict the force with its bands from RUN, a folder of `hdcal calibrate`."""
+    from hdcal.cli.sources import load_posterior
     from hdcal.report.folder import check_file, write_whole
 
-    along = read_grid(deformation, "--deformation")
-    warmth = None if temperature is None else read_grid(temperature, "--temperature")
-    if out is not None:
-        check_file(out, force=force)
-    keep_compilations()
-    from hdcal.inference.posterior import Posterior
+    with console.wrong as wrong:
+        if out is not None:
+            wrong.attempt(check_file, out, force=force)
+    posterior = load_posterior(run)
     from hdcal.prediction.bands.bands import predict as bands_of
+    from hdcal.prediction.bands.document import untested_rows
+    from hdcal.prediction.bands.summary import prediction_answer
     from hdcal.report.csv_table import columns_csv
 
-    posterior = Posterior.load(run)
-    bands = bands_of(posterior, along, warmth, direction)
-    untested = int((~bands.tested).sum())
-    if untested:
-        size = len(bands.tested)
-        console.words(
-            f"{untested} of {size} rows lie outside what was tested: "
-            f"{_tested(posterior.case.records)}"
-        )
+    bands = bands_of(posterior, deformation, temperature, direction)
+    if untested := untested_rows(bands, posterior.case.records):
+        console.words(untested)
     table = columns_csv(bands.columns())
     if out is not None:
         write_whole(out, table, force=force)
@@ -65,17 +54,5 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     elif not console.json:
         console.result(table.rstrip("\n"))
     if console.json:
-        columns = bands.columns()
-        console.data(
-            {"schema": SCHEMA, "status": "ok", "interval": 0.95, "columns": columns}
-        )
+        console.data(prediction_answer(bands))
     return 0
-
-
-def _tested(records) -> str:
-    """Say which deformations, temperatures and directions the data hold."""
-    low, high = records.deformation.min(), records.deformation.max()
-    cold, warm = records.temperature.min(), records.temperature.max()
-    ways = {1.0: "up", -1.0: "down"}
-    seen = " and ".join(way for sense, way in ways.items() if sense in records.sense)
-    return f"{low:g} … {high:g} mm, {cold:g} … {warm:g} °C, {seen}"

@@ -1,24 +1,18 @@
 """`hdcal margin`: the force that a deformation needs, and the margin to it."""
 
-import shlex
-import sys
-
 import click
 
+from hdcal.cli import options
+from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    direction_option,
-    force_option,
-    json_option,
-    read_window,
-    seed_option,
+from hdcal.cli.option_types import WINDOW
+
+
+@command(
+    short_help="Force needed at a deformation, and the margin to it.",
+    context_settings={"show_default": True},
 )
-from hdcal.cli.quantities import read_millimetres, read_named
-from hdcal.errors import Finding, InputError
-
-
-@click.command(short_help="Force needed at a deformation, and the margin to it.")
 @click.argument("run", metavar="RUN")
 @click.option(
     "--deformation", type=float, required=True, help="Deformation as read [mm]."
@@ -29,23 +23,13 @@ from hdcal.errors import Finding, InputError
 )
 @click.option(
     "--temperature",
-    metavar="FROM:TO",
+    type=WINDOW,
     help="Window -20:80, or a list 20,60 [°C] [default: the tested one].",
 )
 @click.option(
-    "--content",
-    type=float,
-    default=0.99,
-    show_default=True,
-    help="Share of the population within each bound.",
+    "--content", default=0.99, help="Share of the population within each bound."
 )
-@click.option(
-    "--confidence",
-    type=float,
-    default=0.95,
-    show_default=True,
-    help="Confidence of each bound.",
-)
+@click.option("--confidence", default=0.95, help="Confidence of each bound.")
 @click.option(
     "--required-probability",
     type=float,
@@ -60,68 +44,37 @@ from hdcal.errors import Finding, InputError
     "--quantity",
     type=click.Choice(["reading", "load"]),
     default="reading",
-    show_default=True,
     help="What the gauge shows, or what acts on the gear.",
 )
-@direction_option
-@click.option(
-    "--tolerance",
-    "tolerances",
-    metavar="SIZE_mm=±",
-    multiple=True,
-    help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
-)
-@seed_option
-@click.option("--out", metavar="DIR", help="Write a result folder with a report.")
-@force_option
-@json_option
+@options.direction_option
+@options.tolerance_option
+@options.seed_option
+@options.folder_options("Write a result folder with a report.")
+@options.json_option
 @click.pass_obj
-def margin(console: Console, run, temperature, tolerances, out, force, **asked):
+def margin(console: Console, run, out, force, **asked):
     """Bound the force needed at a deformation, from RUN.
 
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
     could not tell apart are averaged over by their probability.
     """
-    findings: list[Finding] = []
-    window, sizes = None, {}
-    try:
-        window = None if temperature is None else read_window(temperature)
-    except InputError as error:
-        findings += error.findings
-    try:
-        sizes = read_named(tolerances, "--tolerance", read_millimetres)
-    except InputError as error:
-        findings += error.findings
-    if out is not None:
-        from hdcal.report.folder import check_target
-
-        try:
-            check_target(out, force=force)
-        except InputError as error:
-            findings += error.findings
-    return _margin(console, run, window, sizes, asked, findings, out, force)
-
-
-def _margin(console: Console, run, window, sizes, asked, findings, out, force) -> int:
     keep_compilations()
     from hdcal.prediction.causes import read_models
+    from hdcal.prediction.margin.document import margin_report
     from hdcal.prediction.margin.margin import margin as bounds_of
-    from hdcal.prediction.margin.result_folder import margin_json, write_margin
-    from hdcal.prediction.margin.terminal import closing_words
+    from hdcal.prediction.margin.summary import margin_answer
 
-    try:
-        models = read_models(run)
-    except InputError as error:
-        raise InputError([*findings, *error.findings]) from error
-    if findings:
-        raise InputError(findings)
-    found = bounds_of(models, temperature=window, tolerances=sizes, **asked)
+    with console.wrong as wrong:
+        models = wrong.attempt(read_models, run) or []
+        console.check_target(out, force)
+    found = bounds_of(models, **asked)
     posterior = max(models, key=lambda model: model[0])[1]
-    plain = margin_json(found, posterior, seed=asked["seed"])
+    answer = margin_answer(found, posterior, seed=asked["seed"])
+    document = margin_report(answer, posterior, console.command)
     if out is not None:
-        command = shlex.join(["hdcal", *sys.argv[1:]])
-        write_margin(found, posterior, plain, out, command=command, force=force)
-    console.table(*closing_words(plain, out))
-    if console.json:
-        console.data(plain)
-    return 0
+        from hdcal.prediction.margin.figure import margin_figures
+        from hdcal.report.write import write_report
+
+        figures = margin_figures(found, answer.gear.name)
+        write_report(out, document, {"margin.json": answer}, figures, force=force)
+    return console.answer(document, answer, out)

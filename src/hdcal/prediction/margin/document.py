@@ -1,205 +1,292 @@
-"""A margin in sentences that need no statistics to be understood."""
+"""The report of a margin: its sections, and what they rest on in sentences."""
 
-from collections.abc import Iterator
+from dataclasses import replace
 
-from hdcal.prediction.margin.result import Exceedance, Margin
-from hdcal.report.words import hypothesis, number
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.prediction.margin.answer import MarginAnswer
+from hdcal.prediction.margin.result import Level, Margin
+from hdcal.prediction.margin.sentences import (
+    answer,
+    bound_name,
+    chance,
+    headline,
+    index,
+    input_label,
+    newtons,
+    next_steps,
+)
+from hdcal.prediction.population import Population
+from hdcal.report.document import (
+    Document,
+    Picture,
+    Section,
+    Table,
+    Tag,
+    Text,
+    notices,
+)
+from hdcal.report.parameters import Interval
+from hdcal.report.provenance import gear_rows
+from hdcal.report.words import estimate, hypothesis, number
 
-_MEMBER = {"readings": "reading", "mountings": "mounting", "specimens": "gear"}
-_MANY = {"readings": "readings", "mountings": "mountings", "specimens": "gears"}
-_INPUTS = {
-    "calibration": "calibration (stiffness, zeros)",
-    "cause": "which effect is at work",
-    "alpha": "loss of modulus per kelvin α",
-    "noise": "reading noise",
-    "mounting": "mounting to mounting",
-    "gear": "gear to gear",
-    "leftover": "leftover beyond the tested range",
-    "wall_thickness": "wall thickness δ",
-    "radius": "radius R",
-    "length": "length L",
-    "load_height": "load height",
-    "E0_GPa": "Young's modulus E₀",
-    "K": "influence coefficient K",
-}
-# Rarer than this nobody can say; the words then say so.
-_RAREST = 1e-12
-
-
-def member_word(found: Margin) -> str:
-    """Return what one member of the population is called."""
-    return _MEMBER[found.population]
-
-
-def input_label(name: str) -> str:
-    """Return what an input of a gradient or share is called."""
-    return _INPUTS.get(name.removesuffix("_mm"), name)
-
-
-def bound_name(found: Margin) -> str:
-    """Return content and confidence as people write them: 99/95."""
-    return f"{100.0 * found.content:.6g}/{100.0 * found.confidence:.6g}"
-
-
-def chance(probability: float) -> str:
-    """Return a probability; never one that nobody can know."""
-    if probability < _RAREST:
-        return f"less than {_RAREST:.0e}"
-    if probability > 1.0 - _RAREST:
-        return "certain"
-    if probability > 0.999:
-        return "more than 99.9 %"
-    if probability > 0.99:
-        return f"{100.0 * probability:.1f} %"
-    if probability >= 0.001:
-        return f"{100.0 * probability:.2g} %"
-    return f"{probability:.1e}"
-
-
-def index(beta: float) -> str:
-    """Return a reliability index; beyond ± 7 no probability can be known."""
-    if beta > 7.0:
-        return "above 7"
-    return "below −7" if beta < -7.0 else f"{beta:.2f}"
+LOAD = (
+    "The load on the gear: without the gauge's zero, its errors and its noise. "
+    "A leftover discrepancy counts as the gear's."
+)
+LOAD_OF_MOUNTINGS = (
+    "Mountings differ by the gauge's zero, which is no load: here they are alike."
+)
+TOLERANCES_OF_GEARS = (
+    "The tolerances come on top of how much the tested gears differ, which already "
+    "holds their own."
+)
+TOLERANCES_ALONE = (
+    "With tolerances the forces are those of gears that differ from the tested ones in "
+    "these sizes and in nothing else."
+)
+NORMAL_TAILS = (
+    "Such rare cases rest on the normal tails of noise and scatter, which no test of "
+    "this size has seen."
+)
+CALIBRATION_SHARE = (
+    "“Calibration” is stiffness, zeros, effects and leftover together: the data tie "
+    "them to each other, so that they have no shares of their own; of K and E0 only "
+    "the product matters. The loss of modulus per kelvin stands alone only where it "
+    "is the prior's."
+)
 
 
-def answer(found: Margin) -> list[str]:
-    """Return the answer in sentences."""
-    return [*_force(found), *_capacity(found), *_inverse(found), *_models(found)]
-
-
-def _where(found: Margin) -> str:
-    warm = [level.temperature_C for level in found.levels]
-    if len(warm) == 1:
-        return f"at {warm[0]:g} °C"
-    return f"over {min(warm):g} … {max(warm):g} °C"
-
-
-def newtons(value: float) -> str:
-    """Return a force to four digits."""
-    return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
-
-
-def _force(found: Margin) -> Iterator[str]:
-    level, share = found.worst, f"{100.0 * found.content:.6g} %"
-    what = "force that the gauge shows" if found.quantity == "reading" else "load"
-    way = "" if found.direction == "up" else ", unloading,"
-    several = len(found.levels) > 1
-    at = f" at its worst, {level.temperature_C:g} °C," if several else ""
-    sure = f"{100.0 * found.confidence:.6g} %"
-    width = level.force_N.hi - level.force_N.lo
-    low, middle, high = (
-        number(end, width)
-        for end in (level.force_N.lo, level.force_N.median, level.force_N.hi)
-    )
-    yield (
-        f"At {found.deformation_mm:g} mm{way} the mean {what}{at} is {middle} N, 95 % "
-        f"credible interval {low} … {high} N."
-    )
-    basis = f", an {found.basis} value" if found.basis[:1] == "A" else ""
-    basis = f", a {found.basis} value" if found.basis[:1] == "B" else basis
-    yield (
-        f"With {sure} confidence {share} of {_MANY[found.population]} need at most "
-        f"{newtons(level.upper_bound_N)} {_where(found)}{basis}. Taken by itself, the "
-        f"bound from below is as sure: {share} need at least "
-        f"{newtons(level.lower_bound_N)}."
-    )
-    yield f"Whose forces these are: {_lower(found.population_words)}"
-
-
-def _lower(text: str) -> str:
-    return text[:1].lower() + text[1:]
-
-
-def _capacity(found: Margin) -> Iterator[str]:
-    level, sure = found.worst, f"{100.0 * found.confidence:.6g} %"
-    if level.exceedance is not None:
-        yield _enough(found)
-        yield from _exceedance(found, level.exceedance)
-    yield (
-        f"To hold {100.0 * found.required_probability:.8g} % of "
-        f"{_MANY[found.population]}, a capacity of "
-        f"{newtons(level.capacity_predictive_N)} is expected to do; "
-        f"{newtons(level.capacity_N)} does with {sure} confidence."
+def margin_document(found: Margin) -> Document:
+    """Return what a margin says by itself; its pictures are margin and tornado."""
+    first = headline(found)
+    sections = [_bounds(found)]
+    if found.models:
+        sections.append(_causes(found))
+    if found.shares:
+        sections.append(_sensitivities(found))
+    return Document(
+        name="Margin",
+        kind="margin",
+        subtitle=_subtitle(found),
+        headline=first,
+        answers=[words for words in answer(found) if words != first],
+        next_steps=list(next_steps(found)),
+        notices=notices(
+            ("Outside what was tested", found.extrapolated),
+            ("To be aware of", found.remarks),
+        ),
+        sections=sections,
     )
 
 
-def _enough(found: Margin) -> str:
-    """Say first whether the capacity does."""
-    level, limit = found.worst, found.limit_force_N
-    assert limit is not None
-    many = _MANY[found.population]
-    share = f"{100.0 * found.required_probability:.8g} % of {many}"
-    sure = f"{100.0 * found.confidence:.6g} %"
-    if limit >= level.capacity_N:
-        return (
-            f"A capacity of {limit:g} N is enough for {share}, with {sure} confidence."
-        )
-    if limit >= level.capacity_predictive_N:
-        return (
-            f"A capacity of {limit:g} N is expected to be enough for {share}, but not "
-            f"with {sure} confidence."
-        )
-    return f"A capacity of {limit:g} N is NOT enough for {share}."
+def margin_report(
+    found: MarginAnswer, posterior: Posterior, command: str = ""
+) -> Document:
+    """Return the report of a margin, with whose it is and how it was made.
 
-
-def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
-    one = f"One future {member_word(found)} needs more than {found.limit_force_N:g} N"
-    sure = f"{100.0 * found.confidence:.6g} %"
-    if max(risk.hi, risk.probability) < _RAREST:
-        rarest = chance(risk.probability)
-        yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
-        return
-    yield (
-        f"{one} with a probability of {chance(risk.probability)}: reliability index "
-        f"β = {index(risk.beta)}. The share of {_MANY[found.population]} that do lies "
-        f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
-        f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
-        f"{index(risk.beta_at_confidence)}."
+    Args:
+        found: from `margin_answer`.
+        posterior: of the likeliest model.
+        command: how the result was made.
+    """
+    tolerances = ", ".join(
+        f"{name} ± {size:g}" for name, size in found.tolerances_mm.items()
     )
-    if risk.probability > risk.hi:
-        yield (
-            "The probability lies above the interval of the share because the few "
-            "draws with the widest scatter make most of it."
-        )
-
-
-def _inverse(found: Margin) -> Iterator[str]:
-    got = found.reached
-    if got is None:
-        return
-    low, high = got.searched_mm
-    beyond = f"not within {low:g} … {high:.3g} mm"
-
-    def at(value: float | None) -> str:
-        return beyond if value is None else f"{value:.4g} mm"
-
-    middle = f"{got.force_N:g} N reach {at(got.median_mm)} at {got.temperature_C:g} °C"
-    span = ""
-    if got.lo_mm is not None and got.hi_mm is not None:
-        span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} mm)"
-    share = f"{100.0 * found.content:.6g} %"
-    tested = "" if got.tested else " Part of this lies outside what was tested."
-    yield (
-        f"The other way round: {middle} in the mean{span}. With "
-        f"{100.0 * found.confidence:.6g} % confidence {share} of "
-        f"{_MANY[found.population]} get at least to {at(got.lower_bound_mm)}, and as "
-        f"surely {share} get at most to {at(got.upper_bound_mm)}.{tested}"
+    rows = [
+        *gear_rows(posterior.case, posterior.theory),
+        ("tolerances", tolerances or "none given"),
+        ("seed", str(found.seed)),
+        ("versions", ", ".join(f"{k} {v}" for k, v in found.versions.items())),
+    ]
+    data = found.data
+    return replace(
+        margin_document(found),
+        name=found.gear.name,
+        subtitle=f"{_subtitle(found)}, from {data.rows} readings ({data.name}), theory "
+        f"“{found.gear.theory}”.",
+        provenance=rows + ([("command", command)] if command else []),
     )
 
 
-def _models(found: Margin) -> Iterator[str]:
-    if not found.models:
-        return
-    each = "; ".join(
-        f"{hypothesis(model.model)} ({100.0 * model.probability:.0f} %): "
-        f"{newtons(model.upper_bound_N)}"
+def _subtitle(found: Margin) -> str:
+    return f"Force needed at {found.deformation_mm} mm and the margin to it"
+
+
+def _bounds(found: Margin) -> Section:
+    bounds = bound_name(found)
+    numbers = ["mean [N]", "one member [N]", "lower", "upper", "P", "β"]
+    shown = Picture(
+        "margin",
+        "Force needed with its bounds and the capacity",
+        "Dark: where the mean force lies with 95 % probability. Light: where one "
+        f"future member lies with 95 % probability. Arrows: the {bounds} bounds, "
+        "one-sided each.",
+    )
+    words = (
+        "Mean: 95 % credible interval. One member: 95 % predictive interval. P: "
+        "probability that one future member needs more than the capacity; "
+        f"β = −Φ⁻¹(P). Lower and upper: a {bounds} bound is one that "
+        f"{100.0 * found.content:g} % of the population keep to, with "
+        f"{100.0 * found.confidence:g} % confidence. Each is one-sided: both together "
+        "promise less."
+    )
+    table = Table(
+        ["°C", "tested", *numbers],
+        [_level(level) for level in found.levels],
+        frozenset(["°C", *numbers]),
+    )
+    return Section("Bounds", [shown, table, Text(words, soft=True)])
+
+
+def _level(level: Level) -> list[str | Tag]:
+    risk = level.exceedance
+    return [
+        f"{level.temperature_C:g}",
+        "yes" if level.tested else Tag("extrapolated", "caution"),
+        _span(level.force_N),
+        _span(level.member_N),
+        newtons(level.lower_bound_N),
+        newtons(level.upper_bound_N),
+        "–" if risk is None else chance(risk.probability),
+        "–" if risk is None else index(risk.beta),
+    ]
+
+
+def _span(span: Interval) -> str:
+    return estimate(span)[1]
+
+
+def _causes(found: Margin) -> Section:
+    bounds, worst = bound_name(found), found.worst
+    rows = [
+        [
+            hypothesis(model.model),
+            f"{100.0 * model.probability:.0f} %",
+            newtons(model.lower_bound_N),
+            newtons(model.upper_bound_N),
+        ]
         for model in found.models
+    ]
+    ends = newtons(worst.lower_bound_N), newtons(worst.upper_bound_N)
+    numbers = ["probability", f"{bounds} lower", f"{bounds} upper"]
+    table = Table(
+        ["cause of the gap", *numbers],
+        [*rows, ["averaged", "", *ends]],
+        frozenset(numbers),
+        strong=frozenset({len(rows)}),
     )
-    likeliest = max(found.models, key=lambda model: model.probability)
-    change = found.worst.upper_bound_N - likeliest.upper_bound_N
-    yield (
-        "The cause of the gap is not settled, so the bounds average over the causes by "
-        f"probability. Upper bound with each alone: {each}. The average is "
-        f"{found.worst.upper_bound_N:.4g} N, {change:+.2g} N from the likeliest alone."
+    return Section("The bound with each cause", [table])
+
+
+def _sensitivities(found: Margin) -> Section:
+    shown = Picture(
+        "tornado",
+        "Shares of the variance, and the change of the bound for one per cent",
+        "Left: shares of the variance of one future member's force, all at "
+        f"{found.worst.temperature_C} °C. Right: change of the upper bound when an "
+        "input grows by one per cent.",
     )
+    slopes = ["d bound / d input [N per unit]", "d mean / d input [N per unit]"]
+    numbers = ["at", *slopes, "bound for + 1 % [N]"]
+    rows = [
+        [
+            input_label(slope.name),
+            number(slope.value),
+            {"E0_GPa": "GPa", "K": ""}.get(slope.name, "mm"),
+            number(slope.bound_N),
+            number(slope.force_N),
+            f"{slope.bound_N_per_percent:+.2f}",
+        ]
+        for slope in found.gradients
+    ]
+    table = Table(["input", "at", "", *numbers[1:]], rows, frozenset(numbers))
+    note = Text(CALIBRATION_SHARE, soft=True)
+    return Section("What the bound hangs on", [shown, note, table])
+
+
+def population_words(population: Population, problem: Problem) -> str:
+    """Return in one sentence whose forces the numbers are about."""
+    if population == "readings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        place = "mountings on average" if problem.runs else "mounting"
+        return (
+            f"Single readings of {gears} in the tested {place}. Another gear or "
+            "another mounting may need a force outside these bounds."
+        )
+    runs = f", each in a new mounting ({problem.runs} were tested)"
+    if population == "mountings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        return (
+            f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
+            "Another gear may need a force outside these bounds."
+        )
+    place = runs if problem.runs else ", in the tested mounting"
+    return f"New gears of this kind ({problem.specimens} were tested){place}."
+
+
+def untested_deformation(
+    at: float, tested: tuple[float, float], *, leftover: float, fitted: bool
+) -> str:
+    """Say that a deformation was not tested.
+
+    Args:
+        at: asked for [mm as read].
+        tested: ends of the tested range [mm as read].
+        leftover: sd by which the bounds are widened there [N].
+        fitted: whether that is from a fitted discrepancy.
+    """
+    low, high = tested
+    source = "the fitted leftover discrepancy" if fitted else "the prior only"
+    return (
+        f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside the "
+        f"tested {low:g} … {high:g} mm. Widened by a leftover discrepancy of "
+        f"{leftover:.2g} N (sd), from {source}."
+    )
+
+
+def untested_direction(*, down: bool) -> str:
+    """Say that a direction of the movement was not tested."""
+    word = "unloading" if down else "loading"
+    return f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
+
+
+def untested_temperature(
+    asked: tuple[float, float],
+    tested: tuple[float, float],
+    *,
+    measured: bool,
+    by_data: bool,
+) -> str:
+    """Say that temperatures were not tested.
+
+    Args:
+        asked: coldest and warmest [°C].
+        tested: coldest and warmest of the data [°C].
+        measured: whether the data hold a temperature at all.
+        by_data: whether they tell the loss of modulus per kelvin.
+    """
+    cold, warm = tested
+    seen = f"{cold:g} °C" if cold == warm else f"{cold:g} … {warm:g} °C"
+    assumed = "" if measured else " (assumed, it was not measured)"
+    source = "the data" if by_data else "its prior (the material), not from the data"
+    return (
+        f"Extrapolated: {asked[0]:g} … {asked[1]:g} °C lies outside the tested "
+        f"{seen}{assumed}. Young's modulus carries it, linearly; its loss per kelvin "
+        f"is from {source}."
+    )
+
+
+def few_tested(what: str, count: int) -> str:
+    """Say that the scatter between members rests on the prior.
+
+    Args:
+        what: gears or mountings.
+        count: how many were tested.
+    """
+    return f"How much {what} differ rests on the prior: {count} were too few to tell."
+
+
+def draws_used(used: int, total: int) -> str:
+    """Say that not all draws were used."""
+    return f"{used} of {total} draws were used."

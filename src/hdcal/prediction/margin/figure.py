@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hdcal.prediction.margin.document import bound_name, input_label, member_word
 from hdcal.prediction.margin.result import Margin
+from hdcal.prediction.margin.sentences import bound_name, input_label, member_word
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -26,6 +26,17 @@ _DRIVEN_WORDS = {
     "prior": "from the prior only",
     "given": "from the tolerances given",
 }
+
+
+def margin_figures(found: Margin, name: str) -> dict[str, Figure]:
+    """Return the figures of a margin by name; without shares there is no tornado.
+
+    Args:
+        found: from `margin`.
+        name: of the gear.
+    """
+    drawn = {"margin": margin_figure(found, name)}
+    return drawn | ({"tornado": tornado_figure(found)} if found.shares else {})
 
 
 def margin_figure(found: Margin, name: str) -> Figure:

@@ -17,11 +17,12 @@ from hdcal.prediction.margin.bounds import (
 )
 from hdcal.prediction.margin.checks import Models, check_margin, usable_members
 from hdcal.prediction.margin.deformation_reached import reach
+from hdcal.prediction.margin.document import population_words
 from hdcal.prediction.margin.gradients import gradients
 from hdcal.prediction.margin.remarks import extrapolations, is_tested, remarks
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.variance_shares import shares
-from hdcal.prediction.population import Population, population_words, widest
+from hdcal.prediction.population import Population, widest
 from hdcal.prediction.population_force import MOST_DRAWS, Outlook, Question, look_out
 from hdcal.prediction.size_tolerances import tolerance_nodes
 from hdcal.prediction.tolerance_factors import BASES

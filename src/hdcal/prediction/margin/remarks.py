@@ -1,4 +1,4 @@
-"""What a margin rests on, in sentences: what is extrapolated, assumed or left out."""
+"""What a margin rests on: what is extrapolated, assumed or left out."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,14 +6,9 @@ import numpy as np
 
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import misfits
+from hdcal.prediction.margin import document as say
 from hdcal.prediction.population_force import Outlook
 
-CALIBRATION_NOTE = (
-    "“Calibration” is stiffness, zeros, effects and leftover together: the data tie "
-    "them to each other, so that they have no shares of their own; of K and E0 only "
-    "the product matters. The loss of modulus per kelvin stands alone only where it "
-    "is the prior's."
-)
 # As of the bands: thermometers are no better [K].
 _NEAR_K = 1.0
 
@@ -51,35 +46,24 @@ def _extrapolations(outlook: Outlook, temperature) -> Iterator[str]:
     at, low, high = question.deformation, question.low, question.high
     beyond = max(low - at, at - high)
     if beyond > 1e-9:
-        fitted = outlook.posterior.problem.gap is not None
-        source = "the fitted leftover discrepancy" if fitted else "the prior only"
         length = outlook.values["gap_length"] * (high - low)
         sd = outlook.values["gap_sd"] * np.sqrt(-np.expm1(-((beyond / length) ** 2)))
-        yield (
-            f"Extrapolated: {at:g} mm lies {beyond:.3g} mm outside the tested "
-            f"{low:g} … {high:g} mm. Widened by a leftover discrepancy of "
-            f"{np.sqrt(np.mean(sd**2)):.2g} N (sd), from {source}."
+        yield say.untested_deformation(
+            float(at),
+            (low, high),
+            leftover=float(np.sqrt(np.mean(sd**2))),
+            fitted=outlook.posterior.problem.discrepancy is not None,
         )
     sense = -1.0 if question.down else 1.0
     if sense not in np.asarray(records.sense):
-        word = "unloading" if question.down else "loading"
-        yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
+        yield say.untested_direction(down=question.down)
     if _outside(records.temperature, temperature):
         found = outlook.posterior.diagnoses.get("alpha")
-        by_data = found is not None and found.driven_by == "data"
-        source = (
-            "the data" if by_data else "its prior (the material), not from the data"
-        )
-        cold, warm = np.min(records.temperature), np.max(records.temperature)
-        asked = f"{np.min(temperature):g} … {np.max(temperature):g} °C"
-        tested = f"{cold:g}" if cold == warm else f"{cold:g} … {warm:g}"
-        if "temperature" not in records.known:
-            tested += " °C (assumed, it was not measured)"
-        else:
-            tested += " °C"
-        yield (
-            f"Extrapolated: {asked} lies outside the tested {tested}. Young's modulus "
-            f"carries it, linearly; its loss per kelvin is from {source}."
+        yield say.untested_temperature(
+            (np.min(temperature), np.max(temperature)),
+            (np.min(records.temperature), np.max(records.temperature)),
+            measured="temperature" in records.known,
+            by_data=found is not None and found.driven_by == "data",
         )
 
 
@@ -101,15 +85,9 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
     posterior, problem = first.posterior, first.posterior.problem
     draws = sum(len(outlook.values["K"]) for _, outlook in outlooks)
     if first.quantity == "load":
-        yield (
-            "The load on the gear: without the gauge's zero, its errors and its noise. "
-            "A leftover discrepancy counts as the gear's."
-        )
+        yield say.LOAD
         if first.population == "mountings":
-            yield (
-                "Mountings differ by the gauge's zero, which is no load: here they "
-                "are alike."
-            )
+            yield say.LOAD_OF_MOUNTINGS
     own_zero = first.population != "readings" and first.quantity == "reading"
     for name, what, count in (
         ("specimen_sd", "gears", problem.specimens * (first.population == "specimens")),
@@ -117,27 +95,14 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
     ):
         found = posterior.diagnoses.get(name)
         if count and found is not None and found.driven_by == "prior":
-            yield (
-                f"How much {what} differ rests on the prior: {count} were too few to "
-                "tell."
-            )
-    if first.nodes.factor.size > 1 and first.population == "specimens":
-        yield (
-            "The tolerances come on top of how much the tested gears differ, which "
-            "already holds their own."
-        )
-    elif first.nodes.factor.size > 1:
-        yield (
-            "With tolerances the forces are those of gears that differ from the tested "
-            "ones in these sizes and in nothing else."
-        )
-    if all(outlook.posterior.problem.gap is None for _, outlook in outlooks):
+            yield say.few_tested(what, count)
+    if first.nodes.factor.size > 1:
+        gears = first.population == "specimens"
+        yield say.TOLERANCES_OF_GEARS if gears else say.TOLERANCES_ALONE
+    if all(outlook.posterior.problem.discrepancy is None for _, outlook in outlooks):
         yield from misfits(posterior)
     if (rare is not None and rare < 1.0 / draws) or rounded_tail:
-        yield (
-            "Such rare cases rest on the normal tails of noise and scatter, which no "
-            "test of this size has seen."
-        )
+        yield say.NORMAL_TAILS
     total = sum(len(outlook.posterior.draws["K"]) for _, outlook in outlooks)
     if draws < total:
-        yield f"{draws} of {total} draws were used."
+        yield say.draws_used(draws, total)

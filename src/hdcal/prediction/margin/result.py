@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 from hdcal.prediction.bands.bands import Direction
 from hdcal.prediction.forces import Quantity
@@ -9,9 +10,16 @@ from hdcal.prediction.margin.deformation_reached import Reached
 from hdcal.prediction.margin.gradients import Gradient
 from hdcal.prediction.margin.variance_shares import Share
 from hdcal.prediction.population import Population
+from hdcal.prediction.tolerance_factors import BASES
+from hdcal.report.answer import Promise, Real, Sentences, Words
 from hdcal.report.parameters import Interval
 
 INTERVAL = 0.95
+Chance = Annotated[float, Promise(minimum=0, maximum=1)]
+Fraction = Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
+Size = Annotated[float, Promise(minimum=0)]
+# One whose ends are all known.
+Span = Annotated[Interval, Promise(additionalProperties={"type": "number"})]
 
 
 @dataclass(frozen=True)
@@ -29,14 +37,14 @@ class Exceedance:
         beta_at_confidence: of `at_confidence`.
     """
 
-    probability: float
-    lo: float
-    hi: float
-    at_confidence: float
-    beta: float
-    beta_lo: float
-    beta_hi: float
-    beta_at_confidence: float
+    probability: Chance
+    lo: Chance
+    hi: Chance
+    at_confidence: Chance
+    beta: Real
+    beta_lo: Real
+    beta_hi: Real
+    beta_at_confidence: Real
 
 
 @dataclass(frozen=True)
@@ -57,8 +65,8 @@ class Level:
 
     temperature_C: float
     tested: bool
-    force_N: Interval
-    member_N: Interval
+    force_N: Span
+    member_N: Span
     lower_bound_N: float
     upper_bound_N: float
     capacity_N: float
@@ -79,10 +87,10 @@ class ModelBound:
     """
 
     model: str
-    probability: float
+    probability: Chance
     lower_bound_N: float
     upper_bound_N: float
-    probability_exceeded: float | None
+    probability_exceeded: Chance | None
 
 
 @dataclass(frozen=True)
@@ -115,18 +123,24 @@ class Margin:
     direction: Direction
     quantity: Quantity
     population: Population
-    population_words: str
-    basis: str
-    content: float
-    confidence: float
-    required_probability: float
+    population_words: Words
+    basis: Annotated[str, Promise(enum=["", *BASES])]
+    content: Fraction
+    confidence: Fraction
+    required_probability: Fraction
     limit_force_N: float | None
-    tolerances_mm: Mapping[str, float]
-    levels: tuple[Level, ...]
+    tolerances_mm: Mapping[str, Size]
+    levels: Annotated[tuple[Level, ...], Promise(minItems=1)]
     worst: Level
     reached: Reached | None
     models: tuple[ModelBound, ...]
     gradients: tuple[Gradient, ...]
     shares: tuple[Share, ...]
-    extrapolated: tuple[str, ...]
-    remarks: tuple[str, ...]
+    extrapolated: Sentences
+    remarks: Sentences
+
+    def _repr_html_(self) -> str:
+        from hdcal.prediction.margin.document import margin_document
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(margin_document(self))

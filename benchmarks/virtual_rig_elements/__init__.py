@@ -1,0 +1,1 @@
+"""The virtual rig's ring and cup as finite elements; they make its tables."""

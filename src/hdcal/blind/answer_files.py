@@ -1,0 +1,226 @@
+"""AnswerFiles to a blind check on disk: one file each, then all of them frozen."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hdcal.blind.label import CaseAnswer
+from hdcal.blind.seal import Entry, is_name, is_stamped, stamped
+from hdcal.blind.sealed_set import BlindSet, read_json, refusal
+from hdcal.errors import InputError
+from hdcal.report.folder import write_whole
+from hdcal.report.plain import as_json, as_plain
+
+ANSWER_SCHEMA, ANSWERS_SCHEMA = "hdcal.blind-answer/1", "hdcal.blind-answers/1"
+_PREFIX = "answers-"
+_WORDS = ("none", "named", "ambiguous", "unknown")
+_ASK_AGAIN = "Delete it and run 'hdcal blind answer' again"
+
+
+class AnswerFiles:
+    """The answers of one diagnoser to one set.
+
+    Args:
+        found: the set.
+        by: name of the diagnoser.
+
+    Raises:
+        InputError: the name could be no file's.
+    """
+
+    def __init__(self, found: BlindSet, by: str):
+        if not is_name(by):
+            words = f"'{by[:60]}' cannot be part of a file's name"
+            raise refusal("--by", words, "Use letters, digits, - and _")
+        self.set, self.by = found, by
+        self.folder = found.folder / f"{_PREFIX}{by}"
+        self.file = found.folder / f"{_PREFIX}{by}.json"
+
+    def path(self, case: str) -> Path:
+        """Return the file of one answer."""
+        return self.folder / f"{case}.json"
+
+    def check_free(self) -> None:
+        """Refuse to answer what is frozen.
+
+        Raises:
+            InputError: it is.
+        """
+        if self.file.exists():
+            words = "exists already: these answers are frozen"
+            remedy = f"Move it and {self.folder.name} away to answer anew"
+            raise refusal(self.file, words, remedy)
+
+    def kept(self, fingerprint: Mapping[str, Any]) -> set[str]:
+        """Return which cases are answered already.
+
+        Args:
+            fingerprint: by which all answers have to be made.
+
+        Raises:
+            InputError: one is no answer to this set, or was made by other versions.
+        """
+        cases = {entry.case: entry for entry in self.set.manifest.cases}
+        names = {path.stem for path in self.folder.glob("*.json")}
+        for name in sorted(names - cases.keys()):
+            words = "answers no case of this set"
+            raise refusal(self.path(name), words, "Take it out of the folder")
+        for name in sorted(names):
+            self._check_version(name, self.read(cases[name]), fingerprint)
+        return names
+
+    def read(self, entry: Entry) -> dict[str, Any]:
+        """Return one answer with what it was made by.
+
+        Raises:
+            InputError: it is missing, broken, edited, or belongs to other data.
+        """
+        path = self.path(entry.case)
+        data = read_json(path, ANSWER_SCHEMA, _ASK_AGAIN)
+        if not is_stamped(data):
+            raise refusal(path, "was edited: its hash does not fit", _ASK_AGAIN)
+        bound = data.get("set_commitment"), data.get("csv_sha256"), data.get("by")
+        if bound != (self.set.manifest.commitment, entry.sha256, self.by):
+            raise refusal(path, "answers another set, case or name", _ASK_AGAIN)
+        read_answer(data.get("answer"), entry.case, path)
+        return data
+
+    def write(
+        self, entry: Entry, answer: dict[str, Any], fingerprint: Mapping[str, Any]
+    ) -> None:
+        """Write one answer, whole or not at all."""
+        data = {
+            "schema": ANSWER_SCHEMA,
+            "by": self.by,
+            "set_commitment": self.set.manifest.commitment,
+            "csv_sha256": entry.sha256,
+            "fingerprint": fingerprint,
+            "answer": as_plain(answer),
+        }
+        self.folder.mkdir(exist_ok=True)
+        write_whole(self.path(entry.case), as_json(stamped(data)))
+
+    def freeze(
+        self, fingerprint: Mapping[str, Any], families: Mapping[str, str], library: str
+    ) -> dict[str, Any]:
+        """Write all answers into one file, and return what it holds.
+
+        Raises:
+            InputError: an answer is missing or does not fit the others.
+        """
+        self.kept(fingerprint)
+        answers = [self.read(entry)["answer"] for entry in self.set.manifest.cases]
+        data = stamped(
+            {
+                "schema": ANSWERS_SCHEMA,
+                "by": self.by,
+                "set_commitment": self.set.manifest.commitment,
+                "library": library,
+                "fingerprint": dict(fingerprint),
+                "families": dict(families),
+                "blind": not self.set.opened.exists(),
+                "answers": answers,
+            }
+        )
+        write_whole(self.file, as_json(data))
+        return data
+
+    def frozen(self) -> tuple[dict[str, Any], list[CaseAnswer]]:
+        """Return the frozen answers, as data and as answers in the set's order.
+
+        Raises:
+            InputError: they are missing, edited, incomplete, or of another set.
+        """
+        if not self.file.exists():
+            words = f"is missing: the answers of '{self.by}' are not frozen"
+            remedy = "Let 'hdcal blind answer' come to its end first"
+            raise refusal(self.file, words, remedy)
+        remedy = "Restore the file, or move it and its folder away and answer again"
+        data = read_json(self.file, ANSWERS_SCHEMA, remedy)
+        if not is_stamped(data):
+            words = "was edited: its hash does not fit"
+            raise refusal(self.file, words, remedy)
+        if data.get("set_commitment") != self.set.manifest.commitment:
+            words = "answers another set: the commitments differ"
+            raise refusal(self.file, words, "Answer this set")
+        listed, cases = data.get("answers"), self.set.manifest.cases
+        if not isinstance(listed, list) or len(listed) != len(cases):
+            words = "does not answer every case once"
+            raise refusal(self.file, words, remedy)
+        pairs = list(zip(listed, cases, strict=True))
+        found = [read_answer(one, entry.case, self.file) for one, entry in pairs]
+        kinds = {"blind": bool, "fingerprint": dict, "families": dict}
+        sound = all(isinstance(data.get(key), kind) for key, kind in kinds.items())
+        if data.get("by") != self.by or not sound:
+            words = "is not what 'hdcal blind answer' writes"
+            raise refusal(self.file, words, remedy)
+        if self.folder.is_dir():
+            self._check_same(data)
+        return data, found
+
+    def _check_same(self, data: dict[str, Any]) -> None:
+        """Hold the single answers against the frozen ones."""
+        self.kept(data["fingerprint"])
+        for entry, answer in zip(self.set.manifest.cases, data["answers"], strict=True):
+            if self.read(entry)["answer"] != answer:
+                words = "is not the answer that was frozen"
+                remedy = f"One of it and {self.file.name} was edited: restore both"
+                raise refusal(self.path(entry.case), words, remedy)
+
+    def _check_version(
+        self, case: str, data: dict[str, Any], wanted: Mapping[str, Any]
+    ) -> None:
+        made = data.get("fingerprint")
+        made = made if isinstance(made, dict) else {}
+        differ = [
+            k for k in sorted(wanted.keys() | made) if wanted.get(k) != made.get(k)
+        ]
+        if differ:
+            words = f"mixed versions: it was made with another {', '.join(differ)}"
+            remedy = f"Go on with the version that made it, or move {self.folder} away"
+            raise refusal(self.path(case), words, remedy + " to answer all cases anew")
+
+
+def read_answer(data: Any, case: str, path: Path) -> CaseAnswer:
+    """Return the answer of plain data from a file.
+
+    Raises:
+        InputError: it is none, or one to another case.
+    """
+    try:
+        answer = CaseAnswer.from_plain(data)
+        numbers = [*answer.probabilities.values(), *answer.inclusion.values()]
+        # Sums of shares may pass 1 by a rounding error.
+        if not all(0.0 <= number <= 1.001 for number in numbers):
+            raise ValueError
+        if (answer.case, answer.verdict in _WORDS) != (case, True):
+            raise ValueError
+    except (AttributeError, KeyError, TypeError, ValueError):
+        words = f"holds no answer to the case '{case}'"
+        raise refusal(path, words, _ASK_AGAIN) from None
+    return answer
+
+
+def frozen_names(found: BlindSet) -> list[str]:
+    """Return who has answered a set.
+
+    Raises:
+        InputError: somebody has begun and not come to the end, or nobody has begun.
+    """
+    names = {
+        path.name.removesuffix(".json").removeprefix(_PREFIX)
+        for path in found.folder.glob(f"{_PREFIX}*")
+        if path.is_dir() or path.suffix == ".json"
+    }
+    if not names:
+        words = "holds no frozen answers"
+        raise refusal(found.folder, words, "Run 'hdcal blind answer' first")
+    findings = []
+    for name in sorted(names):
+        if not AnswerFiles(found, name).file.exists():
+            words = f"the answers of '{name}' are not frozen"
+            remedy = "Let 'hdcal blind answer' come to its end, or move them away"
+            findings += refusal(AnswerFiles(found, name).folder, words, remedy).findings
+    if findings:
+        raise InputError(findings)
+    return sorted(names)

@@ -1,0 +1,177 @@
+"""The cases of a blind check: each plan carried out on a rig of its own."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.blind.label import Label
+from hdcal.blind.virtual_rig.history import Floats
+from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
+from hdcal.blind.virtual_rig.mixes import (
+    OUTSIDE,
+    Plan,
+    draw_plans,
+    effects_shown,
+    other_truth,
+)
+from hdcal.blind.virtual_rig.oracle import oracle_probabilities
+from hdcal.blind.virtual_rig.outside import LISTED
+from hdcal.blind.virtual_rig.sensing import NOISES
+from hdcal.blind.virtual_rig.virtual_rig import (
+    MECHANISMS,
+    VirtualRig,
+    draw_noise,
+    draw_rig,
+)
+from hdcal.errors import Finding, InputError
+
+# Material and geometry are those that the rigs are drawn about.
+GEAR_TOML = """\
+[gear]
+name = "blind check"
+wall_thickness_mm = 0.68
+radius_mm = 40.0
+length_mm = 70.0
+material = "40CrNiMoA"
+
+[measurement]
+deformation = "radial"
+reference_temperature_C = 20.0
+"""
+_TRIES = 20
+# An outside mechanism that calibration absorbs for the most part is a wrong K, no gap.
+_LEAST_LEFT = 0.2
+
+
+def draw_cases(
+    mix: str, count: int, seed: int, loading: Loading | None = None
+) -> Iterator[tuple[str, Label]]:
+    """Make cases in random order, named by their number.
+
+    Args:
+        mix: one of `MIXES`.
+        count: of cases.
+        seed: of all random numbers.
+        loading: that every case goes through, instead of those of the mix; effects
+            that it cannot show are replaced by others.
+
+    Yields:
+        The measurement file and the label of each.
+
+    Raises:
+        InputError: a loading shows next to nothing.
+    """
+    rng = np.random.default_rng(seed)
+    digits = len(str(count))
+    for number, plan in enumerate(draw_plans(mix, count, rng), start=1):
+        own, name = rng.spawn(1)[0], f"case-{number:0{digits}}"
+        if loading is not None:
+            plan = _on(loading, plan, own)
+        yield _case(name, plan, loading or LOADINGS[plan.loading](), own)
+
+
+def _on(loading: Loading, plan: Plan, rng: np.random.Generator) -> Plan:
+    """Return the plan for another loading than its own."""
+    plan = replace(plan, loading=loading.name)
+    shown = effects_shown(loading)
+    if plan.kind == "outside" or {*plan.truth} <= {*shown}:
+        return plan
+    return other_truth(plan, shown, rng)
+
+
+def _case(
+    name: str, plan: Plan, loading: Loading, rng: np.random.Generator
+) -> tuple[str, Label]:
+    for _ in range(_TRIES):
+        for _ in range(_TRIES):
+            rig = draw_rig(loading.history, rng)
+            drawn = _drawn_curve(plan, rig, rng)
+            if drawn is not None:
+                return _read(name, plan, loading, rig, *drawn, rng)
+        # No plausible rig shows this at this size: take another effect instead.
+        plan = other_truth(plan, effects_shown(loading), rng)
+    words = f"shows next to nothing of size r = {plan.r:g}"
+    remedy = "Name a program with more rows, or that varies more"
+    raise InputError([Finding(f"program '{loading.name}'", words, remedy)])
+
+
+def _drawn_curve(
+    plan: Plan, rig: VirtualRig, rng: np.random.Generator
+) -> tuple[Floats, dict[str, float]] | None:
+    """Return what the mechanisms add [N] and their true amplitudes.
+
+    Returns:
+        None where this rig does not show a drawn mechanism at the size of the plan.
+    """
+    if plan.kind == "outside":
+        history = replace(rig.history, force=rig.fault_free)
+        curve = OUTSIDE[plan.truth[0]](history, rng)
+        r = float(rig.gap_over_noise(curve))
+        if r == 0.0 or r * rig.sigma < _LEAST_LEFT * np.sqrt(np.mean(curve**2)):
+            return None
+        return rng.choice([-1.0, 1.0]) * plan.r / r * curve, {}
+    active, amplitude = [], {}
+    for name in plan.truth:
+        if name in NOISES:
+            continue
+        found = rig.draw_mechanism(name, plan.r, rng)
+        if found is None:
+            return None
+        active.append(found)
+        if MECHANISMS[name].amplitude:
+            amplitude[MECHANISMS[name].amplitude] = found.size
+    return rig.readings(active) - rig.fault_free, amplitude
+
+
+def _read(
+    name: str,
+    plan: Plan,
+    loading: Loading,
+    rig: VirtualRig,
+    curve: Floats,
+    amplitude: dict[str, float],
+    rng: np.random.Generator,
+) -> tuple[str, Label]:
+    """Return the measurement file and the label of one case."""
+    correlation = float(rng.uniform(0.1, 0.5)) if plan.serial else 0.0
+    clean = rig.fault_free + curve
+    reading = clean + draw_noise(rig, rng, correlation)
+    for each in plan.truth:
+        if each in NOISES:
+            reading = reading + NOISES[each](reading, plan.r * rig.sigma, rng)
+    oracle = {}
+    on_mean = plan.kind == "effect" and plan.truth[0] not in NOISES
+    if on_mean and not plan.withheld and plan.loading in LOADINGS:
+        oracle = oracle_probabilities(
+            loading,
+            rig,
+            reading,
+            truth=plan.truth[0],
+            curve=curve,
+            r=plan.r,
+            correlation=correlation,
+        )
+    label = Label(
+        case=name,
+        mix=plan.mix,
+        kind=plan.kind,
+        truth=plan.truth,
+        program=plan.loading,
+        rows=len(reading),
+        r=plan.r,
+        noise="ar" if plan.serial else "iid",
+        correlation=correlation,
+        sigma=rig.sigma,
+        spanned=plan.truth[0] in LISTED if plan.kind == "outside" else None,
+        withheld=plan.withheld,
+        clean=_rounded(clean),
+        curve=_rounded(rig.gap(curve)),
+        amplitude=amplitude,
+        oracle=oracle,
+    )
+    return loading.csv(reading), label
+
+
+def _rounded(values: Floats) -> tuple[float, ...]:
+    return tuple(np.round(values, 5).tolist())

@@ -1,1 +1,0 @@
-"""The gear as finite elements: what presses back in the blind check's rig."""

@@ -1,0 +1,253 @@
+"""Texts behind options as values: numbers with units, ranges, lists and names."""
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, TypeVar
+
+import click
+
+from hdcal.errors import Finding, Findings, InputError
+
+T = TypeVar("T")
+MOST_POINTS = 100_000
+_QUANTITY = re.compile(r"\s*(?P<number>[-+0-9.eE]+)\s*(?P<unit>\S.*)?")
+_KINDS = {"N": "a force", "mm": "a length", "MPa": "a stress", "N/mm": "a spring rate"}
+
+
+class Parsed(click.ParamType):
+    """An option's text, read by hdcal; what cannot be read is said with all else.
+
+    Args:
+        name: shown in the help.
+        read: called with the text and the option's name; raises `InputError`.
+    """
+
+    def __init__(self, name: str, read: Callable[[str, str], Any]):
+        self.name = name
+        self._read = read
+
+    def get_metavar(self, param, ctx=None) -> str:
+        """Return the name as it is, without capitals."""
+        return self.name
+
+    def convert(self, value, param, ctx):
+        """Return what was read, or None where the text cannot be."""
+        if not isinstance(value, str) or param is None or ctx is None:
+            return value
+        return ctx.obj.wrong.attempt(self._read, value, param.opts[0])
+
+
+def read_all(read: Callable[[Sequence[str], str], T]):
+    """Return a callback that reads all texts of an option that may be repeated.
+
+    Args:
+        read: called with the texts and the option's name; raises `InputError`.
+    """
+
+    def callback(context: click.Context, option: click.Parameter, texts) -> T | None:
+        return context.obj.wrong.attempt(read, texts, option.opts[0])
+
+    return callback
+
+
+def _refused(option: str, words: str, remedy: str) -> InputError:
+    return InputError([Finding(option, words, remedy)])
+
+
+def read_quantity(text: str, option: str, *, unit: str) -> float:
+    """Read a number, alone in a code unit or with a unit behind it: 70, 0.07 kN.
+
+    Args:
+        text: as the user wrote it.
+        option: where it stands.
+        unit: N, mm, MPa or N/mm.
+
+    Raises:
+        InputError: it is no number, or its unit measures something else.
+    """
+    from hdcal.data.units import UnitError, to_code
+
+    match = _QUANTITY.fullmatch(text)
+    remedy = f"Write it like 70 {unit}"
+    try:
+        number = float(match["number"]) if match else None
+    except ValueError:
+        number = None
+    if match is None or number is None:
+        raise _refused(option, f"'{text[:60]}' is no number", remedy)
+    if match["unit"] is None:
+        return number
+    try:
+        factor, code = to_code(match["unit"])
+    except UnitError as error:
+        raise _refused(option, str(error), remedy) from None
+    if code != unit:
+        words = f"'{text[:60]}' is not {_KINDS[unit]}: its unit is that of {code}"
+        raise _refused(option, words, remedy)
+    return number * factor
+
+
+def read_ends(text: str, option: str) -> tuple[float, float]:
+    """Read LO:HI.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        low, high = map(float, text.split(":"))
+        if math.isfinite(low) and math.isfinite(high):
+            return low, high
+    except ValueError:
+        pass
+    words = f"'{text[:60]}' is not LO:HI"
+    raise _refused(option, words, "Write it like 0.38:0.42")
+
+
+def read_whole_numbers(text: str, option: str) -> list[int]:
+    """Read a list of whole numbers.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        words = f"'{text[:60]}' is no list of whole numbers"
+        raise _refused(option, words, "Write it like 1,3") from None
+
+
+def read_grid(text: str, option: str) -> list[float]:
+    """Read start:stop:count or a comma list of numbers.
+
+    Raises:
+        InputError: it is neither, or too long.
+    """
+    try:
+        numbers = _range(text) if ":" in text else [float(x) for x in text.split(",")]
+    except ValueError:
+        numbers = []
+    if not numbers or not all(map(math.isfinite, numbers)):
+        words = f"'{text[:60]}' is neither start:stop:count nor a list of numbers"
+        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, with at most {MOST_POINTS} points"
+        raise _refused(option, words, remedy)
+    return numbers
+
+
+def _range(text: str) -> list[float]:
+    first, last, many = text.split(":")
+    return _between(float(first), float(last), int(many))
+
+
+def _between(start: float, stop: float, count: int) -> list[float]:
+    if not 1 <= count <= MOST_POINTS:
+        raise ValueError(count)
+    if count == 1:
+        return [start]
+    # The ends are met exactly, which start + i·step would not promise.
+    return [
+        (start * (count - 1 - i) + stop * i) / (count - 1)
+        if 0 < i < count - 1
+        else (start if i == 0 else stop)
+        for i in range(count)
+    ]
+
+
+def read_window(text: str, option: str, *, count: int = 2) -> list[float]:
+    """Read from:to, from:to:count or a comma list of numbers.
+
+    Args:
+        text: as the user wrote it.
+        option: where it stands.
+        count: of the numbers over which from:to is spread, both ends included.
+
+    Raises:
+        InputError: it is none of them, or an empty window.
+    """
+    if text.count(":") != 1:
+        return read_grid(text, option)
+    low, high = read_ends(text, option)
+    if high < low:
+        words = f"'{text[:60]}' is an empty window"
+        raise _refused(option, words, "Give the lower end first")
+    return _between(low, high, count if high > low else 1)
+
+
+def read_named(
+    texts: Sequence[str],
+    option: str,
+    *,
+    read: Callable[[str, str], T],
+    known: Callable[[], Sequence[str]] | None = None,
+    fault: str = "is not NAME=…",
+    example: str = "wall_thickness_mm=0.6:0.76:5",
+) -> dict[str, T]:
+    """Read every NAME=…, whatever stands behind the sign.
+
+    Args:
+        texts: as the user wrote them.
+        option: where they stand.
+        read: reads what follows the name.
+        known: returns the names that there are; by default any will do.
+        fault: what is said of a text of another form.
+        example: what is shown instead.
+
+    Raises:
+        InputError: holds what is wrong with any of them.
+    """
+    found: dict[str, T] = {}
+    with Findings() as wrong:
+        for text in texts:
+            name, sign, rest = (part.strip() for part in text.partition("="))
+            if not (name and sign and rest):
+                words = f"'{text[:60]}' {fault}"
+                wrong.append(Finding(option, words, f"Write it like {example}"))
+                continue
+            if name in found:
+                words = f"'{name[:60]}' is given twice"
+                wrong.append(Finding(option, words, "Keep one of them"))
+            if known is not None and name not in known():
+                wrong.append(_unknown(name, known(), option))
+            try:
+                found[name] = read(rest, option)
+            except InputError as error:
+                wrong += error.findings
+    return found
+
+
+def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
+    from hdcal.data.toml_file import nearest
+
+    return Finding(option, f"unknown key '{name[:60]}'", nearest(name, list(known)))
+
+
+def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:
+    """Read every QUANTITY=HEADER.
+
+    Raises:
+        InputError: one of them has no such form, or a quantity comes twice.
+    """
+    return read_named(
+        texts,
+        option,
+        read=lambda header, _: header,
+        fault="names no header",
+        example="force=Load[kgf]",
+    )
+
+
+def read_list(texts: Sequence[str], option: str) -> list[str]:
+    """Read names that are repeated or listed with commas."""
+    return [name.strip() for text in texts for name in text.split(",") if name.strip()]
+
+
+ENDS = Parsed("LO:HI", read_ends)
+GRID = Parsed("START:STOP:COUNT", read_grid)
+NUMBERS = Parsed("LIST", read_grid)
+# Temperatures whose worst counts: a window is spread over eleven.
+WINDOW = Parsed("FROM:TO", partial(read_window, count=11))
+WHOLE_NUMBERS = Parsed("LIST", read_whole_numbers)
+FORCE = Parsed("N", partial(read_quantity, unit="N"))
+LENGTH = Parsed("MM", partial(read_quantity, unit="mm"))
+STRESS = Parsed("MPA", partial(read_quantity, unit="MPa"))

@@ -1,0 +1,60 @@
+"""What is wrong with one file, collected while it is read."""
+
+from collections.abc import Iterable
+from typing import NoReturn
+
+from hdcal.errors import Finding, Findings, InputError
+
+LISTED = 20  # findings of one kind that are spelled out before "and N more"
+
+
+class FileFindings(Findings):
+    """Findings about one file, so that a user sees all of them at once.
+
+    Args:
+        file: how the user named it.
+    """
+
+    def __init__(self, file: str):
+        super().__init__()
+        self.file = file
+
+    def add(
+        self,
+        problem: str,
+        remedy: str,
+        row: int | None = None,
+        column: str | None = None,
+    ) -> None:
+        """Add one finding; its parts are those of `Finding`."""
+        self.append(Finding(self.file, problem, remedy, row, column))
+
+    def add_rows(
+        self,
+        found: Iterable[tuple[int, str, str]],
+        column: str | None = None,
+        kind: str = "rows like these",
+    ) -> None:
+        """Add findings of one kind: the first 20, then how many more there are.
+
+        Args:
+            found: row, problem and remedy of each.
+            column: header.
+            kind: what they are, in the plural.
+        """
+        count = 0
+        for count, (row, problem, remedy) in enumerate(found, 1):
+            if count <= LISTED:
+                self.add(problem, remedy, row, column)
+        if count > LISTED:
+            words = f"and {count - LISTED} more {kind}"
+            self.add(words, "Mend all of them", None, column)
+
+    def refuse(self, problem: str, remedy: str, row: int | None = None) -> NoReturn:
+        """Add one finding, after which nothing more can be read.
+
+        Raises:
+            InputError: holds every finding.
+        """
+        self.add(problem, remedy, row)
+        raise InputError(self)

@@ -1,0 +1,123 @@
+"""From a CSV file to checked columns, runs and gears."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.cells import read_cells
+from hdcal.data.columns import LABELS, QUANTITIES, REQUIRED, Columns, match_columns
+from hdcal.data.csv_table import split_table
+from hdcal.data.findings import FileFindings
+from hdcal.data.text_file import read_text
+from hdcal.data.units import column_to_code
+from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Which of several mountings or gears each row was taken on.
+
+    Attributes:
+        index: shape (n,).
+        names: by index, in order of appearance.
+    """
+
+    index: np.ndarray
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What was measured, in code units, in the order it was taken.
+
+    Attributes:
+        columns: in which nothing is wrong.
+        run: the mountings.
+        specimen: the gears.
+    """
+
+    columns: Columns
+    run: Labels
+    specimen: Labels
+
+
+def read_measurements(
+    path: Path | str, mapping: Mapping[str, str] | None = None
+) -> Measurements:
+    """Read a CSV file of measurements.
+
+    Args:
+        path: the file.
+        mapping: quantity -> header, the unit in brackets, as in
+            `{"force": "Load[kgf]"}`; for headers that do not name themselves.
+
+    Raises:
+        InputError: holds everything that is wrong with the file.
+    """
+    with FileFindings(str(path)) as findings:
+        columns = read_columns(path, mapping, findings)
+        rows = len(columns.table.rows)
+        specimen = _labels(columns.values.get("specimen"), rows)
+        run = _runs(columns.values.get("run"), specimen, rows)
+        check_time(columns, run.index)
+    return Measurements(columns, run, specimen)
+
+
+def read_columns(
+    path: Path | str,
+    mapping: Mapping[str, str] | None,
+    findings: FileFindings,
+    *,
+    quantities: Sequence[str] = QUANTITIES,
+    required: Sequence[str] = REQUIRED,
+    fewest: int = FEWEST_ROWS,
+) -> Columns:
+    """Read the columns of a CSV file that hold known quantities, right or wrong.
+
+    Args:
+        path: the file.
+        mapping: quantity -> header with its unit in brackets, or None.
+        findings: of the file; gets one for everything that is wrong.
+        quantities: what to look for.
+        required: which of them must be there.
+        fewest: rows that are needed.
+
+    Raises:
+        InputError: no table can be found in the file.
+    """
+    utf8, sha256 = read_text(Path(path), findings)
+    table = split_table(utf8, findings)
+    used = match_columns(table, mapping or {}, quantities, required, findings)
+    values = read_cells(table, used, findings)
+    for quantity, column in used.items():
+        if quantity not in LABELS:
+            # a wild number may overflow here; the limits below report it
+            with np.errstate(over="ignore"):
+                converted = column_to_code(values[quantity], quantity, column.unit)
+            values[quantity] = converted
+    columns = Columns(values, used, table, sha256, findings)
+    check_values(columns, fewest)
+    return columns
+
+
+def _labels(labels: np.ndarray | None, rows: int) -> Labels:
+    if labels is None:
+        return Labels(np.zeros(rows, int), ("1",))
+    index, names = pd.factorize(labels)
+    return Labels(index, tuple(names))
+
+
+def _runs(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
+    """Runs by label; the same label on two specimens is two mountings."""
+    if labels is None:
+        return specimen if specimen.index.any() else _labels(None, rows)
+    run, gears = _labels(labels, rows), len(specimen.names)
+    index, pairs = pd.factorize(run.index * gears + specimen.index)
+    if len(pairs) == len(run.names):
+        return run
+    both = (divmod(int(pair), gears) for pair in pairs)
+    names = (f"{specimen.names[gear]}/{run.names[one]}" for one, gear in both)
+    return Labels(index, tuple(names))

@@ -1,0 +1,1 @@
+"""`hdcal design` and its options."""

@@ -1,0 +1,222 @@
+"""What a design comes to, in sentences for somebody who designs gears."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from hdcal.design.answer import (
+    CandidateAnswer,
+    ChosenSpring,
+    DesignAnswer,
+    GeneratorAnswer,
+    InverseAnswer,
+    StressAnswer,
+)
+from hdcal.design.design_draws import Basis
+from hdcal.design.sizes import SIZES
+from hdcal.report.words import estimate, number, percent
+
+
+def as_known(found: DesignAnswer, sentence: str) -> str:
+    """Return a sentence that says so where no gear was measured."""
+    if found.basis == "posterior":
+        return sentence
+    return f"Prior only, no gear was measured: {sentence}"
+
+
+def next_step(found: DesignAnswer) -> str | None:
+    """Return what to do with a design, in one sentence."""
+    if found.basis == "prior":
+        return "Measure a gear and calibrate it: until then this is belief."
+    if isinstance(found, GeneratorAnswer):
+        return (
+            f"Set the free end of a spring of {number(found.spring.rate_N_per_mm)} "
+            f"N/mm {number(found.spring.interference_mm)} mm beyond the undeformed "
+            "gear."
+        )
+    if isinstance(found, InverseAnswer):
+        return "Make one such gear and test it: K is carried over to its sizes."
+    return None
+
+
+def generator_headline(found: GeneratorAnswer) -> str:
+    """Return which spring keeps the window, in one sentence."""
+    spring, (low, high) = found.spring, found.asked.window_mm
+    return as_known(
+        found,
+        f"A spring of {number(spring.rate_N_per_mm)} N/mm keeps the gear within "
+        f"{low:g} … {high:g} mm with probability {_share(spring.probability)}.",
+    )
+
+
+def generator_words(found: GeneratorAnswer) -> Iterator[str]:
+    """Yield what the wave generator has to be."""
+    asked, spring, aim = found.asked, found.spring, found.set_point
+    low, high = asked.window_mm
+    middle, span = estimate(aim.force_N)
+    yield (
+        f"To hold the gear at {aim.deformation_mm:.4g} mm each side has to press "
+        f"with {middle} N ({percent(found.interval)} {_kind(found)} {span} N) at "
+        f"{aim.temperature_C:g} °C."
+    )
+    softest = "any spring does, down to the softest considered: "
+    if not spring.softest_considered:
+        softest = "the softest spring that does it has "
+    yield (
+        f"With one set point for every gear, {softest}"
+        f"{number(spring.rate_N_per_mm)} N/mm, {number(spring.rate_over_gear)} "
+        f"times the gear's own stiffness. Its free end stands "
+        f"{number(spring.interference_mm)} mm beyond the undeformed gear."
+    )
+    yield (
+        f"It keeps {low:g} … {high:g} mm at {_warmth(asked.temperature_C)} with "
+        f"probability {_chance(spring)} (required {asked.probability:g}): no "
+        f"backlash {_share(spring.zero_backlash)}, no jam {_share(spring.no_jam)}."
+    )
+    yield _adjusting(found)
+    yield _stress(found.stress, f"At {high:g} mm")
+
+
+def _adjusting(found: GeneratorAnswer) -> str:
+    own = found.adjusted
+    (x, y), (force, more) = own.interference_mm, own.preload_N
+    share = percent(own.share_of_gears)
+    return (
+        f"Adjusted gear by gear with that spring, the set point has to reach from "
+        f"{number(x, y - x)} to {number(y, y - x)} mm, that is a preload of "
+        f"{number(force, more - force)} to {number(more, more - force)} N, to serve "
+        f"{share} of the gears; the window is then kept with probability "
+        f"{_share(own.probability)}."
+    )
+
+
+def inverse_headline(found: InverseAnswer) -> str:
+    """Return which sizes keep the limit, in one sentence."""
+    return as_known(found, _kept(found))
+
+
+def inverse_words(found: InverseAnswer) -> Iterator[str]:
+    """Yield which sizes keep the limit."""
+    yield f"{_kept(found)} {nearness(found)}"
+    yield from inverse_details(found)
+
+
+def _kept(found: InverseAnswer) -> str:
+    asked, best = found.asked, found.design
+    sizes = ", ".join(
+        f"{name.replace('_', ' ')} {value:.4g} mm"
+        for name, value in best.sizes_mm.items()
+    )
+    what = " with ".join(filter(None, (best.material, sizes)))
+    return (
+        f"{what} keeps {asked.limit_force_N:g} N at {asked.deformation_mm:g} mm "
+        f"and {_warmth(asked.temperature_C)} with probability {_chance(best)} "
+        f"(required {asked.probability:g})."
+    )
+
+
+def nearness(found: InverseAnswer) -> str:
+    """Return what the sizes were chosen by."""
+    return (
+        "Of all that keep the limits its sizes are the nearest to those of "
+        f"{_own(found)}."
+    )
+
+
+def inverse_details(found: InverseAnswer) -> Iterator[str]:
+    """Yield force, stress and slopes of the chosen design."""
+    asked, best, tested = found.asked, found.design, found.tested
+    middle, span = estimate(best.force_N)
+    yield (
+        f"Its force is {middle} N ({percent(found.interval)} {_kind(found)} {span} "
+        f"N). {_own(found).capitalize()} takes {estimate(tested.force_N)[0]} N and "
+        f"keeps the limit with probability {_share(tested.probability)}."
+    )
+    yield _stress(best, f"At {asked.deformation_mm:g} mm")
+    if asked.limit_stress_MPa is not None:
+        yield f"The stress was kept below {asked.limit_stress_MPa:g} MPa."
+    elif best.yield_MPa is None:
+        yield (
+            "The material's file names no yield strength: the stress was not limited. "
+            "Give a limit of the stress."
+        )
+    parts = [
+        f"{name.removesuffix('_mm').replace('_', ' ')} {value:+.2f} %"
+        for name, value in found.elasticities.items()
+        if abs(value) > 1e-9
+    ]
+    yield f"One per cent more of each changes this force by: {', '.join(parts)}."
+
+
+def _stress(entry: StressAnswer, where: str) -> str:
+    middle, span = estimate(entry.stress_MPa)
+    text = (
+        f"{where} the smooth wall bends with {middle} MPa under the load ({span} MPa)"
+    )
+    if entry.utilisation is not None:
+        text += f", {percent(entry.utilisation.median)} of its yield strength"
+    return (
+        f"{text}. This is from the imposed shape; notches at the teeth are not in it."
+    )
+
+
+def _own(found: DesignAnswer) -> str:
+    return "the tested gear" if found.basis == "posterior" else "the gear of the file"
+
+
+def _kind(found: DesignAnswer) -> str:
+    return found.interval_kind.removeprefix("equal-tailed ")
+
+
+def _warmth(levels: Sequence[float]) -> str:
+    low, high = min(levels), max(levels)
+    return f"{low:g} °C" if low == high else f"{low:g} … {high:g} °C"
+
+
+def _chance(entry: ChosenSpring | CandidateAnswer) -> str:
+    error = entry.standard_error
+    return _share(entry.probability) + (f" ± {error:.2g}" if error else "")
+
+
+def _share(value: float) -> str:
+    """Return a probability; what was always so among the draws is not certain."""
+    if value > 0.9995:
+        return "above 0.999"
+    return "below 0.001" if value < 0.0005 else f"{value:.4g}"
+
+
+def beyond_tested(
+    basis: Basis, deformation: np.ndarray, temperature: np.ndarray
+) -> list[str]:
+    """Say which deformations and temperatures no reading covers, in words."""
+    if basis.records is None:
+        return []
+    ratio = basis.problem.reading.radial_per_read
+    told = []
+    for name, values, measured, slack, unit in (
+        ("deformation", deformation, basis.records.deformation * ratio, 1e-9, "mm"),
+        ("temperature", temperature, basis.records.temperature, 1.0, "°C"),
+    ):
+        low, high = float(np.min(measured)), float(np.max(measured))
+        if np.min(values) < low - slack or np.max(values) > high + slack:
+            asked = " … ".join(f"{v:g}" for v in sorted({values.min(), values.max()}))
+            seen = f"{low:g}" if low == high else f"{low:g} … {high:g}"
+            told.append(
+                f"Extrapolated: {name} {asked} {unit}, tested were {seen} {unit}. The "
+                "band assumes that the model goes on holding."
+            )
+    return told
+
+
+def far_from_tested(basis: Basis, sizes: Mapping[str, np.ndarray]) -> list[str]:
+    """Say which sizes lie more than a fifth off the tested gear's, in words."""
+    told = []
+    for name, values in sizes.items():
+        own = float(getattr(basis.gear.geometry, SIZES[name]))
+        worst = float(values[np.argmax(np.abs(np.log(values / own)))])
+        if abs(np.log(worst / own)) > np.log(1.2):
+            told.append(
+                f"{name} = {worst:g} is far from the gear's {own:g}: no data support "
+                "K there."
+            )
+    return told

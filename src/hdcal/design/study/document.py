@@ -1,0 +1,143 @@
+"""The reports of a study and of the article's tables."""
+
+from collections.abc import Sequence
+
+from hdcal.classical.audit.article import TITLE
+from hdcal.design.document import HEADINGS, band, design_document, picture
+from hdcal.design.sentences import as_known
+from hdcal.design.sizes import named
+from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
+from hdcal.design.study.article_tables import ArticleRow
+from hdcal.report.document import Document, Section, Table, Text
+from hdcal.report.parameters import Interval
+from hdcal.report.words import estimate, number, percent
+
+# Rows of a study's table in a terminal and on the page; all are in study.csv.
+_FIRST_ROWS, _MOST_ROWS = 40, 200
+_STUDY = (
+    "Median force with its band, or as a map over the first two sizes. Where more were "
+    "varied, the others are at their middle value."
+)
+ARTICLE_HEADLINE = "Tables 3 and 4 of the article beside values that hold together."
+_ARTICLE = (
+    "original, revised: as printed. article: its slope 1625.19 N/mm scaled by δ³/R³, "
+    "and times 0.13. ring: the series divides, the length counts, K = 1. Rows 0.7 and "
+    "0.9 mm lie beyond what the article measured, 0.54 mm."
+)
+
+
+def study_headline(found: StudyAnswer) -> str:
+    """Return what the study spans, in one sentence."""
+    return as_known(found, _span(found))
+
+
+def study_words(found: StudyAnswer) -> list[str]:
+    """Return what the study spans."""
+    return [_span(found), _bands(found)]
+
+
+def _span(found: StudyAnswer) -> str:
+    force = list(map(float, found.columns["force_median_N"]))
+    varied = " and ".join(map(named, found.varied)) or "nothing"
+    return (
+        f"{len(force)} designs, varying {varied}: median force "
+        f"{number(min(force))} … {number(max(force))} N."
+    )
+
+
+def _bands(found: StudyAnswer) -> str:
+    return f"Bands are {percent(found.interval)} {found.interval_kind}s."
+
+
+def study_document(found: StudyAnswer, command: str = "") -> Document:
+    """Return the report of a study; its picture is called study.
+
+    Args:
+        found: from `study_answer`.
+        command: how the result was made.
+    """
+    sections = [picture("study", "Force", _STUDY), *_designs(found)]
+    return design_document(found, "study", [_bands(found)], sections, command)
+
+
+def _designs(found: StudyAnswer) -> list[Section]:
+    """Return the designs in a table; of many, only the first are brief."""
+    shown = [name for name in HEADINGS if name in found.columns]
+    numbers = [HEADINGS[name] for name in shown if name != "material"]
+    numbers += ["force [N]", "band [N]", "stress [MPa]"]
+    varied = found.varied or ("deformation_mm",)
+    spare = {HEADINGS[name] for name in shown if name not in varied}
+    count = len(found.columns["material"])
+    rows = [_row(found, shown, row) for row in range(min(count, _MOST_ROWS))]
+
+    def table(first: int, last: int) -> Table:
+        columns, part = ["material", *numbers], rows[first:last]
+        silent = frozenset(spare | {"stress [MPa]"})
+        return Table(columns, part, frozenset(numbers), spare=silent)
+
+    def cut(at: int) -> list[Text]:
+        words = f"The first {at} of {count}; all are in study.csv."
+        return [Text(words, soft=True)] if count > at else []
+
+    words = f"Band: {band(found)}. Stress: hoop bending under the load, median."
+    note = Text(words, soft=True)
+    first = [table(0, _FIRST_ROWS), note, *cut(_FIRST_ROWS)]
+    sections = [Section("Designs", first, brief=True)]
+    if count > _FIRST_ROWS:
+        further = [table(_FIRST_ROWS, _MOST_ROWS), *cut(_MOST_ROWS)]
+        sections.append(Section("Further designs", further))
+    return sections
+
+
+def _row(found: StudyAnswer, shown: Sequence[str], row: int) -> list[str]:
+    columns = found.columns
+    ends = (float(columns[f"force_{e}_N"][row]) for e in ("median", "lo", "hi"))
+    stress = float(columns["stress_MPa"][row])
+    cells = [columns[name][row] for name in shown]
+    texts = [cell if isinstance(cell, str) else f"{cell:.6g}" for cell in cells]
+    return [*texts, *estimate(Interval(*ends)), number(stress)]
+
+
+def article_document(found: ArticleAnswer) -> Document:
+    """Return the article's Tables 3 and 4 beside what holds together.
+
+    Args:
+        found: from `article_answer`.
+    """
+    sections = [
+        Section(
+            f"Table {which} of the article, forces in N",
+            [_article_table([row for row in found.rows if row.table == which])],
+            brief=True,
+        )
+        for which in (3, 4)
+    ]
+    return Document(
+        name=TITLE,
+        kind="article tables",
+        subtitle="its forces beside consistent ones",
+        headline=found.headline,
+        sections=[*sections, Section("Columns", [Text(_ARTICLE)], brief=True)],
+    )
+
+
+def _article_table(rows: Sequence[ArticleRow]) -> Table:
+    # In Table 3 the deformation changes, in Table 4 the sizes.
+    sizes = {"deformation_mm": "ω [mm]"}
+    if rows[0].table == 4:
+        sizes = {"wall_thickness_mm": "δ [mm]", "radius_mm": "R [mm]"}
+    forces = ("original_N", "revised_N", "measured_N")
+    forces += ("article_N", "article_revised_N", "ring_N")
+    columns = [*sizes.values()]
+    columns += [name.removesuffix("_N").replace("_", " ") for name in forces]
+    if rows[0].calibrated_N is not None:
+        columns += ["calibrated", "95 % credible"]
+    cells = []
+    for row in rows:
+        values = vars(row)
+        texts = [f"{values[name]:g}" for name in sizes]
+        texts += ["–" if values[n] is None else f"{values[n]:.2f}" for n in forces]
+        if row.calibrated_N is not None:
+            texts += estimate(row.calibrated_N)
+        cells.append(texts)
+    return Table(columns, cells, frozenset(columns))

@@ -1,0 +1,36 @@
+"""Studies and the article's tables as answers."""
+
+from collections.abc import Sequence
+
+from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
+from hdcal.design.study.article_tables import ArticleRow
+from hdcal.design.study.document import ARTICLE_HEADLINE, study_headline, study_words
+from hdcal.design.study.study import Study
+from hdcal.design.summary import in_words, origin
+
+
+def study_answer(found: Study) -> StudyAnswer:
+    """Return a study as an answer, ready for JSON, its table by column.
+
+    Args:
+        found: from `study`.
+    """
+    told = StudyAnswer(
+        **origin(found.basis, found.interval, found.interval_kind),
+        varied=found.varied,
+        columns={n: tuple(column.tolist()) for n, column in found.columns.items()},
+        assumptions=found.assumptions,
+        warnings=found.warnings,
+    )
+    return in_words(told, study_headline(told), study_words(told))
+
+
+def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:
+    """Return the article's tables as an answer, ready for JSON.
+
+    Args:
+        rows: from `article_rows`.
+    """
+    return ArticleAnswer(
+        reasons=(), headline=ARTICLE_HEADLINE, next_step=None, rows=tuple(rows)
+    )

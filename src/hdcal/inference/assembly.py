@@ -1,0 +1,91 @@
+"""From draws to a posterior: what every kind of calibration does after sampling."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Key
+
+from hdcal.data.case import Case
+from hdcal.data.priors import Prior
+from hdcal.data.records import Array
+from hdcal.inference.checks import (
+    Check,
+    bound_check,
+    conflict_check,
+    identification_checks,
+    sampling_checks,
+)
+from hdcal.inference.density import densities
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.flat_directions import dead_parameters, flat_directions
+from hdcal.inference.posterior import versions
+from hdcal.inference.posterior_tree import build_tree
+from hdcal.inference.prior_draws import draw_priors
+from hdcal.inference.sample import Draws
+from hdcal.inference.sampled_problem import Sampled
+
+
+@dataclass(frozen=True)
+class Specifics:
+    """What one kind of calibration found out that another has no equal of.
+
+    Attributes:
+        log_likelihood: by observed column, as `build_tree` takes it.
+        slopes: of the mean reading by parameter, in noise sds.
+        mixed: what else must have mixed, (chain, draw) each.
+        checks: further ones.
+        observed: columns of the records that the model explains.
+    """
+
+    log_likelihood: Mapping[str, np.ndarray]
+    slopes: Mapping[str, np.ndarray]
+    mixed: Mapping[str, np.ndarray]
+    checks: Sequence[Check]
+    observed: tuple[str, ...] = ("force",)
+
+
+def assemble(
+    case: Case,
+    priors: Mapping[str, Prior],
+    problem: Sampled,
+    found: Draws,
+    own: Specifics,
+    key: Key[Array, ""],
+) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
+    """Return the groups, diagnoses and checks of a posterior.
+
+    Args:
+        case: data and gear.
+        priors: of every site.
+        problem: what was sampled.
+        found: its draws.
+        own: of this kind of calibration.
+        key: of the prior draws.
+    """
+    sampled = {
+        name: prior
+        for name, prior in priors.items()
+        if name in found.values and prior.family != "fixed"
+    }
+    scalars = {name: found.values[name] for name in sampled}
+    diagnoses = diagnose_parameters(scalars, sampled, *densities(problem, found.values))
+    prior_draws = draw_priors(sampled, key)
+    tree = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
+    dead = dead_parameters(own.slopes, problem)
+    alive = {name: slope for name, slope in own.slopes.items() if name not in dead}
+    statistics = tree["sample_stats"].to_dataset()
+    checks = (
+        *sampling_checks(statistics, diagnoses | mixing(own.mixed)),
+        *own.checks,
+        conflict_check(scalars, sampled),
+        bound_check(scalars, sampled),
+        *identification_checks(dead, flat_directions(alive, problem)),
+    )
+    return tree, diagnoses, checks
+
+
+def run_settings(found: Draws) -> dict[str, object]:
+    """Return what the file says of a run that was not asked for."""
+    return {"target_acceptance": found.target_acceptance, "versions": versions()}

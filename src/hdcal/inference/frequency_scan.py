@@ -1,0 +1,134 @@
+"""Where the search begins: a scan over natural frequencies.
+
+The likelihood of an oscillation has a narrow peak at its frequency and lower ones
+beside it. Given frequency and damping the model is linear in what is left, so a scan
+by least squares sees all peaks.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from hdcal.data.priors import Prior
+from hdcal.inference.distributions import frozen
+from hdcal.inference.dynamic_problem import DynamicProblem
+from hdcal.inference.padding import measured
+from hdcal.physics.linear_response import linear_response
+
+_RATIOS = np.array([0.005, 0.03, 0.2])
+# Frequencies are scanned in steps of this share of one over the duration.
+_FINENESS = 0.25
+_MOST, _FEWEST, _BLOCK = 6000, 60, 64
+_TAIL = 1e-3
+
+
+@jax.jit
+def _residual(problem: DynamicProblem, frequency, ratio):
+    """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and zero of the best fit."""
+    real = measured(len(problem.time), problem.count)
+    read = jnp.where(real, problem.deformation, 0.0)
+
+    def one(frequency, ratio):
+        # A mass of one over ω² has a stiffness of one.
+        pace = 2.0 * jnp.pi * frequency
+        shape = (pace**-2, 2.0 * ratio / pace, 1.0, problem.time)
+        none = jnp.zeros_like(problem.force)
+        at_rest, moved = jnp.zeros(2), jnp.array([1.0, 0.0])
+        columns = jnp.stack(
+            [
+                linear_response(*shape, problem.force, at_rest)[:, 0],
+                linear_response(*shape, none, moved)[:, 0],
+                linear_response(*shape, none, jnp.stack([0.0, pace]))[:, 0],
+                jnp.ones_like(none),
+            ],
+            axis=1,
+        )
+        columns = jnp.where(real[:, None], columns, 0.0)
+        size = jnp.linalg.norm(columns, axis=0) + 1e-300
+        design = columns / size
+        normal = design.T @ design + 1e-10 * jnp.eye(4)
+        weights = jnp.linalg.solve(normal, design.T @ read)
+        left = read - design @ weights
+        found = weights / size * jnp.array([1.0, 1.0, pace, 1.0])
+        # A gear gives way in the direction of the force, or it is none.
+        return jnp.where(found[0] > 0.0, left @ left, jnp.inf), found
+
+    return jax.vmap(one)(frequency, ratio)
+
+
+def scan(problem: DynamicProblem, count: int) -> list[dict[str, float]]:
+    """Return where to start, best first: values of sites at the highest peaks.
+
+    Args:
+        problem: data and priors.
+        count: how many peaks at most.
+    """
+    frequency = _frequencies(problem)
+    grid = np.stack(np.meshgrid(frequency, _RATIOS, indexing="ij"), axis=-1)
+    flat = grid.reshape(-1, 2)
+    # Blocks of one shape: one compilation, bounded memory.
+    padded = np.pad(flat, ((0, -len(flat) % _BLOCK), (0, 0)), mode="edge")
+    parts = [
+        _residual(problem, part[:, 0], part[:, 1])
+        for part in padded.reshape(-1, _BLOCK, 2)
+    ]
+    left = np.concatenate([np.asarray(p[0]) for p in parts])[: len(flat)]
+    found = np.concatenate([np.asarray(p[1]) for p in parts])[: len(flat)]
+    best = np.argmin(left.reshape(grid.shape[:2]), axis=1)
+    rows = np.arange(len(frequency)) * len(_RATIOS) + best
+    rows = rows[np.isfinite(left[rows])]
+    level = np.pad(left[rows], 1, constant_values=np.inf)
+    peaks = rows[(level[1:-1] <= level[:-2]) & (level[1:-1] <= level[2:])]
+    peaks = peaks[np.argsort(left[peaks], kind="stable")][:count]
+    return [_values(problem, flat[i], found[i], left[i]) for i in peaks]
+
+
+def _frequencies(problem: DynamicProblem) -> np.ndarray:
+    """Return what the priors allow and the sampling can show [Hz]."""
+    ends = {name: _ends(problem.priors[name]) for name in ("K", "E0", "mass")}
+    soft, stiff = ends["K"] * ends["E0"] * problem.unit_stiffness
+    light, heavy = ends["mass"]
+    low, high = np.sqrt(soft / heavy), np.sqrt(stiff / light)
+    time = problem.time[: problem.count]
+    nyquist = np.pi / np.median(np.diff(time))
+    high = min(high, nyquist)
+    low = min(low, 0.5 * high)
+    width = _FINENESS * 2.0 * np.pi / time[-1]
+    count = int(np.clip((high - low) / width, _FEWEST, _MOST))
+    return np.linspace(low, high, count) / (2.0 * np.pi)
+
+
+def _ends(prior: Prior) -> np.ndarray:
+    """Return between which positive numbers the prior puts next to everything."""
+    if prior.family == "fixed":
+        return np.full(2, float(prior.numbers[0]))
+    return np.maximum(frozen(prior).ppf([_TAIL, 1.0 - _TAIL]), 1e-9)
+
+
+def _values(problem: DynamicProblem, place, found, left) -> dict[str, float]:
+    frequency, ratio = place
+    stiffness = 1.0 / found[0]
+    modulus = float(np.mean(_ends(problem.priors["E0"])))
+    influence = stiffness / (modulus * problem.unit_stiffness)
+    values = {
+        "E0": modulus,
+        "_KE0": influence * modulus,
+        "mass": stiffness / (2.0 * np.pi * frequency) ** 2,
+        "damping_ratio": ratio,
+        "initial_deformation": found[1],
+        "initial_velocity": found[2],
+        "deformation_offset": found[3],
+        "deformation_sigma": max(np.sqrt(left / problem.count), 1e-6),
+    }
+    start = {}
+    for name, value in values.items():
+        prior = problem.priors["K" if name == "_KE0" else name]
+        if prior.family == "fixed":
+            continue
+        if prior.family in ("uniform", "beta"):
+            # Outside of its support there is no density to climb.
+            scale = modulus if name == "_KE0" else 1.0
+            ends = scale * frozen(prior).ppf([_TAIL, 1.0 - _TAIL])
+            value = np.clip(value, *ends)
+        start[name] = float(value)
+    return start

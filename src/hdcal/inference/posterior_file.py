@@ -1,0 +1,189 @@
+"""A case as part of a posterior file, and back; a file that was changed is refused."""
+
+import hashlib
+import json
+from dataclasses import fields
+
+import numpy as np
+import xarray as xr
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.priors import Prior
+from hdcal.data.records import Geometry, Records
+from hdcal.errors import Finding, InputError
+
+FORMAT = "hdcal.posterior/1"
+# The attribute that holds the digest of everything else.
+DIGEST = "sha256"
+
+UNITS = {
+    "deformation": "mm",
+    "temperature": "degC",
+    "time": "s",
+    "angle": "rad",
+    "direction": "1",
+    "sense": "1",
+    "rate": "mm/s",
+    "run": "1",
+    "specimen": "1",
+    "force_sd": "N",
+}
+
+
+def covariates(records: Records) -> dict[str, np.ndarray]:
+    """Return every column of the records but the force."""
+    return {name: np.asarray(getattr(records, name)) for name in UNITS}
+
+
+def describe_prior(prior: Prior) -> dict:
+    """Return a prior as plain data."""
+    numbers = [float(number) for number in prior.numbers]
+    return {
+        "family": prior.family,
+        "numbers": numbers,
+        "unit": prior.unit,
+        "source": prior.source,
+    }
+
+
+def restore_prior(plain: dict) -> Prior:
+    """Return the prior that `describe_prior` described."""
+    return Prior(
+        plain["family"], tuple(plain["numbers"]), plain["unit"], plain["source"]
+    )
+
+
+_TABLES = ("priors", "scale_priors", "effect_priors", "dynamic_priors")
+
+
+def describe_case(case: Case) -> str:
+    """Return everything of a case but its rows, as JSON."""
+    gear = {f.name: getattr(case.gear, f.name) for f in fields(Gear)}
+    geometry = {
+        f.name: float(getattr(gear["geometry"], f.name)) for f in fields(Geometry)
+    }
+    for table in _TABLES:
+        gear[table] = {name: describe_prior(p) for name, p in gear[table].items()}
+    return json.dumps(
+        {
+            "name": case.name,
+            "gear": {**gear, "geometry": geometry},
+            "known": sorted(case.records.known),
+            "run_labels": case.run_labels,
+            "specimen_labels": case.specimen_labels,
+            "data_sha256": case.data_sha256,
+            "notes": case.notes,
+        },
+        default=str,
+    )
+
+
+def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
+    """Return the case that was described, with its rows.
+
+    Raises:
+        KeyError, ValueError: the description is not one.
+    """
+    plain = json.loads(text)
+    gear = plain["gear"]
+    # A file of before there were dynamics is as good as ever for the rest.
+    gear.setdefault("dynamic_priors", {})
+    for table in _TABLES:
+        gear[table] = {name: restore_prior(p) for name, p in gear[table].items()}
+    gear["geometry"] = Geometry(**gear["geometry"])
+    rows = {name: constant[name].to_numpy() for name in UNITS}
+    records = Records(**rows, force=force.to_numpy(), known=frozenset(plain["known"]))
+    return Case(
+        name=plain["name"],
+        gear=Gear(**gear),
+        records=records,
+        run_labels=tuple(plain["run_labels"]),
+        specimen_labels=tuple(plain["specimen_labels"]),
+        data_sha256=plain["data_sha256"],
+        notes=tuple(plain["notes"]),
+    )
+
+
+def open_tree(path) -> xr.DataTree:
+    """Open a posterior file and read it whole.
+
+    Raises:
+        InputError: it is missing or not a posterior file.
+    """
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            loaded = tree.load()
+    except FileNotFoundError as error:
+        raise InputError(
+            [
+                Finding(
+                    str(path),
+                    "there is no such file",
+                    "Name the folder that hdcal calibrate wrote",
+                )
+            ]
+        ) from error
+    except Exception as error:
+        raise InputError([not_a_posterior(path)]) from error
+    return loaded
+
+
+def not_a_posterior(path) -> Finding:
+    """Return the finding for a file that hdcal did not write."""
+    return Finding(
+        str(path),
+        "is not a posterior that hdcal wrote, or it is damaged",
+        "Calibrate again",
+    )
+
+
+def digest(tree: xr.DataTree) -> str:
+    """Return a SHA-256 of every number, label and attribute that hdcal reads back.
+
+    It is the same before writing and after reading: groups and variables in the order
+    of their names, numbers as little-endian 64 bits, labels and attributes as text.
+    """
+    whole = hashlib.sha256()
+    for name in sorted(set(map(str, tree.attrs)) - {DIGEST}):
+        whole.update(json.dumps([name, str(tree.attrs[name])]).encode())
+    for node in sorted(tree.subtree, key=lambda node: node.path):
+        variables = node.to_dataset(inherit=False).variables
+        for name in sorted(map(str, variables)):
+            kind, data = _canonical(np.asarray(variables[name].values))
+            head = [node.path, name, variables[name].dims, kind, len(data)]
+            whole.update(json.dumps(head).encode())
+            whole.update(data)
+    return whole.hexdigest()
+
+
+def _canonical(values: np.ndarray) -> tuple[str, bytes]:
+    """Return kind and bytes of an array, whatever type the file gave it."""
+    if values.dtype.kind in "biuf":
+        kind = "<f8" if values.dtype.kind == "f" else "<i8"
+        return f"{kind}{values.shape}", np.ascontiguousarray(values, kind).tobytes()
+    return f"text{values.shape}", json.dumps([str(v) for v in values.flat]).encode()
+
+
+def check_unchanged(tree: xr.DataTree, path) -> None:
+    """Refuse a posterior of another version, or that is not as hdcal wrote it.
+
+    The digest detects accidental changes. It is no signature: it can be computed
+    anew.
+
+    Raises:
+        InputError: with what is wrong.
+    """
+    written = str(tree.attrs.get("hdcal_format", ""))
+    if not written.startswith("hdcal.posterior/"):
+        raise InputError([not_a_posterior(path)])
+    if written != FORMAT:
+        words = f"has the format {written}, and this hdcal reads {FORMAT}"
+        remedy = "Use the hdcal that wrote it, or calibrate again"
+    elif DIGEST not in tree.attrs:
+        words, remedy = "was written by an older version of hdcal", "Calibrate again"
+    elif tree.attrs[DIGEST] != digest(tree):
+        words = "was changed after hdcal wrote it"
+        remedy = "Take the file as it was written, or calibrate again"
+    else:
+        return
+    raise InputError([Finding(str(path), words, remedy)])

@@ -1,0 +1,107 @@
+"""What a posterior file holds, collected in ArviZ' groups."""
+
+from collections.abc import Mapping
+from functools import partial
+
+import jax
+import numpy as np
+import xarray as xr
+from arviz_base import from_dict
+
+from hdcal.data.case import Case
+from hdcal.inference import posterior_file
+from hdcal.inference.density import densities, pointwise_log_likelihood
+from hdcal.inference.discrepancy import discrepancy_columns
+from hdcal.inference.padding import pad_records
+from hdcal.inference.problem import Problem
+from hdcal.inference.sample import Draws
+
+# Above this many numbers the log likelihood of every row and draw is not kept.
+_MOST_LOG_LIKELIHOODS = 8_000_000
+TOTAL = "total"
+
+
+def build_tree(
+    case: Case,
+    draws: Draws,
+    prior_draws: Mapping[str, np.ndarray],
+    log_likelihood: Mapping[str, np.ndarray],
+    observed: tuple[str, ...] = ("force",),
+) -> xr.DataTree:
+    """Collect everything in ArviZ' groups.
+
+    Args:
+        case: data and gear.
+        draws: from the sampler.
+        prior_draws: by parameter, each (draw,).
+        log_likelihood: by observed column, (chain, draw, row), or the total of all
+            rows under `TOTAL`, (chain, draw).
+        observed: columns of the records that the model explains.
+    """
+    rows = {name: np.asarray(getattr(case.records, name)) for name in observed}
+    tree = from_dict(
+        {
+            "posterior": draws.values,
+            "prior": {name: values[None] for name, values in prior_draws.items()},
+            "sample_stats": _sampler_statistics(draws),
+            "observed_data": rows,
+            "constant_data": posterior_file.covariates(case.records),
+            "log_likelihood": dict(log_likelihood),
+        },
+        dims={
+            **{name: ["row"] for name in (*observed, *posterior_file.UNITS)},
+            "run_offset": ["run_label"],
+            "specimen_deviation": ["specimen_label"],
+            "gap_weights": ["basis"],
+        },
+        coords={
+            "run_label": list(case.run_labels),
+            "specimen_label": list(case.specimen_labels),
+        },
+    )
+    if TOTAL in log_likelihood:
+        size = log_likelihood[TOTAL].size * len(case.records.force)
+        tree["log_likelihood"].attrs["note"] = (
+            f"{size} values by row and draw are not kept; this is the log likelihood "
+            "of all rows, runs, specimens and gap integrated out where they were"
+        )
+    return tree
+
+
+def force_log_likelihood(
+    case: Case, problem: Problem, draws: Draws
+) -> dict[str, np.ndarray]:
+    """Return the log likelihood of each row and draw, or the totals if they are many.
+
+    Args:
+        case: data and gear.
+        problem: what was sampled.
+        draws: from the sampler.
+    """
+    rows = len(case.records.force)
+    if draws.energy.size * rows > _MOST_LOG_LIKELIHOODS:
+        return {TOTAL: densities(problem, draws.values)[1]}
+    padded = pad_records(case.records)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
+    each = _pointwise(problem, draws.values, padded, columns)
+    return {"force": np.asarray(each)[..., :rows]}
+
+
+@jax.jit
+def _pointwise(problem, values, records, columns):
+    one = partial(pointwise_log_likelihood, problem)
+    inner = jax.vmap(one, in_axes=(0, None, None))
+    return jax.vmap(inner, in_axes=(0, None, None))(values, records, columns)
+
+
+def _sampler_statistics(draws: Draws) -> dict[str, np.ndarray]:
+    """Return what ArviZ wants to know of the sampler, (chain, draw) each."""
+    return {
+        "energy": draws.energy,
+        "lp": -draws.potential,
+        "diverging": draws.diverging,
+        "n_steps": draws.n_steps,
+        "tree_depth": np.ceil(np.log2(draws.n_steps + 1)).astype(int),
+        "acceptance_rate": draws.acceptance,
+        "step_size": draws.step_size,
+    }

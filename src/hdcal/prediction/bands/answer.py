@@ -1,0 +1,26 @@
+"""The JSON answer of `hdcal predict`: the table by column."""
+
+from dataclasses import dataclass, fields
+from typing import Annotated, Literal
+
+from hdcal.prediction.bands.bands import Bands
+from hdcal.report.answer import Answer, Promise, Real
+
+_COLUMNS = [field.name for field in fields(Bands)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PredictionAnswer(Answer):
+    """What `hdcal predict` answers.
+
+    Attributes:
+        interval: probability inside the bands.
+        columns: those of bands.csv by name; what was not fitted is null.
+    """
+
+    schema: Literal["hdcal.prediction/1"] = "hdcal.prediction/1"
+    status: Literal["ok"] = "ok"
+    interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
+    columns: Annotated[
+        dict[str, tuple[Real | bool | str, ...]], Promise(required=_COLUMNS)
+    ]

@@ -1,0 +1,238 @@
+"""A margin in sentences that need no statistics to be understood."""
+
+from collections.abc import Iterator
+
+from hdcal.prediction.margin.result import Exceedance, Margin
+from hdcal.report.words import hypothesis, number
+
+_MEMBER = {"readings": "reading", "mountings": "mounting", "specimens": "gear"}
+_MANY = {"readings": "readings", "mountings": "mountings", "specimens": "gears"}
+_INPUTS = {
+    "calibration": "calibration (stiffness, zeros)",
+    "cause": "which effect is at work",
+    "alpha": "loss of modulus per kelvin α",
+    "noise": "reading noise",
+    "mounting": "mounting to mounting",
+    "gear": "gear to gear",
+    "leftover": "leftover beyond the tested range",
+    "wall_thickness": "wall thickness δ",
+    "radius": "radius R",
+    "length": "length L",
+    "load_height": "load height",
+    "E0_GPa": "Young's modulus E₀",
+    "K": "influence coefficient K",
+}
+# Rarer than this nobody can say; the words then say so.
+_RAREST = 1e-12
+
+
+def member_word(found: Margin) -> str:
+    """Return what one member of the population is called."""
+    return _MEMBER[found.population]
+
+
+def input_label(name: str) -> str:
+    """Return what an input of a gradient or share is called."""
+    return _INPUTS.get(name.removesuffix("_mm"), name)
+
+
+def bound_name(found: Margin) -> str:
+    """Return content and confidence as people write them: 99/95."""
+    return f"{100.0 * found.content:.6g}/{100.0 * found.confidence:.6g}"
+
+
+def chance(probability: float) -> str:
+    """Return a probability; never one that nobody can know."""
+    if probability < _RAREST:
+        return f"less than {_RAREST:.0e}"
+    if probability > 1.0 - _RAREST:
+        return "certain"
+    if probability > 0.999:
+        return "more than 99.9 %"
+    if probability > 0.99:
+        return f"{100.0 * probability:.1f} %"
+    if probability >= 0.001:
+        return f"{100.0 * probability:.2g} %"
+    return f"{probability:.1e}"
+
+
+def index(beta: float) -> str:
+    """Return a reliability index; beyond ± 7 no probability can be known."""
+    if beta > 7.0:
+        return "above 7"
+    return "below −7" if beta < -7.0 else f"{beta:.2f}"
+
+
+def headline(found: Margin) -> str:
+    """Return whether the capacity is enough, or which force is needed."""
+    if found.limit_force_N is not None:
+        return _enough(found, found.limit_force_N)
+    return (
+        f"At {found.deformation_mm:g} mm {_percent(found.content)} of {_many(found)} "
+        f"need at most {newtons(found.worst.upper_bound_N)}, with "
+        f"{_percent(found.confidence)} confidence."
+    )
+
+
+def next_steps(found: Margin) -> Iterator[str]:
+    """Yield what to do about a small capacity and about untested conditions."""
+    level, limit = found.worst, found.limit_force_N
+    if limit is not None and limit < level.capacity_N:
+        yield (
+            f"Provide {newtons(level.capacity_N)}: that is enough with "
+            f"{_percent(found.confidence)} confidence."
+        )
+    if found.extrapolated:
+        yield (
+            f"Measure at {found.deformation_mm:g} mm {_where(found)} too: what was not "
+            "tested is extrapolated."
+        )
+
+
+def answer(found: Margin) -> list[str]:
+    """Return the answer in sentences."""
+    return [*_force(found), *_capacity(found), *_inverse(found), *_models(found)]
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.6g} %"
+
+
+def _many(found: Margin) -> str:
+    return _MANY[found.population]
+
+
+def _where(found: Margin) -> str:
+    warm = [level.temperature_C for level in found.levels]
+    if len(warm) == 1:
+        return f"at {warm[0]:g} °C"
+    return f"over {min(warm):g} … {max(warm):g} °C"
+
+
+def newtons(value: float) -> str:
+    """Return a force to four digits."""
+    return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
+
+
+def _force(found: Margin) -> Iterator[str]:
+    level, share = found.worst, _percent(found.content)
+    what = "force that the gauge shows" if found.quantity == "reading" else "load"
+    way = "" if found.direction == "up" else ", unloading,"
+    several = len(found.levels) > 1
+    at = f" at its worst, {level.temperature_C:g} °C," if several else ""
+    sure = _percent(found.confidence)
+    width = level.force_N.hi - level.force_N.lo
+    low, middle, high = (
+        number(end, width)
+        for end in (level.force_N.lo, level.force_N.median, level.force_N.hi)
+    )
+    yield (
+        f"At {found.deformation_mm:g} mm{way} the mean {what}{at} is {middle} N, 95 % "
+        f"credible interval {low} … {high} N."
+    )
+    basis = f", an {found.basis} value" if found.basis[:1] == "A" else ""
+    basis = f", a {found.basis} value" if found.basis[:1] == "B" else basis
+    yield (
+        f"With {sure} confidence {share} of {_many(found)} need at most "
+        f"{newtons(level.upper_bound_N)} {_where(found)}{basis}. Taken by itself, the "
+        f"bound from below is as sure: {share} need at least "
+        f"{newtons(level.lower_bound_N)}."
+    )
+    yield f"Whose forces these are: {_lower(found.population_words)}"
+
+
+def _lower(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def _capacity(found: Margin) -> Iterator[str]:
+    level, sure = found.worst, _percent(found.confidence)
+    if level.exceedance is not None:
+        assert found.limit_force_N is not None
+        yield _enough(found, found.limit_force_N)
+        yield from _exceedance(found, level.exceedance)
+    yield (
+        f"To hold {100.0 * found.required_probability:.8g} % of "
+        f"{_many(found)}, a capacity of "
+        f"{newtons(level.capacity_predictive_N)} is expected to do; "
+        f"{newtons(level.capacity_N)} does with {sure} confidence."
+    )
+
+
+def _enough(found: Margin, limit: float) -> str:
+    """Say first whether the capacity does."""
+    level = found.worst
+    share = f"{100.0 * found.required_probability:.8g} % of {_many(found)}"
+    sure = _percent(found.confidence)
+    if limit >= level.capacity_N:
+        return (
+            f"A capacity of {limit:g} N is enough for {share}, with {sure} confidence."
+        )
+    if limit >= level.capacity_predictive_N:
+        return (
+            f"A capacity of {limit:g} N is expected to be enough for {share}, but not "
+            f"with {sure} confidence."
+        )
+    return f"A capacity of {limit:g} N is NOT enough for {share}."
+
+
+def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
+    one = f"One future {member_word(found)} needs more than {found.limit_force_N:g} N"
+    sure = _percent(found.confidence)
+    if max(risk.hi, risk.probability) < _RAREST:
+        rarest = chance(risk.probability)
+        yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
+        return
+    yield (
+        f"{one} with a probability of {chance(risk.probability)}: reliability index "
+        f"β = {index(risk.beta)}. The share of {_many(found)} that do lies "
+        f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
+        f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
+        f"{index(risk.beta_at_confidence)}."
+    )
+    if risk.probability > risk.hi:
+        yield (
+            "The probability lies above the interval of the share because the few "
+            "draws with the widest scatter make most of it."
+        )
+
+
+def _inverse(found: Margin) -> Iterator[str]:
+    got = found.reached
+    if got is None:
+        return
+    low, high = got.searched_mm
+    beyond = f"not within {low:g} … {high:.3g} mm"
+
+    def at(value: float | None) -> str:
+        return beyond if value is None else f"{value:.4g} mm"
+
+    middle = f"{got.force_N:g} N reach {at(got.median_mm)} at {got.temperature_C:g} °C"
+    span = ""
+    if got.lo_mm is not None and got.hi_mm is not None:
+        span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} mm)"
+    share = _percent(found.content)
+    tested = "" if got.tested else " Part of this lies outside what was tested."
+    yield (
+        f"The other way round: {middle} in the mean{span}. With "
+        f"{_percent(found.confidence)} confidence {share} of "
+        f"{_many(found)} get at least to {at(got.lower_bound_mm)}, and as "
+        f"surely {share} get at most to {at(got.upper_bound_mm)}.{tested}"
+    )
+
+
+def _models(found: Margin) -> Iterator[str]:
+    if not found.models:
+        return
+    each = "; ".join(
+        f"{hypothesis(model.model)} ({100.0 * model.probability:.0f} %): "
+        f"{newtons(model.upper_bound_N)}"
+        for model in found.models
+    )
+    likeliest = max(found.models, key=lambda model: model.probability)
+    change = found.worst.upper_bound_N - likeliest.upper_bound_N
+    yield (
+        "The cause of the gap is not settled, so the bounds average over the causes by "
+        f"probability. Upper bound with each alone: {each}. The average is "
+        f"{found.worst.upper_bound_N:.4g} N, {change:+.2g} N from the likeliest alone."
+    )

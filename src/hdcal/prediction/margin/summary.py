@@ -1,0 +1,44 @@
+"""A margin as an answer."""
+
+from hdcal.inference.posterior import Posterior, versions
+from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
+from hdcal.prediction.margin.document import CALIBRATION_SHARE
+from hdcal.prediction.margin.result import Margin
+from hdcal.prediction.margin.sentences import answer, headline, next_steps
+from hdcal.report.posterior_answer import CalibratedGear
+
+KINDS = {
+    "force_N": "mean of the population, equal-tailed credible interval",
+    "member_N": "one future member, equal-tailed predictive interval",
+    "lower_bound_N": "one-sided bound, content and confidence",
+    "upper_bound_N": "one-sided bound, content and confidence",
+    "capacity_N": "quantile of the population, with the stated confidence",
+    "capacity_predictive_N": "quantile of the predictive distribution",
+    "exceedance": "of one future member; lo and hi: credible interval of the share",
+}
+
+
+def margin_answer(
+    found: Margin, posterior: Posterior, *, seed: int = 0
+) -> MarginAnswer:
+    """Return a margin as an answer, ready for JSON.
+
+    Args:
+        found: from `margin`.
+        posterior: of the likeliest model.
+        seed: it was made with.
+    """
+    gear, case = posterior.case.gear, posterior.case
+    return MarginAnswer(
+        reasons=(),
+        headline=headline(found),
+        next_step=next(next_steps(found), None),
+        answer=tuple(answer(found)),
+        **vars(found),
+        shares_note=CALIBRATION_SHARE,
+        kinds=KINDS,
+        seed=seed,
+        versions=versions(),
+        gear=CalibratedGear(gear.name, gear.material, posterior.theory),
+        data=DataUsed(case.name, len(case.records.force), case.data_sha256),
+    )

@@ -1,0 +1,249 @@
+"""Padding counts for nothing: densities and gradients are those of the bare rows."""
+
+import dataclasses
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from moving import moving_case
+from rigs import draw_truth, make_case, make_gear, program
+
+from hdcal.data.priors import Prior, effect_priors
+from hdcal.errors import InputError
+from hdcal.inference import compress, density
+from hdcal.inference.dynamic_problem import (
+    build_dynamic,
+    dynamic_site_priors,
+    predict_motion,
+)
+from hdcal.inference.linearisation import linearise
+from hdcal.inference.padding import bucket_size
+from hdcal.inference.problem import build_problem, without_scatter
+from hdcal.physics.effect import Effect, Stage, parameter
+from hdcal.physics.registry import EFFECTS
+
+# Sums over more rows are added up in another order.
+CLOSE = {"rtol": 1e-11, "atol": 1e-12}
+EXPAND = jax.jit(jax.value_and_grad(density.log_likelihood, argnums=1))
+DRAW = jax.jit(density.draw_members)
+STAGES = ("deformation", "force", "sensor", "noise")
+
+
+def case_of(*, runs=1, specimens=1, sds=(0.0,), resolution=0.0):
+    """Return rows of three cycles, whose runs and specimens take turns."""
+    records = program()
+    rows = len(records.force)
+    assert bucket_size(rows) > rows
+    rng = np.random.default_rng(4)
+    known = {"angle", "bare_rig"} | ({"run"} if runs > 1 else set())
+    known |= {"specimen"} if specimens > 1 else set()
+    force = 200.0 * records.deformation + rng.normal(0.0, 0.6, rows)
+    records = dataclasses.replace(
+        records,
+        angle=2.4 * np.arange(rows),
+        force=force if resolution == 0.0 else resolution * np.round(force / resolution),
+        run=np.arange(rows) * 7 % runs,
+        specimen=np.arange(rows) * 5 % specimens,
+        force_sd=rng.choice(sds, rows),
+        known=records.known | known,
+    )
+    return make_case(records, make_gear(resolution=resolution))
+
+
+def values_of(problem, seed=0) -> dict:
+    """Return parameters and members, all of them away from their nulls."""
+    values = draw_truth(problem, jax.random.key(seed)) | {"sigma": np.float64(0.7)}
+    rng, basis = np.random.default_rng(seed), 20 if problem.discrepancy else 0
+    members = {
+        "run_offset": rng.normal(0.0, 1.0, problem.runs),
+        "specimen_deviation": rng.normal(0.0, 0.02, problem.specimens),
+        "gap_weights": rng.normal(0.0, 0.3, basis),
+    }
+    return values | {name: size for name, size in members.items() if len(size)}
+
+
+def bare(problem, case):
+    """Return the same problem with its rows as they were measured."""
+    columns = None
+    if problem.discrepancy is not None:
+        columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
+    return dataclasses.replace(
+        problem, records=case.records, columns=columns, blocks=None
+    )
+
+
+def of_stage(stage):
+    return without_scatter([e for e in EFFECTS.values() if e.stage == stage])
+
+
+PROBLEMS = {
+    **{f"every effect of the {stage}": (of_stage(stage), {}) for stage in STAGES},
+    "rounded, runs and discrepancy": (
+        (),
+        {"resolution": 1.0, "runs": 4, "specimens": 3, "with_gap": True},
+    ),
+    "runs integrated out": (
+        of_stage("sensor"),
+        {"runs": 4, "specimens": 3, "sds": (0.1, 0.5), "with_gap": True},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_padded_rows_have_the_density_of_the_measured_ones(name: str):
+    effects, data = PROBLEMS[name]
+    with_gap = data.get("with_gap", False)
+    case = case_of(**{k: v for k, v in data.items() if k != "with_gap"})
+    problem = build_problem(case, effect_priors(), effects, with_gap=with_gap)
+    rows = len(case.records.force)
+    assert len(problem.rows.force) == bucket_size(rows)
+    assert problem.count == rows
+    values = values_of(problem)
+    found, slow = (EXPAND(p, values) for p in (problem, bare(problem, case)))
+    np.testing.assert_allclose(float(found[0]), float(slow[0]), **CLOSE)
+    for site, slope in slow[1].items():
+        np.testing.assert_allclose(found[1][site], slope, **CLOSE, err_msg=site)
+        scale = np.abs(np.asarray(slope)).max()
+        np.testing.assert_allclose(found[1][site], slope, rtol=0, atol=1e-11 * scale)
+    assert np.isfinite(float(found[0]))
+    if problem.integrated:
+        key = jax.random.key(1)
+        drawn, alone = (
+            DRAW(problem, values, key),
+            DRAW(bare(problem, case), values, key),
+        )
+        for site, draw in alone.items():
+            np.testing.assert_allclose(drawn[site], draw, rtol=1e-8, atol=1e-11)
+
+
+def test_a_row_of_padding_that_counts_is_seen():
+    """The same comparison, had one padded row been taken for a measured one."""
+    case = case_of()
+    problem = build_problem(case, effect_priors(), of_stage("sensor"))
+    more = dataclasses.replace(problem, count=problem.count + 1)
+    values = values_of(problem)
+    found, slow = (float(EXPAND(p, values)[0]) for p in (more, bare(problem, case)))
+    assert abs(found - slow) > 1e-6 * abs(slow)
+
+
+class Centred(Effect):
+    """A force about the mean deformation: it looks at rows to come."""
+
+    name: ClassVar[str] = "centred"
+    stage: ClassVar[Stage] = "force"
+    family: ClassVar[str] = "drift"
+
+    size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
+
+    def apply(self, signal, rows):
+        """Return the force and its share."""
+        return signal + self.size * (rows.deformation - jnp.mean(rows.deformation))
+
+
+class Cumulative(Centred):
+    """The same about the mean of the rows so far."""
+
+    name: ClassVar[str] = "cumulative"
+
+    def apply(self, signal, rows):
+        """Return the force and its share."""
+        mean = jnp.cumsum(rows.deformation) / jnp.arange(1, len(signal) + 1)
+        return signal + self.size * (rows.deformation - mean)
+
+
+def test_an_effect_from_outside_that_does_not_bear_padding_is_refused():
+    prior = Prior("half_normal", (1.0,), "N/mm", "a test")
+    priors = {"centred.size": prior, "cumulative.size": prior}
+    with pytest.raises(InputError, match=r"centred.*further ones follow"):
+        build_problem(case_of(), priors, (Centred,))
+    assert build_problem(case_of(), priors, (Cumulative,)).count == 198
+
+
+def test_groups_of_no_rows_change_nothing():
+    """A stated sd of each row makes a group of each: their number is padded too."""
+    rng = np.random.default_rng(0)
+    case = case_of(runs=3)
+    sds = rng.uniform(0.1, 0.9, len(case.records.force))
+    records = dataclasses.replace(
+        case.records, force_sd=sds, known=case.records.known | {"force_sd"}
+    )
+    case = dataclasses.replace(case, records=records)
+    problem = build_problem(case, effect_priors())
+    blocks = problem.blocks
+    assert blocks is not None
+    groups = len(np.unique(np.stack([sds, records.run]), axis=1).T)
+    assert len(blocks.count) == bucket_size(groups) > groups
+    cut = jax.tree.map(lambda part: part[:groups], blocks)
+    assert (blocks.count[groups:] == 0.0).all()
+    values = values_of(problem)
+    slow = EXPAND(dataclasses.replace(problem, blocks=cut), values)
+    found = EXPAND(problem, values)
+    np.testing.assert_allclose(float(found[0]), float(slow[0]), **CLOSE)
+    for site, slope in slow[1].items():
+        scale = np.abs(np.asarray(slope)).max()
+        np.testing.assert_allclose(found[1][site], slope, rtol=0, atol=1e-11 * scale)
+    # And without the runs integrated out.
+    single = dataclasses.replace(problem, integrated=frozenset())
+    ends = [
+        float(EXPAND(dataclasses.replace(single, blocks=part), values)[0])
+        for part in (blocks, cut)
+    ]
+    np.testing.assert_allclose(*ends, **CLOSE)
+
+
+def test_groups_of_one_sd_are_not_padded():
+    """Runs and specimens have parameters: another number is another executable."""
+    problem = build_problem(case_of(runs=3, specimens=2), effect_priors())
+    assert isinstance(problem.blocks, compress.CompressedRows)
+    assert len(problem.blocks.count) == 6
+
+
+def test_derivatives_of_measured_rows_are_those_without_padding():
+    case = case_of(runs=3, specimens=2)
+    effects = of_stage("force")
+    problem = build_problem(case, effect_priors(), effects, with_gap=True)
+    values = values_of(problem)
+    columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
+    found = linearise(problem, values, case.records)
+    _, noise = density.predict_rows(problem, values, case.records, columns)
+    np.testing.assert_allclose(found.sd, noise.sd[0], rtol=1e-14)
+
+    def mean(part):
+        return density.predict_rows(problem, values | part, case.records, columns)[0]
+
+    slow = jax.jacfwd(mean)({name: values[name] for name in found.slopes})
+    for name, slope in slow.items():
+        scale = np.abs(np.asarray(slope)).max()
+        np.testing.assert_allclose(
+            found.slopes[name], slope, rtol=0, atol=1e-11 * scale, err_msg=name
+        )
+    assert found.members.shape == (len(case.records.force), 3 + 2 + 20)
+    # A specimen's column: what its rows gain where the gear is stiffer.
+    gain = jax.jvp(lambda k: mean({"K": values["K"] * k}), (1.0,), (1.0,))[1]
+    own = values["specimen_sd"] * np.asarray(gain) * (case.records.specimen == 1)
+    scale = np.abs(own).max()
+    np.testing.assert_allclose(found.members[:, 4], own, rtol=0, atol=1e-11 * scale)
+
+
+def test_a_moving_gear_padded_is_as_measured():
+    rows = 201
+    case = moving_case(0, rows=rows)
+    problem = build_dynamic(case, dynamic_site_priors(case, "ring"), "ring")
+    assert len(problem.time) == bucket_size(rows) > rows
+    assert (np.diff(problem.time) > 0.0).all()
+    cut = dataclasses.replace(
+        problem,
+        time=problem.time[:rows],
+        force=problem.force[:rows],
+        deformation=problem.deformation[:rows],
+    )
+    values = draw_truth(problem, jax.random.key(3))
+    found, slow = EXPAND(problem, values), EXPAND(cut, values)
+    np.testing.assert_allclose(float(found[0]), float(slow[0]), **CLOSE)
+    for site, slope in slow[1].items():
+        scale = np.abs(np.asarray(slope)).max()
+        np.testing.assert_allclose(found[1][site], slope, rtol=0, atol=1e-10 * scale)
+    motion = np.asarray(predict_motion(problem, values))[:rows]
+    np.testing.assert_allclose(motion, predict_motion(cut, values), rtol=0, atol=1e-12)
