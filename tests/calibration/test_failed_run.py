@@ -4,12 +4,14 @@ import base64
 import csv
 import json
 import re
-from importlib.resources import files
 from pathlib import Path
 
 import jsonschema
 import pytest
 from commands import XB1, Done, Hdcal
+
+from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.report.answer import json_schema
 
 MARK = "FAILED — do not use"
 
@@ -30,10 +32,11 @@ def test_the_command_says_so(failed: tuple[Done, Path]):
 
 def test_the_summary_says_so(failed: tuple[Done, Path]):
     summary = json.loads((failed[1] / "summary.json").read_text("utf-8"))
-    path = files("hdcal.report") / "schemas" / "calibration-1.schema.json"
-    jsonschema.validate(summary, json.loads(path.read_text("utf-8")))
+    jsonschema.validate(summary, json_schema(CalibrationAnswer))
     assert summary["status"] == "failed"
     assert summary["reasons"]
+    assert "must not be used" in summary["headline"]
+    assert summary["next_step"].startswith("Do not use this result.")
 
 
 def test_every_figure_says_so(failed: tuple[Done, Path]):

@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-from importlib.resources import files
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -12,6 +11,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from commands import SHORT, XB1, Done, Hdcal
+
+from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.report.answer import json_schema
 
 Calibrated = tuple[Done, Path]
 BANDS = ["physics", "with_gap", "new_measurement"]
@@ -25,10 +27,12 @@ COLUMNS = [
 ]
 
 
-def schema() -> dict:
-    """Return the schema that ships with the package."""
-    path = files("hdcal.report") / "schemas" / "calibration-1.schema.json"
-    return json.loads(path.read_text("utf-8"))
+SCHEMA = json_schema(CalibrationAnswer)
+# A parameter as a gear file fixes it.
+FIXED = dict.fromkeys(("median", "lo", "hi", "contraction"), 1.0)
+FIXED |= dict.fromkeys(("rhat", "ess_bulk", "ess_tail"))
+FIXED |= dict.fromkeys(("prior_sensitivity", "likelihood_sensitivity"))
+FIXED |= {"unit": "N", "driven_by": "prior"}
 
 
 def read_bands(text: str) -> list[dict]:
@@ -56,20 +60,65 @@ def test_the_folder_holds_what_it_should(calibrated: Calibrated):
 def test_the_summary_obeys_its_schema_and_is_what_json_prints(calibrated: Calibrated):
     done, folder = calibrated
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
-    checker = jsonschema.Draft202012Validator(schema())
-    checker.check_schema(schema())
+    checker = jsonschema.Draft202012Validator(SCHEMA)
+    checker.check_schema(SCHEMA)
     checker.validate(summary)
     assert json.loads(done.stdout) == summary
     assert "influence coefficient K" in done.stderr
+    assert summary["headline"] in " ".join(done.stderr.split())
+    assert summary["next_step"] == summary["next_steps"][0]
     assert 195 < summary["stiffness_N_per_mm"]["median"] < 220
 
 
-@pytest.mark.parametrize("key", schema()["required"])
+@pytest.mark.parametrize("key", SCHEMA["required"])
 def test_the_schema_misses_every_key_that_is_left_out(calibrated: Calibrated, key: str):
     summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
     del summary[key]
     with pytest.raises(jsonschema.ValidationError):
-        jsonschema.validate(summary, schema())
+        jsonschema.validate(summary, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("place", "wrong"),
+    [
+        (("schema",), "hdcal.calibration/2"),
+        (("status",), "failed"),
+        (("status",), "fine"),
+        (("reasons",), ["some"]),
+        (("headline",), ""),
+        (("warnings",), [""]),
+        (("parameters", "K"), None),
+        (("parameters", "K", "driven_by"), "hope"),
+        (("parameters", "K", "contraction"), 1.5),
+        (("parameters", "K", "unit"), ""),
+        (("parameters", "no name"), FIXED),
+        (("stiffness_N_per_mm", "median"), "209"),
+        (("K_by_theory", "cup"), 4.2),
+        (("residuals",), [{"name": "end", "p_value": 2, "size_N": 1, "words": "w"}]),
+        (("interval",), 1),
+        (("checks",), []),
+        (("checks", 0, "outcome"), "perhaps"),
+        (("sampling", "chains"), 1),
+        (("sampling", "divergences"), -1),
+        (("seed",), -1),
+        (("versions",), {}),
+        (("gear", "theory"), "torus"),
+        (("data", "rows"), 0),
+        (("data", "sha256"), "abc"),
+    ],
+)
+def test_the_schema_refuses_what_was_never_promised(
+    calibrated: Calibrated, place: tuple, wrong
+):
+    summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
+    summary["parameters"]["effect.parameter"] = FIXED
+    jsonschema.validate(summary, SCHEMA)
+    inner = summary
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = wrong
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(summary, SCHEMA)
 
 
 def test_the_posterior_opens_as_a_data_tree(calibrated: Calibrated):
@@ -102,7 +151,7 @@ def test_the_report_asks_nothing_of_the_network(calibrated: Calibrated):
     assert not re.search(r"<script|<link|@import|url\(", page, re.I)
     for words in ("0.13", "article", "driven by", "SHA-256", "What to do next"):
         assert words in page
-    assert 'class="banner failed"' not in page
+    assert 'class="banner bad"' not in page
 
 
 def test_an_older_result_is_replaced_only_when_told_to(

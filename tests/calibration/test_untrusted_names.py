@@ -7,18 +7,21 @@ from xml.etree import ElementTree
 import pytest
 from hostile_names import NAMES
 from markupsafe import escape
+from rich.console import Console
 
-from hdcal.calibration.document import calibration_report
+from hdcal.calibration.document import calibration_document
 from hdcal.calibration.figure.bands import calibration_figure
 from hdcal.calibration.figure.residuals import residual_figure
-from hdcal.calibration.summary import summarise
+from hdcal.calibration.summary import calibration_answer
 from hdcal.data.prior import Prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import default_bands
 from hdcal.report.canvas import render
 from hdcal.report.draws_figure import prior_figure, sampler_figure
+from hdcal.report.html import html_page, notebook_html
 from hdcal.report.plain import as_json
+from hdcal.report.terminal import terminal_lines
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +57,19 @@ def test_names_are_only_text(name: str, posterior: Posterior):
         tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
         assert not tags & {"script", "img", "foreignObject", "a"}
         render(figure, "png", name)
-    page = calibration_report(posterior, summarise(posterior, left), images, name)
+    found = calibration_answer(posterior, left)
+    document = calibration_document(posterior, found, name)
+    page = html_page(document, images)
     assert "<script" not in page and "<img src=x" not in page and "<!--" not in page
     assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
     assert page.count("<title>") == page.count("</title>") == 1
-    as_json(summarise(posterior, left))
+    as_json(found)
+    cell = notebook_html(document)
+    assert "<script" not in cell and "<img src=x" not in cell
+    terminal = Console(width=110, highlight=False)
+    with terminal.capture() as caught:
+        terminal.print(*terminal_lines(document, name), sep="\n")
+    assert not set(caught.get()) & {"\x00", "\x1b", "\x07", "\u202e"}
 
 
 def test_the_same_draws_give_the_same_bytes(posterior: Posterior):

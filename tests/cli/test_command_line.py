@@ -6,8 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import jsonschema
 import pytest
 from commands import MAIN, XB1, Hdcal
+
+from hdcal.calibration.check.answer import CheckAnswer
+from hdcal.calibration.effects.answer import EffectsAnswer
+from hdcal.report.answer import json_schema
 
 
 @pytest.mark.parametrize(
@@ -52,7 +57,10 @@ def test_effects_lists_the_whole_library(here: Hdcal):
     from hdcal.physics.registry import EFFECTS
 
     done = here("effects", "--json")
-    listed = json.loads(done.stdout)["effects"]
+    found = json.loads(done.stdout)
+    jsonschema.validate(found, json_schema(EffectsAnswer))
+    assert found["headline"] == f"{len(EFFECTS)} effects can be added to the model."
+    listed = found["effects"]
     assert [effect["name"] for effect in listed] == list(EFFECTS)
     assert all(p["unit"] and p["meaning"] for e in listed for p in e["parameters"])
     words = here("effects").stdout
@@ -62,6 +70,8 @@ def test_effects_lists_the_whole_library(here: Hdcal):
 def test_check_says_what_was_read(here: Hdcal):
     done = here("check", XB1, "--json")
     found = json.loads(done.stdout)
+    jsonschema.validate(found, json_schema(CheckAnswer))
+    assert found["headline"] == "The input is in order."
     assert done.returncode == 0
     assert found["data"]["rows"] == 14
     assert found["data"]["direction"] == {"loading": 14, "holding": 0, "unloading": 0}

@@ -35,10 +35,10 @@ def test_every_theory_reads_one_posterior():
     for first, second in zip(
         K_by_theory(by_ring).values(), K_by_theory(by_article).values(), strict=True
     ):
-        assert abs(first["median"] / second["median"] - 1.0) < 0.005
+        assert abs(first.median / second.median - 1.0) < 0.005
     slope = by_ring.draws["stiffness"]
     low, high = np.quantile(slope, [0.025, 0.975])
     assert low < 209.41 < high
     assert abs(np.median(slope) - 209.41) < 1.5
     article = K_by_theory(by_ring)["article"]
-    assert article["lo"] < 0.1289 * 210.0 / 207.0 < article["hi"]
+    assert article.lo < 0.1289 * 210.0 / 207.0 < article.hi

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import jax
+import jsonschema
 import numpy as np
 import pytest
 from moving import TRUTH, motion, moving_case, moving_gear, write_moving
@@ -15,9 +16,13 @@ from hdcal.inference.checks import Check
 from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
 from hdcal.inference.dynamic_problem import build_dynamic, dynamic_site_priors
 from hdcal.motion import dynamic_calibration as calibration
+from hdcal.motion.answer import DynamicCalibrationAnswer
+from hdcal.motion.bands import motion_bands
 from hdcal.motion.dynamic_calibration import highest_peak
-from hdcal.motion.summary import motion_bands, summarise_dynamic
+from hdcal.motion.summary import dynamic_answer
 from hdcal.physics.linear_response import linear_response
+from hdcal.report.answer import json_schema
+from hdcal.report.plain import as_json
 
 # One shape and one length for all: the sampler is compiled once.
 SETTINGS = {"chains": 4, "warmup": 400, "draws": 500}
@@ -93,7 +98,7 @@ def test_the_same_seed_gives_the_same_draws_and_a_file_gives_them_back(
     loaded = load_any(tmp_path)
     assert isinstance(loaded, DynamicPosterior)
     assert np.array_equal(loaded.draws["mass"], posterior.draws["mass"])
-    assert summarise_dynamic(loaded) == summarise_dynamic(posterior)
+    assert as_json(dynamic_answer(loaded)) == as_json(dynamic_answer(posterior))
     assert loaded.case.gear.density == posterior.case.gear.density
 
 
@@ -184,7 +189,7 @@ def failed(posterior):
 
 
 def test_nothing_follows_from_a_failed_one(failed):
-    assert summarise_dynamic(failed)["status"] == "failed"
+    assert dynamic_answer(failed).status == "failed"
     assert not motion_bands(failed).usable.any()
     with pytest.raises(NotUsable, match="told to"):
         respond(failed, "step")
@@ -206,6 +211,7 @@ def test_the_command_writes_what_the_library_found(
     assert ended.value.code == code
     summary = json.loads(capsys.readouterr().out)
     assert summary == json.loads((out / "summary.json").read_text("utf-8"))
+    jsonschema.validate(summary, json_schema(DynamicCalibrationAnswer))
     assert summary["schema"] == "hdcal.dynamic-calibration/1"
     assert summary["status"] == ["ok", "failed"][code]
     names = {"motion.csv", "motion.png", "motion.svg", "posterior.nc", "report.html"}

@@ -5,9 +5,13 @@ import json
 import re
 from pathlib import Path
 
+import jsonschema
 import pytest
 from commands import Hdcal
 from moving import still_posterior
+
+from hdcal.motion.respond.answer import ResponseAnswer, ResponseWithColumns
+from hdcal.report.answer import json_schema
 
 SMALL = ["--points", "101", "--draws", "50"]
 FORCE = "time_s,force_N\n0.0,0\n0.01,40\n0.02,40\n"
@@ -27,6 +31,7 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     done = here("respond", run, "--force", "f.csv", *SMALL, "--json")
     assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)
+    jsonschema.validate(printed, json_schema(ResponseWithColumns))
     assert printed["schema"] == "hdcal.response/1"
     assert printed["status"] == "ok"
     out = Path("run-response")
@@ -34,6 +39,9 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     assert {file.name for file in out.iterdir()} == names | {"report.html"}
     columns = printed.pop("columns")
     assert printed == json.loads((out / "response.json").read_text("utf-8"))
+    jsonschema.validate(printed, json_schema(ResponseAnswer))
+    assert "The deformation reaches" in printed["headline"]
+    assert printed["next_step"].startswith("Measure a vibration")
     with (out / "response.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert list(rows[0]) == list(columns)

@@ -1,62 +1,199 @@
-"""The report of a calibration: one HTML page that needs nothing else."""
+"""A calibration in words: the only place of its sentences."""
 
+from collections.abc import Iterator, Mapping, Sequence
+
+from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
-from hdcal.report.page import parameter_row, render_page
-from hdcal.report.provenance import THEORY_WORDS, data_rows, prior_rows, provenance_rows
+from hdcal.inference.residuals import Residuals
+from hdcal.report.document import (
+    Document,
+    Facts,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Text,
+    notices,
+)
+from hdcal.report.parameters import Interval
+from hdcal.report.posterior_sections import (
+    check_section,
+    failed_headline,
+    parameter_section,
+    prior_section,
+)
+from hdcal.report.provenance import data_rows, provenance_rows
 from hdcal.report.words import estimate, label
 
-_TEMPLATE = "calibration.html.j2"
+ARTICLE_NOTE = (
+    "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
+    "combination of its own inputs reproduces; its K = 0.13 is no property of the gear."
+)
+# Shape of the residuals -> what to do about it.
+_REMEDY: Mapping[str, str] = {
+    "curvature": "Unload as well as load, take finer steps at small deformation, or "
+    "re-seat the gear and repeat: each separates some causes of curvature.",
+    "end": "Take more readings near the largest deformation, loading and unloading.",
+    "direction": "Try the effect coulomb_friction.",
+    "temperature": "Try the effect thermal_zero_drift.",
+    "temperature x deformation": "Check the prior of alpha for this material.",
+    "time": "Try the effect charge_leakage, and repeat the first point at the end.",
+    "order": "Repeat the first point at the end: it tells drift from stiffness.",
+}
+# Covariate that was not measured -> what to do about it.
+_LACKING: Mapping[str, str] = {
+    "temperature": "Measure at a second temperature: only then do data speak of alpha.",
+    "unloading": "Unload too: without it friction and hysteresis cannot be seen.",
+    "specimen": "Measure a second gear: one gear says nothing about the next one.",
+}
 
 
-def calibration_report(
-    posterior: Posterior, summary: dict, images: dict[str, bytes], command: str = ""
-) -> str:
-    """Return the report as the text of an HTML file.
+def headline(stiffness: Interval, reasons: Sequence[str]) -> str:
+    """Return the answer in one sentence.
+
+    Args:
+        stiffness: at the reference temperature [N/mm].
+        reasons: why the calibration must not be used, if so.
+    """
+    return failed_headline(reasons) if reasons else _stiffness(stiffness)
+
+
+def _stiffness(found: Interval) -> str:
+    middle, span = estimate(found)
+    return (
+        f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
+        f"interval {span} N/mm, per millimetre as read."
+    )
+
+
+def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
+    """Return what would make the answer better, most urgent first.
 
     Args:
         posterior: from `calibrate`.
-        summary: its summary.
-        images: SVG files named calibration, residuals, priors and sampler.
+        left: its residuals.
+    """
+    if not posterior.usable:
+        return [
+            "Do not use this result. Calibrate with more warm-up and draws; if it "
+            "still fails, look at the data and leave effects out."
+        ]
+    known = posterior.case.records.known
+    steps = [_REMEDY[shape.name] for shape in left.structure]
+    steps += [words for name, words in _LACKING.items() if name not in known]
+    return list(dict.fromkeys(steps))
+
+
+def calibration_document(
+    posterior: Posterior, found: CalibrationAnswer, command: str = ""
+) -> Document:
+    """Return the report; its pictures are calibration, priors, residuals and sampler.
+
+    Args:
+        posterior: from `calibrate`.
+        found: from `calibration_answer`.
         command: how the result was made.
     """
-    context = {
-        "kind": "calibration",
-        "summary": summary,
-        "failed": summary["status"] != "ok",
-        "name": posterior.case.gear.name,
-        "stiffness": dict(zip(("median", "span"), _stiffness(summary), strict=True)),
-        "K": dict(zip(("median", "span"), _K(summary), strict=True)),
-        "by_data": _names(summary, "data"),
-        "by_prior": _names(summary, "prior"),
-        "parameters": [parameter_row(n, e) for n, e in summary["parameters"].items()],
-        "theories": _theories(summary),
-        "data_rows": data_rows(posterior.case),
-        "priors": prior_rows(posterior),
-        "provenance": provenance_rows(posterior, summary, command),
-    }
-    return render_page(_TEMPLATE, context, images)
+    effects = ", ".join(found.effects).replace("_", " ")
+    return Document(
+        name=posterior.case.gear.name,
+        kind="calibration",
+        subtitle=f"Calibration of the force model from {found.data.rows} readings "
+        f"({found.data.name}), theory “{found.gear.theory}”"
+        f"{', with ' * bool(effects)}{effects}.",
+        # Of a failed calibration the page shows it struck through.
+        headline=_stiffness(found.stiffness_N_per_mm),
+        answers=list(_answers(found)),
+        next_steps=found.next_steps,
+        notices=[
+            *notices(("Remarks", found.flat_directions), tone="neutral"),
+            *notices(("To be aware of", found.warnings)),
+        ],
+        sections=[
+            _bands(found),
+            parameter_section(found.parameters),
+            _theories(found),
+            _residuals(found),
+            check_section(found.checks),
+            Section("Data", [Facts(data_rows(posterior.case))]),
+            prior_section(posterior),
+        ],
+        provenance=provenance_rows(posterior, command),
+        failed=found.reasons,
+        failed_words="The sampler did not pass its checks, so every number and band on "
+        "this page may be wrong.",
+    )
 
 
-def _stiffness(summary: dict) -> tuple[str, str]:
-    return estimate(summary["stiffness_N_per_mm"])
+def _answers(found: CalibrationAnswer) -> Iterator[str]:
+    middle, span = estimate(found.parameters["K"])
+    yield (
+        f"Influence coefficient under “{found.gear.theory}”: K = {middle}, 95 % "
+        f"credible interval {span}."
+    )
+    for driver, words in (
+        ("data", "Decided by the data"),
+        ("prior", "Decided by the prior, not by these data"),
+    ):
+        names = [
+            label(name)
+            for name, one in found.parameters.items()
+            if one.driven_by == driver
+        ]
+        if names:
+            yield f"{words}: {', '.join(names)}."
 
 
-def _K(summary: dict) -> tuple[str, str]:
-    return estimate(summary["parameters"]["K"])
+def _bands(found: CalibrationAnswer) -> Section:
+    gap = "; medium band: the same with the leftover discrepancy" * found.with_gap
+    return Section(
+        "Data and bands",
+        [
+            Picture(
+                "calibration",
+                "Measured force over deformation with the bands of the calibrated "
+                "model",
+                f"Dark band: where the force model lies with 95 % probability{gap}. "
+                "Light band: where one new reading lies with 95 % probability. "
+                "Hatched and dotted: outside what was tested. The numbers are in "
+                "bands.csv.",
+            )
+        ],
+    )
 
 
-def _names(summary: dict, driver: str) -> list[str]:
-    entries = summary["parameters"].items()
-    return [label(name) for name, entry in entries if entry["driven_by"] == driver]
-
-
-def _theories(summary: dict) -> list[dict]:
+def _theories(found: CalibrationAnswer) -> Section:
+    names = list(found.K_by_theory)
     rows = []
-    for theory, entry in summary["K_by_theory"].items():
-        middle, span = ("–", "–") if entry is None else estimate(entry)
-        words = THEORY_WORDS.get(theory, "")
-        own = theory == summary["gear"]["theory"]
-        rows.append(
-            {"name": theory, "words": words, "K": middle, "span": span, "own": own}
-        )
-    return rows
+    for name, K in found.K_by_theory.items():
+        used = " (used here)" * (name == found.gear.theory)
+        texts = ("–", "–") if K is None else estimate(K)
+        rows.append([name, f"{THEORY_WORDS.get(name, '')}{used}", *texts])
+    table = Table(
+        ["theory", "", "K", "95 % interval"],
+        rows,
+        numbers=frozenset({"K", "95 % interval"}),
+        strong=frozenset({names.index(found.gear.theory)}),
+    )
+    one = (
+        "Data identify the stiffness only, that is K times the theory's stiffness; the "
+        "rows are one posterior seen through three formulas."
+    )
+    note = Text(found.K_note.replace("`", ""))
+    return Section("K under each theory", [table, Text(one), note])
+
+
+def _residuals(found: CalibrationAnswer) -> Section:
+    shapes = [
+        f"{one.words} (p = {one.p_value:.2g}, adjusted for all shapes tried)"
+        for one in found.residuals
+    ]
+    none = Text("No shape was found in them that pure noise would rarely show.")
+    picture = Picture(
+        "residuals",
+        "Standardised residuals over deformation and in the order of the rows",
+        "Distance of each reading from the fit in units of the noise; about one in "
+        "twenty lies outside the grey band when the model is right.",
+    )
+    return Section("Residuals", [Sentences(shapes) if shapes else none, picture])

@@ -2,23 +2,23 @@
 
 from pathlib import Path
 
-from hdcal.calibration.document import calibration_report
+from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.calibration.document import calibration_document
 from hdcal.calibration.figure.bands import calibration_figure
 from hdcal.calibration.figure.residuals import residual_figure
-from hdcal.calibration.summary import summarise
-from hdcal.inference.posterior import Posterior
+from hdcal.calibration.summary import calibration_answer
+from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import default_bands
-from hdcal.report.canvas import render
 from hdcal.report.csv_table import columns_csv
+from hdcal.report.document import Document
 from hdcal.report.draws_figure import prior_figure, sampler_figure
-from hdcal.report.folder import whole_folder
-from hdcal.report.plain import as_json
+from hdcal.report.write import write_report
 
 
-def write_result(
+def write_calibration(
     posterior: Posterior, target: Path | str, *, command: str = "", force: bool = False
-) -> dict:
+) -> tuple[Document, CalibrationAnswer]:
     """Write everything that `hdcal calibrate` leaves behind.
 
     Args:
@@ -28,30 +28,33 @@ def write_result(
         force: replace an older result.
 
     Returns:
-        The summary, as it was written.
+        The report and the summary, as they were written.
 
     Raises:
         InputError: the folder exists or cannot be written.
     """
     left, bands = residuals(posterior), default_bands(posterior)
-    summary = summarise(posterior, left)
-    title = f"{posterior.case.gear.name}: calibration"
-    drawn = {
+    found = calibration_answer(posterior, left)
+    document = calibration_document(posterior, found, command)
+    figures = {
         "calibration": calibration_figure(posterior, bands, left),
         "residuals": residual_figure(posterior, left),
         "priors": prior_figure(posterior),
         "sampler": sampler_figure(posterior),
     }
-    images = {name: render(f, "svg", title) for name, f in drawn.items()}
-    picture = render(drawn["calibration"], "png", title)
-    page = calibration_report(posterior, summary, images, command)
-    with whole_folder(target, force=force) as folder:
-        posterior.save(folder / "posterior.nc")
-        (folder / "summary.json").write_text(as_json(summary), "utf-8")
-        (folder / "bands.csv").write_text(
-            columns_csv(bands.columns()), "utf-8", newline=""
-        )
-        (folder / "calibration.svg").write_bytes(images["calibration"])
-        (folder / "calibration.png").write_bytes(picture)
-        (folder / "report.html").write_bytes(page.encode("utf-8", "xmlcharrefreplace"))
-    return summary
+
+    def save(folder: Path) -> None:
+        posterior.save(folder / FILE_NAME)
+        table = columns_csv(bands.columns())
+        (folder / "bands.csv").write_text(table, "utf-8", newline="")
+
+    write_report(
+        target,
+        document,
+        {"summary.json": found},
+        figures,
+        kept=["calibration"],
+        save=save,
+        force=force,
+    )
+    return document, found

@@ -52,12 +52,20 @@ class Console:
         """Return the command line as it was given, for a result's provenance."""
         return shlex.join(["hdcal", *sys.argv[1:]])
 
-    def check_target(self, out: str | None, force: bool) -> None:
-        """Note where a result could not be written, before any work is done."""
+    def check_target(
+        self, out: str | None, force: bool, option: str = "--force"
+    ) -> None:
+        """Note where a result could not be written, before any work is done.
+
+        Args:
+            out: the folder to make, or None.
+            force: whether an older result may be replaced.
+            option: what to say to replace it.
+        """
         if out is not None:
             from hdcal.report.folder import check_target
 
-            self.wrong.attempt(check_target, out, force=force)
+            self.wrong.attempt(check_target, out, force=force, option=option)
 
     def answer(
         self,
@@ -134,9 +142,14 @@ class Console:
         try:
             print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
         except BrokenPipeError:
-            # Nobody reads any more. Python would complain again when it flushes.
-            with contextlib.suppress(OSError, ValueError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            discard_output()
+
+
+def discard_output() -> None:
+    """Send standard output nowhere, once nobody reads it any more."""
+    # Python would complain again when it flushes.
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def usage_error(error: click.UsageError) -> Finding:

@@ -1,94 +1,103 @@
-"""Reports about a gear that moves: one HTML page each that needs nothing else."""
+"""A dynamic calibration in words: the only place of its sentences."""
+
+from collections.abc import Sequence
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.posterior import Posterior
-from hdcal.report.page import parameter_row, render_page
-from hdcal.report.provenance import gear_rows, prior_rows, provenance_rows
-from hdcal.report.words import estimate, with_unit
+from hdcal.motion.answer import DynamicCalibrationAnswer
+from hdcal.motion.quantities import QUANTITIES, quantity_table
+from hdcal.report.document import Document, Picture, Section, Sentences, notices
+from hdcal.report.parameters import Interval
+from hdcal.report.posterior_sections import (
+    check_section,
+    failed_headline,
+    parameter_section,
+    prior_section,
+)
+from hdcal.report.provenance import provenance_rows
+from hdcal.report.words import estimate
 
-# Quantity of an answer -> what it is called and its unit.
-QUANTITIES = {
-    "natural_frequency_Hz": ("natural frequency", "Hz"),
-    "damped_frequency_Hz": ("frequency with damping", "Hz"),
-    "damping_ratio": ("damping ratio ζ", "1"),
-    "damping_N_s_per_mm": ("damping c", "N·s/mm"),
-    "mass_kg": ("moved mass m", "kg"),
-    "stiffness_N_per_mm": ("stiffness k", "N/mm"),
-    "peak_mm": ("largest deformation", "mm"),
-}
-
-
-def quantity_rows(entries: dict[str, dict]) -> list[dict]:
-    """Return quantities as the texts of a table's rows."""
-    rows = []
-    for name, (words, unit) in QUANTITIES.items():
-        if name not in entries:
-            continue
-        middle, span = estimate(entries[name])
-        driver = entries[name].get("driven_by", "data")
-        rows.append(
-            {
-                "label": words,
-                "median": middle,
-                "span": span,
-                "unit": with_unit("", unit).strip(),
-                "driven_by": driver,
-            }
-        )
-    return rows
+ASSUMPTIONS = (
+    "The force is the input: taken as read, without error, and linear between the "
+    "rows.",
+    "The deformation is the output: read with a zero of its own and white noise.",
+    "Mass, damping and stiffness are constant and per millimetre as read.",
+)
 
 
-def motion_report(
-    posterior: DynamicPosterior,
-    summary: dict,
-    images: dict[str, bytes],
-    command: str = "",
-) -> str:
-    """Return the report of a dynamic calibration as the text of an HTML file.
+def headline(frequency: Interval, reasons: Sequence[str]) -> str:
+    """Return the answer in one sentence.
+
+    Args:
+        frequency: natural frequency [Hz].
+        reasons: why the calibration must not be used, if so.
+    """
+    return failed_headline(reasons) if reasons else _frequency(frequency)
+
+
+def _frequency(found: Interval) -> str:
+    middle, span = estimate(found)
+    return f"The gear swings freely at {middle} Hz, 95 % credible interval {span} Hz."
+
+
+def next_steps(posterior: DynamicPosterior) -> list[str]:
+    """Return what to do next, most urgent first."""
+    if posterior.usable:
+        return []
+    return [
+        "Do not use this result. Calibrate with more warm-up and draws; if it still "
+        "fails, look at the data."
+    ]
+
+
+def motion_document(
+    posterior: DynamicPosterior, found: DynamicCalibrationAnswer, command: str = ""
+) -> Document:
+    """Return the report; its pictures are motion, priors and sampler.
 
     Args:
         posterior: from `calibrate_dynamic`.
-        summary: its summary.
-        images: SVG files named motion, priors and sampler.
+        found: from `dynamic_answer`.
         command: how the result was made.
     """
-    entries = {name: summary[name] for name in QUANTITIES if name in summary}
-    entries["mass_kg"] = summary["parameters"]["mass"]
-    context = {
-        "kind": "dynamic calibration",
-        "summary": summary,
-        "failed": summary["status"] != "ok",
-        "name": posterior.case.gear.name,
-        "quantities": quantity_rows(entries),
-        "parameters": [parameter_row(n, e) for n, e in summary["parameters"].items()],
-        "priors": prior_rows(posterior),
-        "provenance": provenance_rows(posterior, summary, command),
-    }
-    return render_page("motion.html.j2", context, images)
-
-
-def response_report(
-    posterior: Posterior, summary: dict, images: dict[str, bytes], command: str = ""
-) -> str:
-    """Return the report of a response as the text of an HTML file.
-
-    Args:
-        posterior: what it rests on.
-        summary: of the response.
-        images: an SVG file named response.
-        command: how the result was made.
-    """
-    context = {
-        "kind": "response",
-        "summary": summary,
-        "failed": False,
-        "name": posterior.case.gear.name,
-        "quantities": quantity_rows(summary["estimates"]),
-        "provenance": [
-            *gear_rows(posterior.case, posterior.theory),
-            ("calibrated", summary["calibration"]),
-            ("gears integrated", str(summary["draws"])),
-            *([("command", command)] if command else []),
+    return Document(
+        name=posterior.case.gear.name,
+        kind="dynamic calibration",
+        subtitle=f"Calibration of the moving gear from {found.data.rows} readings over "
+        f"time ({found.data.name}): mass, damping and stiffness of m ÿ + c ẏ + k y = "
+        f"F(t), theory “{found.gear.theory}”.",
+        # Of a failed calibration the page shows it struck through.
+        headline=_frequency(found.natural_frequency_Hz),
+        next_steps=next_steps(posterior),
+        notices=[
+            *notices(("Remarks", found.flat_directions), tone="neutral"),
+            *notices(("To be aware of", found.warnings)),
         ],
-    }
-    return render_page("response.html.j2", context, images)
+        sections=[
+            _quantities(found),
+            _record(found),
+            parameter_section(found.parameters, brief=False),
+            check_section(found.checks),
+            prior_section(posterior),
+        ],
+        provenance=provenance_rows(posterior, command),
+        failed=found.reasons,
+        failed_words="The calibration did not pass its checks, so every number and "
+        "band on this page may be wrong.",
+    )
+
+
+def _quantities(found: DynamicCalibrationAnswer) -> Section:
+    shown = {n: getattr(found, n) for n in QUANTITIES if hasattr(found, n)}
+    shown["mass_kg"] = found.parameters["mass"]
+    return Section("How the gear swings", [quantity_table(shown)], brief=True)
+
+
+def _record(found: DynamicCalibrationAnswer) -> Section:
+    picture = Picture(
+        "motion",
+        "Measured deformation over time with the bands of the calibrated model",
+        "Dark band: where the model lies with 95 % probability. Light band: where one "
+        "new reading lies with 95 % probability. The numbers are in motion.csv.",
+        tall=True,
+    )
+    return Section("Record and model", [picture, Sentences(found.assumptions)])

@@ -1,158 +1,32 @@
-"""Dynamic answers as plain data: summary.json of a calibration, response.json."""
+"""A dynamic calibration as an answer: the numbers and words of its summary.json."""
 
-from dataclasses import dataclass, fields
-
-import jax
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import DynamicProblem, predict_motion
-from hdcal.inference.posterior import Posterior
-from hdcal.motion.respond.respond import Response
-from hdcal.report.parameters import (
-    INTERVAL,
-    data_entry,
-    flat_directions,
-    interval,
-    parameter_entries,
-    sampling_entry,
-    warnings_of,
-)
-
-CALIBRATION_SCHEMA = "hdcal.dynamic-calibration/1"
-RESPONSE_SCHEMA = "hdcal.response/1"
-# Draws from which the bands of a record are made.
-_DRAWS = 1000
+from hdcal.motion.answer import DynamicCalibrationAnswer
+from hdcal.motion.document import ASSUMPTIONS, headline, next_steps
+from hdcal.report.parameters import credible_interval
+from hdcal.report.posterior_answer import posterior_entries
 
 
-@dataclass(frozen=True)
-class MotionBands:
-    """A calibrated record with equal-tailed 95 % bands; one entry per row.
-
-    Attributes:
-        time_s: since the first row.
-        force_N: as read: the input.
-        deformation_mm: as read: the output.
-        mean_lo_mm: credible band of the mean reading.
-        mean_median_mm: its median.
-        mean_hi_mm: its upper end.
-        new_measurement_lo_mm: predictive band of one more reading.
-        new_measurement_hi_mm: its upper end.
-        usable: the calibration passed its checks.
-    """
-
-    time_s: np.ndarray
-    force_N: np.ndarray
-    deformation_mm: np.ndarray
-    mean_lo_mm: np.ndarray
-    mean_median_mm: np.ndarray
-    mean_hi_mm: np.ndarray
-    new_measurement_lo_mm: np.ndarray
-    new_measurement_hi_mm: np.ndarray
-    usable: np.ndarray
-
-    def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns in the order of motion.csv."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
-
-@jax.jit
-def _predict(problem: DynamicProblem, values, key):
-    keys = jax.random.split(key, len(values["mass"]))
-
-    def one(value, key):
-        mean = predict_motion(problem, value)
-        # The same quantile in every row: bands are row by row, and smooth so.
-        return mean, mean + value["deformation_sigma"] * jax.random.normal(key)
-
-    return jax.vmap(one)(values, keys)
-
-
-def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
-    """Return the record that was calibrated with the bands of the model around it.
+def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
+    """Return a dynamic calibration as an answer, ready for JSON.
 
     Args:
         posterior: from `calibrate_dynamic`.
-        seed: of the new readings' noise.
     """
-    problem, draws = posterior.moving, posterior.draws
-    rows = np.linspace(0, len(draws["mass"]) - 1, _DRAWS).astype(int)
-    values = {name: draw[rows] for name, draw in draws.items()}
-    mean, new = _predict(problem, values, jax.random.key(seed))
-    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
-    real = slice(problem.count)
-    low, middle, high = np.quantile(mean[:, real], tails, axis=0)
-    new_low, _, new_high = np.quantile(new[:, real], tails, axis=0)
-    return MotionBands(
-        np.asarray(problem.time[real]),
-        np.asarray(problem.force[real]),
-        np.asarray(problem.deformation[real]),
-        low,
-        middle,
-        high,
-        new_low,
-        new_high,
-        np.full(problem.count, posterior.usable),
+    draws = posterior.draws
+    ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
+    damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
+    free = credible_interval(frequency)
+    steps = next_steps(posterior)
+    return DynamicCalibrationAnswer(
+        **posterior_entries(posterior),
+        headline=headline(free, posterior.reasons),
+        next_step=steps[0] if steps else None,
+        damping_N_s_per_mm=credible_interval(draws["damping"]),
+        damping_ratio=credible_interval(ratio),
+        natural_frequency_Hz=free,
+        damped_frequency_Hz=credible_interval(damped),
+        assumptions=ASSUMPTIONS,
     )
-
-
-def summarise_dynamic(posterior: DynamicPosterior) -> dict:
-    """Return the summary of a dynamic calibration as plain data, ready for JSON."""
-    draws, case = posterior.draws, posterior.case
-    ratio = draws["damping_ratio"]
-    damped = draws["natural_frequency"] * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
-    return {
-        "schema": CALIBRATION_SCHEMA,
-        "status": "ok" if posterior.usable else "failed",
-        "reasons": list(posterior.reasons),
-        "warnings": warnings_of(posterior),
-        "parameters": parameter_entries(posterior),
-        "stiffness_N_per_mm": interval(draws["stiffness"]),
-        "damping_N_s_per_mm": interval(draws["damping"]),
-        "damping_ratio": interval(ratio),
-        "natural_frequency_Hz": interval(draws["natural_frequency"]),
-        "damped_frequency_Hz": interval(damped),
-        "flat_directions": flat_directions(posterior),
-        "interval": INTERVAL,
-        "interval_kind": "equal-tailed credible interval",
-        "assumptions": [
-            "The force is the input: taken as read, without error, and linear between "
-            "the rows.",
-            "The deformation is the output: read with a zero of its own and white "
-            "noise.",
-            "Mass, damping and stiffness are constant and per millimetre as read.",
-        ],
-        "checks": [vars(check) for check in posterior.checks],
-        "sampling": sampling_entry(posterior),
-        "seed": posterior.settings["seed"],
-        "versions": posterior.settings["versions"],
-        "gear": {
-            "name": case.gear.name,
-            "material": case.gear.material,
-            "theory": posterior.theory,
-        },
-        "data": data_entry(posterior),
-    }
-
-
-def summarise_response(response: Response, posterior: Posterior) -> dict:
-    """Return a response without its rows as plain data, ready for JSON."""
-    dynamic = isinstance(posterior, DynamicPosterior)
-    return {
-        "schema": RESPONSE_SCHEMA,
-        "status": "ok",
-        "gear": posterior.case.gear.name,
-        "calibration": "moving" if dynamic else "at rest",
-        "force": response.request.words,
-        "temperature_C": response.temperature_C,
-        "estimates": response.estimates,
-        "interval": INTERVAL,
-        "interval_kind": "equal-tailed pointwise credible band of the deformation of "
-        "gears like the tested one, without reading noise",
-        "tested_share": float(np.mean(response.tested)),
-        "effects": list(response.effects),
-        "left_out": list(response.left_out),
-        "remarks": list(response.remarks),
-        "draws": response.draws,
-        "points": len(response.time_s),
-    }

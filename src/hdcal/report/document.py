@@ -169,6 +169,8 @@ class Document:
         return self.next_steps[0] if self.next_steps else None
 
 
-def notices(*found: tuple[str, Sequence[str]]) -> tuple[Notice, ...]:
-    """Return cautions by title; those without a sentence are left out."""
-    return tuple(Notice(title, said) for title, said in found if said)
+def notices(
+    *found: tuple[str, Sequence[str]], tone: Tone = "caution"
+) -> tuple[Notice, ...]:
+    """Return notices by title; those without a sentence are left out."""
+    return tuple(Notice(title, said, tone) for title, said in found if said)

@@ -72,14 +72,9 @@ class ParameterEstimate(Interval):
 
 def credible_interval(values: np.ndarray) -> Interval:
     """Return median and equal-tailed 95 % credible interval."""
-    return Interval(**interval(values))
-
-
-def interval(values: np.ndarray) -> dict[str, float]:
-    """Return median and equal-tailed 95 % credible interval."""
     tail = (1.0 - INTERVAL) / 2.0
     lo, median, hi = np.quantile(values, [tail, 0.5, 1.0 - tail])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
+    return Interval(float(median), float(lo), float(hi))
 
 
 def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
@@ -119,68 +114,3 @@ def _estimate(
     unit, factor = unit_of(posterior, name)
     ends = credible_interval(posterior.draws[name] * factor)
     return ParameterEstimate(**vars(ends), unit=unit, **vars(found or _FIXED))
-
-
-def parameter_entry(posterior: Posterior, name: str, found: Diagnosis | None) -> dict:
-    """Return a parameter as an entry of a summary; fixed ones have no diagnosis."""
-    unit, factor = unit_of(posterior, name)
-    entry = {"unit": unit, **interval(posterior.draws[name] * factor)}
-    if found is None:  # fixed by the gear file
-        return {
-            **entry,
-            "rhat": None,
-            "ess_bulk": None,
-            "ess_tail": None,
-            "driven_by": "prior",
-            "contraction": 0.0,
-        }
-    numbers = {name: _finite(value) for name, value in vars(found).items()}
-    return {**entry, **numbers}
-
-
-def _finite(value):
-    # JSON has no NaN: a statistic that could not be computed is null.
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
-def flat_directions(posterior: Posterior) -> list[str]:
-    """Return the sentences about what the data cannot tell apart."""
-    return [check.words for check in posterior.checks if check.outcome == "note"]
-
-
-def parameter_entries(posterior: Posterior) -> dict[str, dict]:
-    """Return every parameter's entry by name, those that were fixed last."""
-    names = [*posterior.diagnoses]
-    names += [n for n in posterior.priors if n in posterior.draws and n not in names]
-    return {
-        name: parameter_entry(posterior, name, posterior.diagnoses.get(name))
-        for name in names
-    }
-
-
-def warnings_of(posterior: Posterior) -> list[str]:
-    """Return the warnings of the checks as sentences."""
-    return [
-        check.words[:1].upper() + check.words[1:]
-        for check in posterior.checks
-        if check.outcome == "warning"
-    ]
-
-
-def sampling_entry(posterior: Posterior) -> dict:
-    """Return how the draws were come by."""
-    stats = posterior.tree["sample_stats"].to_dataset()
-    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
-    settings = {name: posterior.settings[name] for name in names}
-    return settings | {"divergences": int(stats["diverging"].sum())}
-
-
-def data_entry(posterior: Posterior) -> dict:
-    """Return which data it was."""
-    case = posterior.case
-    return {
-        "name": case.name,
-        "rows": len(case.records.force),
-        "sha256": case.data_sha256,
-        "notes": list(case.notes),
-    }

@@ -31,10 +31,18 @@ _SAMPLER = Picture(
 )
 
 
-def parameter_section(found: Mapping[str, ParameterEstimate]) -> Section:
+def failed_headline(reasons: Sequence[str]) -> str:
+    """Return that a calibration must not be used, and why."""
+    listed = "; ".join(reasons)
+    return f"This calibration failed its checks and must not be used: {listed}."
+
+
+def parameter_section(
+    found: Mapping[str, ParameterEstimate], *, brief: bool = True
+) -> Section:
     """Return the estimates with their figure, which is called priors."""
     note = Text("Intervals hold 95 % of the posterior, with equal tails.", soft=True)
-    return Section("Parameters", [parameter_table(found), note, _PRIORS], brief=True)
+    return Section("Parameters", [parameter_table(found), note, _PRIORS], brief)
 
 
 def parameter_table(found: Mapping[str, ParameterEstimate]) -> Table:

@@ -1,39 +1,29 @@
 """How a result was made: priors, sampling, versions, command."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
-from hdcal.report.words import label, number, prior_words, with_unit
+from hdcal.report.words import number, with_unit
 
 
-def prior_rows(posterior: Posterior) -> list[dict]:
-    """Return the priors as texts of a table's rows."""
-    shown = [name for name in posterior.priors if name in posterior.draws]
-    return [
-        {
-            "label": label(name),
-            "words": prior_words(name, posterior.priors[name]),
-            "source": posterior.priors[name].source or "the gear file",
-        }
-        for name in shown
-    ]
-
-
-def provenance_rows(posterior: Posterior, summary: dict, command: str) -> list:
+def provenance_rows(posterior: Posterior, command: str) -> list[tuple[str, str]]:
     """Return how a calibration was made, as pairs of name and words."""
-    sampling = summary["sampling"]
+    settings: Mapping[str, Any] = posterior.settings
     rows = [
         *gear_rows(posterior.case, posterior.theory),
         ("effects", ", ".join(effect.name for effect in posterior.effects) or "none"),
         (
             "sampling",
-            f"NUTS, {sampling['chains']} chains of {sampling['draws']} draws after "
-            f"{sampling['warmup']} of warm-up, seed {summary['seed']}",
+            f"NUTS, {settings['chains']} chains of {settings['draws']} draws after "
+            f"{settings['warmup']} of warm-up, seed {settings['seed']}",
         ),
-        ("seconds", f"{sampling['seconds']:.1f}"),
-        ("versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
+        ("seconds", f"{settings['seconds']:.1f}"),
+        ("versions", ", ".join(f"{k} {v}" for k, v in settings["versions"].items())),
     ]
     return rows + ([("command", command)] if command else [])
 

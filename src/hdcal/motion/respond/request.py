@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.errors import Finding, InputError
-from hdcal.physics.forcing import Chirp, Forcing, Sine, Step, Table
+from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Sine, Step
 
 SHAPES = ("step", "sine", "chirp")
 MOST_POINTS = 100_001
@@ -56,28 +56,34 @@ def make_request(
         findings.append(Finding(name, problem, remedy))
 
     if not 2 <= points <= MOST_POINTS:
-        find("--points", f"{points} is no usable number", f"Use 2 to {MOST_POINTS}")
+        find("points", f"{points} is no usable number", f"Use 2 to {MOST_POINTS}")
     if isinstance(drive, str) and drive not in SHAPES:
         known = ", ".join(SHAPES)
-        find("--force", f"'{drive[:60]}' is no known force", f"Use {known} or a table")
+        find("force", f"'{drive[:60]}' is no known force", f"Use {known} or a table")
     if not math.isfinite(amplitude) or amplitude == 0.0:
-        find("--amplitude", f"{amplitude:g} drives nothing", "Give a force in N")
+        find("amplitude", f"{amplitude:g} drives nothing", "Give a force in N")
     if duration is not None and not (math.isfinite(duration) and duration > 0.0):
-        find("--duration", f"{duration:g} s is not positive", "Give it in seconds")
+        find("duration", f"{duration:g} s is not positive", "Give it in seconds")
         duration = None
     if not isinstance(drive, str) and duration is not None:
-        find("--duration", "a sampled force has its own", "Leave it out")
+        find("duration", "a sampled force has its own", "Leave it out")
     length = duration or _DURATION
     tones = _tones(drive, frequency, length, points, find)
     if not isinstance(drive, str):
         _check_table(drive, find)
     if findings:
         raise InputError(findings)
+    return _request(drive, amplitude, tones, length, points)
+
+
+def _request(
+    drive: Drive, amplitude: float, tones: list[float], length: float, points: int
+) -> Request:
     if not isinstance(drive, str):
         time, force = (np.asarray(part, dtype=float) for part in drive)
         words = f"a sampled force of {len(time)} rows, linear between them"
         return Request(
-            Table(time, force), words, np.linspace(time[0], time[-1], points)
+            SampledForce(time, force), words, np.linspace(time[0], time[-1], points)
         )
     times = np.linspace(0.0, length, points)
     if drive == "step":
@@ -96,32 +102,35 @@ def _tones(drive, frequency, duration: float, points: int, find) -> list[float]:
     if len(given) != need:
         words, remedy = {
             0: ("such a force has no frequency", "Leave it out"),
-            1: ("a sine needs one frequency", "Write --frequency 5"),
-            2: ("a chirp needs its first and last", "Write --frequency 5:200"),
+            1: ("a sine needs one frequency", "Give it in Hz, such as 5"),
+            2: (
+                "a chirp needs its first and last",
+                "Give both in Hz",
+            ),
         }[need]
-        find("--frequency", words, remedy)
+        find("frequency", words, remedy)
         return []
     highest = 0.5 * (points - 1) / duration
     for tone in given:
         lowest = tone == 0.0 and need == 2
         if not (math.isfinite(tone) and (tone > 0.0 or lowest)):
-            find("--frequency", f"{tone:g} Hz is not positive", "Give it in hertz")
+            find("frequency", f"{tone:g} Hz is not positive", "Give it in hertz")
         elif tone > highest:
             words = f"{tone:g} Hz cannot be seen at {points} points in {duration:g} s"
-            remedy = f"Stay below {highest:g} Hz, or use more --points"
-            find("--frequency", words, remedy)
+            remedy = f"Stay below {highest:g} Hz, or use more points"
+            find("frequency", words, remedy)
     if need == 2 and given[0] == given[1]:
-        find("--frequency", "a chirp between equal frequencies is a sine", "Use sine")
+        find("frequency", "a chirp between equal frequencies is a sine", "Use sine")
     return given
 
 
 def _check_table(drive, find) -> None:
     time, force = (np.asarray(part, dtype=float) for part in drive)
     if time.shape != force.shape or time.ndim != 1 or len(time) < 2:
-        find("--force", "needs as many times as forces, two or more", "Mend the table")
+        find("force", "needs as many times as forces, two or more", "Mend the table")
     elif not (np.isfinite(time).all() and np.isfinite(force).all()):
-        find("--force", "holds what is no finite number", "Mend the table")
+        find("force", "holds what is no finite number", "Mend the table")
     elif np.any(np.diff(time) <= 0.0):
-        find("--force", "has times that do not rise", "Put them in order")
+        find("force", "has times that do not rise", "Put them in order")
     elif not np.any(force):
-        find("--force", "is zero throughout", "Give a force in N")
+        find("force", "is zero throughout", "Give a force in N")

@@ -6,20 +6,21 @@ damping are drawn from their priors, and the answer says so.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
 
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.answer import COLUMNS
+from hdcal.motion.respond.document import remarks
+from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
-from hdcal.motion.respond.remarks import drivers, remarks, tested_rows
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.physics.dynamics import acting, natural_frequency
-from hdcal.report.parameters import INTERVAL, interval
+from hdcal.report.parameters import INTERVAL, credible_interval
 
 _MOST_DRAWS = 10_000
 # More take minutes, and a band that long past its start says nothing new.
@@ -31,6 +32,7 @@ class Response:
     """The motion under a force; one entry per time.
 
     Attributes:
+        posterior: what the answer rests on.
         time_s: times.
         force_N: on the gear.
         deformation_lo_mm: lower end of the pointwise band of the deformation, as
@@ -50,6 +52,7 @@ class Response:
         remarks: what the reader must know, in sentences.
     """
 
+    posterior: Posterior
     time_s: np.ndarray
     force_N: np.ndarray
     deformation_lo_mm: np.ndarray
@@ -66,9 +69,14 @@ class Response:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
-        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
-        names += ("deformation_hi_mm", "tested")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
+
+    def _repr_html_(self) -> str:
+        from hdcal.motion.respond.document import response_document
+        from hdcal.motion.respond.summary import response_answer
+        from hdcal.report.html import notebook_html
+
+        return notebook_html(response_document(self, response_answer(self)))
 
 
 def respond(
@@ -109,10 +117,19 @@ def respond(
         InputError: what was asked makes no sense.
     """
     posterior.require_usable()
-    request = _checked(
-        partial(make_request, force, amplitude, frequency, duration, points),
-        _problems(posterior, temperature, mass, damping, draws),
-    )
+    with Findings() as wrong:
+        request = wrong.attempt(
+            make_request, force, amplitude, frequency, duration, points
+        )
+        wrong += _problems(posterior, temperature, mass, damping, draws)
+    assert request is not None
+    return _move(posterior, request, temperature, mass, damping, draws, seed)
+
+
+def _move(
+    posterior: Posterior, request: Request, temperature, mass, damping, draws, seed
+) -> Response:
+    """Integrate every gear of the posterior, and say what its motion rests on."""
     at = _temperature(posterior) if temperature is None else float(temperature)
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
@@ -124,11 +141,12 @@ def respond(
     lo, middle, hi = _band(states[..., 0], done)
     facts["peak_mm"] = np.abs(states[..., 0]).max(axis=1)
     estimates = {
-        name: {**interval(facts[name]), "driven_by": driver}
+        name: {**vars(credible_interval(facts[name])), "driven_by": driver}
         for name, driver in drivers(posterior, mass, damping).items()
     }
     tested = tested_rows(posterior, at, lo, hi)
     return Response(
+        posterior,
         request.times,
         np.asarray(jax.vmap(request.force)(request.times)),
         lo,
@@ -141,7 +159,7 @@ def respond(
         len(done),
         tuple(effect.name for effect in kept),
         tuple(effect.name for effect in left),
-        remarks(posterior, request.times, estimates, kept, left, tested),
+        tuple(remarks(posterior, request.times, estimates, kept, left, tested)),
     )
 
 
@@ -167,17 +185,6 @@ def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
     return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
 
 
-def _checked(make, findings: list[Finding]) -> Request:
-    """Return the request; raise with its findings and the others at once."""
-    try:
-        request = make()
-    except InputError as error:
-        raise InputError([*error.findings, *findings]) from None
-    if findings:
-        raise InputError(findings)
-    return request
-
-
 def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
     findings = []
 
@@ -185,25 +192,25 @@ def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
         findings.append(Finding(name, problem, remedy))
 
     if mass is not None and not (np.isfinite(mass) and mass > 0.0):
-        find("--mass-kg", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
+        find("mass", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
     if damping is not None and not (np.isfinite(damping) and damping >= 0.0):
         words = f"{damping:g} N·s/mm is no damping"
-        find("--damping", words, "Give zero or more")
+        find("damping", words, "Give zero or more")
     if isinstance(posterior, DynamicPosterior):
-        for name, value in (("--mass-kg", mass), ("--damping", damping)):
+        for name, value in (("mass", mass), ("damping", damping)):
             if value is not None:
                 words = "this calibration of the moving gear knows it already"
                 find(name, words, "Leave it out")
     if not 20 <= draws <= _MOST_DRAWS:
-        find("--draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
+        find("draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
     if temperature is not None:
         gear = posterior.case.gear
         rise = abs(temperature - gear.reference_temperature)
         if not np.isfinite(temperature) or temperature < -273.15:
-            find("--temperature", "is below absolute zero", "Give it in °C")
+            find("temperature", "is below absolute zero", "Give it in °C")
         elif np.median(posterior.draws["alpha"]) * rise >= 0.5:
             words = "the linear law E(T) would lose half of Young's modulus"
-            find("--temperature", words, "Give it in °C")
+            find("temperature", words, "Give it in °C")
     return findings
 
 
@@ -217,12 +224,12 @@ def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> 
     static = float(request.force.largest()) / np.median(values["stiffness"])
     if static >= limit:
         words = f"would deform the gear by {static:.3g} mm even at rest"
-        findings.append(Finding("--force", words, "Give the force in N"))
+        findings.append(Finding("force", words, "Give the force in N"))
     seconds = float(request.times[-1] - request.times[0])
     swings = seconds * float(np.max(natural_frequency(mass, values["stiffness"])))
     if swings > _MOST_SWINGS:
         words = f"{seconds:g} s are up to {swings:.2g} swings of the gear"
         remedy = f"Ask for at most {_MOST_SWINGS:g} swings, and give times in s"
-        findings.append(Finding("--duration", words, remedy))
+        findings.append(Finding("duration", words, remedy))
     if findings:
         raise InputError(findings)

@@ -1,0 +1,52 @@
+"""A check in words: the only place of its sentences."""
+
+from collections.abc import Iterator
+
+from hdcal.calibration.check.answer import CheckAnswer, Ends
+from hdcal.report.document import Document, Facts, Section
+
+HEADLINE = "The input is in order."
+_MOST_LISTED = 8
+
+
+def check_document(found: CheckAnswer) -> Document:
+    """Return the report of a check.
+
+    Args:
+        found: from `check_answer`.
+    """
+    return Document(
+        name=found.case,
+        kind="check",
+        subtitle="what was read",
+        headline=found.headline,
+        sections=[Section("Data and gear", [Facts(list(_facts(found)))], brief=True)],
+    )
+
+
+def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
+    data, gear = found.data, found.gear
+    yield "gear", f"{gear.name}, {gear.material}, theory {gear.theory}"
+    yield "rows", str(data.rows)
+    for what, labels in (("runs", data.runs), ("specimens", data.specimens)):
+        if len(labels) > 1:
+            rest = ", …" if len(labels) > _MOST_LISTED else ""
+            yield what, f"{len(labels)}: {', '.join(labels[:_MOST_LISTED])}{rest}"
+    way = f"{gear.deformation}, as read"
+    yield "deformation", f"{_span(data.deformation_mm)} mm ({way})"
+    yield "force", f"{_span(data.force_N)} N"
+    measured = "" if data.temperature_measured else " (not measured: the reference)"
+    yield "temperature", f"{_span(data.temperature_C)} °C{measured}"
+    moves = vars(data.direction).items()
+    yield "direction", ", ".join(f"{many} {word}" for word, many in moves if many)
+    yield "also known", ", ".join(data.known) or "–"
+    yield "effects to test", ", ".join(found.effects.testable)
+    for name, lack in found.effects.not_testable.items():
+        yield "not testable", f"{name}: needs {', '.join(lack)}"
+    for note in found.notes:
+        yield "note", note
+
+
+def _span(ends: Ends) -> str:
+    low, high = (f"{end:g}" for end in ends)
+    return low if low == high else f"{low} … {high}"

@@ -1,0 +1,70 @@
+"""A case that was read, as an answer."""
+
+import numpy as np
+
+from hdcal.calibration.check.answer import (
+    CheckAnswer,
+    CheckedData,
+    CheckedGear,
+    EffectsInReach,
+    Ends,
+    RowsByMovement,
+)
+from hdcal.calibration.check.document import HEADLINE
+from hdcal.data.case import Case
+from hdcal.physics.registry import EFFECTS
+
+
+def check_answer(case: Case) -> CheckAnswer:
+    """Return what was understood of a case, ready for JSON.
+
+    Args:
+        case: from `read_case`.
+    """
+    gear, records = case.gear, case.records
+    lacking = {
+        name: tuple(sorted(effect.needs - records.known))
+        for name, effect in EFFECTS.items()
+    }
+    return CheckAnswer(
+        status="ok",
+        reasons=(),
+        headline=HEADLINE,
+        next_step=None,
+        case=case.name,
+        gear=CheckedGear(
+            name=gear.name,
+            material=gear.material,
+            theory=gear.theory,
+            deformation=gear.reading,
+            reference_temperature_C=gear.reference_temperature,
+            force_resolution_N=gear.force_resolution or None,
+        ),
+        data=_data(case),
+        effects=EffectsInReach(
+            testable=tuple(name for name, lack in lacking.items() if not lack),
+            not_testable={name: lack for name, lack in lacking.items() if lack},
+        ),
+        notes=case.notes,
+    )
+
+
+def _data(case: Case) -> CheckedData:
+    records = case.records
+    rows = [int(np.count_nonzero(records.direction == sign)) for sign in (1, 0, -1)]
+    return CheckedData(
+        rows=len(records.force),
+        runs=case.run_labels,
+        specimens=case.specimen_labels,
+        deformation_mm=_ends(records.deformation),
+        force_N=_ends(records.force),
+        temperature_C=_ends(records.temperature),
+        temperature_measured="temperature" in records.known,
+        direction=RowsByMovement(*rows),
+        known=tuple(sorted(records.known)),
+        sha256=case.data_sha256,
+    )
+
+
+def _ends(values) -> Ends:
+    return float(np.min(values)), float(np.max(values))

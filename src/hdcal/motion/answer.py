@@ -1,0 +1,35 @@
+"""The JSON answer of a dynamic calibration: what each number in it is."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from hdcal.report.answer import Promise, Sentences
+from hdcal.report.parameters import Interval, ParameterEstimate
+from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
+
+_ALWAYS = ["K", "E0", "alpha", "mass", "damping_ratio", "deformation_offset"]
+_ALWAYS += ["initial_deformation", "initial_velocity", "deformation_sigma"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DynamicCalibrationAnswer(PosteriorAnswer):
+    """What `hdcal calibrate --dynamic` answers; summary.json.
+
+    Attributes:
+        damping_N_s_per_mm: c, at the temperature of the test, as all below.
+        damping_ratio: ζ.
+        natural_frequency_Hz: without damping.
+        damped_frequency_Hz: with it.
+        assumptions: what the model takes for granted, in sentences.
+    """
+
+    schema: Literal["hdcal.dynamic-calibration/1"] = "hdcal.dynamic-calibration/1"
+    parameters: Annotated[
+        dict[str, ParameterEstimate],
+        Promise(required=_ALWAYS, propertyNames=PARAMETER_NAMES),
+    ]
+    damping_N_s_per_mm: Interval
+    damping_ratio: Interval
+    natural_frequency_Hz: Interval
+    damped_frequency_Hz: Interval
+    assumptions: Sentences

@@ -1,0 +1,84 @@
+"""Bands of the calibrated model around the record that it was calibrated with."""
+
+from dataclasses import dataclass, fields
+
+import jax
+import numpy as np
+
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.dynamic_problem import DynamicProblem, predict_motion
+from hdcal.report.parameters import INTERVAL
+
+# Draws from which the bands of a record are made.
+_DRAWS = 1000
+
+
+@dataclass(frozen=True)
+class MotionBands:
+    """A calibrated record with equal-tailed 95 % bands; one entry per row.
+
+    Attributes:
+        time_s: since the first row.
+        force_N: as read: the input.
+        deformation_mm: as read: the output.
+        mean_lo_mm: credible band of the mean reading.
+        mean_median_mm: its median.
+        mean_hi_mm: its upper end.
+        new_measurement_lo_mm: predictive band of one more reading.
+        new_measurement_hi_mm: its upper end.
+        usable: the calibration passed its checks.
+    """
+
+    time_s: np.ndarray
+    force_N: np.ndarray
+    deformation_mm: np.ndarray
+    mean_lo_mm: np.ndarray
+    mean_median_mm: np.ndarray
+    mean_hi_mm: np.ndarray
+    new_measurement_lo_mm: np.ndarray
+    new_measurement_hi_mm: np.ndarray
+    usable: np.ndarray
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns in the order of motion.csv."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+
+@jax.jit
+def _predict(problem: DynamicProblem, values, key):
+    keys = jax.random.split(key, len(values["mass"]))
+
+    def one(value, key):
+        mean = predict_motion(problem, value)
+        # The same quantile in every row: bands are row by row, and smooth so.
+        return mean, mean + value["deformation_sigma"] * jax.random.normal(key)
+
+    return jax.vmap(one)(values, keys)
+
+
+def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
+    """Return the record that was calibrated with the bands of the model around it.
+
+    Args:
+        posterior: from `calibrate_dynamic`.
+        seed: of the new readings' noise.
+    """
+    problem, draws = posterior.moving, posterior.draws
+    rows = np.linspace(0, len(draws["mass"]) - 1, _DRAWS).astype(int)
+    values = {name: draw[rows] for name, draw in draws.items()}
+    mean, new = _predict(problem, values, jax.random.key(seed))
+    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
+    real = slice(problem.count)
+    low, middle, high = np.quantile(mean[:, real], tails, axis=0)
+    new_low, _, new_high = np.quantile(new[:, real], tails, axis=0)
+    return MotionBands(
+        np.asarray(problem.time[real]),
+        np.asarray(problem.force[real]),
+        np.asarray(problem.deformation[real]),
+        low,
+        middle,
+        high,
+        new_low,
+        new_high,
+        np.full(problem.count, posterior.usable),
+    )

@@ -1,0 +1,53 @@
+"""What a response rests on: data, priors or what was given; and where it was tested."""
+
+import numpy as np
+
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.posterior import Posterior
+
+# How far beyond the data still counts as tested [K]: thermometers are no better.
+_NEAR_K = 1.0
+
+
+def drivers(posterior: Posterior, mass, damping) -> dict[str, str]:
+    """Say of each quantity whether data, a prior or the user decided it."""
+    of = {name: found.driven_by for name, found in posterior.diagnoses.items()}
+    stiffness = of.get("K", "prior")
+    if isinstance(posterior, DynamicPosterior):
+        m, z = of.get("mass", "prior"), of.get("damping_ratio", "prior")
+        both = "data" if (m, z) == ("data", "data") else "prior"
+        frequency, c = m, both
+    else:
+        m = "prior" if mass is None else "given"
+        c = "prior" if damping is None else "given"
+        # With the mass given, what is left to know of the frequency is the stiffness.
+        frequency = "prior" if mass is None else stiffness
+        z = "prior" if "prior" in (m, c) else stiffness
+        both = z
+    return {
+        "mass_kg": m,
+        "damping_N_s_per_mm": c,
+        "damping_ratio": z,
+        "stiffness_N_per_mm": stiffness,
+        "natural_frequency_Hz": frequency,
+        "damped_frequency_Hz": "prior" if "prior" in (frequency, z) else "data",
+        "peak_mm": both,
+    }
+
+
+def tested_rows(posterior: Posterior, temperature: float, lo, hi) -> np.ndarray:
+    """Return where a band lies within what was calibrated.
+
+    Args:
+        posterior: with its records.
+        temperature: of the gear [°C].
+        lo: lower end of the band of the deformation from the unloaded gear [mm].
+        hi: its upper end.
+    """
+    records = posterior.case.records
+    zero = float(np.median(posterior.draws["deformation_offset"]))
+    low = min(0.0, float(np.min(records.deformation)) - zero)
+    high = float(np.max(records.deformation)) - zero
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    inside = (lo >= low - 1e-9) & (hi <= high + 1e-9)
+    return inside & bool(cold - _NEAR_K <= temperature <= warm + _NEAR_K)

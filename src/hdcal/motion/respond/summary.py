@@ -1,0 +1,51 @@
+"""A response as an answer: the numbers and words of response.json."""
+
+import numpy as np
+
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.motion.respond.answer import (
+    QuantityEstimate,
+    ResponseAnswer,
+    ResponseWithColumns,
+)
+from hdcal.motion.respond.document import headline, next_steps
+from hdcal.motion.respond.respond import Response
+from hdcal.report.parameters import INTERVAL
+
+
+def response_answer(response: Response) -> ResponseAnswer:
+    """Return a response without its rows as an answer, ready for JSON.
+
+    Args:
+        response: from `respond`.
+    """
+    posterior = response.posterior
+    moving = isinstance(posterior, DynamicPosterior)
+    estimates = {n: QuantityEstimate(**one) for n, one in response.estimates.items()}
+    steps = next_steps(posterior, estimates)
+    return ResponseAnswer(
+        status="ok",
+        reasons=(),
+        headline=headline(estimates["peak_mm"]),
+        next_step=steps[0] if steps else None,
+        gear=posterior.case.gear.name,
+        calibration="moving" if moving else "at rest",
+        force=response.request.words,
+        temperature_C=response.temperature_C,
+        estimates=estimates,
+        interval=INTERVAL,
+        interval_kind="equal-tailed pointwise credible band of the deformation of "
+        "gears like the tested one, without reading noise",
+        tested_share=float(np.mean(response.tested)),
+        effects=response.effects,
+        left_out=response.left_out,
+        remarks=response.remarks,
+        draws=response.draws,
+        points=len(response.time_s),
+    )
+
+
+def with_columns(found: ResponseAnswer, response: Response) -> ResponseWithColumns:
+    """Return the answer with the rows beside it."""
+    columns = {name: rows.tolist() for name, rows in response.columns().items()}
+    return ResponseWithColumns(**vars(found), columns=columns)
