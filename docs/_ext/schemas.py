@@ -23,7 +23,7 @@ def answers() -> dict[str, type[Answer]]:
     waiting, found = [Answer], {}
     for answer in waiting:  # grows while it is walked along
         waiting += answer.__subclasses__()
-        schema = getattr(answer, "schema", None)
+        schema = vars(answer).get("schema")
         if isinstance(schema, str):
             assert schema not in found, f"two answers are called {schema}"
             found[schema] = answer

@@ -224,8 +224,8 @@ def dense_log_likelihood(problem, case, values):
         centring = np.eye(problem.specimens) - 1.0 / problem.specimens
         own = centring[records.specimen][:, records.specimen]
         covariance += values["specimen_sd"] ** 2 * np.outer(elastic, elastic) * own
-    if "gap" in problem.integrated:
-        basis = np.asarray(problem.gap.columns(records.deformation))
+    if "discrepancy" in problem.integrated:
+        basis = np.asarray(problem.discrepancy.columns(records.deformation))
         sd = np.asarray(prior_sd(values["gap_sd"], values["gap_length"]))
         covariance += (basis * sd**2) @ basis.T
     law = stats.multivariate_normal(np.zeros(rows), covariance)
@@ -260,8 +260,8 @@ def structured(request, program, gear):
 def rows_form(problem, case):
     """Return the same problem with its rows kept."""
     columns = None
-    if problem.gap is not None:
-        columns = problem.gap.columns(case.records.deformation)
+    if problem.discrepancy is not None:
+        columns = problem.discrepancy.columns(case.records.deformation)
     return dataclasses.replace(
         problem, records=case.records, blocks=None, columns=columns
     )
@@ -289,7 +289,7 @@ def test_drawn_members_explain_the_data(structured):
     names = {
         "run": "run_offset",
         "specimen": "specimen_deviation",
-        "gap": "gap_weights",
+        "discrepancy": "gap_weights",
     }
     assert set(drawn) == {names[kind] for kind in problem.integrated}
     for name in set(drawn) - {"gap_weights"}:
@@ -325,7 +325,7 @@ def members_of(problem, drawn):
     if "specimen" in problem.integrated:
         own = drawn["specimen_deviation"]
         parts.append(contrasts(problem.specimens).T @ own)
-    if "gap" in problem.integrated:
+    if "discrepancy" in problem.integrated:
         parts.append(drawn["gap_weights"])
     return np.concatenate(parts)
 

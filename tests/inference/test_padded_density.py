@@ -55,11 +55,11 @@ def case_of(*, runs=1, specimens=1, sds=(0.0,), resolution=0.0):
 def values_of(problem, seed=0) -> dict:
     """Return parameters and members, all of them away from their nulls."""
     values = draw_truth(problem, jax.random.key(seed)) | {"sigma": np.float64(0.7)}
-    rng = np.random.default_rng(seed)
+    rng, basis = np.random.default_rng(seed), 20 if problem.discrepancy else 0
     members = {
         "run_offset": rng.normal(0.0, 1.0, problem.runs),
         "specimen_deviation": rng.normal(0.0, 0.02, problem.specimens),
-        "gap_weights": rng.normal(0.0, 0.3, 20 if problem.gap is not None else 0),
+        "gap_weights": rng.normal(0.0, 0.3, basis),
     }
     return values | {name: size for name, size in members.items() if len(size)}
 
@@ -67,8 +67,8 @@ def values_of(problem, seed=0) -> dict:
 def bare(problem, case):
     """Return the same problem with its rows as they were measured."""
     columns = None
-    if problem.gap is not None:
-        columns = np.asarray(problem.gap.columns(case.records.deformation))
+    if problem.discrepancy is not None:
+        columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
     return dataclasses.replace(
         problem, records=case.records, columns=columns, blocks=None
     )
@@ -205,7 +205,7 @@ def test_derivatives_of_measured_rows_are_those_without_padding():
     effects = of_stage("force")
     problem = build_problem(case, effect_priors(), effects, with_gap=True)
     values = values_of(problem)
-    columns = np.asarray(problem.gap.columns(case.records.deformation))
+    columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
     found = linearise(problem, values, case.records)
     _, noise = density.predict_rows(problem, values, case.records, columns)
     np.testing.assert_allclose(found.sd, noise.sd[0], rtol=1e-14)

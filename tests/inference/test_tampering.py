@@ -9,7 +9,7 @@ import pytest
 from posteriors import batch
 
 from hdcal.errors import InputError
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.posterior import Posterior
 
 CHANGED = "was changed after hdcal wrote it"
@@ -34,7 +34,9 @@ def test_an_unchanged_file_is_taken_and_keeps_its_digest(file: Path, tmp_path: P
     # Written again by whoever read it, it is the same once more.
     again = tmp_path / "again.nc"
     first.save(again)
-    assert archive.digest(Posterior.load(again).tree) == archive.digest(first.tree)
+    assert posterior_file.digest(Posterior.load(again).tree) == posterior_file.digest(
+        first.tree
+    )
 
 
 def edit_number(file: h5py.File) -> None:
@@ -102,7 +104,7 @@ def test_every_edit_is_found(copy: Path, edit):
 
 
 def test_an_edit_through_xarray_is_found(copy: Path):
-    tree = archive.open_tree(copy)
+    tree = posterior_file.open_tree(copy)
     tree["posterior"]["K"][0, 0] += 0.1
     tree.to_netcdf(copy, mode="w", engine="h5netcdf")
     with pytest.raises(InputError, match=CHANGED):
@@ -111,7 +113,7 @@ def test_an_edit_through_xarray_is_found(copy: Path):
 
 def test_a_file_without_digest_is_an_older_one(copy: Path):
     with h5py.File(copy, "r+") as opened:
-        del opened.attrs[archive.DIGEST]
+        del opened.attrs[posterior_file.DIGEST]
     with pytest.raises(InputError, match="an older version of hdcal"):
         Posterior.load(copy)
 

@@ -1,5 +1,7 @@
 """The response of a calibrated gear: right for every draw, honest about its priors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from moving import TRUTH, motion, still_posterior
@@ -83,6 +85,16 @@ def test_effects_of_the_moment_go_along_and_others_are_named():
 def test_what_swings_faster_than_the_points_is_told():
     found = respond(still_posterior(), "step", **KNOWN, **{**SMALL, "duration": 0.5})
     assert any("more points" in words for words in found.remarks)
+
+
+def test_a_notebook_shows_the_answer_and_harmless_names():
+    posterior = still_posterior()
+    gear = replace(posterior.case.gear, name="<script>alert(1)</script>")
+    posterior = replace(posterior, case=replace(posterior.case, gear=gear))
+    cell = respond(posterior, "step", **SMALL)._repr_html_()
+    assert "The deformation reaches" in cell and "decided by" in cell
+    assert "there the prior is the answer" in cell
+    assert "&lt;script&gt;" in cell and "<script" not in cell
 
 
 def test_nothing_follows_from_a_failed_calibration():

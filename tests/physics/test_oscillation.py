@@ -18,7 +18,7 @@ from hdcal.physics.dynamics import (
     natural_frequency,
     ring_mass,
 )
-from hdcal.physics.forcing import Chirp, Sine, Step, Table
+from hdcal.physics.forcing import Chirp, SampledForce, Sine, Step
 from hdcal.physics.linear_response import linear_response
 from hdcal.physics.theory import ring
 
@@ -109,7 +109,7 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     force = rng.normal(0.0, 40.0, 80)
     parts = (MASS, gear(ratio).damping, STIFFNESS)
     exact = exact_response(*parts, time, force, np.zeros(2))
-    found = move(gear(ratio), Table(time, force), time)
+    found = move(gear(ratio), SampledForce(time, force), time)
     assert worst(found[:, 0], exact[:, 0]) < 1e-6
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
 
@@ -141,7 +141,9 @@ def test_a_sweep_passes_through_its_frequencies():
 def test_dry_friction_takes_the_same_from_every_swing():
     # Free decay: a swing loses 2 F_c/k from peak to peak on the other side.
     friction = EFFECTS["coulomb_friction"](force=2.0)
-    release = Table(np.array([0.0, 0.2, 0.2001, 0.21]), np.array([0.0, 60.0, 0.0, 0.0]))
+    release = SampledForce(
+        np.array([0.0, 0.2, 0.2001, 0.21]), np.array([0.0, 60.0, 0.0, 0.0])
+    )
     times = np.linspace(0.2001, 0.206, 2000)
     swing = np.asarray(move(gear(0.0, (friction,)), release, np.r_[0.0, times])[1:, 0])
     inner = (np.diff(np.sign(np.diff(swing))) != 0).nonzero()[0] + 1

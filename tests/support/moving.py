@@ -9,7 +9,7 @@ from rigs import make_case, make_gear, make_records
 
 from hdcal import EFFECTS, Posterior
 from hdcal.data.priors import dynamic_priors, effect_priors
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import problem_priors, unit_stiffness
@@ -105,7 +105,7 @@ def still_posterior(effects: dict | None = None, *, usable: bool = True, **sprea
         {
             "posterior": draws,
             "observed_data": {"force": records.force},
-            "constant_data": archive.covariates(records),
+            "constant_data": posterior_file.covariates(records),
         }
     )
     driven = Diagnosis(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")

@@ -9,7 +9,7 @@ from rigs import make_case, make_records
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.posterior import Posterior, versions
@@ -38,11 +38,11 @@ def written_posterior(
             "prior": {name: v[:1] for name, v in shaped.items() if v.ndim == 2},
             "sample_stats": stats,
             "observed_data": {"force": np.asarray(case.records.force)},
-            "constant_data": archive.covariates(case.records),
+            "constant_data": posterior_file.covariates(case.records),
         },
         dims={
             "force": ["row"],
-            **{name: ["row"] for name in archive.UNITS},
+            **{name: ["row"] for name in posterior_file.UNITS},
             "run_offset": ["run_label"],
             "specimen_deviation": ["specimen_label"],
             "gap_weights": ["basis"],

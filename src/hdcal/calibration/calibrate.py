@@ -15,7 +15,7 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import rounding_check
 from hdcal.inference.density import MEMBER_SD, MEMBERS
 from hdcal.inference.executables import bound_executables
-from hdcal.inference.flat_directions import beside_members
+from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
@@ -118,9 +118,7 @@ def calibrate(
     registry: Mapping[str, type[Effect]] = EFFECTS,
     progress: Progress | None = None,
 ) -> Posterior:
-    """Calibrate the force model against a case.
-
-    The result depends on the arguments only: the same seed gives the same draws.
+    """Calibrate the force model against a case; the same seed gives the same draws.
 
     Args:
         case: from `read_case`.
@@ -145,17 +143,16 @@ def calibrate(
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
     check_effect_priors(case, registry)
-    theory = theory or case.gear.theory
-    shipped = effect_priors()
-    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
+    theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
+    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
     of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
     whitening = laplace.fit(problem, of_fit)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
-    settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
+    settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
     settings["seconds"] = round(time.perf_counter() - began, 3)
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
@@ -171,15 +168,15 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
-            name: beside_members(slope / near.sd, members)
+            name: remove_members(slope / near.sd, members)
             for name, slope in near.slopes.items()
         },
-        mixed=_beside_parameters(problem, found),
+        mixed=_other_quantities(problem, found),
         checks=[rounding_check(float(problem.step), problem.rounded, sigma)],
     )
 
 
-def _beside_parameters(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
+def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     """Return what else must have mixed: the headline, and members that were sampled."""
     others = {"stiffness": found.values["stiffness"]}
     for kind, name in MEMBERS.items():

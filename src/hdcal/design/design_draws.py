@@ -133,7 +133,7 @@ class Basis:
                 f"The calibrated {', '.join(force).replace('_', ' ')} is carried over "
                 "to other sizes as it is."
             )
-        if self.problem.gap is not None:
+        if self.problem.discrepancy is not None:
             words.append("The leftover discrepancy is taken to grow with stiffness.")
         return words
 
@@ -268,7 +268,7 @@ def _bare_problem(gear: Gear) -> Problem:
         records=None,
         blocks=None,
         columns=None,
-        gap=None,
+        discrepancy=None,
         step=0.0,
         effects=(),
         rounded=False,

@@ -34,8 +34,8 @@ from hdcal.design.sentences import (
 )
 from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
-from hdcal.prediction.margin.answer import GearModel
 from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.posterior_answer import CalibratedGear
 
 D = TypeVar("D", bound=DesignAnswer)
 
@@ -48,7 +48,7 @@ def origin(basis: Basis, interval: float, interval_kind: str) -> dict[str, Any]:
         "headline": "",
         "next_step": None,
         "answer": (),
-        "gear": GearModel(basis.gear.name, basis.gear.material, basis.theory),
+        "gear": CalibratedGear(basis.gear.name, basis.gear.material, basis.theory),
         "basis": basis.kind,
         "draws": basis.size,
         "interval": interval,

@@ -18,13 +18,13 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.density import densities
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
 from hdcal.inference.posterior import versions
 from hdcal.inference.posterior_tree import build_tree
 from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.sample import Draws
+from hdcal.inference.sampled_problem import Sampled
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Specifics:
     Attributes:
         log_likelihood: by observed column, as `build_tree` takes it.
         slopes: of the mean reading by parameter, in noise sds.
-        mixed: what must have mixed beside the parameters, (chain, draw) each.
+        mixed: what else must have mixed, (chain, draw) each.
         checks: further ones.
         observed: columns of the records that the model explains.
     """
@@ -87,5 +87,5 @@ def assemble(
 
 
 def run_settings(found: Draws) -> dict[str, object]:
-    """Return what the file says of a run beside what was asked for."""
+    """Return what the file says of a run that was not asked for."""
     return {"target_acceptance": found.target_acceptance, "versions": versions()}

@@ -5,13 +5,19 @@ than the triangular factor of [X y] and their number:
 ‖y − X c‖² = ‖R (c, −1)‖².
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.data.records import Array
-from hdcal.inference.padding import append_zeros, bucket_size
+from hdcal.data.records import Array, Records
+from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
+from hdcal.inference.padding import append_zeros, bucket_size, pad_records
+
+# Up to this many rows of triangular factors cost little, whatever they replace.
+_MANY_FACTOR_ROWS = 10_000
 
 
 class CompressedRows(eqx.Module):
@@ -71,6 +77,37 @@ def compress(columns, force, distinct, group) -> CompressedRows:
     )
     same_sd = (distinct[:, 2] == distinct[0, 2]).all()
     return rows if same_sd else append_zeros(rows, bucket_size(len(distinct)))
+
+
+def keep_or_compress(
+    records: Records, base_columns, discrepancy: Discrepancy | None, *, keep: bool
+) -> dict[str, Any]:
+    """Return the fields of a problem that hold its rows, kept or compressed.
+
+    Args:
+        records: the measured rows.
+        base_columns: of the base model, shape (n, 4).
+        discrepancy: of the problem, or None.
+        keep: whether the rows must be kept.
+    """
+    padded, count = pad_records(records), len(records.force)
+    columns = discrepancy_columns(discrepancy, padded.deformation)
+    if not keep:
+        own = [] if columns is None else [columns[:count]]
+        blocks = _compress_if_smaller(records, np.hstack([base_columns, *own]))
+        if blocks is not None:
+            return {"records": None, "columns": None, "blocks": blocks, "count": count}
+    return {"records": padded, "columns": columns, "blocks": None, "count": count}
+
+
+def _compress_if_smaller(records: Records, design) -> CompressedRows | None:
+    """Return the rows compressed, or None where that would be no smaller."""
+    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
+    # One factor per row (an sd of its own in each) would be larger than the rows.
+    factor_rows = len(distinct) * (design.shape[1] + 1)
+    if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
+        return None
+    return compress(design, records.force, distinct, group)
 
 
 def residual(

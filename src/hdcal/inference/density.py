@@ -11,13 +11,13 @@ from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_offsets import Linear, contrasts
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import (
     Base,
     linear_coefficients,
@@ -33,7 +33,7 @@ POSITIVE = frozenset({"E0", "mass", "damping_ratio", "deformation_sigma"})
 MEMBERS = {
     "run": "run_offset",
     "specimen": "specimen_deviation",
-    "gap": "gap_weights",
+    "discrepancy": "gap_weights",
 }
 # The site of the spread of those that are labels in the data.
 MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
@@ -89,7 +89,7 @@ def predict_rows(
         problem: structure.
         values: parameters of one draw.
         records: the rows.
-        columns: basis of the gap at the rows, or None.
+        columns: basis of the discrepancy at the rows, or None.
     """
     base = member_base(problem, values, records.run, records.specimen)
     mean, noise = predict_reading(
@@ -152,7 +152,7 @@ def linear_part(problem: Problem, values: Values) -> Linear:
         scale.append(jnp.full(problem.runs - 1, values["run_offset_sd"]))
     if "specimen" in problem.integrated:
         scale.append(jnp.full(problem.specimens - 1, values["specimen_sd"]))
-    if "gap" in problem.integrated:
+    if "discrepancy" in problem.integrated:
         scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
     if problem.blocks is not None:
         return _linear_blocks(problem, problem.blocks, values, jnp.concatenate(scale))
@@ -166,7 +166,7 @@ def _linear_rows(problem: Problem, values: Values, scale) -> Linear:
     design = []
     if "run" in problem.integrated:
         design.append(contrasts(problem.runs)[records.run])
-    if "gap" in problem.integrated:
+    if "discrepancy" in problem.integrated:
         design.append(problem.columns)
     real = measured(len(sd), problem.count)
     return Linear(
@@ -194,9 +194,9 @@ def _linear_blocks(
         slope = jnp.zeros(width - 1)
         slope = slope.at[:_CORE].set(linear_coefficients(base, problem.reading))
         design.append(slope[None, :, None] * rows[:, None, :])
-    if "gap" in problem.integrated:
-        gap = jnp.eye(width - 1)[:, _CORE:]
-        design.append(jnp.broadcast_to(gap, (groups, *gap.shape)))
+    if "discrepancy" in problem.integrated:
+        basis = jnp.eye(width - 1)[:, _CORE:]
+        design.append(jnp.broadcast_to(basis, (groups, *basis.shape)))
     variance = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
     mapped = jnp.einsum(
         "gij,gjk->gik", blocks.factor[..., :-1], jnp.concatenate(design, axis=-1)
@@ -215,7 +215,7 @@ def _linear_blocks(
 def _block_coefficients(
     problem: Problem, blocks: compress.CompressedRows, values: Values
 ) -> Float[Array, "g p"]:
-    """Return the coefficients of each block, those of the gap zero."""
+    """Return the coefficients of each block, those of the discrepancy zero."""
     base = member_base(problem, values, blocks.run, blocks.specimen)
     core = linear_coefficients(base, problem.reading)
     core = jnp.broadcast_to(core, (len(blocks.count), _CORE))
@@ -241,7 +241,7 @@ def _(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
     if "specimen" in problem.integrated:
         own = weights[used : used + problem.specimens - 1]
         drawn["specimen_deviation"] = contrasts(problem.specimens) @ own
-    if "gap" in problem.integrated:
+    if "discrepancy" in problem.integrated:
         drawn["gap_weights"] = weights[-BASIS_SIZE:]
     return drawn
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from hdcal.errors import Finding, InputError
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.problem import Problem
@@ -45,6 +45,6 @@ def load_any(path: Path | str) -> Posterior:
     """
     file = Path(path)
     file = file / FILE_NAME if file.is_dir() else file
-    described = str(archive.open_tree(file).attrs.get("model", ""))
+    described = str(posterior_file.open_tree(file).attrs.get("model", ""))
     kind = DynamicPosterior if '"kind": "dynamic"' in described else Posterior
     return kind.load(path)

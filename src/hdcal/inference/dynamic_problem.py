@@ -16,11 +16,16 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import Values, log_likelihood
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.distributions import scaled
 from hdcal.inference.model import model, sample_influence, sample_site
 from hdcal.inference.padding import measured, pad_records
-from hdcal.inference.problem import bare, case_reading, influence_prior, unit_stiffness
+from hdcal.inference.problem import (
+    case_reading,
+    influence_prior,
+    unit_stiffness,
+    without_texts,
+)
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.linear_response import linear_response
 
@@ -103,7 +108,7 @@ def build_dynamic(case: Case, priors: Mapping[str, Prior], theory: Theory):
     time = np.asarray(records.time) - records.time[0]
     beyond = np.arange(1, len(padded.force) - count + 1) * (time[-1] - time[-2])
     return DynamicProblem(
-        priors=bare(priors),
+        priors=without_texts(priors),
         unit_stiffness=unit_stiffness(case, theory) * reading.radial_per_read,
         rise=rise,
         time=np.concatenate([time, time[-1] + beyond]),

@@ -5,8 +5,8 @@ from itertools import combinations
 
 import numpy as np
 
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.distributions import frozen
+from hdcal.inference.sampled_problem import Sampled
 
 # A leftover direction is named with the parameters that carry this part of it.
 _SHARE = 0.3
@@ -14,7 +14,7 @@ _SHARE = 0.3
 _DEAD = 1e-3
 
 
-def beside_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
+def remove_members(column: np.ndarray, members: np.ndarray) -> np.ndarray:
     """Return what of a column the members leave, the unit priors of theirs included.
 
     The squared length of the result is the information on the column's parameter
@@ -51,7 +51,7 @@ def flat_directions(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[
     sensitivity in noise sds and S the prior sds, where ‖J v‖² < ‖v/S‖².
 
     Args:
-        slopes: from `linearise`, in noise sds and beside the members, dead
+        slopes: from `linearise`, in noise sds and without the members, dead
             parameters left out.
         problem: priors.
 

@@ -14,10 +14,10 @@ from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
 from hdcal.data.records import Array
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 
 Position = dict[str, Any]
 
@@ -53,26 +53,26 @@ def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
 def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return the potential whose minimum is a typical place, not only the mode.
 
-    Members that are sampled can shrink with their scale, and a gap can interpolate
-    while sigma vanishes: there the density is highest, in next to no volume, and a
-    sampler that starts there stays. The volume is counted in: the scale to the number
-    of what shrinks with it.
+    Members that are sampled can tend to zero with their scale, and a discrepancy can
+    interpolate while sigma vanishes: there the density is highest, in next to no
+    volume, and a sampler that starts there stays. The volume is counted in: the scale
+    to the power of the number of parameters that tend to zero with it.
     """
     value = potential(problem, position)
     if not isinstance(problem, Problem):
         return value
-    shrinking = {}
-    if problem.gap is not None and "gap" not in problem.integrated:
-        shrinking["sigma"] = BASIS_SIZE
+    vanishing = {}
+    if problem.discrepancy is not None and "discrepancy" not in problem.integrated:
+        vanishing["sigma"] = BASIS_SIZE
     if "_run_offset" in position:
-        shrinking["run_offset_sd"] = (problem.runs - 1) / 2
+        vanishing["run_offset_sd"] = (problem.runs - 1) / 2
     if "_specimen_deviation" in position:
-        shrinking["specimen_sd"] = (problem.specimens - 1) / 2
-    if shrinking:
+        vanishing["specimen_sd"] = (problem.specimens - 1) / 2
+    if vanishing:
         values = constrain_fn(
             model, (problem,), {}, position, return_deterministic=True
         )
-        for name, count in shrinking.items():
+        for name, count in vanishing.items():
             value = value - count * jnp.log(values[name])
     return value
 

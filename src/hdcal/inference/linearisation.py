@@ -49,7 +49,7 @@ def linearise(
         records: the rows, not padded.
     """
     rows, padded = len(records.force), pad_records(records)
-    columns = discrepancy_columns(problem.gap, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     sd, slopes, stiffening = jax.tree.map(
         lambda part: np.asarray(part)[:rows],
         _derivatives(problem, values, padded, columns, _moving(problem, values)),

@@ -1,4 +1,4 @@
-"""What belongs to one run, one specimen or the gap, integrated out exactly.
+"""What belongs to a run, a specimen or the discrepancy, integrated out exactly.
 
 Given the shared parameters these weights are normal a priori and enter a Gaussian
 likelihood linearly, r ~ N(Z w, V) with w ~ N(0, S). Sampling them beside their own

@@ -14,10 +14,10 @@ from jax.nn import log_sigmoid, softplus
 
 from hdcal.data.priors import Prior
 from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.effect import parameters
 
 
@@ -71,7 +71,7 @@ def _sample_members(name: str, sd, count: int):
 
 
 def _sample_structure(problem: Problem, values: dict) -> None:
-    """Sample what belongs to runs, specimens and the gap, and their scales."""
+    """Sample what belongs to runs, specimens and the discrepancy, and their scales."""
     integrated, priors = problem.integrated, problem.priors
     if problem.runs:
         values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
@@ -83,10 +83,10 @@ def _sample_structure(problem: Problem, values: dict) -> None:
         if "specimen" not in integrated:
             sd, name = values["specimen_sd"], "specimen_deviation"
             values[name] = _sample_members(name, sd, problem.specimens)
-    if problem.gap is not None:
+    if problem.discrepancy is not None:
         for name in ("gap_sd", "gap_length"):
             values[name] = sample_site(name, priors[name])
-        if "gap" not in integrated:
+        if "discrepancy" not in integrated:
             score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([BASIS_SIZE]))
             scale = prior_sd(values["gap_sd"], values["gap_length"])
             values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)

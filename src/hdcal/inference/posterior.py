@@ -14,7 +14,7 @@ import xarray as xr
 from hdcal.data.case import Case, Theory
 from hdcal.data.priors import Prior
 from hdcal.errors import Finding, InputError, NotUsable
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
@@ -106,15 +106,15 @@ class Posterior:
         """Write the posterior as a NetCDF file that ArviZ opens."""
         tree = self.tree.copy()
         tree.attrs = {
-            "hdcal_format": archive.FORMAT,
+            "hdcal_format": posterior_file.FORMAT,
             "status": "ok" if self.usable else "failed",
-            "case": archive.describe_case(self.case),
+            "case": posterior_file.describe_case(self.case),
             "model": json.dumps(
                 {
                     "theory": self.theory,
                     "effects": [effect.name for effect in self.effects],
                     "priors": {
-                        name: archive.describe_prior(prior)
+                        name: posterior_file.describe_prior(prior)
                         for name, prior in self.priors.items()
                     },
                     "settings": dict(self.settings),
@@ -123,7 +123,7 @@ class Posterior:
                 }
             ),
         }
-        tree.attrs[archive.DIGEST] = archive.digest(tree)
+        tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
         tree.to_netcdf(path, engine="h5netcdf")
 
     @classmethod
@@ -143,13 +143,13 @@ class Posterior:
         """
         path = Path(path)
         file = path / FILE_NAME if path.is_dir() else path
-        tree = archive.open_tree(file)
-        archive.check_unchanged(tree, file)
+        tree = posterior_file.open_tree(file)
+        posterior_file.check_unchanged(tree, file)
         try:
             model = json.loads(tree.attrs["model"])
             if model["settings"].get("kind", "static") != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
-            case = archive.restore_case(
+            case = posterior_file.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
                 tree["observed_data"].to_dataset()["force"],
@@ -159,7 +159,7 @@ class Posterior:
                 theory=model["theory"],
                 effects=_look_up(model["effects"], effects, file),
                 priors={
-                    name: archive.restore_prior(prior)
+                    name: posterior_file.restore_prior(prior)
                     for name, prior in model["priors"].items()
                 },
                 tree=tree,
@@ -168,7 +168,7 @@ class Posterior:
                 settings=model["settings"],
             )
         except (KeyError, ValueError, TypeError) as error:
-            raise InputError([archive.not_a_posterior(file)]) from error
+            raise InputError([posterior_file.not_a_posterior(file)]) from error
 
 
 def _of_another_kind(file, wanted: str) -> Finding:

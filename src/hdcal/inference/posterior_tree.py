@@ -9,7 +9,7 @@ import xarray as xr
 from arviz_base import from_dict
 
 from hdcal.data.case import Case
-from hdcal.inference import archive
+from hdcal.inference import posterior_file
 from hdcal.inference.density import densities, pointwise_log_likelihood
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.padding import pad_records
@@ -45,11 +45,11 @@ def build_tree(
             "prior": {name: values[None] for name, values in prior_draws.items()},
             "sample_stats": _sampler_statistics(draws),
             "observed_data": rows,
-            "constant_data": archive.covariates(case.records),
+            "constant_data": posterior_file.covariates(case.records),
             "log_likelihood": dict(log_likelihood),
         },
         dims={
-            **{name: ["row"] for name in (*observed, *archive.UNITS)},
+            **{name: ["row"] for name in (*observed, *posterior_file.UNITS)},
             "run_offset": ["run_label"],
             "specimen_deviation": ["specimen_label"],
             "gap_weights": ["basis"],
@@ -82,7 +82,7 @@ def force_log_likelihood(
     if draws.energy.size * rows > _MOST_LOG_LIKELIHOODS:
         return {TOTAL: densities(problem, draws.values)[1]}
     padded = pad_records(case.records)
-    columns = discrepancy_columns(problem.gap, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     each = _pointwise(problem, draws.values, padded, columns)
     return {"force": np.asarray(each)[..., :rows]}
 

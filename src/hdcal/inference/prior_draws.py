@@ -9,7 +9,7 @@ import numpy as np
 from hdcal.data.priors import Prior
 from hdcal.inference.density import POSITIVE
 from hdcal.inference.distributions import distribution
-from hdcal.inference.problem import bare
+from hdcal.inference.problem import without_texts
 
 _PRIOR_DRAWS = 2000
 
@@ -19,7 +19,7 @@ def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
     keys = jax.random.split(key, len(priors))
     return {
         name: np.asarray(_draw(prior, k, positive=name in POSITIVE))
-        for k, (name, prior) in zip(keys, bare(priors).items(), strict=True)
+        for k, (name, prior) in zip(keys, without_texts(priors).items(), strict=True)
     }
 
 

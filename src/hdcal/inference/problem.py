@@ -12,17 +12,16 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
-from hdcal.inference.compress import CompressedRows, compress, group_rows
-from hdcal.inference.density_protocol import Sampled
+from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import (
     BASIS_SIZE,
     Discrepancy,
     build_discrepancy,
-    discrepancy_columns,
 )
 from hdcal.inference.distributions import scaled
-from hdcal.inference.held_rows import check_held_rows
 from hdcal.inference.padding import pad_records
+from hdcal.inference.padding_check import check_padding
+from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
@@ -30,8 +29,6 @@ from hdcal.physics.theory import THEORIES
 
 # Below this many rows the rounding likelihood is always exact: it is cheap there.
 _FEW_ROWS = 500
-# Up to this many rows of triangular factors cost little, whatever they replace.
-_MANY_FACTOR_ROWS = 10_000
 # Largest rounding step, in noise sds, for which Sheppard's correction is used: the
 # noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
 _FINE_STEP = 1.3
@@ -53,14 +50,14 @@ class Problem(Sampled):
         reading: how the rig reads.
         records: all rows, padded, or None when they are compressed.
         blocks: compressed rows, or None.
-        columns: basis of the gap at the padded rows, or None.
-        gap: the leftover discrepancy, or None.
+        columns: basis of the discrepancy at the padded rows, or None.
+        discrepancy: the leftover one, or None.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
-        integrated: which of "run", "specimen", "gap" are integrated out exactly.
+        integrated: which of "run", "specimen", "discrepancy" are integrated out.
         count: measured rows; `records` and `columns` have padding after them.
     """
 
@@ -71,7 +68,7 @@ class Problem(Sampled):
     records: Records | None
     blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
-    gap: Discrepancy | None
+    discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
@@ -92,7 +89,7 @@ class Problem(Sampled):
         return self.records
 
 
-def bare(priors: Mapping[str, Prior]) -> dict[str, Prior]:
+def without_texts(priors: Mapping[str, Prior]) -> dict[str, Prior]:
     """Return priors without their texts.
 
     Text is static: left in, another source line would mean another compilation.
@@ -215,56 +212,54 @@ def build_problem(
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: effects in the model. Those of scatter must have what they need and
-            then change nothing: the model's own members carry them.
+        effects: in the model. Those of scatter must have what they need and then
+            change nothing: the model's own members carry them.
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
 
     Raises:
-        InputError: an effect lacks its covariates or a prior, or does not bear that
-            rows are padded.
+        InputError: an effect lacks its covariates or a prior, or bears no padding.
     """
     _check_needs(case, effects)
     effects = without_scatter(effects)
     theory = theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
-    measured, reading = case.records, case_reading(case)
-    check_held_rows(effects, measured, reading)
-    records, count = pad_records(measured), len(measured.force)
-    gap = build_discrepancy(measured.deformation) if with_gap else None
-    columns = discrepancy_columns(gap, records.deformation)
-    base_columns = np.asarray(_base_columns(records, reading))[:count]
-    noise_sd = pilot_noise(measured)
-    members = _member_counts(case, with_gap)
-    rounded = _is_rounded(case, noise_sd, few=count <= _FEW_ROWS and not members)
-    blocks = None
-    if not effects and not rounded:
-        own = [] if columns is None else [columns[:count]]
-        blocks = _compress(measured, np.hstack([base_columns, *own]))
-    integrated = set(members)
-    if blocks is None:
-        # Through an effect the force need not be linear in the stiffness.
-        integrated.discard("specimen")
-    gaussian = not rounded and all(effect.stage != "noise" for effect in effects)
+    records, reading = case.records, case_reading(case)
+    check_padding(effects, records, reading)
+    noise_sd, members = pilot_noise(records), _member_counts(case, with_gap)
+    rounded = _is_rounded(case, noise_sd, members)
+    leftover = build_discrepancy(records.deformation) if with_gap else None
+    columns = _columns(records, reading)
+    rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
+    linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     return Problem(
-        priors=bare(priors),
-        units=amplitude_units(
-            measured, base_columns, reading, effects, priors, noise_sd
-        ),
+        priors=without_texts(priors),
+        units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
-        records=records if blocks is None else None,
-        blocks=blocks,
-        columns=columns if blocks is None else None,
-        gap=gap,
+        discrepancy=leftover,
         step=case.gear.force_resolution,
         effects=effects,
         rounded=rounded,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
-        integrated=frozenset(integrated if gaussian else ()),
-        count=count,
+        integrated=linear & members.keys(),
+        **rows,
     )
+
+
+def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:
+    """Return the kinds of members that enter a Gaussian likelihood linearly."""
+    if rounded or any(effect.stage == "noise" for effect in effects):
+        return frozenset()
+    # Through an effect the force need not be linear in the stiffness.
+    return frozenset({"run", "discrepancy", *(["specimen"] if compressed else [])})
+
+
+def _columns(records: Records, reading: Reading) -> np.ndarray:
+    """Return the columns of the base model at the measured rows, shape (n, 4)."""
+    columns = _base_columns(pad_records(records), reading)
+    return np.asarray(columns)[: len(records.force)]
 
 
 def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
@@ -273,25 +268,16 @@ def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "gap": BASIS_SIZE if with_gap else 0,
+        "discrepancy": BASIS_SIZE if with_gap else 0,
     }
     return {kind: count for kind, count in counts.items() if count}
 
 
-def _is_rounded(case: Case, noise_sd: float, *, few: bool) -> bool:
+def _is_rounded(case: Case, noise_sd: float, members: Mapping[str, int]) -> bool:
     """Return whether the exact rounding likelihood is needed, or cheap."""
     step = case.gear.force_resolution
+    few = len(case.records.force) <= _FEW_ROWS and not members
     return step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
-
-
-def _compress(records: Records, design) -> CompressedRows | None:
-    """Return the rows compressed, or None where that would be no smaller."""
-    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
-    # One factor per row (an sd of its own in each) would be larger than the rows.
-    factor_rows = len(distinct) * (design.shape[1] + 1)
-    if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
-        return None
-    return compress(design, records.force, distinct, group)
 
 
 def case_reading(case: Case) -> Reading:

@@ -55,7 +55,7 @@ def residuals(posterior: Posterior) -> Residuals:
     """Return the residuals of a calibration and the shapes found in them."""
     problem, records = posterior.problem, posterior.case.records
     padded = pad_records(records)
-    columns = discrepancy_columns(problem.gap, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     fitted = _fit(problem, _thinned(posterior.draws), padded, columns)
     fitted = np.asarray(fitted)[: len(records.force)]
     residual = np.asarray(records.force) - fitted
@@ -121,7 +121,7 @@ def misfits(posterior: Posterior) -> tuple[str, ...]:
     Args:
         posterior: from `calibrate`.
     """
-    if posterior.problem.gap is not None:
+    if posterior.problem.discrepancy is not None:
         return ()
     return tuple(
         "This takes the model's shape for right, but its residuals have one. "

@@ -1,6 +1,6 @@
 """The only sampler: NumPyro's NUTS in whitened coordinates.
 
-One compiled program serves every data set of one shape, because data, priors and
+One executable serves every data set of one bucket of rows, because data, priors and
 whitening are arguments of it. It advances in short stretches, so that progress can
 be shown and an interruption is heard.
 """
@@ -19,9 +19,9 @@ from numpyro.infer.util import constrain_fn
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import draw_members
-from hdcal.inference.density_protocol import Sampled
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
+from hdcal.inference.sampled_problem import Sampled
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
@@ -147,7 +147,7 @@ def sample(
         chains: independent chains, advanced side by side.
         warmup: iterations of adaptation per chain, discarded.
         draws: iterations kept per chain.
-        progress: told after every stretch.
+        progress: called after every stretch.
     """
     run = partial(_run, problem, whitening, key, chains, warmup, draws, progress)
     target, *shorter = TARGET_ACCEPTANCE

@@ -20,8 +20,8 @@ from hdcal.inference.dynamic_problem import (
     pointwise,
     predict_motion,
 )
-from hdcal.inference.dynamic_start import scan
 from hdcal.inference.executables import bound_executables
+from hdcal.inference.frequency_scan import scan
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 
 FEWEST_ROWS = 20
@@ -135,10 +135,10 @@ def check_motion(case: Case) -> None:
 
 
 def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
-    """Climb from every peak of the scan; return the highest, and say how lonely it is.
+    """Search from every peak of the scan; return the highest, and check the next one.
 
-    Chains start around one peak and never cross to another, so that no R-hat could
-    tell of it.
+    Chains start around one peak and never cross to another, so that no R-hat would
+    show a second one.
     """
     fits = [laplace.fit(problem, key, start) for start in scan(problem, _PEAKS)]
     fits = fits or [laplace.fit(problem, key)]
@@ -175,7 +175,7 @@ def _pointwise(problem: DynamicProblem, values):
     return jax.vmap(jax.vmap(partial(pointwise, problem)))(values)
 
 
-def centre(found: Draws) -> dict[str, np.ndarray]:
+def _best_draw(found: Draws) -> dict[str, np.ndarray]:
     """Return the draw of the highest posterior density."""
     place = np.unravel_index(np.argmin(found.potential), found.potential.shape)
     return {name: values[place] for name, values in found.values.items()}
@@ -187,7 +187,7 @@ def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
     The test is Ljung and Box's over twenty lags (fewer in short records).
     """
     name = "residuals are noise"
-    values = centre(found)
+    values = _best_draw(found)
     left = problem.deformation - np.asarray(_predict(problem, values))
     left = left[: problem.count]
     left = left - left.mean()
@@ -224,7 +224,7 @@ def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
 
 def _slopes_in_sds(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
     """Return by how much each parameter moves the measured rows, in noise sds."""
-    values = centre(found)
+    values = _best_draw(found)
     names = [
         name
         for name, prior in problem.priors.items()

@@ -91,7 +91,7 @@ class Chirp(Forcing):
         return jnp.abs(self.amplitude)
 
 
-class Table(Forcing):
+class SampledForce(Forcing):
     """A force that was sampled: linear between the rows, constant beyond them.
 
     Attributes:

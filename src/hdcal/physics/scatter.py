@@ -1,4 +1,4 @@
-"""Scatter effects: members of one kind that differ, told by the spread of them all."""
+"""Scatter effects: members of one kind that differ, described by their spread."""
 
 from abc import abstractmethod
 from typing import TYPE_CHECKING, Literal, final

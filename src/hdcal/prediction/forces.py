@@ -123,7 +123,7 @@ def gear_force(
     )
     effects = [e for e in build_effects(problem, values) if e.stage == "force"]
     force, _ = predict_reading(base, effects, records, problem.reading)
-    if problem.gap is not None:
-        columns = problem.gap.columns(as_read + values["deformation_offset"])
+    if problem.discrepancy is not None:
+        columns = problem.discrepancy.columns(as_read + values["deformation_offset"])
         force = force + factor * (columns @ values["gap_weights"])
     return force

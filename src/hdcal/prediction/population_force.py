@@ -250,9 +250,9 @@ def leftover(problem: Problem, value: Values, question: Question):
     # The root has no derivative at zero.
     new = jnp.sqrt(jnp.where(new > 0.0, new, 1.0)) * (new > 0.0)
     found = value["gap_sd"] * new * value["_standard"][2]
-    if problem.gap is None or "gap_weights" not in value:
+    if problem.discrepancy is None or "gap_weights" not in value:
         return found
-    columns = problem.gap.columns_beyond(
+    columns = problem.discrepancy.columns_beyond(
         jnp.reshape(jnp.asarray(at, float), 1), value["gap_length"]
     )
     return found + (columns @ value["gap_weights"])[0]

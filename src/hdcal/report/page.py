@@ -5,7 +5,6 @@ import base64
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hdcal.report.plain import harmless
-from hdcal.report.words import estimate, label, unit
 
 
 def render_page(template: str, context: dict, images: dict[str, bytes]) -> str:
@@ -32,27 +31,3 @@ def render_page(template: str, context: dict, images: dict[str, bytes]) -> str:
 def _address(image: bytes) -> str:
     # As an image the drawing can run no script and share no names with the page.
     return "data:image/svg+xml;base64," + base64.b64encode(image).decode("ascii")
-
-
-def parameter_row(name: str, entry: dict) -> dict:
-    """Return a parameter of a summary as the texts of a table's row."""
-    middle, span = estimate(entry)
-    return {
-        "name": name,
-        "label": label(name),
-        "median": middle,
-        "span": span,
-        "unit": unit(entry["unit"]),
-        "driven_by": entry["driven_by"],
-        "contraction": _share(entry["contraction"]),
-        "rhat": "–" if entry["rhat"] is None else f"{entry['rhat']:.3f}",
-        "ess": [_count(entry["ess_bulk"]), _count(entry["ess_tail"])],
-    }
-
-
-def _share(value: float | None) -> str:
-    return "–" if value is None else f"{max(value, 0.0):.0%}"
-
-
-def _count(value: float | None) -> str:
-    return "–" if value is None else f"{value:.0f}"

@@ -200,7 +200,7 @@ def _stream_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
     if isinstance(known, Gear):
         return prior_from_gear(known, seed)
     known.require_usable()
-    if known.problem.gap is not None:
+    if known.problem.discrepancy is not None:
         words = "holds a leftover discrepancy, which cannot be followed"
         raise InputError([Finding("known", words, "Calibrate again without it")])
     return prior_from_posterior(known, seed)

@@ -217,7 +217,7 @@ def force_quantiles(
 def is_linear(basis: Basis) -> bool:
     """Tell whether the force is proportional to stiffness and deformation."""
     bent = any(effect.stage == "force" for effect in basis.problem.effects)
-    return not bent and basis.problem.gap is None
+    return not bent and basis.problem.discrepancy is None
 
 
 def _linear_quantiles(basis, factor, deformation, temperature, shares) -> np.ndarray:

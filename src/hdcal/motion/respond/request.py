@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.errors import Finding, InputError
-from hdcal.physics.forcing import Chirp, Forcing, Sine, Step, Table
+from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Sine, Step
 
 SHAPES = ("step", "sine", "chirp")
 MOST_POINTS = 100_001
@@ -73,11 +73,17 @@ def make_request(
         _check_table(drive, find)
     if findings:
         raise InputError(findings)
+    return _request(drive, amplitude, tones, length, points)
+
+
+def _request(
+    drive: Drive, amplitude: float, tones: list[float], length: float, points: int
+) -> Request:
     if not isinstance(drive, str):
         time, force = (np.asarray(part, dtype=float) for part in drive)
         words = f"a sampled force of {len(time)} rows, linear between them"
         return Request(
-            Table(time, force), words, np.linspace(time[0], time[-1], points)
+            SampledForce(time, force), words, np.linspace(time[0], time[-1], points)
         )
     times = np.linspace(0.0, length, points)
     if drive == "step":

@@ -6,15 +6,15 @@ damping are drawn from their priors, and the answer says so.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
 
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
@@ -69,9 +69,7 @@ class Response:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
-        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
-        names += ("deformation_hi_mm", "tested")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
 
     def _repr_html_(self) -> str:
         from hdcal.motion.respond.document import response_document
@@ -119,10 +117,19 @@ def respond(
         InputError: what was asked makes no sense.
     """
     posterior.require_usable()
-    request = _checked(
-        partial(make_request, force, amplitude, frequency, duration, points),
-        _problems(posterior, temperature, mass, damping, draws),
-    )
+    with Findings() as wrong:
+        request = wrong.attempt(
+            make_request, force, amplitude, frequency, duration, points
+        )
+        wrong += _problems(posterior, temperature, mass, damping, draws)
+    assert request is not None
+    return _move(posterior, request, temperature, mass, damping, draws, seed)
+
+
+def _move(
+    posterior: Posterior, request: Request, temperature, mass, damping, draws, seed
+) -> Response:
+    """Integrate every gear of the posterior, and say what its motion rests on."""
     at = _temperature(posterior) if temperature is None else float(temperature)
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
@@ -176,17 +183,6 @@ def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
         )
     tail = (1.0 - INTERVAL) / 2.0
     return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
-
-
-def _checked(make, findings: list[Finding]) -> Request:
-    """Return the request; raise with its findings and the others at once."""
-    try:
-        request = make()
-    except InputError as error:
-        raise InputError([*error.findings, *findings]) from None
-    if findings:
-        raise InputError(findings)
-    return request
 
 
 def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:

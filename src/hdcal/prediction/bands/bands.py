@@ -76,7 +76,7 @@ class Bands:
 @jax.jit
 def _predict_block(problem: Problem, values, records: Records, keys):
     """Return mean, mean with gap and a new reading: [draw, row] each."""
-    gap = problem.gap
+    gap = problem.discrepancy
     columns = None if gap is None else gap.columns(records.deformation)
 
     def one(value, key):
@@ -215,7 +215,7 @@ def predict(
         parts = _predict_block(posterior.problem, values, records, keys)
         blocks.append(np.stack([np.quantile(part, tails, axis=0) for part in parts]))
     physics, with_gap, new = np.concatenate(blocks, axis=2)
-    if posterior.problem.gap is None:
+    if posterior.problem.discrepancy is None:
         with_gap = np.full_like(physics, np.nan)
     return Bands(
         at,

@@ -209,4 +209,4 @@ def model_bounds(
 def model_name(posterior: Posterior) -> str:
     """Return what a model is called among the hypotheses of a diagnosis."""
     effects = "+".join(sorted(effect.name for effect in posterior.effects))
-    return effects or ("none" if posterior.problem.gap is None else "unknown")
+    return effects or ("none" if posterior.problem.discrepancy is None else "unknown")

@@ -52,7 +52,7 @@ def _extrapolations(outlook: Outlook, temperature) -> Iterator[str]:
             float(at),
             (low, high),
             leftover=float(np.sqrt(np.mean(sd**2))),
-            fitted=outlook.posterior.problem.gap is not None,
+            fitted=outlook.posterior.problem.discrepancy is not None,
         )
     sense = -1.0 if question.down else 1.0
     if sense not in np.asarray(records.sense):
@@ -99,7 +99,7 @@ def _remarks(outlooks, rare, rounded_tail) -> Iterator[str]:
     if first.nodes.factor.size > 1:
         gears = first.population == "specimens"
         yield say.TOLERANCES_OF_GEARS if gears else say.TOLERANCES_ALONE
-    if all(outlook.posterior.problem.gap is None for _, outlook in outlooks):
+    if all(outlook.posterior.problem.discrepancy is None for _, outlook in outlooks):
         yield from misfits(posterior)
     if (rare is not None and rare < 1.0 / draws) or rounded_tail:
         yield say.NORMAL_TAILS

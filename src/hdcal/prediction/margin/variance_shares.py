@@ -163,7 +163,7 @@ def _inputs(outlooks, temperature: float, tolerances) -> dict[str, Driver]:
         found["gear"] = _driver(first, "specimen_sd")
     found |= dict.fromkeys(tolerances, "given")
     if not question.low <= question.deformation <= question.high:
-        fitted = all(o.posterior.problem.gap is not None for _, o in outlooks)
+        fitted = all(o.posterior.problem.discrepancy is not None for _, o in outlooks)
         found["leftover"] = _driver(first, "gap_sd") if fitted else "prior"
     return found
 

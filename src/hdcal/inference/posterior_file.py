@@ -167,8 +167,8 @@ def _canonical(values: np.ndarray) -> tuple[str, bytes]:
 def check_unchanged(tree: xr.DataTree, path) -> None:
     """Refuse a posterior of another version, or that is not as hdcal wrote it.
 
-    The digest tells slips and careless edits. It is no signature: who means to forge
-    can compute it anew.
+    The digest detects accidental changes. It is no signature: it can be computed
+    anew.
 
     Raises:
         InputError: with what is wrong.

@@ -18,7 +18,7 @@ _BASE = (200.0, 0.0, 0.0, 0.0, 1.0)
 _SAME = 1e-9
 
 
-def check_held_rows(
+def check_padding(
     effects: Sequence[type[Effect]], records: Records, reading: Reading
 ) -> None:
     """Refuse an effect for which rows after the last one change those before.
