@@ -159,7 +159,7 @@ def test_an_opening_says_what_was_answered_of_a_measurement(blind):
     blind("answer", "real", "--by", "none")
     said = " ".join(blind("open", "real", "--key", "real.key").stdout.split())
     assert "none seating slack none no gap > 99 % no" in said
-    assert "1 measured; answers of 'none'" in said
+    assert "none on 1 cases (1 measured)" in said
     assert "false alarms" not in said
 
 
@@ -169,7 +169,7 @@ def test_an_opening_prints_every_row_of_the_bar(blind, fresh: Path):
     done = blind("open", "set", "--key", "set.key")
     said = " ".join(done.stdout.split())
     bar = json.loads((fresh / "result" / "scores.json").read_text())["bar"]
-    assert "3 without a gap; answers of 'hdcal'" in said
+    assert "hdcal on 3 cases (3 without a gap)" in said
     assert "0.0 % 0.0 … 56.1 % 3 ≤ 5 % met, not firmly" in said
     empty = sum(row["value"] is None for row in bar)
     # The headline says it once more.
