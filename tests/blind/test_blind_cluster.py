@@ -17,7 +17,7 @@ import pytest
 from commands import Hdcal
 from sealing import by_library, deadly, sealed_set, slowly
 
-from hdcal.blind.answer import answer_set
+from hdcal.blind.answering import answer_set
 from hdcal.blind.diagnosers import DIAGNOSERS
 from hdcal.cli import cluster
 from hdcal.errors import HdcalError, InputError
@@ -167,7 +167,7 @@ def test_the_real_diagnosis_answers_there(local, hdcal: Hdcal, tmp_path: Path):
 
 
 def test_workers_of_another_version_are_refused(local, monkeypatch, tmp_path: Path):
-    from hdcal.blind import answer as answering
+    from hdcal.blind import answering
 
     made_by = answering.fingerprint()
     monkeypatch.setattr(

@@ -226,5 +226,5 @@ def test_a_gap_beside_an_effect_is_integrated_too():
     problem = found.problem
     one = {name: values[0] for name, values in found.draws.items()}
     shared = {name: value for name, value in one.items() if name != "gap_weights"}
-    assert "gap" in problem.integrated
+    assert "discrepancy" in problem.integrated
     assert float(log_likelihood(problem, one)) == float(log_likelihood(problem, shared))

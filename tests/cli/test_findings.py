@@ -25,7 +25,10 @@ from moving import still_posterior
             "--temperature: is below absolute zero",
         ),
         (
-            ["design", "--limit-force", "9", "--vary", "radius_mm=38:42"],
+            [
+                *("design", "--limit-force", "9", "--vary", "radius_mm=38:42"),
+                *("--probability", "0.9"),
+            ],
             "--limit-force: no radius between 38 and 42 mm meets 9 N",
         ),
         (

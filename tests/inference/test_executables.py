@@ -1,5 +1,6 @@
-"""The sampler's executables go before mappings run out; nobody else's do."""
+"""Sizes of one bucket share executables; the sampler's go before mappings run out."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -7,11 +8,15 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from jax import monitoring
+from moving import moving_case
 from rigs import make_case, ramp
 
+from hdcal import calibrate, calibrate_dynamic, residuals
 from hdcal.data.priors import effect_priors
 from hdcal.inference import executables, laplace
+from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem
+from hdcal.motion.bands import motion_bands
 
 COMPILED = "/jax/core/compile/backend_compile_duration"
 
@@ -32,6 +37,49 @@ def compilations():
     monitoring.register_event_duration_secs_listener(note)
     yield found
     monitoring.unregister_event_duration_listener(note)
+
+
+def bent(rows: int):
+    """Return a ramp that grows faster than its deformation."""
+    records = ramp(rows)
+    noise = np.random.default_rng(rows).normal(0.0, 0.6, rows)
+    force = 205.0 * records.deformation + 40.0 * records.deformation**3 + noise
+    return make_case(replace(records, force=force))
+
+
+SETTINGS = {"chains": 2, "warmup": 20, "draws": 20}
+# Two numbers of rows of one bucket, and of the next one.
+KINDS = {
+    "rows kept": (
+        lambda rows: residuals(
+            calibrate(bent(rows), effects=["progressive_stiffening"], **SETTINGS)
+        ),
+        (33, 47, 49),
+    ),
+    "discrepancy": (
+        lambda rows: residuals(calibrate(bent(rows), with_gap=True, **SETTINGS)),
+        (33, 47, 49),
+    ),
+    "moving": (
+        lambda rows: motion_bands(
+            calibrate_dynamic(moving_case(0, rows=rows), **SETTINGS)
+        ),
+        (200, 250, 260),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_sizes_of_one_bucket_share_every_executable(kind: str, compilations):
+    run, (first, same, other) = KINDS[kind]
+    assert bucket_size(first) == bucket_size(same) != bucket_size(other)
+    run(first)
+    assert "jit(_advance)" in compilations
+    compilations.clear()
+    run(same)
+    assert compilations == []
+    run(other)
+    assert compilations
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="Linux only")

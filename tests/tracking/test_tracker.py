@@ -189,7 +189,7 @@ def test_a_failed_calibration_gives_nothing():
 
 
 def test_a_calibration_with_a_discrepancy_is_refused():
-    problem = SimpleNamespace(gap=object())
+    problem = SimpleNamespace(discrepancy=object())
     known = SimpleNamespace(require_usable=lambda: None, problem=problem)
     with pytest.raises(InputError, match="known: holds a leftover discrepancy"):
         Tracker(known)  # type: ignore[arg-type]

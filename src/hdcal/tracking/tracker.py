@@ -91,8 +91,8 @@ class Tracker:
             force: as read [N].
             temperature: of the specimen [°C]; by default the reference one.
             time: since the reset of the rig [s]; only some effects look at it.
-            run: label of the mounting; another one than before opens the zero of the
-                force again.
+            run: label of the mounting; another one than before widens the zero of the
+                force.
 
         Returns:
             The answer as plain data: a line of `hdcal track`.
@@ -146,7 +146,7 @@ class Tracker:
         )
 
     def _mount(self, run: str | None) -> None:
-        """Open the zero of the force if the label of the mounting is another one."""
+        """Widen the zero of the force if the label of the mounting is another one."""
         if run is None or run == self._run:
             return
         if self._run is not None:
@@ -154,7 +154,7 @@ class Tracker:
         self._run = run
 
     def _restart(self) -> None:
-        """Begin anew to look for a change, and open what may have changed."""
+        """Begin anew to look for a change; widen what may have changed, if wanted."""
         self.alarms += 1
         self._since = self.rows + 1
         if self._reopen:
