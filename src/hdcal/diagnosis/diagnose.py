@@ -51,8 +51,8 @@ def diagnose(
         The verdict; it may be none, ambiguous or unknown.
 
     Raises:
-        InputError: an effect has no prior, the gear file names an unknown one, or the
-            force does not grow with the deformation.
+        InputError: an effect has no prior or does not bear padded rows, the gear file
+            names an unknown one, or the force does not grow with the deformation.
     """
     _check(case, library)
     rng = np.random.default_rng(seed)

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.inference.padding import bucket_size, repeat_last_row
+from hdcal.inference.padding import pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 
@@ -16,13 +16,12 @@ _BLOCK, _MOST_VALUES = 16, 2**22
 
 
 def padded_records(records: Records) -> Records:
-    """Return records of a length that many cases share, the last row repeated.
+    """Return records of a length that many cases share.
 
-    An effect looks back only: rows that follow do not change what it says of a row.
-    What is known of the records is left out; it would compile everything anew.
+    What is known of them is left out: it would compile everything anew, and only what
+    an effect `needs` hangs on it.
     """
-    rows = replace(records, known=frozenset())
-    return repeat_last_row(rows, bucket_size(len(records.force)))
+    return pad_records(replace(records, known=frozenset()))
 
 
 @jax.jit

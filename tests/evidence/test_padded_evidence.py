@@ -1,0 +1,111 @@
+"""Padding changes no evidence, and sizes of one bucket share every executable."""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from compiling import compilations
+from diagnosis_cases import judged, simulated
+from rigs import cycles
+
+from hdcal.data.prior import Prior
+from hdcal.data.priors import effect_priors
+from hdcal.errors import InputError
+from hdcal.evidence import closed_form, noise_evidence
+from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.inference import padding
+from hdcal.inference.padding import bucket_size
+from hdcal.physics.effect import Effect, Stage, parameter
+from hdcal.physics.registry import EFFECTS
+
+# One of each kind: linear or not in its amplitude, with memory, with shapes, with
+# several amplitudes, of members, on the noise.
+NAMES = (
+    "coulomb_friction",
+    "contact_bedding",
+    "hysteresis",
+    "screw_error",
+    "run_offset",
+    "heteroscedastic_noise",
+    "outliers",
+)
+LIBRARY = {name: EFFECTS[name] for name in NAMES}
+
+
+def rows_of(rows: int):
+    """Return cycles in three runs that take turns, with friction and some outliers."""
+    records = cycles(rows)
+    known = records.known | {"run", "runs"}
+    records = replace(records, run=np.arange(rows) * 7 % 3, known=known)
+    case = simulated(records, {"coulomb_friction": {"force": 0.8}}, seed=rows)
+    force = np.array(case.records.force)
+    force[[5, 20, 33]] += [3.0, -2.5, 4.0]
+    return replace(case, records=replace(case.records, force=force))
+
+
+def table_of(case) -> dict[str, np.ndarray]:
+    return compute_evidence(case, LIBRARY, effect_priors()).table
+
+
+@pytest.fixture
+def unpadded(monkeypatch):
+    """Give every array the length of its own."""
+    for module in (padding, closed_form, noise_evidence):
+        monkeypatch.setattr(module, "bucket_size", lambda size: size)
+
+
+@pytest.fixture(scope="module")
+def padded() -> dict[str, np.ndarray]:
+    return table_of(rows_of(42))
+
+
+def test_every_hypothesis_is_as_likely_as_without_padding(padded, unpadded):
+    slow = table_of(rows_of(42))
+    assert bucket_size(42) > 42
+    assert list(padded) == list(slow)
+    assert {"none", "unknown", "outliers", "hysteresis+screw_error"} <= set(padded)
+    for name, evidence in slow.items():
+        np.testing.assert_allclose(padded[name], evidence, rtol=0, atol=1e-9)
+
+
+def test_rows_that_were_not_measured_would_be_noticed(padded, monkeypatch):
+    """The comparison can fail: padding that counts as readings."""
+    monkeypatch.setattr(
+        noise_evidence, "measured", lambda size, count: np.ones(size, bool)
+    )
+    noise_evidence._laplace.clear_cache()
+    wrong = table_of(rows_of(42))
+    noise_evidence._laplace.clear_cache()
+    assert np.max(np.abs(wrong["outliers"] - padded["outliers"])) > 0.1
+
+
+def test_sizes_of_one_bucket_share_every_executable():
+    assert bucket_size(42) == bucket_size(48) != bucket_size(54)
+    judged(rows_of(42), library=LIBRARY)
+    with compilations() as found:
+        judged(rows_of(48), library=LIBRARY)
+        assert found == []
+        judged(rows_of(54), library=LIBRARY)
+        assert found
+
+
+class Centred(Effect):
+    """A force about the mean deformation: it looks at rows to come."""
+
+    name: ClassVar[str] = "centred"
+    stage: ClassVar[Stage] = "force"
+    family: ClassVar[str] = "drift"
+
+    size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
+
+    def apply(self, signal, rows):
+        """Return the force and its share."""
+        return signal + self.size * (rows.deformation - jnp.mean(rows.deformation))
+
+
+def test_an_effect_that_looks_ahead_is_refused():
+    priors = effect_priors() | {"centred.size": Prior("normal", (0.0, 5.0))}
+    with pytest.raises(InputError, match="further ones follow"):
+        compute_evidence(rows_of(42), {"centred": Centred}, priors)
