@@ -30,11 +30,11 @@ def measure(repeats: int) -> dict:
     import numpy as np
 
     from hdcal import read_case
-    from hdcal.design.design_draws import basis_of
+    from hdcal.design.design_draws import design_draws
     from hdcal.design.study.study import force_quantiles, general_quantiles
     from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
 
-    line = basis_of(read_case(CASE).gear, draws=DRAWS)
+    line = design_draws(read_case(CASE).gear, draws=DRAWS)
     random = np.random.default_rng(0)
     slope = {"progressive_stiffening.slope": random.normal(0.35, 0.05, DRAWS)}
     effects = replace(line.problem, effects=(ProgressiveStiffening,))

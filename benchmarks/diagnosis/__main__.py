@@ -12,7 +12,7 @@ for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _TWO = ("hysteresis", "thermal_zero_drift")
 _LINES = (14, 60, 180, 2000)
-_PROGRAMS = ("rich", "lean")
+_LOADINGS = ("rich", "lean")
 
 
 def arguments() -> argparse.Namespace:
@@ -22,7 +22,7 @@ def arguments() -> argparse.Namespace:
     add = parser.add_argument
     add("--per-class", type=int, default=40, help="cases of each effect")
     add("--r", type=float, nargs="*", default=[0.3, 0.5, 1.0, 2.0, 5.0])
-    add("--program", nargs="*", choices=_PROGRAMS, default=list(_PROGRAMS))
+    add("--program", nargs="*", choices=_LOADINGS, default=list(_LOADINGS))
     add("--effects", nargs="*", help="these only; default: every one on the mean")
     add("--nulls", type=int, default=400, help="cases without gap for each noise")
     add("--lines", type=int, default=100, help="cases without gap for each length")

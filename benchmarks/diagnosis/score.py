@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from benchmarks.diagnosis import causes
+from benchmarks.diagnosis.loadings import LOADINGS, line
 from benchmarks.diagnosis.oracle import judge
-from benchmarks.diagnosis.programs import PROGRAMS, line
 from benchmarks.diagnosis.world import World, draw_noise, draw_world
 from hdcal.data.records import Records
 from hdcal.diagnosis.diagnose import diagnose
@@ -47,7 +47,7 @@ class Task:
 
 @cache
 def records_of(program: str) -> Records:
-    return PROGRAMS[program]() if program in PROGRAMS else line(int(program))
+    return LOADINGS[program]() if program in LOADINGS else line(int(program))
 
 
 def score(task: Task, seed: int) -> dict:

@@ -16,23 +16,24 @@ FOLDER = "schemas"
 
 
 def answers() -> dict[str, type[Answer]]:
-    """Return every answer of the package by the name of its format."""
+    """Return every answer of the package by its format, and its kind if it has one."""
     for module in pkgutil.walk_packages(hdcal.__path__, "hdcal."):
         if module.name.rpartition(".")[2] == "answer":
             import_module(module.name)
     waiting, found = [Answer], {}
     for answer in waiting:  # grows while it is walked along
         waiting += answer.__subclasses__()
-        schema = getattr(answer, "schema", None)
+        schema = vars(answer).get("schema")
         if isinstance(schema, str):
-            assert schema not in found, f"two answers are called {schema}"
-            found[schema] = answer
+            name = " ".join(filter(None, (schema, vars(answer).get("kind"))))
+            assert name not in found, f"two answers are called {name}"
+            found[name] = answer
     return dict(sorted(found.items()))
 
 
-def file_name(schema: str) -> str:
+def file_name(name: str) -> str:
     """Return the name of a schema's file: hdcal.margin/1 → hdcal.margin-1.json."""
-    return f"{schema.replace('/', '-')}.json"
+    return f"{name.replace('/', '-').replace(' ', '-')}.json"
 
 
 class SchemaList(SphinxDirective):
@@ -41,9 +42,9 @@ class SchemaList(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """Return the list."""
         listed = nodes.bullet_list()
-        for schema, answer in answers().items():
+        for name, answer in answers().items():
             first = (answer.__doc__ or "").splitlines()[0]
-            link = nodes.reference("", schema, refuri=f"{FOLDER}/{file_name(schema)}")
+            link = nodes.reference("", name, refuri=f"{FOLDER}/{file_name(name)}")
             words = nodes.paragraph("", "", link, nodes.Text(f": {first}"))
             listed += nodes.list_item("", words)
         return [listed]
@@ -55,9 +56,9 @@ def write_schemas(app: Sphinx, error: Exception | None) -> None:
         return
     folder = Path(app.outdir) / FOLDER
     folder.mkdir(exist_ok=True)
-    for schema, answer in answers().items():
+    for name, answer in answers().items():
         text = json.dumps(json_schema(answer), indent=2) + "\n"
-        (folder / file_name(schema)).write_text(text, "utf-8")
+        (folder / file_name(name)).write_text(text, "utf-8")
 
 
 def setup(app: Sphinx) -> dict:

@@ -83,12 +83,3 @@ class Findings(list[Finding]):
         if self:
             # One gear file may be behind many cases; its faults are said once.
             raise InputError(dict.fromkeys(self)) from None
-
-
-def attempt(findings: list[Finding], make: Callable[..., T], *arguments) -> T | None:
-    """Return what is made, or None and keep why it cannot be among the findings."""
-    try:
-        return make(*arguments)
-    except InputError as error:
-        findings += error.findings
-        return None

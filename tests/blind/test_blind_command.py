@@ -6,17 +6,23 @@ import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 import sealing
 from commands import XB1, Hdcal
 from sealing import by_library, key_of, sealed_set
 
-from hdcal.blind.answer import answer_set
+from hdcal.blind.answer import FrozenAnswer, ScoresAnswer
+from hdcal.blind.answering import answer_set
 from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
 from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import stamped
 from hdcal.errors import InputError
+from hdcal.report.answer import json_schema
+
+# What every answer says, and the file of frozen answers does not.
+NOT_IN_FILE = {"status", "reasons", "headline", "next_step"}
 
 Seen = dict[str, bytes]
 
@@ -98,13 +104,15 @@ def test_make_answer_open(blind, tmp_path: Path):
     said = json.loads(done.stdout)
     assert f"answers {said['sha256']}" in done.stderr
     kept = json.loads((tmp_path / "set" / "answers-hdcal.json").read_text())
-    assert kept == {k: v for k, v in said.items() if k != "status"}
+    jsonschema.validate(said, json_schema(FrozenAnswer))
+    assert kept == {k: v for k, v in said.items() if k not in NOT_IN_FILE}
     assert kept["blind"] and kept["set_commitment"] == manifest["commitment"]
     done = blind("open", "set", "--key", "set.key", "--json")
     assert done.returncode == 0, done.stderr
     result = tmp_path / "set" / "result"
     assert {"scores.json", "labels.json"} <= seen(result).keys()
     said = json.loads(done.stdout)
+    jsonschema.validate(said, json_schema(ScoresAnswer))
     assert said["answers"]["hdcal"] == {"sha256": kept["sha256"], "blind": True}
 
 
@@ -164,8 +172,8 @@ def test_an_opening_prints_every_row_of_the_bar(blind, fresh: Path):
     assert "3 without a gap; answers of 'hdcal'" in said
     assert "0.0 % 0.0 … 56.1 % 3 ≤ 5 % met, not firmly" in said
     empty = sum(row["value"] is None for row in bar)
-    # The sentence below the table says it once more.
-    assert said.count(" no cases") == empty + 1
+    # The headline says it once more.
+    assert said.count("no cases") == empty + 1
     met = [sum(row["met"] is word for row in bar) for word in (True, False)]
     assert "{} met, {} missed".format(*met) in said
     again = blind("open", "set", "--key", "set.key", "--json")

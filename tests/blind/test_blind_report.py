@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 
-from hdcal.blind.document import write_scores
 from hdcal.blind.figure import bar_figure, confusion_figure
 from hdcal.blind.label import CaseAnswer, Label
+from hdcal.blind.result_files import score_files
 from hdcal.blind.scoring.scores import score
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
@@ -24,6 +24,12 @@ FAMILIES = {name: effect.family for name, effect in EFFECTS.items()}
 NAUGHTY = (
     '<script>alert("x")</script> $\\frac{a}{b}$ \x1b[31m \N{RIGHT-TO-LEFT OVERRIDE}'
 )
+
+
+def write_scores(found: dict, folder: Path) -> None:
+    """Write all files of a result."""
+    for name, content in score_files(found).items():
+        (folder / name).write_bytes(content)
 
 
 @cache
@@ -183,7 +189,7 @@ ROW = {
 )
 def test_a_row_in_words(changes: dict, words: tuple):
     row = bar_row(ROW | changes)
-    assert (row["word"], row["value"], row["span"], row["target"]) == words
+    assert (str(row["word"]), row["value"], row["span"], row["target"]) == words
 
 
 def test_a_number_with_its_interval_in_words():

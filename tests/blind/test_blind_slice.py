@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdcal.blind.answer import answer_set
+from hdcal.blind.answering import answer_set
 from hdcal.blind.open import open_set
 from hdcal.blind.sealed_set import write_set
 from hdcal.blind.virtual_rig.cases import GEAR_TOML, draw_cases

@@ -59,7 +59,7 @@ def test_mixes_hold_what_they_promise(drawn):
 def test_the_same_seed_gives_the_same_cases(drawn):
     mix, cases = drawn
     assert list(draw_cases(mix, COUNT, seed=3)) == cases
-    assert list(draw_cases(mix, COUNT, seed=4)) != cases
+    assert next(draw_cases(mix, COUNT, seed=4)) != cases[0]
 
 
 def test_neighbours_are_no_more_alike_than_others():

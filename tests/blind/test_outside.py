@@ -61,16 +61,16 @@ class TestEach:
         assert 10 < len(first) <= 80
         assert MECHANISMS[name].__name__ == name
 
-    @pytest.mark.parametrize("seed", SEEDS)
-    def test_is_finite_and_of_the_records_shape(self, name, seed):
-        curve = drawn(name, seed)
-        assert curve.shape == HISTORY.order.shape
-        assert curve.dtype == float
-        assert np.all(np.isfinite(curve))
+    def test_is_finite_and_of_the_records_shape(self, name):
+        for seed in SEEDS:
+            curve = drawn(name, seed)
+            assert curve.shape == HISTORY.order.shape, seed
+            assert curve.dtype == float, seed
+            assert np.all(np.isfinite(curve)), seed
 
-    @pytest.mark.parametrize("seed", range(30))
-    def test_is_about_a_newton_and_not_zero_on_a_rich_history(self, name, seed):
-        assert 0.1 < np.max(np.abs(drawn(name, seed))) < 15.0
+    def test_is_about_a_newton_and_not_zero_on_a_rich_history(self, name):
+        largest = [np.max(np.abs(drawn(name, seed))) for seed in range(30)]
+        assert min(largest) > 0.1 and max(largest) < 15.0, largest
 
     def test_is_repeatable(self, name):
         np.testing.assert_array_equal(drawn(name, 3), drawn(name, 3))
@@ -80,12 +80,13 @@ class TestEach:
         for one, other in itertools.combinations(draws, 2):
             assert not np.allclose(one, other)
 
-    @pytest.mark.parametrize("seed", SEEDS)
-    def test_survives_a_record_that_holds_everything_constant(self, name, seed):
+    def test_survives_a_record_that_holds_everything_constant(self, name):
         poor = made_history(runs=1, cycles=1)
         flat = {"temperature": 20.0, "time": 0.0, "angle": 0.0, "direction": 0.0}
         held = {key: np.full(len(poor.order), value) for key, value in flat.items()}
-        assert np.all(np.isfinite(drawn(name, seed, History(**vars(poor) | held))))
+        for seed in SEEDS:
+            curve = drawn(name, seed, History(**vars(poor) | held))
+            assert np.all(np.isfinite(curve)), seed
 
 
 @pytest.mark.parametrize("seed", SEEDS)

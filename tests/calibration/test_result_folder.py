@@ -28,6 +28,11 @@ COLUMNS = [
 
 
 SCHEMA = json_schema(CalibrationAnswer)
+# A parameter as a gear file fixes it.
+FIXED = dict.fromkeys(("median", "lo", "hi", "contraction"), 1.0)
+FIXED |= dict.fromkeys(("rhat", "ess_bulk", "ess_tail"))
+FIXED |= dict.fromkeys(("prior_sensitivity", "likelihood_sensitivity"))
+FIXED |= {"unit": "N", "driven_by": "prior"}
 
 
 def read_bands(text: str) -> list[dict]:
@@ -69,6 +74,49 @@ def test_the_summary_obeys_its_schema_and_is_what_json_prints(calibrated: Calibr
 def test_the_schema_misses_every_key_that_is_left_out(calibrated: Calibrated, key: str):
     summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
     del summary[key]
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(summary, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("place", "wrong"),
+    [
+        (("schema",), "hdcal.calibration/2"),
+        (("status",), "failed"),
+        (("status",), "fine"),
+        (("reasons",), ["some"]),
+        (("headline",), ""),
+        (("warnings",), [""]),
+        (("parameters", "K"), None),
+        (("parameters", "K", "driven_by"), "hope"),
+        (("parameters", "K", "contraction"), 1.5),
+        (("parameters", "K", "unit"), ""),
+        (("parameters", "no name"), FIXED),
+        (("stiffness_N_per_mm", "median"), "209"),
+        (("K_by_theory", "cup"), 4.2),
+        (("residuals",), [{"name": "end", "p_value": 2, "size_N": 1, "words": "w"}]),
+        (("interval",), 1),
+        (("checks",), []),
+        (("checks", 0, "outcome"), "perhaps"),
+        (("sampling", "chains"), 1),
+        (("sampling", "divergences"), -1),
+        (("seed",), -1),
+        (("versions",), {}),
+        (("gear", "theory"), "torus"),
+        (("data", "rows"), 0),
+        (("data", "sha256"), "abc"),
+    ],
+)
+def test_the_schema_refuses_what_was_never_promised(
+    calibrated: Calibrated, place: tuple, wrong
+):
+    summary = json.loads((calibrated[1] / "summary.json").read_text("utf-8"))
+    summary["parameters"]["effect.parameter"] = FIXED
+    jsonschema.validate(summary, SCHEMA)
+    inner = summary
+    for key in place[:-1]:
+        inner = inner[key]
+    inner[place[-1]] = wrong
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(summary, SCHEMA)
 

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hdcal.classical.audit.article import Claim
+from hdcal.classical.audit.article import Claim, cubic
 from hdcal.classical.audit.audit import audit
 from hdcal.classical.audit.data_claims import data_claims
 from hdcal.classical.audit.summary import audit_answer
-from hdcal.classical.audit.theory_claims import cubic
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
 from hdcal.report.plain import as_plain

@@ -172,6 +172,15 @@ def test_blank_lines_do_not_shift_the_row_numbers(folder):
     check(findings_of(folder), [(7, "force_N", "'oops'")])
 
 
+def test_headers_of_fifty_thousand_blanks(folder):
+    blanks = " " * 50_000
+    content = f"deformation_mm,force[{blanks}x\n" + GOOD
+    (folder / "data.csv").write_text(content)
+    check(findings_of(folder), [(1, "force", "no column")])
+    mapped = findings_of(folder, columns={"force": f"Load{blanks}[{blanks}N"})
+    assert "names a column that is not there" in mapped[0].problem
+
+
 def test_missing_files_are_reported_together(tmp_path):
     findings = findings_of(tmp_path / "a.csv", tmp_path / "b.toml")
     assert [f.problem for f in findings] == ["does not exist"] * 2

@@ -191,3 +191,12 @@ def test_table_and_gear_are_reported_together(folder):
 def test_theory_of_the_command_line(folder):
     with pytest.raises(InputError, match="Did you mean 'article'"):
         read_case(folder, theory="artikel")
+
+
+def test_two_thousand_unknown_keys_have_a_row_each(tmp_path):
+    path = tmp_path / "gear.toml"
+    path.write_text(GEAR + "".join(f"key_{i} = {i}\n" for i in range(2000)))
+    with pytest.raises(InputError) as caught:
+        read_gear(path)
+    found = {f.column: f.row for f in caught.value.findings}
+    assert found == {f"gear.key_{i}": 5 + i for i in range(2000)}

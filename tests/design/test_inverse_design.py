@@ -1,5 +1,7 @@
 """The sizes found keep the limits with the least change, where algebra says."""
 
+from inspect import signature
+
 import numpy as np
 import pytest
 from designs import bent, known
@@ -15,57 +17,57 @@ WALL, RADIUS = {"wall_thickness_mm": (0.4, 0.9)}, {"radius_mm": (32.0, 50.0)}
 
 @pytest.fixture
 def given(monkeypatch):
-    """Let a basis stand in for a calibration."""
+    """Let draws stand in for a calibration."""
 
-    def use(basis):
-        monkeypatch.setattr(module, "basis_of", lambda source, seed: basis)
-        return basis
+    def use(draws):
+        monkeypatch.setattr(module, "design_draws", lambda source, seed: draws)
+        return draws
 
     return use
 
 
-def kept_force(basis, probability=0.99, at=0.4):
-    stiffness = basis.values["K"] * basis.values["E0"] * basis.problem.unit_stiffness
-    rank = int(np.ceil(probability * basis.size)) - 1
+def kept_force(draws, probability=0.99, at=0.4):
+    stiffness = draws.values["K"] * draws.values["E0"] * draws.problem.unit_stiffness
+    rank = int(np.ceil(probability * draws.size)) - 1
     return float(np.sort(stiffness * at)[rank])
 
 
 def test_one_size_is_the_cube_root(given):
-    basis = given(known(2000))
-    found = inverse_design(basis.gear, WALL, 60.0)
-    wall = 0.68 * (60.0 / kept_force(basis)) ** (1.0 / 3.0)
+    draws = given(known(2000))
+    found = inverse_design(draws.gear, WALL, 60.0)
+    wall = 0.68 * (60.0 / kept_force(draws)) ** (1.0 / 3.0)
     assert found.chosen.sizes["wall_thickness_mm"] == pytest.approx(wall, rel=1e-7)
     assert found.chosen.force == pytest.approx(60.0, rel=1e-6)
     assert 0.99 <= found.chosen.kept < 0.991
-    assert found.tested.force == pytest.approx(kept_force(basis), rel=1e-12)
+    assert found.tested.force == pytest.approx(kept_force(draws), rel=1e-12)
     assert found.elasticities["wall_thickness_mm"] == pytest.approx(3.0)
     assert found.elasticities["radius_mm"] == pytest.approx(-3.0)
 
 
 def test_of_several_sizes_each_changes_as_much_as_it_counts(given):
     """Least Σ (ln x/x₀)² on 3 ln δ − 3 ln R + ln L = const is along (3, −3, 1)."""
-    basis = given(known(2000))
+    draws = given(known(2000))
     free = WALL | RADIUS | {"length_mm": (63.0, 90.0)}
-    found = inverse_design(basis.gear, free, 60.0)
+    found = inverse_design(draws.gear, free, 60.0)
     steps = np.log(np.array(list(found.chosen.sizes.values())) / [0.68, 40.0, 70.0])
-    needed = np.log(60.0 / kept_force(basis))
+    needed = np.log(60.0 / kept_force(draws))
     expected = needed * np.array([3.0, -3.0, 1.0]) / 19.0
     np.testing.assert_allclose(steps, expected, rtol=1e-5)
     assert found.chosen.change == pytest.approx(abs(needed) / np.sqrt(19.0), rel=1e-6)
 
 
 def test_a_bound_passes_the_rest_on(given):
-    basis = given(known(2000))
+    draws = given(known(2000))
     free = {"wall_thickness_mm": (0.66, 0.9)} | RADIUS
-    sizes = inverse_design(basis.gear, free, 60.0).chosen.sizes
+    sizes = inverse_design(draws.gear, free, 60.0).chosen.sizes
     assert sizes["wall_thickness_mm"] == pytest.approx(0.66, rel=1e-9)
-    left = np.log(60.0 / kept_force(basis)) - 3.0 * np.log(0.66 / 0.68)
+    left = np.log(60.0 / kept_force(draws)) - 3.0 * np.log(0.66 / 0.68)
     assert sizes["radius_mm"] == pytest.approx(40.0 * np.exp(-left / 3.0), rel=1e-6)
 
 
 def test_with_an_effect_it_is_still_the_best_of_a_fine_grid(given):
-    basis = given(bent(400))
-    found = inverse_design(basis.gear, WALL | RADIUS, 60.0, probability=0.95)
+    draws = given(bent(400))
+    found = inverse_design(draws.gear, WALL | RADIUS, 60.0, probability=0.95)
     assert found.chosen.kept >= 0.95
     # The effect changes every draw's force by a factor that knows no size.
     needed = np.log(60.0 / found.tested.force)
@@ -73,16 +75,16 @@ def test_with_an_effect_it_is_still_the_best_of_a_fine_grid(given):
 
 
 def test_nothing_changes_where_the_limit_is_kept_already(given):
-    basis = given(known(2000))
-    found = inverse_design(basis.gear, WALL | RADIUS, 500.0)
+    draws = given(known(2000))
+    found = inverse_design(draws.gear, WALL | RADIUS, 500.0)
     assert found.chosen.change == 0.0
     assert found.chosen.kept == 1.0
 
 
 def test_cold_is_what_counts(given):
-    basis = given(known(2000))
-    mild = inverse_design(basis.gear, WALL, 60.0, temperatures=[20.0])
-    cold = inverse_design(basis.gear, WALL, 60.0, temperatures=[-40.0, 80.0])
+    draws = given(known(2000))
+    mild = inverse_design(draws.gear, WALL, 60.0, temperatures=[20.0])
+    cold = inverse_design(draws.gear, WALL, 60.0, temperatures=[-40.0, 80.0])
     ratio = (
         cold.chosen.sizes["wall_thickness_mm"] / mild.chosen.sizes["wall_thickness_mm"]
     )
@@ -91,11 +93,11 @@ def test_cold_is_what_counts(given):
 
 def test_stress_limits_too(given):
     """The force alone would have a thicker wall than the stress allows."""
-    basis = given(known(2000))
-    free = inverse_design(basis.gear, WALL | RADIUS, 60.0)
+    draws = given(known(2000))
+    free = inverse_design(draws.gear, WALL | RADIUS, 60.0)
     assert free.chosen.utilisation < 0.2
     limit = 0.9 * float(np.median(free.chosen.stresses))
-    tight = inverse_design(basis.gear, WALL | RADIUS, 60.0, limit_stress=limit)
+    tight = inverse_design(draws.gear, WALL | RADIUS, 60.0, limit_stress=limit)
     assert tight.chosen.utilisation == pytest.approx(1.0, rel=1e-5)
     assert tight.chosen.change > free.chosen.change
     sizes = tight.drawing
@@ -103,9 +105,9 @@ def test_stress_limits_too(given):
 
 
 def test_materials_are_chosen_among(given):
-    basis = given(known(2000))
+    draws = given(known(2000))
     among = ["40CrNiMoA", "Ti-6Al-4V"]
-    found = inverse_design(basis.gear, WALL, 60.0, materials=among)
+    found = inverse_design(draws.gear, WALL, 60.0, materials=among)
     assert [one.basis.material for one in found.candidates] == among
     assert all(one.met for one in found.candidates)
     # Titanium is soft enough at the tested sizes; no size has to change.
@@ -115,12 +117,12 @@ def test_materials_are_chosen_among(given):
 
 
 def test_not_even_the_best_is_told_with_its_numbers(given):
-    basis = given(known(2000))
+    draws = given(known(2000))
     with pytest.raises(InputError) as refused:
-        inverse_design(basis.gear, {"wall_thickness_mm": (0.65, 0.8)}, 40.0)
+        inverse_design(draws.gear, {"wall_thickness_mm": (0.65, 0.8)}, 40.0)
     words = str(refused.value)
     assert "no wall thickness between 0.65 and 0.8 mm meets 40 N at 0.4 mm" in words
-    best = kept_force(basis) * (0.65 / 0.68) ** 3
+    best = kept_force(draws) * (0.65 / 0.68) ** 3
     assert f"the best (wall thickness 0.65 mm) gives {best:.4g} N" in words
 
 
@@ -161,8 +163,10 @@ def test_the_solver_keeps_what_it_has_when_it_cannot_do_better():
     ],
 )
 def test_bad_input_is_refused(given, vary, changed, words):
-    basis = given(known(2000))
+    draws = given(known(2000))
     asked = {"limit_force": 60.0, **changed}
     with pytest.raises(InputError) as refused:
-        inverse_design(basis.gear, vary, **asked)
+        inverse_design(draws.gear, vary, **asked)
     assert words in str(refused.value)
+    names = {finding.file for finding in refused.value.findings}
+    assert names <= {*signature(inverse_design).parameters}

@@ -1,6 +1,7 @@
 """A study holds every combination with its band, and says what it stands on."""
 
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -91,6 +92,8 @@ def test_bad_input_is_refused(vary, changed, words):
     with pytest.raises(InputError) as refused:
         study(GEAR, vary, **changed)
     assert words in str(refused.value)
+    names = {finding.file for finding in refused.value.findings}
+    assert names <= {*signature(study).parameters}
 
 
 def test_without_a_nominal_deformation_it_asks_for_one():

@@ -1,6 +1,7 @@
 """The spring found is the softest that holds, and its probabilities are true."""
 
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -9,10 +10,10 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from hdcal.design import wave_generator as module
-from hdcal.design.next_gear import next_gear
+from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.springs import best_common, judge, set_points
 from hdcal.design.summary import generator_answer
-from hdcal.design.wave_generator import gear_forces, wave_generator
+from hdcal.design.wave_generator import wave_generator
 from hdcal.errors import InputError
 
 WINDOW = (0.38, 0.42)
@@ -20,11 +21,11 @@ WINDOW = (0.38, 0.42)
 
 @pytest.fixture
 def given(monkeypatch):
-    """Let a basis stand in for a calibration."""
+    """Let draws stand in for a calibration."""
 
-    def use(basis):
-        monkeypatch.setattr(module, "basis_of", lambda source, seed: basis)
-        return basis
+    def use(draws):
+        monkeypatch.setattr(module, "design_draws", lambda source, seed: draws)
+        return draws
 
     return use
 
@@ -35,21 +36,22 @@ def springs_of(stiffness):
 
 
 def test_counting_intervals_is_solving_the_balance():
-    basis = bent(40)
-    gear = next_gear(basis, {"wall_thickness_mm": 0.02})
+    draws = bent(40)
+    gears = next_gear(draws, {"wall_thickness_mm": 0.02}).gears
     levels = np.array([-20.0, 80.0])
-    forces = gear_forces(basis, gear, np.array(WINDOW), levels)
+    forces = NextGear(gears, "").forces(np.array(WINDOW), levels)
     rate, x = 500.0, 0.56
     low, high = set_points(rate, WINDOW, forces)
-    for draw in range(basis.size):
-        own = replace(
-            basis, values={k: v[draw : draw + 1] for k, v in basis.values.items()}
+    for draw in range(draws.size):
+        alone = replace(
+            gears,
+            values={k: v[draw : draw + 1] for k, v in gears.values.items()},
+            shifts={k: v[draw : draw + 1] for k, v in gears.shifts.items()},
+            deviation=gears.deviation[draw : draw + 1],
         )
-        shifts = {k: v[draw : draw + 1] for k, v in gear.shifts.items()}
-        alone = replace(gear, deviation=gear.deviation[:1], shifts=shifts)
 
-        def left(at, level, own=own, alone=alone):
-            force = gear_forces(own, alone, np.array([at]), np.array([level]))
+        def left(at, level, own=alone):
+            force = NextGear(own, "").forces(np.array([at]), np.array([level]))
             return rate * (x - at) - force[0, 0, 0]
 
         rests = [brentq(left, 1e-3, x, args=(level,), xtol=1e-10) for level in levels]
@@ -121,8 +123,8 @@ def test_choosing_on_the_same_draws_flatters_little():
 
 
 def test_the_softest_that_meets_it_is_found(given):
-    basis = given(known(2000))
-    found = wave_generator(basis.gear, WINDOW, temperatures=[-20.0, 80.0])
+    draws = given(known(2000))
+    found = wave_generator(draws.gear, WINDOW, temperatures=[-20.0, 80.0])
     assert found.temperatures.tolist() == [-20.0, 20.0, 80.0]
     assert found.chosen.together >= 0.99
     softer = [s for s in found.springs if s.rate < found.chosen.rate]
@@ -135,8 +137,8 @@ def test_the_softest_that_meets_it_is_found(given):
 
 
 def test_a_spring_set_badly_has_a_best_rate(given):
-    basis = given(known(2000))
-    found = wave_generator(basis.gear, WINDOW, setting_sd=0.012, probability=0.8)
+    draws = given(known(2000))
+    found = wave_generator(draws.gear, WINDOW, setting_sd=0.012, probability=0.8)
     chances = [s.together for s in found.springs]
     best = int(np.argmax(chances))
     assert 0 < best < len(chances) - 1
@@ -147,11 +149,11 @@ def test_a_spring_set_badly_has_a_best_rate(given):
 
 
 def test_the_adjusting_range_is_that_of_the_gears(given):
-    basis = given(known(20_000))
-    found = wave_generator(basis.gear, WINDOW, rates=(100.0, 10_000.0))
+    draws = given(known(20_000))
+    found = wave_generator(draws.gear, WINDOW, rates=(100.0, 10_000.0))
     told = generator_answer(found)
     low, high = told.adjusted.interference_mm
-    stiffness = basis.values["K"] * 207e3 * basis.problem.unit_stiffness
+    stiffness = draws.values["K"] * 207e3 * draws.problem.unit_stiffness
     own = 0.4 + 0.4 * stiffness / found.chosen.rate
     assert low == pytest.approx(np.quantile(own, 0.005), rel=1e-9)
     assert high == pytest.approx(np.quantile(own, 0.995), rel=1e-9)
@@ -163,9 +165,9 @@ def test_the_adjusting_range_is_that_of_the_gears(given):
 
 
 def test_impossible_requirements_say_what_the_best_is(given):
-    basis = given(known(2000))
+    draws = given(known(2000))
     with pytest.raises(InputError) as refused:
-        wave_generator(basis.gear, (0.399, 0.401), rates=(1.0, 50.0))
+        wave_generator(draws.gear, (0.399, 0.401), rates=(1.0, 50.0))
     words = str(refused.value)
     assert "no spring rate between 1 and 50 N/mm meets 0.399 … 0.401 mm" in words
     assert "the best is 50 N/mm with 0." in words
@@ -173,12 +175,12 @@ def test_impossible_requirements_say_what_the_best_is(given):
 
 
 def test_a_force_that_falls_is_refused(given):
-    basis = bent(1000)
+    draws = bent(1000)
     slope = np.full(1000, -2.0)
-    values = {**basis.values, "progressive_stiffening.slope": slope}
-    given(replace(basis, values=values))
+    values = {**draws.values, "progressive_stiffening.slope": slope}
+    given(replace(draws, values=values))
     with pytest.raises(InputError, match="does not grow with deformation"):
-        wave_generator(basis.gear, WINDOW)
+        wave_generator(draws.gear, WINDOW)
 
 
 @pytest.mark.parametrize(
@@ -199,18 +201,20 @@ def test_a_force_that_falls_is_refused(given):
     ],
 )
 def test_bad_input_is_refused(given, changed, words):
-    basis = given(known(2000))
+    draws = given(known(2000))
     asked = {"window": WINDOW, **changed}
     with pytest.raises(InputError) as refused:
-        wave_generator(basis.gear, **asked)
+        wave_generator(draws.gear, **asked)
     assert words in str(refused.value)
+    names = {finding.file for finding in refused.value.findings}
+    assert names <= {*signature(wave_generator).parameters}
 
 
 def test_everything_wrong_is_said_at_once(given):
-    basis = given(known(2000))
+    draws = given(known(2000))
     with pytest.raises(InputError) as refused:
         wave_generator(
-            basis.gear,
+            draws.gear,
             (0.4, 0.3),
             probability=2.0,
             temperatures=[-300.0],

@@ -9,10 +9,11 @@ from diagnosis_cases import judged, rich, simulated
 from rigs import make_case, ramp
 
 from hdcal.data.prior import Prior
+from hdcal.diagnosis import detection, next_run
 from hdcal.diagnosis import diagnose as module
-from hdcal.diagnosis import next_run
 from hdcal.diagnosis.candidate_runs import candidate_runs
 from hdcal.diagnosis.verdict import Verdict
+from hdcal.evidence.residual_test import residual_test
 from hdcal.evidence.row_means import average_rows
 from hdcal.physics.registry import EFFECTS
 
@@ -107,11 +108,9 @@ def test_what_is_not_detected_has_no_size():
 
 def test_a_departure_without_a_cause_has_a_reason_of_its_own(monkeypatch):
     def suspicious(*arguments):
-        cells, tested = look(*arguments)
-        return cells, replace(tested, p_value=0.01)
+        return replace(residual_test(*arguments), p_value=0.01)
 
-    look = module.look
-    monkeypatch.setattr(module, "look", suspicious)
+    monkeypatch.setattr(detection, "residual_test", suspicious)
     verdict = judged(simulated(ramp(14), seed=2))
     assert verdict.gap.detected and verdict.which.verdict == "none"
     assert "no gap is detected" not in verdict.shrink.reason
@@ -141,7 +140,8 @@ def test_members_left_out_of_the_bands_are_told_only_with_bands():
     found = SimpleNamespace(accounted=())
 
     def notes(*refitted: str) -> str:
-        return " ".join(module._notes(found, which, list(refitted), [], 1))
+        fits = {name: (0.3, SimpleNamespace(usable=True)) for name in refitted}
+        return " ".join(module._notes(found, which, fits, 1))
 
     assert "likeliest members" not in notes()
     assert "likeliest members" in notes("a", "b", "c")

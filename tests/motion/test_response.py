@@ -1,5 +1,8 @@
 """The response of a calibrated gear: right for every draw, honest about its priors."""
 
+from dataclasses import replace
+from inspect import signature
+
 import numpy as np
 import pytest
 from moving import TRUTH, motion, still_posterior
@@ -85,6 +88,16 @@ def test_what_swings_faster_than_the_points_is_told():
     assert any("more points" in words for words in found.remarks)
 
 
+def test_a_notebook_shows_the_answer_and_harmless_names():
+    posterior = still_posterior()
+    gear = replace(posterior.case.gear, name="<script>alert(1)</script>")
+    posterior = replace(posterior, case=replace(posterior.case, gear=gear))
+    cell = respond(posterior, "step", **SMALL)._repr_html_()
+    assert "The deformation reaches" in cell and "decided by" in cell
+    assert "there the prior is the answer" in cell
+    assert "&lt;script&gt;" in cell and "<script" not in cell
+
+
 def test_nothing_follows_from_a_failed_calibration():
     with pytest.raises(NotUsable, match="by hand"):
         respond(still_posterior(usable=False), "step", **KNOWN, **SMALL)
@@ -121,8 +134,9 @@ def test_nothing_follows_from_a_failed_calibration():
     ],
 )
 def test_what_makes_no_sense_is_refused(force, options, words):
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(InputError, match=words) as caught:
         respond(still_posterior(), force, **options)
+    assert {f.file for f in caught.value.findings} <= {*signature(respond).parameters}
 
 
 def test_every_fault_is_told_at_once():

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from posteriors import single, stiffer
 from rigs import make_case, ramp
 
 from hdcal.calibration.calibrate import calibrate
-from hdcal.prediction import averaged_bands as averaged
-from hdcal.prediction.averaged_bands import averaged_bands
-from hdcal.prediction.bands.bands import default_bands
+from hdcal.prediction.bands.bands import default_bands, predict
+
+TAILS = np.array([0.025, 0.5, 0.975])
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +23,14 @@ def posterior():
 
 
 def test_one_model_keeps_its_bands(posterior):
-    alone, averaged_one = default_bands(posterior), averaged_bands([(1.0, posterior)])
+    alone, averaged_one = default_bands(posterior), default_bands([(1.0, posterior)])
     for name, column in alone.columns().items():
         np.testing.assert_array_equal(column, averaged_one.columns()[name])
 
 
 def test_a_model_with_itself_changes_little(posterior):
     alone = default_bands(posterior)
-    both = averaged_bands([(0.3, posterior), (0.7, posterior)])
+    both = default_bands([(0.3, posterior), (0.7, posterior)])
     width = alone.new_measurement_hi_N - alone.new_measurement_lo_N
     for end in ("lo", "median", "hi"):
         name = f"new_measurement_{end}_N"
@@ -40,14 +41,17 @@ def test_a_model_with_itself_changes_little(posterior):
 
 
 def test_a_mixture_is_that_of_pooled_draws():
-    rng = np.random.default_rng(0)
-    draws = rng.normal(0.0, 1.0, 200_000), rng.normal(4.0, 0.5, 200_000)
-    levels = averaged._levels()
-    each = [np.quantile(part, levels)[:, None] for part in draws]
-    found = averaged._mixture(each, [0.8, 0.2])[:, 0]
-    pooled = np.concatenate([draws[0], draws[1][:50_000]])
-    expected = np.quantile(pooled, list(averaged._TARGETS.values()))
-    np.testing.assert_allclose(found, expected, atol=0.1)
+    one, at = single(), 0.5
+    other = stiffer(one, 1.05)
+    found = predict([(0.8, one), (0.2, other)], [at])
+    each = [
+        p.draws["stiffness"] * (at - p.draws["deformation_offset"])
+        + p.draws["force_offset"]
+        for p in (one, other)
+    ]
+    expected = np.quantile(np.concatenate([*[each[0]] * 4, each[1]]), TAILS)
+    ends = [getattr(found, f"physics_{end}_N")[0] for end in ("lo", "median", "hi")]
+    np.testing.assert_allclose(ends, expected, atol=0.01)
     # The average of both models' own quantiles is something else.
-    wrong = 0.8 * np.quantile(draws[0], 0.975) + 0.2 * np.quantile(draws[1], 0.975)
+    wrong = 0.8 * np.quantile(each[0], 0.975) + 0.2 * np.quantile(each[1], 0.975)
     assert abs(wrong - expected[2]) > 1.0

@@ -1,6 +1,7 @@
 """Bands: what they hold, where they are tested, and what they refuse."""
 
 from dataclasses import replace
+from inspect import signature
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hdcal.errors import InputError, NotUsable
 from hdcal.inference.checks import Check
 from hdcal.prediction.bands import bands
 from hdcal.prediction.bands.bands import default_bands, predict
+from hdcal.prediction.engine.conditions import is_tested
 
 
 def reading(records, seed=0):
@@ -63,9 +65,9 @@ def test_tested_means_inside_the_data(rubbing):
     found = predict(rubbing, [0.01, 0.3, 0.6], [20.0, 90.0])
     assert list(found.tested) == [False, True, False, False, False, False]
     loading_only = make_records(np.linspace(0.0, 0.5, 9))
-    assert not bands._tested(
-        loading_only, np.array([0.3]), np.array([20.0]), np.array([-1.0])
-    )
+    for sense, inside in ((1.0, True), (-1.0, False)):
+        found = is_tested(loading_only, deformation=0.3, temperature=20.0, sense=sense)
+        assert bool(found) == inside
 
 
 def test_blocks_do_not_show(rubbing, monkeypatch):
@@ -103,8 +105,9 @@ def test_default_bands_reach_a_tenth_beyond_each_way_tested(rubbing):
     ],
 )
 def test_bad_grids_are_refused(rubbing, arguments):
-    with pytest.raises(InputError):
+    with pytest.raises(InputError) as caught:
         predict(rubbing, **arguments)
+    assert {f.file for f in caught.value.findings} <= {*signature(predict).parameters}
 
 
 def test_a_failed_posterior_predicts_nothing(rubbing):

@@ -9,59 +9,62 @@ import pytest
 from designs import bent, known
 from posteriors import single
 
-from hdcal.design.design_draws import basis_of
-from hdcal.design.force_limit import Target
+from hdcal.design.design_draws import design_draws
+from hdcal.design.force_limit import Limits, Target
 from hdcal.design.next_gear import next_gear
 from hdcal.design.study.study import force_quantiles, general_quantiles, is_linear
 from hdcal.errors import InputError
 from hdcal.physics.effects.hysteresis import Hysteresis
 from hdcal.physics.effects.rig_compliance import RigCompliance
-from hdcal.prediction.forces import gear_force
+from hdcal.prediction.engine.forces import gear_forces
+from hdcal.prediction.engine.sizes import stiffness_ratio
 
 SHARES = np.array([0.5, 0.025, 0.975])
 
 
-def one(basis, index=0):
-    return {name: values[index] for name, values in basis.values.items()}
+def one(draws):
+    return {name: values[:1] for name, values in draws.values.items()}
 
 
 def test_the_rig_is_no_part_of_it():
-    basis = known()
-    value = {**one(basis), "rig_compliance.compliance": 1e-3}
-    loose = replace(basis.problem, effects=(RigCompliance,))
+    draws = known()
+    value = {**one(draws), "rig_compliance.compliance": np.full(1, 1e-3)}
+    loose = replace(draws.problem, effects=(RigCompliance,))
     at, warm = np.array([0.1, 0.4]), np.full(2, 20.0)
-    force = gear_force(loose, value, at, warm)
-    stiffness = value["K"] * value["E0"] * basis.problem.unit_stiffness
+    force = gear_forces(loose, value, at, warm)[:, 0]
+    stiffness = value["K"] * value["E0"] * draws.problem.unit_stiffness
     np.testing.assert_allclose(force, stiffness * at, rtol=1e-13)
-    other = {**value, "force_offset": 9.0, "deformation_offset": 0.1}
-    np.testing.assert_array_equal(force, gear_force(loose, other, at, warm))
+    zeros = {"force_offset": np.full(1, 9.0), "deformation_offset": np.full(1, 0.1)}
+    other = gear_forces(loose, value | zeros, at, warm)[:, 0]
+    np.testing.assert_array_equal(force, other)
 
 
 def test_a_diametral_rig_changes_nothing():
-    basis = known()
-    half = replace(basis.problem, reading=replace(basis.problem.reading))
+    draws = known()
+    half = replace(draws.problem, reading=replace(draws.problem.reading))
     half = replace(half, reading=replace(half.reading, radial_per_read=0.5))
     at, warm = np.array([0.1, 0.4]), np.full(2, 20.0)
     np.testing.assert_allclose(
-        gear_force(half, one(basis), at, warm),
-        gear_force(basis.problem, one(basis), at, warm),
+        gear_forces(half, one(draws), at, warm),
+        gear_forces(draws.problem, one(draws), at, warm),
         rtol=1e-13,
     )
 
 
 def test_each_row_is_a_gear_at_rest():
-    basis = known()
-    sticking = replace(basis.problem, effects=(Hysteresis,))
-    value = {**one(basis), "hysteresis.force": 5.0, "hysteresis.reach": 0.1}
+    draws = known()
+    sticking = replace(draws.problem, effects=(Hysteresis,))
+    loop = {"hysteresis.force": np.full(1, 5.0), "hysteresis.reach": np.full(1, 0.1)}
+    value = one(draws) | loop
     at, warm = np.array([0.5, 0.05, 0.3]), np.full(3, 20.0)
-    together = gear_force(sticking, value, at, warm)
-    alone = gear_force(sticking, value, at[1:2], warm[:1])
-    assert float(together[1]) == pytest.approx(float(alone[0]), rel=1e-13)
+    together = gear_forces(sticking, value, at, warm)
+    alone = gear_forces(sticking, value, at[1:2], warm[:1])
+    assert float(together[1, 0]) == pytest.approx(float(alone[0, 0]), rel=1e-13)
 
 
 @pytest.mark.parametrize("make", [known, bent])
 def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
-    basis = make(200)
+    draws = make(200)
     random = np.random.default_rng(0)
     factor, at = random.uniform(0.5, 2.0, 7), random.uniform(0.1, 0.5, 7)
     warm = random.choice([20.0, 80.0], 7)
@@ -69,24 +72,24 @@ def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
     slow = []
     for f, x, t in zip(factor, at, warm, strict=True):
         rise = t - 20.0
-        force = basis.values["K"] * 207e3 * basis.problem.unit_stiffness * f * x
-        force = force * (1.0 - basis.values["alpha"] * rise)
-        slope = basis.values.get("progressive_stiffening.slope", 0.0)
+        force = draws.values["K"] * 207e3 * draws.problem.unit_stiffness * f * x
+        force = force * (1.0 - draws.values["alpha"] * rise)
+        slope = draws.values.get("progressive_stiffening.slope", 0.0)
         depth = np.hypot(x, 1e-4) - 1e-4
         slow.append(np.quantile(force * (1.0 + slope * depth), SHARES))
     for fast in (force_quantiles, general_quantiles):
-        found = fast(basis, factor, at, warm, SHARES)
+        found = fast(draws, factor, at, warm, SHARES)
         np.testing.assert_allclose(found.T, slow, rtol=1e-12)
-    assert is_linear(basis) == (make is known)
+    assert is_linear(draws) == (make is known)
 
 
 @pytest.mark.parametrize("theory", ["ring", "cup"])
 @pytest.mark.parametrize("make", [known, bent])
 def test_derivatives_are_those_of_finite_differences(make, theory):
-    basis = make(500, theory)
-    gear = next_gear(basis, {"wall_thickness_mm": 0.02, "radius_mm": 0.05})
-    target = Target.of(basis, gear, np.array([-20.0, 80.0]), 0.95)
-    geometry = basis.gear.geometry
+    draws = make(500, theory)
+    gear = next_gear(draws, {"wall_thickness_mm": 0.02, "radius_mm": 0.05})
+    levels, limits = np.array([-20.0, 80.0]), Limits(60.0, None, 0.95)
+    target = Target.of(draws, gear, 0.3, levels, limits)
     place = {
         "wall_thickness_mm": 0.66,
         "radius_mm": 41.0,
@@ -96,7 +99,7 @@ def test_derivatives_are_those_of_finite_differences(make, theory):
         "K": 1.0,
     }
     place = {name: jnp.asarray(value) for name, value in place.items()}
-    force = jax.jit(lambda x: target.force(geometry, x))
+    force = jax.jit(lambda x: target.force(x))
     slopes = jax.grad(force)(place)
     for name, value in place.items():
         step = 1e-4 * value
@@ -111,67 +114,65 @@ def test_derivatives_are_those_of_finite_differences(make, theory):
 
 
 def test_a_wrong_derivative_would_be_seen():
-    basis = bent(500)
-    target = Target.of(basis, next_gear(basis), np.array([20.0]), 0.95)
-    geometry = basis.gear.geometry
-    place = {"deformation_mm": jnp.asarray(0.4), "modulus": 1.0, "K": 1.0}
-    slope = jax.grad(lambda x: target.force(geometry, {**place, "deformation_mm": x}))
+    draws = bent(500)
+    limits = Limits(60.0, None, 0.95)
+    target = Target.of(draws, next_gear(draws), 0.4, np.array([20.0]), limits)
+    slope = jax.grad(lambda x: target.force({"deformation_mm": x}))
     # That of the straight line alone.
-    straight = target.force(geometry, place) / 0.4
+    straight = target.force({}) / 0.4
     assert float(slope(0.4)) != pytest.approx(float(straight), rel=1e-2)
 
 
 def test_no_fewer_draws_keep_the_limit_than_were_asked_for():
-    basis = known(2000)
+    draws = known(2000)
     for probability in (0.5, 0.9, 0.99, 0.995):
-        target = Target.of(basis, next_gear(basis), np.array([20.0]), probability)
-        place = {"deformation_mm": 0.4, "modulus": 1.0, "K": 1.0}
-        limit = float(target.force(basis.gear.geometry, place))
-        forces = np.asarray(target.forces(basis.gear.geometry, 0.4, 1.0, 1.0))
-        share = np.mean(forces <= limit)
-        assert probability <= share < probability + 2.0 / basis.size
+        limits = Limits(60.0, None, probability)
+        target = Target.of(draws, next_gear(draws), 0.4, np.array([20.0]), limits)
+        share = np.mean(np.asarray(target.forces({})) <= float(target.force({})))
+        assert probability <= share < probability + 2.0 / draws.size
 
 
 def test_tolerances_and_tested_gears_scatter_the_next_one():
-    basis = replace(known(20_000), kind="posterior")
-    assert not np.any(next_gear(basis).deviation)
-    assert "no statement about a population" in next_gear(basis).words
-    made = next_gear(basis, {"wall_thickness_mm": 0.02})
-    factor = np.asarray(made.factor(basis, basis.gear.geometry))
+    draws = replace(known(20_000), kind="posterior")
+    assert not np.any(next_gear(draws).gears.deviation)
+    assert "no statement about a population" in next_gear(draws).words
+    made = next_gear(draws, {"wall_thickness_mm": 0.02})
+    sizes = made.gears.made(draws.drawing)
+    factor = np.asarray(stiffness_ratio(sizes, draws.gear.geometry, draws.theory))
     # Uniform within ± 0.02 mm, to the third power.
     assert np.std(factor) == pytest.approx(3 * 0.02 / 0.68 / np.sqrt(3.0), rel=0.02)
     assert factor.max() < (1.0 + 0.02 / 0.68) ** 3
     tested = replace(
-        basis,
-        problem=replace(basis.problem, specimens=5),
-        values={**basis.values, "specimen_sd": np.full(20_000, 0.05)},
+        draws,
+        problem=replace(draws.problem, specimens=5),
+        values={**draws.values, "specimen_sd": np.full(20_000, 0.05)},
     )
-    spread = np.std(next_gear(tested).deviation)
+    spread = np.std(next_gear(tested).gears.deviation)
     assert spread == pytest.approx(0.05 * np.sqrt(1.2), rel=0.02)
     assert "5 tested ones" in next_gear(tested).words
     with pytest.raises(InputError, match="Did you mean 'radius_mm'"):
-        next_gear(basis, {"radius": 0.02})
+        next_gear(draws, {"radius": 0.02})
     with pytest.raises(InputError, match="± part in mm"):
-        next_gear(basis, {"wall_thickness_mm": 0.5})
+        next_gear(draws, {"wall_thickness_mm": 0.5})
 
 
 def test_the_nominal_deformation_is_the_gears_own():
     """The gear file says it as read: of a diametral reading half is the gear's."""
-    basis = known()
-    gear = replace(basis.gear, nominal_deformation=0.8)
-    half = replace(basis.problem.reading, radial_per_read=0.5)
-    read = replace(basis, gear=gear, problem=replace(basis.problem, reading=half))
+    draws = known()
+    gear = replace(draws.gear, nominal_deformation=0.8)
+    half = replace(draws.problem.reading, radial_per_read=0.5)
+    read = replace(draws, gear=gear, problem=replace(draws.problem, reading=half))
     assert read.nominal_deformation == pytest.approx(0.4)
-    assert replace(basis, gear=gear).nominal_deformation == pytest.approx(0.8)
+    assert replace(draws, gear=gear).nominal_deformation == pytest.approx(0.8)
 
 
 def test_a_cause_that_is_not_settled_is_told():
     posterior = single(size=100)
-    assert basis_of(posterior).misfits == ()
+    assert design_draws(posterior).misfits == ()
     origin = {"hypothesis": "contact_onset", "probabilities": {"contact_onset": 0.6}}
     settled = {**posterior.settings, "diagnosis": origin}
-    assert basis_of(replace(posterior, settings=settled)).misfits == ()
+    assert design_draws(replace(posterior, settings=settled)).misfits == ()
     origin = {**origin, "probabilities": {"contact_onset": 0.6, "none": 0.4}}
     open_one = {**posterior.settings, "diagnosis": origin}
-    (words,) = basis_of(replace(posterior, settings=open_one)).misfits
+    (words,) = design_draws(replace(posterior, settings=open_one)).misfits
     assert "rests on contact onset alone" in words

@@ -20,11 +20,12 @@ from scipy import stats
 
 import hdcal
 from hdcal.errors import InputError
-from hdcal.prediction.forces import force_of, grid_records
-from hdcal.prediction.margin.margin import _outlook
-from hdcal.prediction.mixture import Mixture
-from hdcal.prediction.population import widest
-from hdcal.prediction.size_tolerances import relative_stiffness, tolerance_nodes
+from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.forces import force_of, grid_records
+from hdcal.prediction.engine.mixture import Mixture
+from hdcal.prediction.engine.population import widest
+from hdcal.prediction.engine.population_force import SCORES, population_force
+from hdcal.prediction.engine.sizes import shifted, stiffness_ratio, tolerance_strata
 
 QUICK = {"sensitivities": False}
 QUANTILE = jax.jit(Mixture.quantile)
@@ -45,8 +46,8 @@ def members(posterior, at: float, *, count: int = 2000, seed: int = 3) -> np.nda
     rng, d = np.random.default_rng(seed), posterior.draws
     size, runs = len(d["K"]), posterior.problem.runs
     # The centre of the population is as the margin has it, the members are not.
-    outlook = _outlook(posterior, at, "up", "specimens", "reading", {}, 0)
-    of_gears, of_runs, _ = outlook.values["_standard"].T
+    force = population_force(*causes_of(posterior), at, "specimens")
+    of_gears, of_runs, _ = force.cause.values[SCORES].T
     stiff = rng.normal(of_gears[:, None] / np.sqrt(runs), 1.0, (size, count))
     zero = rng.normal(of_runs[:, None] / np.sqrt(runs), 1.0, (size, count))
     load = d["stiffness"] * (at - d["deformation_offset"])
@@ -136,12 +137,13 @@ def test_the_worst_temperature_counts(one):
 def test_tolerances_widen_as_brute_force_says(one):
     sizes = {"wall_thickness": 0.02, "radius": 0.05}
     geometry = one.case.gear.geometry
-    nodes = tolerance_nodes(geometry, sizes, "ring")
+    strata = tolerance_strata(geometry, sizes, "ring")
     rng = np.random.default_rng(0)
     shifts = {n: t * rng.uniform(-1.0, 1.0, 200_000) for n, t in sizes.items()}
-    drawn = np.asarray(relative_stiffness(geometry, shifts, "ring"))
-    assert nodes.weight @ nodes.factor == pytest.approx(drawn.mean(), abs=2e-4)
-    square = nodes.weight @ (nodes.factor**2 + nodes.width**2)
+    made = shifted(geometry, shifts)
+    drawn = np.asarray(stiffness_ratio(made, geometry, "ring"))
+    assert strata.weight @ strata.factor == pytest.approx(drawn.mean(), abs=2e-4)
+    square = strata.weight @ (strata.factor**2 + strata.width**2)
     assert square == pytest.approx(np.mean(drawn**2), abs=4e-4)
     asked = {f"{name}_mm": size for name, size in sizes.items()}
     found = hdcal.margin(one, 0.4, tolerances=asked, **QUICK)
@@ -160,13 +162,14 @@ def test_scatter_through_a_bent_force_is_that_of_brute_force():
     curvature = {"force_saturation.curvature": np.full(40, 2e-5)}
     draws = {**gears.draws, **curvature, "specimen_sd": np.full(40, 0.08)}
     bent = written_posterior(gears.case, draws, effects=["force_saturation"])
-    outlook = _outlook(bent, 0.4, "up", "specimens", "reading", {}, 0)
+    future = population_force(*causes_of(bent), 0.4, "specimens")
     problem = bent.problem
-    row, rng = {n: v[7] for n, v in outlook.values.items()}, np.random.default_rng(1)
+    row = {name: values[7] for name, values in future.cause.values.items()}
+    rng = np.random.default_rng(1)
     gear, zero, noise = rng.normal(size=(3, 100_000))
     gear, zero = (
         score + centre / np.sqrt(6.0)
-        for score, centre in zip((gear, zero), row["_standard"], strict=False)
+        for score, centre in zip((gear, zero), row[SCORES], strict=False)
     )
     records = grid_records(np.array([0.4]), np.array([20.0]), np.ones(1), 0.0)
 
@@ -176,7 +179,7 @@ def test_scatter_through_a_bent_force_is_that_of_brute_force():
     factor = jnp.asarray(1.0 + row["specimen_sd"] * gear)
     force = np.asarray(jax.jit(jax.vmap(mean))(factor))
     drawn = force + row["run_offset_sd"] * zero + row["sigma"] * noise
-    found = outlook.mixture(20.0)
+    found = future.mixture()
     for share in (0.01, 0.5, 0.99):
         expected = np.quantile(drawn, share)
         assert float(QUANTILE(found, share)[7]) == pytest.approx(expected, rel=3e-3)

@@ -14,7 +14,7 @@ from verdicts import ambiguous, failed
 
 from hdcal.diagnosis.result_folder import write_verdict
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.causes import ORIGIN, read_models
+from hdcal.prediction.engine.causes import ORIGIN, read_models
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.report.answer import json_schema
 

@@ -19,9 +19,9 @@ from hdcal.inference.density import member_base
 from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.physics.chain import predict_reading
-from hdcal.prediction.margin.bounds import content_bound
-from hdcal.prediction.margin.margin import _outlook
-from hdcal.prediction.mixture import Mixture, pooled
+from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.mixture import Mixture, pooled, weighted_quantile
+from hdcal.prediction.engine.population_force import population_force
 
 FAIR, PREDICTIVE, HALVED = range(3)
 AT, CONTENTS, CONFIDENCE = 0.4, (0.90, 0.99), 0.95
@@ -106,7 +106,9 @@ def run(population: str, size: int, count: int, fixed: bool = False):
             posterior = written_posterior(case, values)
             each, plain = _quantiles(_mixture(posterior, population))
             even = np.ones(len(values["K"]))
-            found.append([content_bound(np.asarray(q), even, CONFIDENCE) for q in each])
+            found.append(
+                [weighted_quantile(np.asarray(q), even, CONFIDENCE) for q in each]
+            )
             if values is draws:
                 found.append([float(quantile) for quantile in plain])
         fair, predictive, halved = found
@@ -115,8 +117,7 @@ def run(population: str, size: int, count: int, fixed: bool = False):
 
 
 def _mixture(posterior, population) -> Mixture:
-    outlook = _outlook(posterior, AT, "up", population, "reading", {}, 0)
-    return outlook.mixture(20.0)
+    return population_force(*causes_of(posterior), AT, population).mixture()
 
 
 def shortfall(hits: np.ndarray) -> float:

@@ -7,41 +7,34 @@ from posteriors import batch, plain_draws, ramp_case, single, stiffer, written_p
 from rigs import make_gear
 
 import hdcal
-from hdcal.prediction.margin.gradients import design_point, gradients, mixture_at
-from hdcal.prediction.margin.margin import _outlook
-from hdcal.prediction.margin.variance_shares import shares
-from hdcal.prediction.mixture import Mixture, weighted_quantile
+from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.mixture import Mixture, weighted_quantile
+from hdcal.prediction.engine.population_force import population_force
+from hdcal.prediction.margin.gradients import Redesign, gradients
+from hdcal.prediction.margin.request import Criteria
+from hdcal.prediction.margin.variance_shares import variance_shares
 
-CONTENT, CONFIDENCE, WARM = 0.99, 0.95, 40.0
+WARM, CRITERIA = 40.0, Criteria(0.99, 0.95, None, None)
 QUANTILE = jax.jit(Mixture.quantile)
 
 
-def bound(outlook, tolerances, point, origin) -> float:
-    """Compute the upper bound of another gear from scratch."""
-    mixture = mixture_at(outlook, WARM, tolerances, point, origin)
-    found = np.asarray(QUANTILE(mixture, CONTENT))
-    return weighted_quantile(found, np.ones(len(found)), CONFIDENCE)[0]
+def bound(mixture: Mixture) -> float:
+    """Compute the upper bound from scratch."""
+    found = np.asarray(QUANTILE(mixture, CRITERIA.content))
+    return weighted_quantile(found, np.ones(len(found)), CRITERIA.confidence)
 
 
 def check(posterior, population: str, tolerances: dict) -> None:
-    outlook = _outlook(posterior, 0.4, "up", population, "reading", tolerances, 0)
-    origin = design_point(outlook)
-    mixture = outlook.mixture(WARM)
-    quantiles = np.asarray(QUANTILE(mixture, CONTENT))
-    found = gradients(
-        [(1.0, outlook)],
-        WARM,
-        tolerances,
-        quantiles,
-        np.ones(len(quantiles)),
-        CONTENT,
-        CONFIDENCE,
-    )
-    assert {slope.name for slope in found} == set(origin)
+    (cause,) = causes_of(posterior)
+    force = population_force(cause, 0.4, population, tolerances=tolerances).at(WARM)
+    gear = Redesign.of(force)
+    quantiles = np.asarray(QUANTILE(force.mixture(), CRITERIA.content))
+    found = gradients([force], quantiles, CRITERIA)
+    assert {slope.name for slope in found} == set(gear.origin)
     for slope in found:
         step = 1e-5 * slope.value
         ends = [
-            bound(outlook, tolerances, {**origin, slope.name: slope.value + by}, origin)
+            bound(gear.mixture({**gear.origin, slope.name: slope.value + by}))
             for by in (step, -step)
         ]
         difference = (ends[0] - ends[1]) / (2.0 * step)
@@ -86,8 +79,8 @@ def test_shares_of_a_sum_are_its_variances():
         "deformation_offset": np.zeros(2000),
     }
     posterior = written_posterior(case, draws)
-    outlook = _outlook(posterior, 0.4, "up", "readings", "reading", {}, 0)
-    found = {s.name: s for s in shares([(1.0, outlook)], 60.0, {})}
+    force = population_force(*causes_of(posterior), 0.4, "readings").at(60.0)
+    found = {s.name: s for s in variance_shares([force])}
     at = 0.4 * draws["stiffness"] * (1.0 - 3e-4 * 40.0) + draws["force_offset"]
     parts = {
         "calibration": np.var(at),

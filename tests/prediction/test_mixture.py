@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from hdcal.prediction.mixture import Mixture, pooled, weighted_quantile
+from hdcal.prediction.engine.mixture import (
+    Mixture,
+    draw_quantiles,
+    pooled,
+    quantile_weights,
+    weighted_quantile,
+)
 
 WEIGHT = np.array([0.3, 0.7])
 MEAN = np.array([[0.0, 1.0], [5.0, -3.0], [2.0, 2.0]])
@@ -103,11 +109,22 @@ def test_weighted_quantiles_are_those_of_repeated_values():
     values = rng.normal(size=400)
     counts = rng.integers(1, 5, 400)
     for share in (0.05, 0.5, 0.95):
-        found, used = weighted_quantile(values, counts.astype(float), share)
+        found = weighted_quantile(values, counts.astype(float), share)
+        used = quantile_weights(values, counts.astype(float), share)
         expected = np.quantile(np.repeat(values, counts), share, method="hazen")
         assert found == pytest.approx(expected, abs=0.02)
         assert used.sum() == pytest.approx(1.0) and used @ values == pytest.approx(
             found
         )
-    even, _ = weighted_quantile(values, np.ones(400), 0.9)
+    even = weighted_quantile(values, np.ones(400), 0.9)
     assert even == pytest.approx(np.quantile(values, 0.9, method="hazen"), abs=1e-12)
+
+
+def test_quantiles_of_many_rows_are_those_of_each():
+    rng = np.random.default_rng(1)
+    values, weights = rng.normal(size=(400, 3)), rng.uniform(0.5, 2.0, 400)
+    shares = np.array([0.05, 0.5, 0.95])
+    found = draw_quantiles(values, weights, shares)
+    for row, share in np.ndindex(3, 3):
+        alone = weighted_quantile(values[:, row], weights, shares[share])
+        assert found[share, row] == pytest.approx(alone, rel=1e-12)

@@ -9,8 +9,7 @@ from scipy.stats import qmc
 
 import hdcal
 from hdcal.errors import InputError
-from hdcal.prediction.margin.bounds import content_bound
-from hdcal.prediction.mixture import Mixture
+from hdcal.prediction.engine.mixture import Mixture, weighted_quantile
 
 # One-sided normal factors at 95 % confidence, Owen (1963), Sandia SCR-607; to two
 # or three decimals also CMH-17, vol. 1, tables of k_B and k_A.
@@ -50,7 +49,7 @@ def bayesian_factor(size: int, content: float, *, narrowed=1.0) -> float:
         jnp.ones(1), jnp.asarray(mean)[:, None], narrowed * jnp.asarray(sd)[:, None]
     )
     found = np.asarray(jax.jit(Mixture.quantile)(population, content))
-    return content_bound(found, np.ones(len(found)), 0.95)
+    return weighted_quantile(found, np.ones(len(found)), 0.95)
 
 
 @pytest.mark.parametrize("size", [5, 10, 30])

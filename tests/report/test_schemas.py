@@ -19,11 +19,13 @@ ALL = answers()
 def test_a_schema_is_valid_and_names_its_format(name: str):
     schema = json_schema(ALL[name])
     jsonschema.Draft202012Validator.check_schema(schema)
-    assert schema["properties"]["schema"]["const"] == name
+    format_, *kind = name.split()
+    assert schema["properties"]["schema"]["const"] == format_
+    assert kind in ([], [schema["properties"].get("kind", {}).get("const")])
     assert {"status", "reasons", "headline", "next_step"} <= set(schema["required"])
     assert set(schema["required"]) == set(schema["properties"])
     assert schema["description"].splitlines()[0].endswith(".")
-    assert "/" not in file_name(name)
+    assert not {"/", " "} & set(file_name(name))
 
 
 def test_nothing_else_passes_for_an_answer():

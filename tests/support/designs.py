@@ -6,11 +6,11 @@ import numpy as np
 from rigs import make_gear
 
 from hdcal.data.prior import Prior
-from hdcal.design.design_draws import Basis, basis_of
+from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
 
 
-def known(draws: int = 2000, theory="ring") -> Basis:
+def known(draws: int = 2000, theory="ring") -> DesignDraws:
     """Return draws of a gear whose K is lognormal and whose modulus is known."""
     gear = make_gear(
         theory=theory,
@@ -18,15 +18,15 @@ def known(draws: int = 2000, theory="ring") -> Basis:
         E0=Prior("fixed", (207e3,)),
         alpha=Prior("normal", (3e-4, 2e-5)),
     )
-    return basis_of(gear, draws=draws)
+    return design_draws(gear, draws=draws)
 
 
-def bent(draws: int = 500, theory="ring") -> Basis:
+def bent(draws: int = 500, theory="ring") -> DesignDraws:
     """Return draws of a gear that gets stiffer as it is deformed."""
-    basis = known(draws, theory)
+    own = known(draws, theory)
     slope = np.random.default_rng(1).normal(0.35, 0.05, draws)
     return replace(
-        basis,
-        problem=replace(basis.problem, effects=(ProgressiveStiffening,)),
-        values={**basis.values, "progressive_stiffening.slope": slope},
+        own,
+        problem=replace(own.problem, effects=(ProgressiveStiffening,)),
+        values={**own.values, "progressive_stiffening.slope": slope},
     )

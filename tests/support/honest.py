@@ -25,7 +25,7 @@ PAIRS = ("drift+friction", "slack+stiffening")
 DIMENSIONS, ROWS = 8, 144
 SIZES = (0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
 PRIOR = {"none": 0.2, "unknown": 0.15, "pair": 0.05, "effect": 0.6}
-GATE = 0.02
+ALARM = 0.02
 # Between any two of them the cosine is 0.5: alike, but not the same.
 SHAPES = np.sqrt(0.5) * (np.eye(DIMENSIONS)[: len(EFFECTS)] + np.eye(DIMENSIONS)[-1])
 
@@ -99,7 +99,7 @@ def reply(case: str, seen: np.ndarray, withheld: tuple[str, ...] = ()) -> CaseAn
             set=(),
             probabilities=posterior(seen, withheld),
             inclusion={},
-            detected=bool(chi2.sf(seen @ seen, DIMENSIONS) < GATE),
+            detected=bool(chi2.sf(seen @ seen, DIMENSIONS) < ALARM),
         )
     )
 

@@ -62,6 +62,7 @@ def make(
     one_thread_for_algebra()
     given = {"--cases": cases, "--mix": mix, "--seed": seed, "--program": program}
     _check_forms(source, given, {f"--{name}": text for name, text in real.items()})
+    from hdcal.blind.answer import SetAnswer
     from hdcal.blind.sealed_set import check_free, write_set
 
     key = _beside(out) if key is None else Path(key)
@@ -86,9 +87,11 @@ def make(
         drawn, about = [(table, label)], {}
     manifest = write_set(out, drawn, gear, key, force=force, **about)
     console.result(f"commitment {manifest.commitment}")
-    console.words(f"{len(manifest.cases)} sealed: {out}; keep the key to them: {key}")
+    words = f"{len(manifest.cases)} sealed: {out}; keep the key to them: {key}"
+    console.words(words)
     if console.json:
-        console.data({"status": "ok", **manifest.plain()})
+        next_step = f"Answer them: hdcal blind answer {out}"
+        console.data(_answer(SetAnswer, manifest.plain(), words, next_step))
     return 0
 
 
@@ -118,7 +121,8 @@ def answer(console: Console, folder, **settings) -> int:
     """Answer every case of DIR; an interrupted run goes on when it is run again."""
     one_thread_for_algebra()
     keep_compilations()
-    from hdcal.blind.answer import answer_set
+    from hdcal.blind.answer import FrozenAnswer
+    from hdcal.blind.answering import answer_set
     from hdcal.cli.progress import progress_bar
 
     try:
@@ -129,11 +133,13 @@ def answer(console: Console, folder, **settings) -> int:
         console.words(f"interrupted: {words}")
         return _INTERRUPTED
     console.result(f"answers {frozen['sha256']}")
-    console.words(f"{len(frozen['answers'])} answers by '{frozen['by']}' are frozen")
+    words = f"{len(frozen['answers'])} answers by '{frozen['by']}' are frozen"
+    console.words(words)
     if not frozen["blind"]:
         console.words("NOT BLIND: this set was opened before")
     if console.json:
-        console.data({"status": "ok", **frozen})
+        next_step = f"Open it with its key: hdcal blind open {folder} --key FILE"
+        console.data(_answer(FrozenAnswer, frozen, words, next_step))
     return 0
 
 
@@ -150,8 +156,10 @@ def answer(console: Console, folder, **settings) -> int:
 @click.pass_obj
 def open_(console: Console, folder, key, by) -> int:
     """Open DIR, score its frozen answers, and write DIR/result."""
+    from hdcal.blind.answer import ScoresAnswer
+    from hdcal.blind.document import scores_document
     from hdcal.blind.open import open_set
-    from hdcal.blind.terminal import opening_words
+    from hdcal.report.terminal import terminal_lines
 
     opening = open_set(folder, Path(key), tuple(dict.fromkeys(by)))
     result = opening.result
@@ -162,12 +170,17 @@ def open_(console: Console, folder, key, by) -> int:
             words = "were frozen after the set was opened"
             console.words(f"NOT BLIND: the answers of '{name}' {words}")
     console.words(f"verified and scored: {opening.folder}")
+    document = scores_document(result["scores"], opening.secret.labels, opening.answers)
     if console.json:
-        console.data({"status": "ok", **result})
+        console.data(_answer(ScoresAnswer, result, document.headline, None))
         return 0
-    labels, where = opening.secret.labels, str(opening.folder)
-    console.table(*opening_words(result["scores"], labels, opening.answers, where))
+    console.table(*terminal_lines(document, str(opening.folder)))
     return 0
+
+
+def _answer(kind, content: dict, headline: str, next_step: str | None):
+    said = {"headline": headline, "next_step": next_step}
+    return kind(status="ok", reasons=(), **said, **content)
 
 
 def _check_forms(source, drawn: dict, real: dict) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.blind.label import CaseAnswer, Span
+from hdcal.blind.label import CaseAnswer, Quantiles
 from hdcal.blind.rival_methods import fit_each
 from hdcal.blind.seal import canonical, digest
 from hdcal.data.case import Case
@@ -103,7 +103,7 @@ def answer_of(verdict: Verdict) -> CaseAnswer:
     )
 
 
-def _span(interval: Interval) -> Span:
+def _span(interval: Interval) -> Quantiles:
     return interval.median, interval.lo, interval.hi
 
 

@@ -1,28 +1,32 @@
-"""The report of a blind check, and everything that its scores leave behind."""
+"""The report of a blind check, from its scores."""
 
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from hdcal.blind.figure import (
-    bar_figure,
-    confusion_figure,
-    detection_figure,
-    reliability_figure,
-)
+from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.words import (
     bar_row,
     limit_row,
+    measured_row,
     shown,
     span,
     truth_word,
     with_span,
 )
-from hdcal.report.canvas import render
-from hdcal.report.page import render_page
-from hdcal.report.plain import as_json, as_plain
+from hdcal.report.document import (
+    Block,
+    Details,
+    Document,
+    Facts,
+    Picture,
+    Section,
+    Table,
+    Text,
+    notices,
+)
 
-_TEMPLATE = "blind.html.j2"
 _TITLE = "Blind check"
+_KINDS = {"null": "without a gap", "pair": "with two effects", "real": "measured"}
 # key, heading and unit of the numbers in the tables of groups
 _FIRST = (
     ("top1", "true effect first", "share"),
@@ -59,38 +63,31 @@ _PAIRS = (
 )
 
 
-def write_scores(found: dict[str, Any], folder: Path) -> None:
-    """Write scores.json, the figures and report.html.
+def headline(found: Mapping[str, Any]) -> str:
+    """Return how many promises were kept, in one sentence."""
+    count = found["summary"]
+    return (
+        f"{count['met']} met, {count['missed']} missed of the rows that were promised; "
+        f"{count['open']} have no target or no cases."
+    )
+
+
+def scores_document(
+    found: Mapping[str, Any],
+    labels: Sequence[Label] = (),
+    answers: Mapping[str, Sequence[CaseAnswer]] | None = None,
+) -> Document:
+    """Return the report; its pictures: bar, confusion, reliability and detection.
 
     Args:
-        found: from `hdcal.blind.scoring.scores.score`.
-        folder: one that exists, from `whole_folder`.
+        found: from `hdcal.blind.scoring.scores.score`, as plain data.
+        labels: the truth, where what was said of measured data is to be shown.
+        answers: by diagnoser, in the order of the labels.
     """
-    plain = as_plain(found)
-    (folder / "scores.json").write_text(as_json(plain), "utf-8")
-    drawn = {
-        "bar": bar_figure(plain["bar"]),
-        "confusion": confusion_figure(plain["confusion"]),
-        "reliability": reliability_figure(plain["reliability"]),
-        "detection": detection_figure(plain["detection"]),
-    }
-    images = {n: render(f, "svg", f"{_TITLE}: {n}") for n, f in drawn.items()}
-    for name, figure in drawn.items():
-        (folder / f"{name}.svg").write_bytes(images[name])
-        png = render(figure, "png", f"{_TITLE}: {name}")
-        (folder / f"{name}.png").write_bytes(png)
-    page = blind_report(plain, images).encode("utf-8", "xmlcharrefreplace")
-    (folder / "report.html").write_bytes(page)
-
-
-def blind_report(found: dict[str, Any], images: dict[str, bytes]) -> str:
-    """Return the report as the text of an HTML file.
-
-    Args:
-        found: scores as plain data.
-        images: SVG files named bar, confusion, reliability and detection.
-    """
+    kinds = found["cases"]["kinds"]
+    listed = ", ".join(f"{n} {_KINDS.get(kind, kind)}" for kind, n in kinds.items())
     rows = [bar_row(row) for row in found["bar"]]
+    missed = [str(row["what"]) for row in rows if str(row["word"])[:6] == "missed"]
     groups = {
         "size of the gap": found["by_r"],
         "program": found["by_program"],
@@ -98,61 +95,164 @@ def blind_report(found: dict[str, Any], images: dict[str, bytes]) -> str:
         "effect": found["by_effect"],
         "family": found["by_family"],
     }
-    context = {
-        "kind": "scores",
-        "failed": False,
-        "name": _TITLE,
-        "found": found,
-        "kinds": ", ".join(f"{n} {k}" for k, n in found["cases"]["kinds"].items()),
-        "bar": rows,
-        "missed": [row["what"] for row in rows if row["word"].startswith("missed")],
-        "rivals": _table(_rivals(found), _RIVALS),
-        "groups": [(name, _table(lines, _FIRST)) for name, lines in groups.items()],
-        "sizes": _table(found["by_r"], _SIZES),
-        "limits": [limit_row(curve) for curve in found["detection"]],
-        "mix_ups": [_mix_up(row) for row in found["mix_ups"]],
-        "calibration": _calibration(found["reliability"]),
-        "pairs": [(words, with_span(found["pairs"][key])) for key, words in _PAIRS],
-        "order": _order(found["order"]),
-        "notes": list(found["notes"].items()),
-    }
-    return render_page(_TEMPLATE, context, images)
-
-
-def _table(lines: list[dict], columns: tuple) -> dict[str, list]:
-    return {
-        "heads": [words for _, words, _ in columns],
-        "rows": [
-            {
-                "name": line["name"].replace("_", " "),
-                "n": str(line["n"]),
-                "cells": [_cell(line[key], unit) for key, _, unit in columns],
-            }
-            for line in lines
+    notes = [(name.replace("_", " "), words) for name, words in found["notes"].items()]
+    return Document(
+        name=_TITLE,
+        kind="scores",
+        subtitle=f"{found['diagnoser']} on {found['cases']['n']} cases"
+        + (f" ({listed})" if listed else "")
+        + " whose truth was sealed until every answer was given.",
+        headline=headline(found),
+        notices=notices(("Missed", missed)),
+        sections=[
+            _promised(rows, bool(set(kinds) - {"real"})),
+            *_measured(labels, answers or {}),
+            _beside_others(found),
+            _confused(found),
+            _reliability(found),
+            _detection(found),
+            Section(
+                "How near the sizes come",
+                [_grid("size of the gap", found["by_r"], _SIZES)],
+            ),
+            *(
+                Section(f"By {name}", [_grid(name, lines, _FIRST)])
+                for name, lines in groups.items()
+            ),
+            Section("Order of the files", [Facts(_order(found["order"]))]),
+            Section("How it was reckoned", [Facts(notes)]),
         ],
-    }
+    )
 
 
-def _cell(entry: dict | None, unit: str) -> tuple[str, str]:
-    """Return a number and its interval, which stands below it."""
-    if entry is None or entry["value"] is None:
-        return "–", ""
-    ends = span(entry, unit)
-    return shown(entry["value"], unit), ends if ends != "–" else ""
+def _promised(rows: list[dict], brief: bool) -> Section:
+    caption = (
+        "Green: where the target is met. Dot: met. Red cross: missed. Grey diamond: no "
+        "target. Line: 95 % interval; at the edge: beyond it. The same numbers stand "
+        "in the table."
+    )
+    picture = Picture(
+        "bar", "Every row with its interval against its target", caption, tall=True
+    )
+    numbers = ("found", "target", "95 % interval", "cases")
+    keys = ("what", "word", "value", "target", "span", "n", "interval")
+    table = Table(
+        ["row", "", *numbers, "interval by"],
+        [[row[key] for key in keys] for row in rows],
+        frozenset(numbers),
+        frozenset({"row"}),
+    )
+    note = (
+        "“Not firmly”: the interval reaches across the target, so that other cases of "
+        "the same kind could turn it."
+    )
+    blocks = [picture, table, Text(note, soft=True)]
+    return Section("What was promised", blocks, brief=brief)
 
 
-def _rivals(found: dict) -> list[dict]:
-    return [
-        {**row, "brier": found["brier"].get(row["name"])} for row in found["rivals"]
+def _measured(
+    labels: Sequence[Label], answers: Mapping[str, Sequence[CaseAnswer]]
+) -> Iterator[Section]:
+    rows = [
+        [name, *measured_row(label, answer)]
+        for name, said in answers.items()
+        for label, answer in zip(labels, said, strict=True)
+        if label.kind == "real"
     ]
+    if rows:
+        words = "The cause of measured data is what was stated when it was sealed."
+        table = Table(["by", "stated", "verdict", "set", "holds it"], rows)
+        yield Section("Measured data", [table, Text(words)], brief=True)
 
 
-def _mix_up(row: dict) -> dict[str, str]:
-    return {
-        "truth": truth_word(row["truth"]),
-        "answer": truth_word(row["answer"]),
-        "count": f"{row['n']} of {row['of']}",
-    }
+def _beside_others(found: Mapping[str, Any]) -> Section:
+    brier = found["brier"]
+    lines = [{**row, "brier": brier.get(row["name"])} for row in found["rivals"]]
+    note = (
+        "The oracle knows the size of the gap, the noise and the rig, and that an "
+        "effect acts: nobody can be right more often. Below each number: 95 % "
+        "interval. Log score: 0 is perfect, −13.8 the worst; Brier score: 0 to 2."
+    )
+    blocks = [_grid("diagnoser", lines, _RIVALS), Text(note, soft=True)]
+    return Section("Beside others", blocks)
+
+
+def _confused(found: Mapping[str, Any]) -> Section:
+    caption = (
+        "Cases by truth (row) and most probable answer (column); shade: share of the "
+        "row. Framed: right."
+    )
+    shows = "Truth against the most probable answer"
+    blocks: list[Block] = [Picture("confusion", shows, caption, tall=True)]
+    rows = [
+        [
+            truth_word(row["truth"]),
+            truth_word(row["answer"]),
+            f"{row['n']} of {row['of']}",
+        ]
+        for row in found["mix_ups"]
+    ]
+    if rows:
+        columns = ["truth", "answered", "cases"]
+        long = frozenset({"truth", "answered"})
+        blocks.append(Table(columns, rows, frozenset({"cases"}), long))
+    pairs = [(words, with_span(found["pairs"][key])) for key, words in _PAIRS]
+    heading = f"Two effects at once ({found['pairs']['n']} cases)"
+    blocks.append(Details(heading, [Facts(pairs)], folded=False))
+    return Section("Who is taken for whom", blocks)
+
+
+def _reliability(found: Mapping[str, Any]) -> Section:
+    caption = (
+        "Dots on the dashed line: what is stated with 70 % is true seven times in ten. "
+        "Below it: too sure."
+    )
+    shows = "Stated probability against the share that was true"
+    picture = Picture("reliability", shows, caption)
+    facts = Facts(_calibration(found["reliability"]))
+    return Section("Whether probabilities mean what they say", [picture, facts])
+
+
+def _detection(found: Mapping[str, Any]) -> Section:
+    caption = (
+        "Dots: fraction detected with 95 % interval. Curve and band: fitted. Dashed: "
+        "where nine of ten are detected."
+    )
+    shows = "Fraction detected against the size of the gap, by effect"
+    blocks: list[Block] = [Picture("detection", shows, caption, tall=True)]
+    rows = [limit_row(curve) for curve in found["detection"]]
+    if rows:
+        numbers = ("cases", "r for 90 %", "95 % interval")
+        long = frozenset({"effect"})
+        blocks.append(Table(["effect", *numbers], rows, frozenset(numbers), long))
+    return Section("From which size on a gap is detected", blocks)
+
+
+def _sizes(found: Mapping[str, Any]) -> Section:
+    table = _grid("size of the gap", found["by_r"], _SIZES)
+    return Section("How near the sizes come", [table])
+
+
+def _grid(first: str, lines: Sequence[Mapping], columns: Sequence[tuple]) -> Table:
+    """Return numbers of groups of cases, each with its interval below it."""
+    heads = [words for _, words, _ in columns]
+    rows = [
+        [
+            line["name"].replace("_", " "),
+            str(line["n"]),
+            *(_cell(line[key], unit) for key, _, unit in columns),
+        ]
+        for line in lines
+    ]
+    titles = [first, "cases", *heads]
+    return Table(titles, rows, frozenset(titles[1:]), frozenset({first}))
+
+
+def _cell(entry: Mapping | None, unit: str) -> str:
+    if entry is None or entry["value"] is None:
+        return "–"
+    ends = span(entry, unit)
+    return shown(entry["value"], unit) + (f"\n{ends}" if ends != "–" else "")
 
 
 def _calibration(table: dict) -> list[tuple[str, str]]:

@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 CaseKind = Literal["null", "effect", "pair", "outside", "real"]
-Span = tuple[float, float, float]
+Quantiles = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -94,9 +94,9 @@ class CaseAnswer:
     inclusion: dict[str, float]
     detected: bool
     p_value: float | None = None
-    gap: Span | None = None
-    amplitude: dict[str, Span] = field(default_factory=dict)
-    closed: Span | None = None
+    gap: Quantiles | None = None
+    amplitude: dict[str, Quantiles] = field(default_factory=dict)
+    closed: Quantiles | None = None
     noise_sd: float | None = None
 
     def plain(self) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from typing import Any
 
 from hdcal.blind.answer_files import AnswerFiles, frozen_names
 from hdcal.blind.closures import closures
-from hdcal.blind.document import write_scores
 from hdcal.blind.label import CaseAnswer
+from hdcal.blind.result_files import score_files
 from hdcal.blind.scoring.scores import JUDGED, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
@@ -140,8 +140,10 @@ def _write(found: BlindSet, opened: OpenedSet, hashes: dict[str, str] | None) ->
         }
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(record)))
+    files = score_files(opened.result["scores"], opened.secret.labels, opened.answers)
     with whole_folder(opened.folder, force=True) as building:
-        write_scores(opened.result["scores"], building)
+        for name, content in files.items():
+            (building / name).write_bytes(content)
         about = {n: v for n, v in opened.result.items() if n != "scores"}
         for name, data in (
             ("opening.json", about),

@@ -10,7 +10,7 @@ from hdcal.data.priors import effect_priors
 from hdcal.evidence.case_evidence import NONE
 from hdcal.evidence.piecewise_effect import piecewise_effect
 from hdcal.evidence.prepare import PreparedCase, prepare
-from hdcal.evidence.subspaces import effect_columns, is_subspace
+from hdcal.evidence.subspaces import is_subspace, subspace_effect
 from hdcal.physics.effect import Effect
 
 # Slope and offset, the first two columns of the base, have no prior here.
@@ -59,7 +59,7 @@ def fit_each(
         if effect.stage == "noise" or effect.needs - case.records.known:
             continue
         if is_subspace(effect, prepared):
-            tables = effect_columns(effect, prepared)
+            tables = subspace_effect(effect, prepared).columns
             offsets, count = np.zeros((len(tables), rows)), tables.shape[1]
         else:
             pieces = piecewise_effect(effect, prepared)

@@ -1,12 +1,14 @@
 """The numbers of a blind check as the texts of tables."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from hdcal.blind.label import CaseAnswer, Label
+from hdcal.report.document import Cell, Tag, Tone
 from hdcal.report.words import hypothesis, number, percent
 
 _MET = {True: "met", False: "missed", None: "–"}
-_TAGS = {"met": "passed", "missed": "failed-tag"}
+_TONES: Mapping[str, Tone] = {"met": "good", "missed": "bad"}
 _TRUTHS = {
     "pair": "two effects",
     "outside": "outside the library",
@@ -21,7 +23,7 @@ def truth_word(name: str) -> str:
     return _TRUTHS.get(name) or hypothesis(name)
 
 
-def bar_row(row: dict[str, Any]) -> dict[str, str]:
+def bar_row(row: Mapping[str, Any]) -> dict[str, Cell]:
     """Return a row of the bar as texts."""
     word = _MET[row["met"]]
     if row["met"] is None:
@@ -30,8 +32,7 @@ def bar_row(row: dict[str, Any]) -> dict[str, str]:
         # Chance could turn it: the interval reaches across the target.
         word += ", not firmly"
     return {
-        "word": word,
-        "tag": _TAGS.get(word.split(",")[0], "note"),
+        "word": Tag(word, _TONES.get(word.split(",")[0], "neutral")),
         "what": row["what"],
         "value": shown(row["value"], row["unit"]),
         "span": span(row, row["unit"]),
@@ -52,7 +53,7 @@ def shown(value: float | None, unit: str = "share") -> str:
     return words.replace("-", "−") + ending
 
 
-def span(entry: dict[str, Any], unit: str = "share") -> str:
+def span(entry: Mapping[str, Any], unit: str = "share") -> str:
     """Return an interval."""
     if entry["lo"] is None or entry["hi"] is None:
         return "–"
@@ -62,7 +63,7 @@ def span(entry: dict[str, Any], unit: str = "share") -> str:
     return f"{low} … {high}"
 
 
-def target(row: dict[str, Any]) -> str:
+def target(row: Mapping[str, Any]) -> str:
     """Return what was promised."""
     wanted = row["target"]
     if wanted is None:
@@ -78,7 +79,7 @@ def target(row: dict[str, Any]) -> str:
     return f"{'≥' if row['direction'] == 'at least' else '≤'} {words}"
 
 
-def with_span(entry: dict[str, Any] | None, unit: str = "share") -> str:
+def with_span(entry: Mapping[str, Any] | None, unit: str = "share") -> str:
     """Return a number with its interval in brackets; a dash without cases."""
     if entry is None or entry["value"] is None:
         return "–"
@@ -86,7 +87,7 @@ def with_span(entry: dict[str, Any] | None, unit: str = "share") -> str:
     return shown(entry["value"], unit) + (f" ({ends})" if ends != "–" else "")
 
 
-def limit_row(curve: dict[str, Any]) -> dict[str, str]:
+def limit_row(curve: Mapping[str, Any]) -> list[str]:
     """Return the detection limit of an effect as texts."""
     if curve["below_all"]:
         words = f"below {number(curve['r90'])}, the smallest tried"
@@ -97,21 +98,13 @@ def limit_row(curve: dict[str, Any]) -> dict[str, str]:
     low = "–" if curve["lo"] is None else f"{curve['lo']:.2g}"
     high = "not reached" if curve["hi"] is None else f"{curve['hi']:.2g}"
     between = "–" if curve["lo"] is None or curve["below_all"] else f"{low} … {high}"
-    return {
-        "effect": hypothesis(curve["effect"]),
-        "n": str(curve["n"]),
-        "r90": words,
-        "span": between,
-    }
+    return [hypothesis(curve["effect"]), str(curve["n"]), words, between]
 
 
-def measured_row(label: Label, answer: CaseAnswer) -> dict[str, str]:
+def measured_row(label: Label, answer: CaseAnswer) -> list[str]:
     """Return what was stated of a measurement and what was answered, as texts."""
     chances = {**answer.probabilities, **answer.inclusion}
     found = [f"{hypothesis(name)} {percent(chances.get(name))}" for name in answer.set]
-    return {
-        "stated": " or ".join(map(hypothesis, label.truth)),
-        "word": answer.verdict,
-        "set": ", ".join(found),
-        "holds": "yes" if set(label.truth) & set(answer.set) else "no",
-    }
+    stated = " or ".join(map(hypothesis, label.truth))
+    holds = "yes" if set(label.truth) & set(answer.set) else "no"
+    return [stated, answer.verdict, ", ".join(found), holds]

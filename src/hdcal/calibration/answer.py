@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
+from hdcal.data.theory_names import Theory
 from hdcal.report.answer import Promise, Sentences, Words
 from hdcal.report.parameters import Interval, ParameterEstimate
-from hdcal.report.posterior_answer import ParameterName, PosteriorAnswer
+from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 
@@ -43,10 +44,11 @@ class CalibrationAnswer(PosteriorAnswer):
 
     schema: Literal["hdcal.calibration/1"] = "hdcal.calibration/1"
     parameters: Annotated[
-        dict[ParameterName, ParameterEstimate], Promise(required=_ALWAYS)
+        dict[str, ParameterEstimate],
+        Promise(required=_ALWAYS, propertyNames=PARAMETER_NAMES),
     ]
     K_by_theory: Annotated[
-        Mapping[str, Interval | None], Promise(required=["ring", "cup", "article"])
+        Mapping[str, Interval | None], Promise(required=list(get_args(Theory)))
     ]
     K_note: str
     residuals: tuple[ResidualShape, ...]

@@ -7,7 +7,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.options import case_options, force_option, json_option, read_given
+from hdcal.cli.options import case_options, folder_options, json_option, read_given
 from hdcal.cli.sampling_options import sampling_options
 from hdcal.errors import Finding
 
@@ -32,10 +32,7 @@ from hdcal.errors import Finding
     help="DATA are a gear that moves: calibrate mass, damping and stiffness.",
 )
 @sampling_options
-@click.option(
-    "--out", metavar="DIR", help="Result folder to make [default: NAME-calibration]."
-)
-@force_option
+@folder_options("Result folder to make [default: NAME-calibration].")
 @json_option
 @click.pass_obj
 def calibrate(console: Console, data, gear, columns, out, force, dynamic, **settings):

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 
 from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
 from hdcal.report.document import (
@@ -22,7 +23,7 @@ from hdcal.report.posterior_sections import (
     parameter_section,
     prior_section,
 )
-from hdcal.report.provenance import THEORY_WORDS, data_rows, provenance_rows
+from hdcal.report.provenance import data_rows, provenance_rows
 from hdcal.report.words import estimate, label
 
 ARTICLE_NOTE = (

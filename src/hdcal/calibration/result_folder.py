@@ -10,7 +10,6 @@ from hdcal.calibration.summary import calibration_answer
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import default_bands
-from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
 from hdcal.report.draws_figure import prior_figure, sampler_figure
 from hdcal.report.write import write_report
@@ -42,19 +41,14 @@ def write_calibration(
         "priors": prior_figure(posterior),
         "sampler": sampler_figure(posterior),
     }
-
-    def save(folder: Path) -> None:
-        posterior.save(folder / FILE_NAME)
-        table = columns_csv(bands.columns())
-        (folder / "bands.csv").write_text(table, "utf-8", newline="")
-
     write_report(
         target,
         document,
         {"summary.json": found},
         figures,
         kept=["calibration"],
-        save=save,
+        tables={"bands.csv": bands.columns()},
+        save=lambda folder: posterior.save(folder / FILE_NAME),
         force=force,
     )
     return document, found

@@ -17,7 +17,7 @@ class Command(click.Command):
         Raises:
             InputError: with options in place of the library's parameters.
         """
-        options = {p.name: p.opts[0] for p in self.params if p.name is not None}
+        options = {p.name: _shown(p) for p in self.params if p.name is not None}
         try:
             return super().invoke(ctx)
         except InputError as error:
@@ -27,6 +27,13 @@ class Command(click.Command):
                 else finding
                 for finding in error.findings
             ) from error
+
+
+def _shown(parameter: click.Parameter) -> str:
+    """Return how a user writes a parameter: --option, or the name of an argument."""
+    if isinstance(parameter, click.Option):
+        return parameter.opts[0]
+    return parameter.human_readable_name.strip("[]")
 
 
 command = partial(click.command, cls=Command)

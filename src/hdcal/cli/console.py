@@ -142,9 +142,14 @@ class Console:
         try:
             print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
         except BrokenPipeError:
-            # Nobody reads any more. Python would complain again when it flushes.
-            with contextlib.suppress(OSError, ValueError):
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            discard_output()
+
+
+def discard_output() -> None:
+    """Send standard output nowhere, once nobody reads it any more."""
+    # Python would complain again when it flushes.
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def usage_error(error: click.UsageError) -> Finding:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 import click
 
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import Parsed, read_all, read_columns
+from hdcal.cli.option_types import Parsed, read_columns
+from hdcal.cli.options import repeated_option
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
@@ -49,12 +50,11 @@ def force_options(command: Callable) -> Callable:
             metavar="N",
             help="Of a shape [N] [default: 80].",
         ),
-        click.option(
+        repeated_option(
             "--column",
             "columns",
             metavar="QUANTITY=HEADER",
-            multiple=True,
-            callback=read_all(read_columns),
+            read=read_columns,
             help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
         ),
         click.option(

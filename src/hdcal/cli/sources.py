@@ -1,8 +1,9 @@
-"""Results of earlier commands that a command starts from."""
+"""What a command starts from: the result of an earlier one, or a gear file."""
 
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from hdcal.data.case import Gear
     from hdcal.inference.posterior import Posterior
 
 
@@ -21,3 +22,17 @@ def load_posterior(run: str) -> "Posterior":
     posterior = Posterior.load(run)
     posterior.require_usable()
     return posterior
+
+
+def load_gear(path: str) -> "Gear":
+    """Read a gear file.
+
+    Raises:
+        InputError: it cannot be used.
+    """
+    from hdcal.cli.compilation_cache import keep_compilations
+
+    keep_compilations()
+    from hdcal.data.gear import read_gear
+
+    return read_gear(path)

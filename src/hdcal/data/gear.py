@@ -64,6 +64,7 @@ def _assemble(
     sizes, measurement = model.gear, model.measurement
     given, effects = own
     merged = rig_priors() | facts | given
+    moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     geometry = Geometry(
         wall_thickness=sizes.wall_thickness_mm,
         radius=sizes.radius_mm,
@@ -86,13 +87,9 @@ def _assemble(
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=effects,
-        dynamic_priors=dynamic_priors() | _part(given, DYNAMIC_UNITS),
+        dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
     )
-
-
-def _part(priors: dict[str, Prior], units: dict[str, str]) -> dict[str, Prior]:
-    return {name: prior for name, prior in priors.items() if name in units}
 
 
 def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:

@@ -1,5 +1,6 @@
 """Prior tables: a family, its numbers, a unit and a source for every parameter."""
 
+from functools import cache
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
@@ -71,15 +72,22 @@ def read_priors(
     return found
 
 
+@cache
+def _shipped(name: str) -> dict[str, Prior]:
+    moving = DYNAMIC_UNITS | {"mass_ratio": "1"}
+    units = {"rig": MODEL_UNITS | SCALE_UNITS, "dynamics": moving}
+    source = priors_folder() / f"{name}.toml"
+    return read_priors(source, units.get(name, MATERIAL_UNITS))
+
+
 def rig_priors() -> dict[str, Prior]:
     """Shipped priors of what is not the material: `MODEL_UNITS` and `SCALE_UNITS`."""
-    return read_priors(priors_folder() / "rig.toml", MODEL_UNITS | SCALE_UNITS)
+    return _shipped("rig").copy()
 
 
 def dynamic_priors() -> dict[str, Prior]:
     """Shipped priors of the moving gear: `DYNAMIC_UNITS`, mass as `mass_ratio`."""
-    units = {**DYNAMIC_UNITS, "mass_ratio": "1"}
-    return read_priors(priors_folder() / "dynamics.toml", units)
+    return _shipped("dynamics").copy()
 
 
 def effect_priors() -> dict[str, Prior]:
@@ -133,4 +141,4 @@ def material_priors(name: str) -> dict[str, Prior]:
     if name not in material_names():
         remedy = nearest(name, material_names())
         raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
-    return read_priors(priors_folder() / f"{name}.toml", MATERIAL_UNITS)
+    return _shipped(name).copy()

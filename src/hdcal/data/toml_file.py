@@ -4,6 +4,7 @@ import re
 import tomllib
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import cached_property
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
@@ -24,12 +25,12 @@ class TomlFile:
     Attributes:
         file: how the user named it.
         table: its content.
-        rows: line of each dotted key and table.
+        text: as it stands in the file.
     """
 
     file: str
     table: dict
-    rows: dict[str, int]
+    text: str
 
     def finding(self, problem: str, remedy: str, key: str) -> Finding:
         """A finding about a dotted key, with its line where that is found."""
@@ -41,9 +42,25 @@ class TomlFile:
 
     def row(self, key: str) -> int | None:
         """Line of a dotted key, or of the innermost table around it."""
-        while key and key not in self.rows:
+        while key and key not in self._rows:
             key = key.rpartition(".")[0]
-        return self.rows.get(key)
+        return self._rows.get(key)
+
+    @cached_property
+    def _rows(self) -> dict[str, int]:
+        rows: dict[str, int] = {}
+        table = ""
+        for number, line in enumerate(map(str.strip, self.text.splitlines()), 1):
+            name, sign, _ = line.partition("=")
+            if header := _TABLE.fullmatch(line):
+                here = table = _bare(header["name"])
+            elif sign and all(_KEY.fullmatch(part.strip()) for part in name.split(".")):
+                here = ".".join(filter(None, (table, _bare(name))))
+            else:
+                continue
+            if here:
+                rows.setdefault(here, number)
+        return rows
 
 
 def read_toml(source: Traversable | Path, file: str) -> TomlFile:
@@ -84,7 +101,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
         words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
         row = int(place["row"]) if place else None
         raise _refusal(file, words, "Mend that line", row) from None
-    return TomlFile(file, table, _rows(text))
+    return TomlFile(file, table, text)
 
 
 def nearest(name: str, known: list[str], what: str = "Known are") -> str:
@@ -93,22 +110,6 @@ def nearest(name: str, known: list[str], what: str = "Known are") -> str:
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)
     hint = f"Did you mean '{by_lower[near[0]]}'? " if near else ""
     return f"{hint}{what}: {', '.join(known)}"
-
-
-def _rows(text: str) -> dict[str, int]:
-    rows: dict[str, int] = {}
-    table = ""
-    for number, line in enumerate(map(str.strip, text.splitlines()), 1):
-        name, sign, _ = line.partition("=")
-        if header := _TABLE.fullmatch(line):
-            here = table = _bare(header["name"])
-        elif sign and all(_KEY.fullmatch(part.strip()) for part in name.split(".")):
-            here = ".".join(filter(None, (table, _bare(name))))
-        else:
-            continue
-        if here:
-            rows.setdefault(here, number)
-    return rows
 
 
 def _bare(name: str) -> str:

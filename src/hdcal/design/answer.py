@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from hdcal.prediction.margin.answer import GearModel
 from hdcal.prediction.margin.result import Chance, Fraction, Size
 from hdcal.report.answer import Answer, Count, Sentences, Words
 from hdcal.report.parameters import Interval
+from hdcal.report.posterior_answer import CalibratedGear
 
 Numbers = tuple[float, ...]
 Ends = tuple[float, float]
@@ -29,7 +29,7 @@ class DesignAnswer(Answer):
     """
 
     status: Literal["ok"] = "ok"
-    gear: GearModel
+    gear: CalibratedGear
     basis: Literal["posterior", "prior"]
     draws: Count
     interval: Fraction

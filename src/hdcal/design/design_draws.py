@@ -20,16 +20,17 @@ from hdcal.data.priors import (
     material_priors,
     read_priors,
 )
-from hdcal.data.records import Records
+from hdcal.data.records import Geometry, Records
 from hdcal.data.toml_file import nearest
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import POSITIVE, Values
-from hdcal.inference.distributions import distribution, frozen, scaled
+from hdcal.inference.density import Values
+from hdcal.inference.distributions import frozen, scaled
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
 from hdcal.physics.chain import Reading
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.engine.causes import ORIGIN, causes_of, sample_prior
 
 _FACTS = ("E0", "alpha", "poisson")
 CARRIED = (
@@ -48,7 +49,7 @@ _PRIOR_ONLY = (
 
 
 @dataclass(frozen=True)
-class Basis:
+class DesignDraws:
     """Draws that designs are computed from.
 
     Attributes:
@@ -96,12 +97,12 @@ class Basis:
         return {"posterior": "the tested gear", "prior": "the gear file"}[self.kind]
 
     @property
-    def poisson(self) -> float:
-        """Poisson's ratio of the material in use [-]."""
-        own = self.material == self.gear.material
-        if own or "poisson" not in self.facts:
-            return float(self.gear.geometry.poisson)
-        return float(self.facts["poisson"].numbers[0])
+    def drawing(self) -> Geometry:
+        """The gear's sizes [mm], with Poisson's ratio of the material in use."""
+        geometry = self.gear.geometry
+        if self.material == self.gear.material or "poisson" not in self.facts:
+            return geometry
+        return replace(geometry, poisson=float(self.facts["poisson"].numbers[0]))
 
     @cached_property
     def yield_strength(self) -> np.ndarray | None:
@@ -118,7 +119,7 @@ class Basis:
 
     @property
     def assumptions(self) -> list[str]:
-        """Return what every answer from this basis takes for granted, in words."""
+        """Return what every answer from these draws takes for granted, in words."""
         words = [CARRIED.format(gear=self.known_as), OF_THE_GEAR]
         if self.kind == "prior":
             words.insert(0, _PRIOR_ONLY)
@@ -137,8 +138,8 @@ class Basis:
             words.append("The leftover discrepancy is taken to grow with stiffness.")
         return words
 
-    def of_material(self, name: str, seed: int = 0) -> "Basis":
-        """Return the basis of the same gear made of another material.
+    def of_material(self, name: str, seed: int = 0) -> "DesignDraws":
+        """Return the draws of the same gear made of another material.
 
         Args:
             name: a shipped material, or the path of a .toml file of one.
@@ -152,14 +153,16 @@ class Basis:
         facts = read_material(name)
         keys = jax.random.split(jax.random.key(seed), 2)
         new = {
-            site: _draw(facts[site], site, key, self.size)
+            site: sample_prior(facts[site], site, key, self.size)
             for site, key in zip(("E0", "alpha"), keys, strict=True)
         }
         values = {**self.values, **new}
         return replace(self, values=values, facts=facts, material=name)
 
 
-def basis_of(source: Posterior | Gear, *, draws: int = 4000, seed: int = 0) -> Basis:
+def design_draws(
+    source: Posterior | Gear, *, draws: int = 4000, seed: int = 0
+) -> DesignDraws:
     """Return what designs are computed from.
 
     Args:
@@ -171,36 +174,39 @@ def basis_of(source: Posterior | Gear, *, draws: int = 4000, seed: int = 0) -> B
         NotUsable: the calibration failed its checks.
     """
     if isinstance(source, Posterior):
-        source.require_usable()
-        gear = source.case.gear
-        values = {name: np.asarray(v) for name, v in source.draws.items()}
-        return Basis(
-            gear,
-            source.theory,
-            source.problem,
-            values,
-            _own_facts(gear),
-            gear.material,
-            "posterior",
-            source.case.records,
-            (*_unsettled(source), *misfits(source)),
-        )
+        return _calibrated(source)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
     keys = jax.random.split(jax.random.key(seed), len(priors))
     values = {
-        name: _draw(prior, name, key, draws)
+        name: sample_prior(prior, name, key, draws)
         for key, (name, prior) in zip(keys, priors.items(), strict=True)
     }
-    return Basis(
-        source,
-        source.theory,
-        _bare_problem(source),
-        values,
-        _own_facts(source),
-        source.material,
-        "prior",
-        None,
+    return DesignDraws(
+        gear=source,
+        theory=source.theory,
+        problem=_bare_problem(source),
+        values=values,
+        facts=_own_facts(source),
+        material=source.material,
+        kind="prior",
+        records=None,
+    )
+
+
+def _calibrated(posterior: Posterior) -> DesignDraws:
+    (cause,) = causes_of(posterior)
+    gear = posterior.case.gear
+    return DesignDraws(
+        gear=gear,
+        theory=posterior.theory,
+        problem=cause.problem,
+        values=cause.values,
+        facts=_own_facts(gear),
+        material=gear.material,
+        kind="posterior",
+        records=posterior.case.records,
+        misfits=(*_unsettled(posterior), *misfits(posterior)),
     )
 
 
@@ -217,7 +223,7 @@ def read_material(name: str) -> dict[str, Prior]:
         if name not in material_names():
             words = f"unknown material '{name[:60]}'"
             remedy = nearest(name, material_names(), "Shipped are")
-            raise InputError([Finding("--material", words, remedy)])
+            raise InputError([Finding("materials", words, remedy)])
         return material_priors(name)
     facts = read_priors(Path(name), MATERIAL_UNITS, name)
     lacking = [need for need in _FACTS if need not in facts]
@@ -229,7 +235,7 @@ def read_material(name: str) -> dict[str, Prior]:
 
 def _unsettled(posterior: Posterior) -> tuple[str, ...]:
     """Return a warning where a diagnosis left other causes open."""
-    origin = posterior.settings.get("diagnosis")
+    origin = posterior.settings.get(ORIGIN)
     if not isinstance(origin, dict) or len(origin["probabilities"]) < 2:
         return ()
     used = str(origin["hypothesis"]).replace("_", " ")
@@ -244,13 +250,6 @@ def _own_facts(gear: Gear) -> dict[str, Prior]:
     # by now; only its yield strength would be needed of it.
     shipped = gear.material in material_names()
     return material_priors(gear.material) if shipped else {}
-
-
-def _draw(prior: Prior, name: str, key, count: int) -> np.ndarray:
-    if prior.family == "fixed":
-        return np.full(count, float(prior.numbers[0]))
-    law = distribution(prior, positive=name in POSITIVE)
-    return np.asarray(law.sample(key, (count,)))
 
 
 def _formula(gear: Gear, theory: Theory) -> float:

@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 
 from hdcal.data.records import Geometry
 from hdcal.design.candidate import spreads
-from hdcal.design.design_draws import Basis
+from hdcal.design.design_draws import DesignDraws
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sizes import named
-from hdcal.design.wave_generator import WaveGenerator, gear_forces
+from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import ring_profile
 from hdcal.physics.theory import RING_SERIES
 from hdcal.report.canvas import (
@@ -54,7 +54,7 @@ def inverse_figures(found: InverseDesign) -> dict[str, Figure]:
     return ({"design": inverse_figure(found)} if found.bounds else {}) | shape
 
 
-def _modulus(basis: Basis) -> float:
+def _modulus(basis: DesignDraws) -> float:
     return float(np.median(np.asarray(basis.values["E0"])))
 
 
@@ -78,7 +78,7 @@ def _balance(axes: Axes, found: WaveGenerator) -> None:
     along = np.linspace(max(low - 1.5 * wide, 0.02 * low), high + 1.5 * wide, _FINE)
     ends = found.temperatures[[0, -1]] if len(found.temperatures) > 1 else None
     levels = found.temperatures if ends is None else ends
-    forces = gear_forces(found.basis, found.gear, along, levels)
+    forces = found.gear.forces(along, levels)
     bands = np.quantile(forces, _TAILS, axis=2)
     for index, colour in enumerate(temperature_colours(levels)):
         lo, middle, hi = bands[:, :, index]
@@ -149,8 +149,7 @@ def inverse_figure(found: InverseDesign) -> Figure:
 
 def _spreads(found: InverseDesign, sizes: dict) -> np.ndarray:
     """Return lower end, median, upper end and the kept force at sizes [N]."""
-    basis, tails = found.chosen.basis, np.array(_TAILS)
-    return spreads(basis, found.target, sizes, found.deformation, tails)
+    return spreads(found.target, sizes, np.array(_TAILS))
 
 
 def _along_one(axes: Axes, found: InverseDesign) -> None:

@@ -1,139 +1,125 @@
 """The force and stress that a gear exceeds rarely, differentiable in all its sizes."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
-from hdcal.design.design_draws import Basis
+from hdcal.design.design_draws import DesignDraws
 from hdcal.design.next_gear import NextGear
-from hdcal.design.sizes import SIZES
-from hdcal.inference.problem import Problem
+from hdcal.design.sizes import geometry_with
 from hdcal.physics.profile import peak_stress
-from hdcal.physics.theory import THEORIES, Scalar
-from hdcal.prediction.forces import gear_force
+from hdcal.physics.theory import Scalar
+from hdcal.prediction.engine.sampled_gears import SampledGears
+from hdcal.prediction.engine.sizes import SIZES
 
-# What a derivative may be taken by, beside the sizes.
-_ALONE = {"deformation_mm", "modulus", "K"}
+
+@dataclass(frozen=True)
+class Limits:
+    """What the next gear has to keep.
+
+    Attributes:
+        force: [N].
+        stress: hoop bending [MPa]; None for the yield strength, where one is known.
+        probability: share of the draws that have to keep each limit.
+    """
+
+    force: float
+    stress: float | None
+    probability: float
 
 
 class Target(eqx.Module):
-    """The next gear at the worst of some temperatures, as a function of its drawing.
+    """The next gear at the worst of some temperatures, beside what it has to keep.
+
+    Its methods take a place: what differs from the tested gear, by name. That may be
+    sizes by edge name, deformation_mm, and factors on modulus and K.
 
     Attributes:
-        problem: structure.
-        values: draws by site: [draw, …].
-        own: the tested gear's formula stiffness per modulus [mm].
-        deviation: of each draw's gear, relative stiffness, shape (draw,).
-        shifts: of its sizes [mm], by field of the geometry, shape (draw,).
+        gears: one for each draw.
+        drawing: the tested gear's sizes, of the material in use [mm].
+        deformation: radial [mm].
         temperatures: [°C], shape (t,).
-        limit: stress that must not be exceeded [MPa], shape (draw,); infinite where
+        limit_force: that must not be exceeded [N].
+        limit_stress: that must not be exceeded [MPa], shape (draw,); infinite where
             there is none.
-        theory: which stiffness K multiplies.
         rank: place of the quantile among the sorted draws.
     """
 
-    problem: Problem
-    values: dict
-    own: Float[Array, ""] | float
-    deviation: Float[Array, " d"]
-    shifts: dict
+    gears: SampledGears
+    drawing: Geometry
+    deformation: Scalar
     temperatures: Float[Array, " t"]
-    limit: Float[Array, " d"]
-    theory: str = eqx.field(static=True)
+    limit_force: float
+    limit_stress: Float[Array, " draw"]
     rank: int = eqx.field(static=True)
 
     @classmethod
     def of(
         cls,
-        basis: Basis,
+        draws: DesignDraws,
         gear: NextGear,
+        deformation: float,
         temperatures: np.ndarray,
-        probability: float,
-        limit_stress: float | None = None,
+        limits: Limits,
     ) -> "Target":
-        """Return the target of a basis.
+        """Return the target of a material.
 
         Args:
-            basis: draws, of the material in use.
+            draws: of the material in use.
             gear: how the next one differs.
+            deformation: radial [mm].
             temperatures: at all of which the limits hold [°C].
-            probability: share of the draws that have to keep a limit.
-            limit_stress: [MPa]; by default the yield strength, where one is known.
+            limits: to be kept.
         """
-        strength = basis.yield_strength
-        if limit_stress is not None:
-            strength = np.full(basis.size, limit_stress)
+        strength = draws.yield_strength
+        if limits.stress is not None:
+            strength = np.full(draws.size, limits.stress)
+        elif strength is None:
+            strength = np.full(draws.size, np.inf)
         return cls(
-            problem=basis.problem,
-            values={name: np.asarray(v) for name, v in basis.values.items()},
-            own=float(THEORIES[basis.theory](basis.gear.geometry, 1.0)),
-            deviation=gear.deviation,
-            shifts={SIZES[name]: shift for name, shift in gear.shifts.items()},
+            gears=replace(gear.gears, values=dict(draws.values)),
+            drawing=draws.drawing,
+            deformation=deformation,
             temperatures=temperatures,
-            limit=np.full(basis.size, np.inf) if strength is None else strength,
-            theory=basis.theory,
+            limit_force=limits.force,
+            limit_stress=strength,
             # Every smaller draw keeps the limit too: never fewer than were asked for.
-            rank=ceil(probability * basis.size - 1e-9) - 1,
+            rank=ceil(limits.probability * draws.size - 1e-9) - 1,
         )
 
-    def made(self, geometry: Geometry) -> Geometry:
-        """Return the gears as made: the drawing and each draw's deviations from it."""
-        moved = {name: getattr(geometry, name) + s for name, s in self.shifts.items()}
-        return replace(geometry, **moved)
+    def drawn(self, place: Mapping[str, Scalar]) -> Geometry:
+        """Return the drawing with the sizes of a place."""
+        sizes = {name: value for name, value in place.items() if name in SIZES}
+        return geometry_with(self.drawing, sizes)
 
-    def forces(
-        self, geometry: Geometry, deformation: Scalar, modulus: Scalar, K: Scalar
-    ) -> Float[Array, " d"]:
-        """Return the largest force over the temperatures of each draw [N].
+    def forces(self, place: Mapping[str, Scalar]) -> Float[Array, " draw"]:
+        """Return the largest force over the temperatures of each draw [N]."""
+        at = jnp.asarray(place.get("deformation_mm", self.deformation))
+        along = jnp.broadcast_to(at, self.temperatures.shape)
+        factors = place.get("modulus", 1.0), place.get("K", 1.0)
+        each = self.gears.forces(self.drawn(place), along, self.temperatures, *factors)
+        return jnp.max(each, axis=0)
 
-        Args:
-            geometry: the drawing [mm].
-            deformation: radial [mm].
-            modulus: factor on Young's modulus [-].
-            K: factor on the influence coefficient [-].
-        """
-        stiffness = THEORIES[self.theory](self.made(geometry), 1.0) / self.own
-        factor = stiffness * (1.0 + self.deviation) * modulus * K
-        at = jnp.broadcast_to(jnp.asarray(deformation), self.temperatures.shape)
-
-        def of_draw(value, own):
-            each = gear_force(self.problem, value, at, self.temperatures, factor=own)
-            return jnp.max(each)
-
-        count = self.deviation.shape
-        return jax.vmap(of_draw)(self.values, jnp.broadcast_to(factor, count))
-
-    def stresses(
-        self, geometry: Geometry, deformation: Scalar, modulus: Scalar
-    ) -> Float[Array, " d"] | float:
+    def stresses(self, place: Mapping[str, Scalar]) -> Float[Array, " draw"]:
         """Return the largest hoop bending stress over the temperatures [MPa]."""
-        rise = self.temperatures - self.problem.reading.reference_temperature
-        warm = jnp.max(1.0 - self.values["alpha"][:, None] * rise, axis=1)
-        own = self.values["E0"] * warm * modulus
-        return peak_stress(self.made(geometry), own, deformation)
+        values = self.gears.values
+        rise = self.temperatures - self.gears.problem.reading.reference_temperature
+        warm = jnp.max(1.0 - values["alpha"][:, None] * rise, axis=1)
+        modulus = values["E0"] * warm * place.get("modulus", 1.0)
+        at = place.get("deformation_mm", self.deformation)
+        made = self.gears.made(self.drawn(place))
+        return jnp.asarray(peak_stress(made, modulus, at))
 
-    def force(self, geometry: Geometry, place: Mapping[str, Scalar]) -> Scalar:
-        """Return the force that is kept with the target's probability [N].
+    def force(self, place: Mapping[str, Scalar]) -> Scalar:
+        """Return the force that is kept with the target's probability [N]."""
+        return jnp.sort(self.forces(place))[self.rank]
 
-        Args:
-            geometry: the tested gear [mm].
-            place: sizes by edge name that replace its own, and deformation_mm, modulus
-                and K.
-        """
-        sizes = {SIZES[n]: v for n, v in place.items() if n not in _ALONE}
-        alone = place["deformation_mm"], place["modulus"], place["K"]
-        return jnp.sort(self.forces(replace(geometry, **sizes), *alone))[self.rank]
-
-    def utilisation(self, geometry: Geometry, place: Mapping[str, Scalar]) -> Scalar:
+    def utilisation(self, place: Mapping[str, Scalar]) -> Scalar:
         """Return the share of the allowed stress that is kept with the probability."""
-        sizes = {SIZES[n]: v for n, v in place.items() if n not in _ALONE}
-        alone = place["deformation_mm"], place["modulus"]
-        share = self.stresses(replace(geometry, **sizes), *alone) / self.limit
-        return jnp.sort(share)[self.rank]
+        return jnp.sort(self.stresses(place) / self.limit_stress)[self.rank]

@@ -9,14 +9,14 @@ there. Solved by sequential quadratic programming on the logarithms of the sizes
 exact derivatives of the model.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.records import Geometry
-from hdcal.design.candidate import Candidate, candidate, elasticities, solve
+from hdcal.design.candidate import Candidate, best_candidate, candidate, elasticities
 from hdcal.design.checks import (
     name_findings,
     no_deformation,
@@ -25,18 +25,18 @@ from hdcal.design.checks import (
     size_findings,
     unseen_findings,
 )
-from hdcal.design.design_draws import Basis, basis_of
-from hdcal.design.force_limit import Target
+from hdcal.design.design_draws import DesignDraws, design_draws
+from hdcal.design.force_limit import Limits, Target
 from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import (
-    SIZES,
     geometry_with,
     named,
     with_reference,
 )
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.sizes import SIZES
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class InverseDesign:
         warnings: what is extrapolated, in words.
     """
 
-    basis: Basis
+    basis: DesignDraws
     gear: NextGear
     bounds: Mapping[str, tuple[float, float]]
     deformation: float
@@ -124,52 +124,63 @@ def inverse_design(
         NotUsable: the calibration failed its checks.
         InputError: bad input, or nothing inside the bounds keeps the limits.
     """
-    basis = basis_of(source, seed=seed)
-    nominal = basis.nominal_deformation
-    at = deformation if deformation is not None else nominal
-    levels = with_reference(basis, temperatures)
-    findings = _findings(
-        basis, vary, at, levels, limit_force, limit_stress, probability, materials
-    )
-    listed = materials or [basis.material]
-    made = [attempt(findings, basis.of_material, name, seed) for name in listed]
-    gear = attempt(findings, next_gear, basis, tolerances, seed)
-    if findings or gear is None or at is None:
-        raise InputError(findings)
+    draws = design_draws(source, seed=seed)
+    at = draws.nominal_deformation if deformation is None else deformation
+    levels = with_reference(draws, temperatures)
+    limits = Limits(limit_force, limit_stress, probability)
+    with Findings() as wrong:
+        wrong += _findings(draws, vary, at, levels, limits, materials)
+        listed = materials or [draws.material]
+        made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
+        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+    assert gear is not None
+    return _nearest_design(draws, filter(None, made), gear, vary, (at, levels, limits))
 
-    def target(of: Basis) -> Target:
-        return Target.of(of, gear, levels, probability, limit_stress)
 
-    found = [solve(one, target(one), vary, at, limit_force) for one in made if one]
+def _nearest_design(
+    draws: DesignDraws, made: Iterable[DesignDraws], gear: NextGear, vary, place
+) -> InverseDesign:
+    """Return the nearest of the designs of all materials.
+
+    Args:
+        draws: of the tested gear.
+        made: the same of each material.
+        gear: how the next one differs.
+        vary: bounds of the free sizes [mm] by edge name.
+        place: deformation [mm], temperatures [°C] and limits.
+    """
+    at, levels, limits = place
+    found = [best_candidate(one, Target.of(one, gear, *place), vary) for one in made]
     met = [one for one in found if one.met]
     if not met:
-        raise InputError([_unmet(found, vary, at, limit_force, probability)])
+        raise InputError([_unmet(found, vary, at, limits)])
     chosen = min(met, key=lambda one: one.change)
+    kept = Target.of(chosen.basis, gear, *place)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
-    kept = target(chosen.basis)
     return InverseDesign(
-        basis,
-        gear,
-        dict(vary),
-        at,
-        levels,
-        limit_force,
-        limit_stress,
-        probability,
-        chosen,
-        tuple(found),
-        candidate(basis, target(basis), {}, at, limit_force),
-        kept,
-        elasticities(chosen, kept, at),
-        (
-            *beyond_tested(basis, np.array([at]), levels),
-            *far_from_tested(basis, sizes),
-            *basis.misfits,
+        basis=draws,
+        gear=gear,
+        bounds=dict(vary),
+        deformation=at,
+        temperatures=levels,
+        limit_force=limits.force,
+        limit_stress=limits.stress,
+        required=limits.probability,
+        chosen=chosen,
+        candidates=tuple(found),
+        tested=candidate(draws, Target.of(draws, gear, *place), {}),
+        target=kept,
+        elasticities=elasticities(kept, chosen.sizes),
+        warnings=(
+            *beyond_tested(draws, np.array([at]), levels),
+            *far_from_tested(draws, sizes),
+            *draws.misfits,
         ),
     )
 
 
-def _unmet(found, vary, deformation, limit, probability) -> Finding:
+def _unmet(found: Sequence[Candidate], vary, deformation, limits: Limits) -> Finding:
+    limit = limits.force
     best = min(found, key=lambda one: max(one.force / limit, one.utilisation or 0.0))
     ranges = " and ".join(
         f"{named(name)} between {low:g} and {high:g} mm"
@@ -183,41 +194,40 @@ def _unmet(found, vary, deformation, limit, probability) -> Finding:
         stress = f" and {best.utilisation:.3g} of the allowed stress"
     words = (
         f"no {ranges or 'material'} meets {limit:g} N at {deformation:g} mm with "
-        f"probability {probability:g}: the best ({at or best.basis.material}) gives "
-        f"{best.force:.4g} N{stress}"
+        f"probability {limits.probability:g}: the best ({at or best.basis.material}) "
+        f"gives {best.force:.4g} N{stress}"
     )
     remedy = "Widen the bounds, free another size, or allow more force"
-    return Finding("--limit-force", words, remedy)
+    return Finding("limit_force", words, remedy)
 
 
 def _findings(
-    basis: Basis, vary, deformation, temperatures, force, stress, probability, materials
+    draws: DesignDraws, vary, deformation, temperatures, limits: Limits, materials
 ) -> list[Finding]:
-    findings = name_findings(vary, SIZES, "--vary")
+    findings = name_findings(vary, SIZES, "vary")
     if not vary and not materials:
         words = "nothing may change"
-        remedy = "Free a size, e.g. --vary wall_thickness_mm=0.5:0.8"
-        findings.append(Finding("--vary", words, remedy))
-    for option, value, unit in (
-        ("--limit-force", force, "N"),
-        ("--limit-stress", stress, "MPa"),
+        remedy = "Free a size, e.g. wall_thickness_mm=0.5:0.8"
+        findings.append(Finding("vary", words, remedy))
+    for name, value, unit in (
+        ("limit_force", limits.force, "N"),
+        ("limit_stress", limits.stress, "MPa"),
     ):
         if value is not None and not 0.0 < value < np.inf:
             words = f"{value:g} is no limit"
-            findings.append(Finding(option, words, f"Give it in {unit}, above zero"))
-    findings += probability_findings(basis, probability)
-    if name_findings(vary, SIZES, "--vary"):
+            findings.append(Finding(name, words, f"Give it in {unit}, above zero"))
+    findings += probability_findings(draws, limits.probability)
+    if any(name not in SIZES for name in vary):
         return findings
     for name, (low, high) in vary.items():
         if not low < high:
             words = f"{name} = {low:g}:{high:g} is empty"
-            findings.append(Finding("--vary", words, "Write NAME=LO:HI"))
-    findings += unseen_findings(vary, basis.theory, "--vary")
+            findings.append(Finding("vary", words, "Write NAME=LO:HI"))
+    findings += unseen_findings(draws, vary)
     sizes = {name: np.asarray(ends, float) for name, ends in vary.items()}
-    findings += size_findings(basis, sizes, "--vary")
+    findings += size_findings(draws, sizes)
     if deformation is None:
         return [*findings, no_deformation()]
-    radius = float(np.min(sizes.get("radius_mm", basis.gear.geometry.radius)))
-    return findings + place_findings(
-        basis, np.array([float(deformation)]), temperatures, radius
-    )
+    radius = float(np.min(sizes.get("radius_mm", draws.gear.geometry.radius)))
+    at = np.array([float(deformation)])
+    return findings + place_findings(draws, at, temperatures, radius)

@@ -1,8 +1,8 @@
-"""The nearest point at which every limit is kept: two small programs with slopes.
+"""The nearest point at which every limit is kept, by sequential quadratic programming.
 
-Sequential quadratic programming, first to where nothing is exceeded (or least), then
-to the nearest such point. In logarithms of the sizes both are nearly quadratic with
-straight limits, so that a few steps do.
+First to where nothing is exceeded (or least), then to the nearest such point. In
+logarithms of the sizes both are nearly quadratic with straight limits, so that a few
+steps do.
 """
 
 from collections.abc import Callable
@@ -32,49 +32,50 @@ def nearest_kept(
     Returns:
         The point; where no point keeps all limits, the one that exceeds them least.
     """
-    z = np.clip(own, *bounds.T)
-    if not _kept(excess(z)):
-        z = _least_excess(excess, slopes, z, bounds)
-    return _nearest(excess, slopes, z, own, bounds) if _kept(excess(z)) else z
 
+    def kept(point: np.ndarray) -> bool:
+        return bool(np.max(excess(point)) <= CLOSE)
 
-def _kept(excess: np.ndarray) -> bool:
-    return bool(np.max(excess) <= CLOSE)
-
-
-def _least_excess(excess: Excess, slopes: Excess, z, bounds) -> np.ndarray:
-    """Return where the worst excess is least, or none is left: least t ≥ excess."""
-    worst = np.append(np.zeros(len(z)), 1.0)
-    done = minimize(
-        lambda y: y[-1],
-        np.append(z, float(np.max(excess(z)))),
-        jac=lambda y: worst,
-        bounds=[*bounds, (0.0, None)],
-        constraints={
-            "type": "ineq",
-            "fun": lambda y: y[-1] - excess(y[:-1]),
-            "jac": lambda y: np.insert(-slopes(y[:-1]), len(z), 1.0, axis=1),
-        },
-        method="SLSQP",
-        options={"maxiter": _MOST_STEPS, "ftol": 1e-12},
+    start = np.clip(own, *bounds.T)
+    if not kept(start):
+        start = _least_excess(excess, slopes, start, bounds)
+    if not kept(start):
+        return start
+    found = _minimise(
+        lambda y: (float(np.sum((y - own) ** 2)), 2.0 * (y - own)),
+        start,
+        bounds,
+        lambda y: -excess(y),
+        lambda y: -slopes(y),
+        1e-14,
     )
-    return np.clip(done.x[:-1], *bounds.T)
-
-
-def _nearest(excess: Excess, slopes: Excess, z, own, bounds) -> np.ndarray:
-    done = minimize(
-        lambda y: float(np.sum((y - own) ** 2)),
-        z,
-        jac=lambda y: 2.0 * (y - own),
-        bounds=bounds,
-        constraints={
-            "type": "ineq",
-            "fun": lambda y: -excess(y),
-            "jac": lambda y: -slopes(y),
-        },
-        method="SLSQP",
-        options={"maxiter": _MOST_STEPS, "ftol": 1e-14},
-    )
-    better = np.clip(done.x, *bounds.T)
+    better = np.clip(found, *bounds.T)
     # A solver that lost its way may not cost what was already found.
-    return better if _kept(excess(better)) else z
+    return better if kept(better) else start
+
+
+def _least_excess(excess: Excess, slopes: Excess, start, bounds) -> np.ndarray:
+    """Return where the worst excess is least, or none is left: least t ≥ excess."""
+    worst = np.append(np.zeros(len(start)), 1.0)
+    found = _minimise(
+        lambda y: (y[-1], worst),
+        np.append(start, float(np.max(excess(start)))),
+        [*bounds, (0.0, None)],
+        lambda y: y[-1] - excess(y[:-1]),
+        lambda y: np.insert(-slopes(y[:-1]), len(start), 1.0, axis=1),
+        1e-12,
+    )
+    return np.clip(found[:-1], *bounds.T)
+
+
+def _minimise(objective, start, bounds, room, room_slopes, close) -> np.ndarray:
+    """Return where an objective with its gradient is least and all room ≥ 0."""
+    return minimize(
+        objective,
+        start,
+        jac=True,
+        bounds=bounds,
+        constraints={"type": "ineq", "fun": room, "jac": room_slopes},
+        method="SLSQP",
+        options={"maxiter": _MOST_STEPS, "ftol": close},
+    ).x

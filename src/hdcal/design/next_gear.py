@@ -1,55 +1,57 @@
 """The next gear: how it may differ from the tested one, drawn beside each draw."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.data.records import Geometry
 from hdcal.design.checks import name_findings
-from hdcal.design.design_draws import Basis
-from hdcal.design.sizes import SIZES, stiffness_factor
+from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding, InputError
+from hdcal.prediction.engine.population import new_member_sd
+from hdcal.prediction.engine.sampled_gears import SampledGears
+from hdcal.prediction.engine.sizes import SIZES
 
 
 @dataclass(frozen=True)
 class NextGear:
-    """One gear for each draw, none of them tested.
+    """The gears that a design has to serve, one for each draw, none of them tested.
 
     Attributes:
-        deviation: of its stiffness from the tested mean, relative, shape (draw,).
-        shifts: of its sizes from the drawing [mm] by edge name, shape (draw,).
+        gears: beside the draws of the tested one.
         words: what the population is.
     """
 
-    deviation: np.ndarray
-    shifts: Mapping[str, np.ndarray]
+    gears: SampledGears
     words: str
 
-    def interval_kind(self, basis: Basis) -> str:
+    def interval_kind(self, draws: DesignDraws) -> str:
         """What an interval over these gears is called: one with scatter predicts."""
-        if not self.shifts and not np.any(self.deviation):
-            return basis.interval_kind
-        known = {"posterior": "predictive", "prior": "prior predictive"}[basis.kind]
+        if not self.gears.shifts and not np.any(self.gears.deviation):
+            return draws.interval_kind
+        known = {"posterior": "predictive", "prior": "prior predictive"}[draws.kind]
         return f"equal-tailed {known} interval"
 
-    def factor(self, basis: Basis, geometry: Geometry):
-        """Return stiffness over the tested gear's of each gear, shape (draw,)."""
-        moved = {
-            SIZES[name]: getattr(geometry, SIZES[name]) + shift
-            for name, shift in self.shifts.items()
-        }
-        made = stiffness_factor(basis, replace(geometry, **moved))
-        return made * (1.0 + self.deviation)
+    def forces(self, deformation: np.ndarray, temperatures: np.ndarray) -> np.ndarray:
+        """Return forces [N] at the tested sizes: [deformation, temperature, draw].
+
+        Args:
+            deformation: radial [mm].
+            temperatures: [°C].
+        """
+        shape = len(deformation), len(temperatures), -1
+        at = np.repeat(deformation, shape[1])
+        warm = np.tile(temperatures, shape[0])
+        return np.asarray(self.gears.forces(self.gears.tested, at, warm)).reshape(shape)
 
 
 def next_gear(
-    basis: Basis, tolerances: Mapping[str, float] | None = None, seed: int = 0
+    draws: DesignDraws, tolerances: Mapping[str, float] | None = None, seed: int = 0
 ) -> NextGear:
     """Draw the gears that a design has to serve.
 
     Args:
-        basis: draws of the tested gear.
+        draws: of the tested gear.
         tolerances: ± of a size [mm] by edge name; sizes are uniform within it, which
             is what limits alone say (JCGM 100:2008, 4.3.7).
         seed: of the scatter.
@@ -58,32 +60,39 @@ def next_gear(
         InputError: a size is unknown, or its tolerance is none.
     """
     tolerances = dict(tolerances or {})
-    findings = name_findings(tolerances, SIZES, "--tolerance")
+    findings = name_findings(tolerances, SIZES, "tolerances")
     for name, width in tolerances.items() if not findings else ():
-        own = float(getattr(basis.gear.geometry, SIZES[name]))
+        own = float(getattr(draws.gear.geometry, SIZES[name]))
         if not 0.0 < width < 0.5 * own:
             words = f"{name} = {width:g} is no tolerance of {own:g} mm"
             remedy = "Give the ± part in mm, such as 0.02"
-            findings.append(Finding("--tolerance", words, remedy))
+            findings.append(Finding("tolerances", words, remedy))
     if findings:
         raise InputError(findings)
     random = np.random.default_rng(seed)
     shifts = {
-        name: random.uniform(-width, width, basis.size)
+        SIZES[name]: random.uniform(-width, width, draws.size)
         for name, width in tolerances.items()
     }
-    tested = basis.problem.specimens
-    deviation = np.zeros(basis.size)
+    tested = draws.problem.specimens
+    deviation = np.zeros(draws.size)
     if tested:
-        # A new gear also carries the distance of the tested mean from the population's.
-        spread = np.sqrt(1.0 + 1.0 / tested) * np.asarray(basis.values["specimen_sd"])
-        deviation = spread * random.normal(size=basis.size)
-    return NextGear(deviation, shifts, _words(basis, tested, tolerances))
+        spread = new_member_sd(np.asarray(draws.values["specimen_sd"]), tested)
+        deviation = spread * random.normal(size=draws.size)
+    gears = SampledGears(
+        problem=draws.problem,
+        values=dict(draws.values),
+        tested=draws.gear.geometry,
+        deviation=deviation,
+        shifts=shifts,
+        theory=draws.theory,
+    )
+    return NextGear(gears, _words(draws, tested, tolerances))
 
 
-def _words(basis: Basis, tested: int, tolerances: Mapping[str, float]) -> str:
+def _words(draws: DesignDraws, tested: int, tolerances: Mapping[str, float]) -> str:
     sizes = ", ".join(f"{name} ± {width:g}" for name, width in tolerances.items())
-    if basis.kind == "prior":
+    if draws.kind == "prior":
         told = "a gear of which only priors are known"
     elif tested:
         told = f"the next gear, with the scatter seen between {tested} tested ones"

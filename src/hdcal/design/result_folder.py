@@ -13,7 +13,6 @@ from hdcal.design.study.study import Study
 from hdcal.design.study.summary import study_answer
 from hdcal.design.summary import generator_answer, inverse_answer
 from hdcal.design.wave_generator import WaveGenerator
-from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
 from hdcal.report.write import write_report
 
@@ -71,11 +70,12 @@ def write_study(
     """
     answer = study_answer(found)
     document = study_document(answer, command)
-    figures, table = {"study": study_figure(found)}, columns_csv(found.columns)
-
-    def save(folder: Path) -> None:
-        (folder / "study.csv").write_text(table, "utf-8", newline="")
-
-    answers = {"study.json": answer}
-    write_report(target, document, answers, figures, save=save, force=force)
+    write_report(
+        target,
+        document,
+        {"study.json": answer},
+        {"study": study_figure(found)},
+        tables={"study.csv": found.columns},
+        force=force,
+    )
     return document, answer

@@ -12,8 +12,9 @@ from hdcal.design.answer import (
     InverseAnswer,
     StressAnswer,
 )
-from hdcal.design.design_draws import Basis
-from hdcal.design.sizes import SIZES
+from hdcal.design.design_draws import DesignDraws
+from hdcal.prediction.engine.conditions import NEAR_K, NEAR_MM
+from hdcal.prediction.engine.sizes import SIZES
 from hdcal.report.words import estimate, number, percent
 
 
@@ -186,16 +187,16 @@ def _share(value: float) -> str:
 
 
 def beyond_tested(
-    basis: Basis, deformation: np.ndarray, temperature: np.ndarray
+    basis: DesignDraws, deformation: np.ndarray, temperature: np.ndarray
 ) -> list[str]:
     """Say which deformations and temperatures no reading covers, in words."""
     if basis.records is None:
         return []
     ratio = basis.problem.reading.radial_per_read
-    told = []
+    radial, told = basis.records.deformation * ratio, []
     for name, values, measured, slack, unit in (
-        ("deformation", deformation, basis.records.deformation * ratio, 1e-9, "mm"),
-        ("temperature", temperature, basis.records.temperature, 1.0, "°C"),
+        ("deformation", deformation, radial, NEAR_MM, "mm"),
+        ("temperature", temperature, basis.records.temperature, NEAR_K, "°C"),
     ):
         low, high = float(np.min(measured)), float(np.max(measured))
         if np.min(values) < low - slack or np.max(values) > high + slack:
@@ -208,7 +209,7 @@ def beyond_tested(
     return told
 
 
-def far_from_tested(basis: Basis, sizes: Mapping[str, np.ndarray]) -> list[str]:
+def far_from_tested(basis: DesignDraws, sizes: Mapping[str, np.ndarray]) -> list[str]:
     """Say which sizes lie more than a fifth off the tested gear's, in words."""
     told = []
     for name, values in sizes.items():

@@ -23,7 +23,7 @@ from hdcal.design.answer import (
     WindowKept,
 )
 from hdcal.design.candidate import Candidate
-from hdcal.design.design_draws import Basis
+from hdcal.design.design_draws import DesignDraws
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sentences import (
     generator_headline,
@@ -34,13 +34,13 @@ from hdcal.design.sentences import (
 )
 from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
-from hdcal.prediction.margin.answer import GearModel
 from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.posterior_answer import CalibratedGear
 
 D = TypeVar("D", bound=DesignAnswer)
 
 
-def origin(basis: Basis, interval: float, interval_kind: str) -> dict[str, Any]:
+def origin(basis: DesignDraws, interval: float, interval_kind: str) -> dict[str, Any]:
     """Return what every design answer says of the draws it rests on."""
     return {
         "reasons": (),
@@ -48,7 +48,7 @@ def origin(basis: Basis, interval: float, interval_kind: str) -> dict[str, Any]:
         "headline": "",
         "next_step": None,
         "answer": (),
-        "gear": GearModel(basis.gear.name, basis.gear.material, basis.theory),
+        "gear": CalibratedGear(basis.gear.name, basis.gear.material, basis.theory),
         "basis": basis.kind,
         "draws": basis.size,
         "interval": interval,
@@ -182,7 +182,7 @@ def _window_stress(found: WaveGenerator) -> StressAtWindow:
     return StressAtWindow(deformation_mm=at, **_stress(basis, draws))
 
 
-def _stress(basis: Basis, draws: np.ndarray) -> dict[str, Any]:
+def _stress(basis: DesignDraws, draws: np.ndarray) -> dict[str, Any]:
     """Return hoop bending stress and yield utilisation as intervals.
 
     Args:

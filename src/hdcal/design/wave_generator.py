@@ -7,13 +7,12 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.design.checks import place_findings, probability_findings
-from hdcal.design.design_draws import Basis, basis_of
+from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.sentences import beyond_tested
 from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
-from hdcal.design.study.study import all_forces
-from hdcal.errors import Finding, InputError, attempt
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 
 # Default range of the spring rate, relative to the gear's own stiffness.
@@ -40,7 +39,7 @@ class WaveGenerator:
         warnings: what is extrapolated, in words.
     """
 
-    basis: Basis
+    basis: DesignDraws
     gear: NextGear
     window: tuple[float, float]
     temperatures: np.ndarray
@@ -102,48 +101,49 @@ def wave_generator(
         NotUsable: the calibration failed its checks.
         InputError: bad input, or no spring rate meets the requirement.
     """
-    basis = basis_of(source, seed=seed)
-    levels = with_reference(basis, temperatures)
-    findings = _findings(basis, window, levels, probability, setting_sd, rates)
-    gear = attempt(findings, next_gear, basis, tolerances, seed)
-    if findings or gear is None:
-        raise InputError(findings)
+    draws = design_draws(source, seed=seed)
+    levels = with_reference(draws, temperatures)
+    with Findings() as wrong:
+        wrong += _findings(draws, window, levels, probability, setting_sd, rates)
+        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+    assert gear is not None
+    return _generator(draws, gear, window, levels, probability, setting_sd, rates, seed)
+
+
+def _generator(
+    draws: DesignDraws,
+    gear: NextGear,
+    window: tuple[float, float],
+    temperatures: np.ndarray,
+    required: float,
+    setting_sd: float,
+    rates: tuple[float, float] | None,
+    seed: int,
+) -> WaveGenerator:
     along = np.linspace(*window, _ALONG)
-    forces = gear_forces(basis, gear, along, levels)
+    forces = gear.forces(along, temperatures)
     _check_growing(forces)
-    error = setting_sd * np.random.default_rng([seed, 1]).normal(size=basis.size)
     if rates is None:
         middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
         rates = (RATE_RANGE[0] * middle, RATE_RANGE[1] * middle)
+    error = setting_sd * np.random.default_rng([seed, 1]).normal(size=draws.size)
     springs = judge_all(rates, window, forces, error)
-    chosen = softest(springs, window, forces, error, probability)
+    chosen = softest(springs, window, forces, error, required)
     if chosen is None:
-        raise InputError([_unmet(springs, window, probability)])
+        raise InputError([_unmet(springs, window, required)])
     return WaveGenerator(
-        basis,
+        draws,
         gear,
         window,
-        levels,
-        probability,
+        temperatures,
+        required,
         setting_sd,
         tuple(sorted({*springs, chosen}, key=lambda spring: spring.rate)),
         chosen,
         forces[[0, _ALONG // 2, -1]],
         error,
-        (*beyond_tested(basis, np.array(window), levels), *basis.misfits),
+        (*beyond_tested(draws, np.array(window), temperatures), *draws.misfits),
     )
-
-
-def gear_forces(basis: Basis, gear: NextGear, deformation, temperatures) -> np.ndarray:
-    """Return the force of each draw's gear [N]: [deformation, temperature, draw]."""
-    factor = np.asarray(gear.factor(basis, basis.gear.geometry))
-    shape = len(deformation), len(temperatures)
-    at = np.repeat(deformation, shape[1])
-    warm = np.tile(temperatures, shape[0])
-    # Each draw has a factor of its own: it goes where the draws' K goes.
-    values = {**basis.values, "K": np.asarray(basis.values["K"]) * factor}
-    forces = all_forces(basis.problem, values, np.ones(len(at)), at, warm)
-    return np.asarray(forces).reshape(*shape, basis.size)
 
 
 def _unmet(springs: list[Spring], window, required: float) -> Finding:
@@ -158,7 +158,7 @@ def _unmet(springs: list[Spring], window, required: float) -> Finding:
     if alone.adjusted >= required:
         each = f"{alone.rate:.4g} N/mm reaches {alone.adjusted:.4g}"
         remedy += f"; adjusted gear by gear, {each}"
-    return Finding("--window", words, remedy)
+    return Finding("window", words, remedy)
 
 
 def _check_growing(forces: np.ndarray) -> None:
@@ -169,27 +169,24 @@ def _check_growing(forces: np.ndarray) -> None:
             "deformation inside the window, so that a spring may snap through"
         )
         remedy = "Name a window inside what was tested, or calibrate without the effect"
-        raise InputError([Finding("--window", words, remedy)])
+        raise InputError([Finding("window", words, remedy)])
 
 
 def _findings(
-    basis, window, temperatures, probability, setting_sd, rates
+    draws: DesignDraws, window, temperatures, probability, setting_sd, rates
 ) -> list[Finding]:
     findings = []
     low, high = window
     if not low < high:
         words = f"{low:g}:{high:g} is empty"
-        findings.append(Finding("--window", words, "Write LO:HI, e.g. 0.38:0.42"))
-    findings += probability_findings(basis, probability)
+        findings.append(Finding("window", words, "Write LO:HI, e.g. 0.38:0.42"))
+    findings += probability_findings(draws, probability)
     if not 0.0 <= setting_sd < np.inf:
         words = f"{setting_sd:g} is no standard deviation"
-        findings.append(Finding("--setting-sd", words, "Give it in mm"))
+        findings.append(Finding("setting_sd", words, "Give it in mm"))
     if rates is not None and not 0.0 < rates[0] < rates[1] < np.inf:
         words = f"{rates[0]:g}:{rates[1]:g} is no range of spring rates"
-        findings.append(Finding("--spring-rate", words, "Write LO:HI in N/mm"))
-    radius = float(basis.gear.geometry.radius)
-    place = place_findings(basis, np.asarray(window, float), temperatures, radius)
-    return findings + [
-        Finding("--window", f.problem, f.remedy) if f.file == "--deformation" else f
-        for f in place
-    ]
+        findings.append(Finding("rates", words, "Write LO:HI in N/mm"))
+    radius, ends = float(draws.gear.geometry.radius), np.asarray(window, float)
+    names = "window", "temperatures"
+    return findings + place_findings(draws, ends, temperatures, radius, names)

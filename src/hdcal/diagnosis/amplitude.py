@@ -52,22 +52,21 @@ def _piecewise_amplitude(
 ) -> tuple[float, float, float]:
     """Return quantiles .05, .5, .95 of the amplitude of an effect in pieces."""
     index = evidence.single.names.index(name)
-    draws = [_draw(part, index, rng) for part in evidence.single.parts]
+    draws = [_draw(part.of(index), rng) for part in evidence.single.parts]
     log_total = np.array([total for _, total in draws])
     share = np.exp(log_total - log_total.max()) / _DRAWS
     values = np.concatenate([v for v, _ in draws])
     return weighted_quantiles(values, np.repeat(share, _DRAWS))
 
 
-def _draw(part: CellEvidence, index: int, rng) -> tuple[np.ndarray, float]:
+def _draw(part: CellEvidence, rng) -> tuple[np.ndarray, float]:
     """Draw amplitudes from normals cut to their cells; return them and log evidence."""
-    own = np.flatnonzero(part.owner == index)
-    log_weight = part.log_evidence[:, own].ravel()
+    log_weight = part.log_evidence.ravel()
     weight = np.exp(log_weight - log_weight.max())
     chosen = rng.choice(len(weight), _DRAWS, p=weight / weight.sum())
-    row, cell = np.unravel_index(chosen, (len(part.log_evidence), len(own)))
-    mean, sd = part.mean[row, own[cell]], part.sd[row, own[cell]]
-    low, high = part.cells.low[own[cell]], part.cells.high[own[cell]]
+    mean, sd = part.mean.ravel()[chosen], part.sd.ravel()[chosen]
+    cell = chosen % len(part.owner)
+    low, high = part.cells.low[cell], part.cells.high[cell]
     ends = ndtr((low - mean) / sd), ndtr((high - mean) / sd)
     place = np.clip(rng.uniform(*ends), 1e-300, 1.0 - 1e-16)
     values = np.clip(mean + sd * ndtri(place), low, high)

@@ -27,6 +27,35 @@ class CandidateRun:
     records: Records
 
 
+# What to do, its cost and effort, the path, its seconds a row over the usual ones, and
+# what else changes.
+_RUNS = (
+    ("load and unload at the same rate", "one cycle", 1.5, "loop", 1.0, ""),
+    ("load and unload four times faster", "one cycle", 1.5, "loop", 0.25, ""),
+    ("load and unload ten times slower", "one slow cycle", 4.0, "loop", 10.0, ""),
+    ("load, then hold the top for a minute", "two minutes", 2.0, "hold", 1.0, ""),
+    (
+        "load and unload at {other:.0f} °C",
+        *("one change of temperature", 6.0, "loop", 1.0, "other temperature"),
+    ),
+    (
+        "re-seat the gear and load again in finer steps at small deformation",
+        *("one mounting", 2.0, "fine", 1.0, ""),
+    ),
+    ("small loops between half and 0.7 of the top", "one cycle", 1.5, "inner", 1.0, ""),
+    (
+        "load to 1.25 of the tested deformation",
+        *("one run beyond the tested range", 5.0, "beyond", 1.0, ""),
+    ),
+    ("turn the gear by 90° and load again", "one mounting", 2.0, "up", 1.0, "angle"),
+    ("load a second gear of the same kind", "one gear", 8.0, "up", 1.0, "gear"),
+    (
+        "go back to the first temperature, {first:.0f} °C, and load again",
+        *("one change of temperature", 6.0, "loop", 1.0, "first temperature"),
+    ),
+)
+
+
 def candidate_runs(
     records: Records, reference_temperature: float
 ) -> list[CandidateRun]:
@@ -36,66 +65,43 @@ def candidate_runs(
         records: what was taken, run after run.
         reference_temperature: T_ref of the gear [°C].
     """
-    low, top = _ends(records)
-    warm = float(records.temperature[-1])
-    pace = _pace(records)
-
-    def run(words: str, cost: str, effort, path, seconds, **columns) -> CandidateRun:
-        return CandidateRun(
-            words, cost, effort, _rows(records, path, seconds, **columns)
+    first, last = (float(records.temperature[row]) for row in (0, -1))
+    near = abs(last - reference_temperature) < 15.0
+    other = last + 30.0 if near else reference_temperature
+    changes: dict[str, dict[str, float]] = {
+        "": {},
+        "other temperature": {"temperature": other},
+        "angle": {"angle": float(records.angle[-1]) + np.pi / 2.0},
+        "gear": {"specimen": int(np.max(records.specimen)) + 1},
+    }
+    if abs(first - last) > 5.0:
+        changes["first temperature"] = {"temperature": first}
+    pace, paths = _pace(records), _paths(records)
+    return [
+        CandidateRun(
+            words.format(other=other, first=first),
+            cost,
+            effort,
+            _rows(records, paths[path], slower * pace, **changes[change]),
         )
-
-    up = np.linspace(low, top, ROWS)
-    loop = np.concatenate([up[::2], up[::-2]])
-    fine = low + (top - low) * np.linspace(0.0, 1.0, ROWS) ** 2
-    small = np.linspace(0.5, 0.7, ROWS // 4) * top
-    inner = np.concatenate([small, small[::-1], small, small[::-1]])
-    hold = np.concatenate([up[::2], np.full(ROWS // 2, top)])
-    turn = float(records.angle[-1]) + np.pi / 2.0
-    gear = int(np.max(records.specimen)) + 1
-    near = abs(warm - reference_temperature) < 15.0
-    other = warm + 30.0 if near else reference_temperature
-    first = float(records.temperature[0])
-    cycle, mounting = ("one cycle", 1.5), ("one mounting", 2.0)
-    change, slow = ("one change of temperature", 6.0), ("one slow cycle", 4.0)
-    found = [
-        run("load and unload at the same rate", *cycle, loop, pace),
-        run("load and unload four times faster", *cycle, loop, pace / 4.0),
-        run("load and unload ten times slower", *slow, loop, 10.0 * pace),
-        run("load, then hold the top for a minute", "two minutes", 2.0, hold, pace),
-        run(
-            f"load and unload at {other:.0f} °C", *change, loop, pace, temperature=other
-        ),
-        run(
-            "re-seat the gear and load again in finer steps at small deformation",
-            *(*mounting, fine, pace),
-        ),
-        run("small loops between half and 0.7 of the top", *cycle, inner, pace),
-        run(
-            "load to 1.25 of the tested deformation",
-            *("one run beyond the tested range", 5.0, 1.25 * up, pace),
-        ),
-        run(
-            "turn the gear by 90° and load again",
-            "one mounting",
-            2.0,
-            up,
-            pace,
-            angle=turn,
-        ),
-        run(
-            "load a second gear of the same kind",
-            "one gear",
-            8.0,
-            up,
-            pace,
-            specimen=gear,
-        ),
+        for words, cost, effort, path, slower, change in _RUNS
+        if change in changes
     ]
-    if abs(first - warm) > 5.0:
-        words = f"go back to the first temperature, {first:.0f} °C, and load again"
-        found.append(run(words, *change, loop, pace, temperature=first))
-    return found
+
+
+def _paths(records: Records) -> dict[str, np.ndarray]:
+    """Return deformations [mm] by name, of `ROWS` rows each."""
+    low, top = _ends(records)
+    up = np.linspace(low, top, ROWS)
+    small = np.linspace(0.5, 0.7, ROWS // 4) * top
+    return {
+        "up": up,
+        "loop": np.concatenate([up[::2], up[::-2]]),
+        "fine": low + (top - low) * np.linspace(0.0, 1.0, ROWS) ** 2,
+        "inner": np.concatenate([small, small[::-1], small, small[::-1]]),
+        "hold": np.concatenate([up[::2], np.full(ROWS // 2, top)]),
+        "beyond": 1.25 * up,
+    }
 
 
 def _ends(records: Records) -> tuple[float, float]:

@@ -135,14 +135,11 @@ def _subspace_on_run(
     """Return a subspace, which says something only where amplitudes are parameters."""
     prepared = evidence.prepared
     grid = make_grid(effect, prepared.priors, kind="subspace")
-    count = len(own.columns)
-    if len(grid.amplitudes) != count:
+    if len(grid.amplitudes) != len(own.columns):
         # Members of a new run or gear are new: their scatter adds to the noise.
         return _NOTHING
     shape, _ = evidence.subspaces.likeliest(effect.name)
-    values = {n: np.full(count, v[shape]) for n, v in grid.shapes.items()}
-    for index, field in enumerate(grid.amplitudes):
-        values[field] = grid.sd * np.eye(count)[index]
+    values = grid.one_amplitude_each({n: v[[shape]] for n, v in grid.shapes.items()})
     table = _curves_on_run(prepared, effect, values, run)
     return DesignMatrix(np.zeros(ROWS), table, own.mean, own.sd, {})
 

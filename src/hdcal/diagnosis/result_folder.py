@@ -7,9 +7,8 @@ from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.verdict import Verdict, member_files
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.averaged_bands import averaged_bands
-from hdcal.prediction.bands.bands import Bands
-from hdcal.prediction.causes import ORIGIN
+from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.prediction.engine.causes import ORIGIN
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.plain import as_json
 
@@ -40,7 +39,7 @@ def write_verdict(
     (folder / "verdict.json").write_text(as_json(found), "utf-8")
     refit, bands = corrected(verdict), None
     if refit is not None:
-        bands = averaged_bands(list(verdict.posteriors.values()))
+        bands = default_bands(list(verdict.posteriors.values()))
         _save_models(verdict, folder)
         table = columns_csv(bands.columns())
         (folder / "bands.csv").write_text(table, "utf-8", newline="")

@@ -153,6 +153,11 @@ class Which:
     sensitivity: dict[str, float]
     stability: float | None
 
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Return the effects that are named, none to two."""
+        return tuple(name for name in (self.effect, self.second_effect) if name)
+
 
 @dataclass(frozen=True)
 class LadderEntry:

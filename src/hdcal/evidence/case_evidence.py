@@ -1,6 +1,6 @@
 """The evidences of one case and what they were computed from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,10 +31,10 @@ class CaseEvidence:
         noise: effects on the noise.
         rounding_step: of the grid of readings [N], 0 = none.
         table: log evidence of each hypothesis by name, [correlation].
+        scatter: those of `subspace_effects` whose members differ.
         not_testable: effect → features that the records lack.
         not_excited: effects that this loading cannot show at a physical size.
         accounted: effects that the gear file already accounts for.
-        scatter: those of `subspace_effects` that are the members' of a label.
     """
 
     prepared: PreparedCase
@@ -46,10 +46,10 @@ class CaseEvidence:
     noise: dict[str, NoiseEvidence]
     rounding_step: float
     table: dict[str, np.ndarray]
-    not_testable: dict[str, tuple[str, ...]]
-    not_excited: tuple[str, ...]
-    accounted: tuple[str, ...]
     scatter: tuple[str, ...]
+    not_testable: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    not_excited: tuple[str, ...] = ()
+    accounted: tuple[str, ...] = ()
 
     @property
     def effects(self) -> tuple[str, ...]:

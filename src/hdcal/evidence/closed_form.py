@@ -234,25 +234,16 @@ def subspace_evidence(
     return np.asarray(_subspace_evidence(common, *padded, sigma))[:, : len(scale)]
 
 
-@jax.jit
-def _base_evidence(common, ee, sigma: Prior):
-    centre = 0.5 * jnp.log(ee / common.rows)
-
-    def value(log_sd):
-        return -common.rows * log_sd - 0.5 * ee * jnp.exp(-2.0 * log_sd)
-
-    total = integrate_noise(value, centre, common.rows, sigma)
-    return total + common.constant - 0.5 * common.rows * LOG_2PI
-
-
 def base_evidence(
-    common: CommonTerms, ee: Float[Array, " r"], sigma: Prior
+    common: CommonTerms, ee: Float[np.ndarray, " r"], sigma: Prior
 ) -> Float[np.ndarray, " r"]:
-    """Return the log evidence without any effect, one for each correlation.
+    """Return the log evidence without any effect: of a subspace without columns.
 
     Args:
         common: what all hypotheses share.
-        ee: squared length of the reading beside the base model.
+        ee: squared length of the reading beside the base model, [correlation].
         sigma: prior of the noise sd.
     """
-    return np.asarray(_base_evidence(common, ee, sigma))
+    nothing, one = np.zeros((len(ee), 1, 0)), np.ones((1, 1))
+    products = SubspaceProducts(ee[:, None], nothing, nothing)
+    return subspace_evidence(common, products, one, 0.0 * one, sigma)[:, 0, 0]

@@ -14,7 +14,6 @@ from hdcal.evidence.case_evidence import (
     UNKNOWN,
     CaseEvidence,
 )
-from hdcal.evidence.inner_products import CommonTerms
 from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.noise_evidence import NoiseEvidence, noise_evidence
 from hdcal.evidence.pair_evidence import pair_evidence
@@ -23,23 +22,21 @@ from hdcal.evidence.prepare import PreparedCase, prepare, with_relative_noise
 from hdcal.evidence.quantisation import quantisation_evidence
 from hdcal.evidence.single_evidence import evidence_of_none, single_evidence
 from hdcal.evidence.subspaces import (
-    SubspaceEvidence,
-    effect_columns,
-    effect_scales,
+    SubspaceEffect,
     evidence_of_subspaces,
     is_subspace,
-    large_scale,
-    unknown_scales,
+    subspace_effect,
 )
-from hdcal.evidence.unknown_structure import mean_over_kernels, unknown_kernels
+from hdcal.evidence.unknown_structure import unknown_evidence, unknown_kernels
 from hdcal.inference.problem import problem_priors
 from hdcal.physics.effect import Effect
-from hdcal.physics.scatter import Scatter
+
+Library = Mapping[str, type[Effect]]
 
 
 def compute_evidence(
     case: Case,
-    library: Mapping[str, type[Effect]],
+    library: Library,
     shipped: Mapping[str, Prior],
     *,
     noise_sd: float | None = None,
@@ -60,57 +57,47 @@ def compute_evidence(
     # Raises where a prior is missing.
     problem_priors(case, tuple(library.values()), shipped, case.gear.theory)
     prepared = prepare(case, shipped, noise_sd, stiffness)
-    known = case.records.known
-    missing = {name: effect.needs - known for name, effect in library.items()}
+    missing = {n: effect.needs - case.records.known for n, effect in library.items()}
     accounted = (QUANTISATION,) if case.gear.force_resolution > 0.0 else ()
-    testable = {
-        n: e for n, e in library.items() if not missing[n] and n not in accounted
-    }
-    noisy = {n: e for n, e in testable.items() if e.stage == "noise"}
-    mean = {n: e for n, e in testable.items() if n not in noisy}
-    several = {n: e for n, e in mean.items() if is_subspace(e, prepared)}
-    columns = {n: effect_columns(e, prepared) for n, e in several.items()}
-    piecewise = tuple(
-        piecewise_effect(e, prepared) for n, e in mean.items() if n not in several
-    )
-    evidence = _evidence_without_pairs(prepared, piecewise, columns, several, noisy)
+    testable = [n for n in library if not missing[n] and n not in accounted]
+    noisy = {n: library[n] for n in testable if library[n].stage == "noise"}
+    piecewise, subspaces = [], {}
+    for name in [name for name in testable if name not in noisy]:
+        effect = library[name]
+        if is_subspace(effect, prepared):
+            subspaces[name] = subspace_effect(effect, prepared)
+        else:
+            piecewise.append(piecewise_effect(effect, prepared))
+    evidence = _without_pairs(prepared, tuple(piecewise), subspaces, noisy)
     every = evidence.table | pair_evidence(evidence, noisy)
-    large = {each.name: each.large[:, None] for each in piecewise}
-    large |= {n: large_scale(e, prepared) * columns[n] for n, e in several.items()}
-    # All are computed, so that the same executables serve every noise; effects that
-    # the rows cannot show do not compete.
-    hidden = tuple(name for name in mean if not _seen(prepared, large[name]))
+    curves = {each.name: each.large[:, None] for each in piecewise}
+    curves |= {name: each.large * each.columns for name, each in subspaces.items()}
+    # All are computed, so that the same executables serve every case; effects that
+    # its rows cannot show do not compete.
+    hidden = [n for n in testable if n in curves and not _seen(prepared, curves[n])]
     return replace(
         evidence,
         table={n: v for n, v in every.items() if not {*hidden} & {*n.split("+")}},
         not_testable={n: tuple(sorted(m)) for n, m in missing.items() if m},
-        not_excited=hidden,
+        not_excited=tuple(hidden),
         accounted=accounted,
     )
 
 
-def _evidence_without_pairs(
+def _without_pairs(
     prepared: PreparedCase,
     piecewise: tuple[PiecewiseEffect, ...],
-    columns: dict[str, np.ndarray],
-    several: Mapping[str, type[Effect]],
-    noisy: Mapping[str, type[Effect]],
+    effects: dict[str, SubspaceEffect],
+    noisy: Library,
 ) -> CaseEvidence:
     """Return the evidence of none, of each effect alone and of unknown structure."""
-    sigma = prepared.priors["sigma"]
-    single = single_evidence(prepared.rows, piecewise, sigma)
-    kernels = unknown_kernels(prepared, piecewise, columns)
-    subspaces = _subspaces(prepared, single.common, several, columns, kernels)
+    single = single_evidence(prepared.rows, piecewise, prepared.priors["sigma"])
+    kernels, log_counts = unknown_kernels(prepared, piecewise, effects.values())
+    subspaces = evidence_of_subspaces(prepared, single.common, effects, kernels)
     table = {NONE: single.none}
     table |= {name: single.by_correlation(name) for name in single.names}
-    table |= {name: subspaces.by_correlation(name) for name in columns}
-    table[UNKNOWN] = mean_over_kernels(
-        [
-            subspaces.by_correlation(n) - log_count
-            for n, (_, log_count) in kernels.items()
-        ],
-        single.none,
-    )
+    table |= {name: subspaces.by_correlation(name) for name in effects}
+    table[UNKNOWN] = unknown_evidence(subspaces, log_counts, single.none)
     noise = {
         n: noise_evidence(e, prepared) for n, e in noisy.items() if n != QUANTISATION
     }
@@ -125,33 +112,12 @@ def _evidence_without_pairs(
         piecewise=piecewise,
         single=single,
         subspaces=subspaces,
-        subspace_effects=tuple(several),
+        subspace_effects=tuple(effects),
         kernel_names=tuple(kernels),
         noise=noise,
         rounding_step=step,
         table=table,
-        not_testable={},
-        not_excited=(),
-        accounted=(),
-        scatter=tuple(n for n, e in several.items() if issubclass(e, Scatter)),
-    )
-
-
-def _subspaces(
-    prepared: PreparedCase, common: CommonTerms, several, columns, kernels
-) -> SubspaceEvidence:
-    """Return the evidence of effects with several columns, and of kernels."""
-    names, tables, scales = [], [], []
-    for name, effect in several.items():
-        names += [name] * len(columns[name])
-        tables += list(columns[name])
-        scales += [effect_scales(effect, prepared)] * len(columns[name])
-    names += list(kernels)
-    tables += [kernel for kernel, _ in kernels.values()]
-    scales += [unknown_scales(prepared.priors["gap_sd"])] * len(kernels)
-    sigma = prepared.priors["sigma"]
-    return evidence_of_subspaces(
-        prepared.rows, common, sigma, tuple(names), tables, scales
+        scatter=tuple(name for name, effect in effects.items() if effect.scatter),
     )
 
 

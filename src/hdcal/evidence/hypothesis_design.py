@@ -1,14 +1,19 @@
 """A hypothesis at its most probable point, by all rows or by some of them."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hdcal.evidence.case_evidence import CaseEvidence
+from hdcal.evidence.closed_form import AmplitudeCells
 from hdcal.evidence.design_matrix import DesignMatrix, fit_design, join_designs
+from hdcal.evidence.inner_products import piece_products
 from hdcal.evidence.piecewise_effect import PiecewiseEffect, amplitude_cells
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.evidence.subspaces import SubspaceEvidence
+
+_FLAT = 1e-12
 
 
 def design_of(evidence: CaseEvidence, names: Sequence[str]) -> DesignMatrix:
@@ -16,33 +21,34 @@ def design_of(evidence: CaseEvidence, names: Sequence[str]) -> DesignMatrix:
     single, parts = evidence.single, []
     for name in names:
         if name in single.names:
-            exact = single.parts[0]
-            own = np.flatnonzero(exact.owner == single.names.index(name))
-            weight = np.logaddexp.reduce(exact.log_evidence[:, own], axis=0)
-            cell = own[int(np.argmax(weight))]
             index = single.names.index(name)
-            piece = int(exact.cells.piece[cell]) - int(single.starts[index])
-            prior = float(exact.cells.mean[cell]), float(exact.cells.precision[cell])
-            parts.append(_piece_design(evidence.piecewise[index], piece, *prior))
+            effect = evidence.piecewise[index]
+            weight = np.logaddexp.reduce(single.parts[0].of(index).log_evidence, axis=0)
+            cells = amplitude_cells(effect, exact=True)
+            parts.append(_piece_design(effect, cells, int(np.argmax(weight))))
         elif name in evidence.subspaces.names:
             parts.append(_subspace_design(evidence.subspaces, name))
     return join_designs(parts, len(evidence.prepared.rows.reading))
 
 
 def _piece_design(
-    effect: PiecewiseEffect, piece: int, mean: float, precision: float
+    effect: PiecewiseEffect, cells: AmplitudeCells, cell: int
 ) -> DesignMatrix:
-    """Return one piece of an effect; a prior precision of 0 is a flat prior."""
+    """Return the piece on which a cell lies, with the cell's prior."""
+    piece = cells.piece[cell]
     values = {
         f"{effect.name}.{name}": float(table[piece])
         for name, table in effect.values.items()
         if name not in effect.grid.amplitudes
     }
+    precision = cells.precision[[cell]]
+    # A flat prior has no precision.
+    precision = np.where(precision == 0.0, _FLAT, precision)
     return DesignMatrix(
         effect.offsets[piece],
         effect.slopes[piece][None],
-        np.array([mean]),
-        1.0 / np.sqrt(np.array([precision or 1e-12])),
+        np.asarray(cells.mean)[[cell]],
+        1.0 / np.sqrt(precision),
         values,
     )
 
@@ -108,23 +114,21 @@ def _likeliest_piece(
 ) -> DesignMatrix:
     """Return the piece and cell that fit the kept rows best, at the pilot noise."""
     rows = prepared.rows
-    weight = rows.weight[kept, None]
-    base = rows.base[kept] * weight
-    gram = base.T @ base + np.diag(rows.precision)
-    left, slope = (
-        weight * table[:, kept].T
-        for table in (rows.reading - effect.offsets, effect.slopes)
+    independent = replace(
+        rows,
+        reading=rows.reading[kept],
+        base=rows.base[kept],
+        before=np.full(np.count_nonzero(kept), -1),
+        weight=rows.weight[kept],
+        correlations=np.zeros(1),
+    )
+    products = piece_products(
+        independent, effect.offsets[:, kept], effect.slopes[:, kept]
     )
     cells, variance = amplitude_cells(effect, exact=True), prepared.noise_sd**2
-    inside = [np.linalg.solve(gram, base.T @ table) for table in (left, slope)]
     ee, eu, uu = (
-        (np.sum(a * b, axis=0) - np.sum((base.T @ a) * fitted, axis=0))[cells.piece]
-        / variance
-        for a, b, fitted in (
-            (left, left, inside[0]),
-            (left, slope, inside[1]),
-            (slope, slope, inside[1]),
-        )
+        np.asarray(part)[0, cells.piece] / variance
+        for part in (products.ee, products.eu, products.uu)
     )
     pull = cells.precision
     size = (eu + pull * cells.mean) / (uu + pull + 1e-12)
@@ -132,5 +136,4 @@ def _likeliest_piece(
     height = size * eu - 0.5 * size**2 * uu - 0.5 * ee
     height -= 0.5 * pull * (size - cells.mean) ** 2
     best = int(np.argmax(height + cells.log_height + cells.log_weight))
-    prior = float(cells.mean[best]), float(pull[best])
-    return _piece_design(effect, int(cells.piece[best]), *prior)
+    return _piece_design(effect, cells, best)

@@ -17,8 +17,9 @@ from jaxtyping import Float
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.evidence.effect_curves import padded_records
+from hdcal.evidence.parameter_grid import quantile_grid
 from hdcal.evidence.prepare import PreparedCase
-from hdcal.inference.distributions import distribution, frozen
+from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
@@ -187,19 +188,18 @@ def _grid(
 
     A last point follows at which the amplitude is null: the noise is plain there.
     """
-    declared, axes = parameters(effect), []
-    for name, about in declared.items():
-        prior = case.priors[f"{effect.name}.{name}"]
-        count = _SHAPES if about.null is None else _AMPLITUDES
-        quantiles = (np.arange(count) + 0.5) / count
-        fixed = prior.family == "fixed"
-        axes.append(prior.numbers[:1] if fixed else frozen(prior).ppf(quantiles))
-    mesh = np.meshgrid(*map(np.asarray, axes), indexing="ij")
+    declared = parameters(effect)
+    amplitude = next(n for n, about in declared.items() if about.null is not None)
+    priors = {name: case.priors[f"{effect.name}.{name}"] for name in declared}
+    counts = {
+        name: _SHAPES if about.null is None else _AMPLITUDES
+        for name, about in declared.items()
+    }
     values = {}
-    for (name, about), column in zip(declared.items(), mesh, strict=True):
-        plain = column.flat[0] if about.null is None else about.null
-        values[name] = np.append(column.ravel(), plain).astype(float)
-    return values, next(n for n, about in declared.items() if about.null is not None)
+    for name, column in quantile_grid(priors, counts).items():
+        null = declared[name].null
+        values[name] = np.append(column, column[0] if null is None else null)
+    return values, amplitude
 
 
 def _least_squares(problem: NoiseProblem, noise_sd: float) -> np.ndarray:

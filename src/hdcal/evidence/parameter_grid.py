@@ -56,6 +56,24 @@ class ParameterGrid:
         """Number of shape points."""
         return len(next(iter(self.shapes.values()))) if self.shapes else 1
 
+    def one_amplitude_each(
+        self, shapes: Mapping[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
+        """Return values in which one amplitude after the other is its prior sd.
+
+        Args:
+            shapes: values of the shape parameters, by name, each of shape (s,).
+
+        Returns:
+            Of shape (s · number of amplitudes,) each; the amplitudes change first.
+        """
+        count = len(self.amplitudes)
+        points = len(next(iter(shapes.values()))) if shapes else 1
+        values = {name: np.repeat(value, count) for name, value in shapes.items()}
+        for index, name in enumerate(self.amplitudes):
+            values[name] = np.tile(self.sd * np.eye(count)[index], points)
+        return values
+
     @property
     def centred(self) -> bool:
         """Whether a wider prior is only a matter of scale."""
@@ -101,17 +119,30 @@ def make_grid(
 def _shape_points(
     free: Mapping[str, Prior], points: tuple[int, ...]
 ) -> dict[str, np.ndarray]:
-    varied = [name for name, prior in free.items() if prior.family != "fixed"]
-    count = points[min(max(len(varied), 1), len(points)) - 1]
-    quantiles = (np.arange(count) + 0.5) / count
-    axes = [
-        frozen(prior).ppf(quantiles)
-        if name in varied
-        else np.array([float(prior.numbers[0])])
-        for name, prior in free.items()
-    ]
-    table = np.array(list(product(*axes))) if axes else np.zeros((1, 0))
-    return dict(zip(free, table.T, strict=True))
+    varied = sum(prior.family != "fixed" for prior in free.values())
+    count = points[min(max(varied, 1), len(points)) - 1]
+    return quantile_grid(free, dict.fromkeys(free, count))
+
+
+def quantile_grid(
+    priors: Mapping[str, Prior], counts: Mapping[str, int]
+) -> dict[str, np.ndarray]:
+    """Return all combinations of equally probable values of several parameters.
+
+    Args:
+        priors: of each parameter, by name.
+        counts: values of each; a fixed parameter has one.
+
+    Returns:
+        Values of each parameter at all points, all of one length.
+    """
+    axes = []
+    for name, prior in priors.items():
+        quantiles = (np.arange(counts[name]) + 0.5) / counts[name]
+        fixed = prior.family == "fixed"
+        axes.append(prior.numbers[:1] if fixed else frozen(prior).ppf(quantiles))
+    table = np.array(list(product(*axes)), float)
+    return dict(zip(priors, table.T, strict=True))
 
 
 def amplitude_edges(prior: Prior, ratio: float) -> np.ndarray:

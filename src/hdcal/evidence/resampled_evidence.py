@@ -8,6 +8,7 @@ from hdcal.evidence.closed_form import base_evidence, cell_evidence
 from hdcal.evidence.inner_products import CommonTerms, PieceProducts
 from hdcal.evidence.linear_rows import whiten
 from hdcal.evidence.row_features import half_cycle_blocks
+from hdcal.evidence.single_evidence import CellEvidence
 
 _SAMPLES = 20
 
@@ -37,11 +38,11 @@ def resampled_evidence(
     sigma = evidence.prepared.priors["sigma"]
     common = CommonTerms(np.zeros(_SAMPLES), float(len(block)))
     exact = evidence.single.parts[0]
-    found, _, _ = cell_evidence(common, products, exact.cells, sigma)
+    log_evidence, mean, sd = cell_evidence(common, products, exact.cells, sigma)
     totals = [base_evidence(common, ee[:, 0], sigma)]
+    found = CellEvidence(exact.owner, exact.cells, log_evidence, mean, sd)
     for effect in range(len(evidence.piecewise)):
-        mine = found[:, exact.owner == effect]
-        totals.append(np.logaddexp.reduce(mine, axis=1))
+        totals.append(np.logaddexp.reduce(found.of(effect).log_evidence, axis=1))
     return np.stack(totals, axis=1)
 
 

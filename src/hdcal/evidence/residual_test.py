@@ -129,9 +129,8 @@ def residual_test(
     }
     chance["noise"] = 2.0 * min(chance["spread"], chance["tails"])
     spread = float(np.sqrt(np.sum(error**2) / statistics.freedom))
-    cells = directions.cells.shape[1]
     counts = np.maximum(directions.cells.sum(axis=0), 1.0)
-    step = spread * length[:cells] / counts
+    step = spread * length[: len(counts)] / counts
     critical = float(np.quantile(null["largest"], 0.95))
     fitted = rows.base @ (solve @ (basis.T @ padded))
     z = observed["z"][0]
@@ -139,7 +138,7 @@ def residual_test(
         _p_value(chance, _SHARES),
         _p_value(chance, ("largest", "between", "local")),
         z,
-        z[:cells] * step,
+        z[: len(counts)] * step,
         critical * step,
         rows.reading - fitted,
         spread,

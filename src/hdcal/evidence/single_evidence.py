@@ -47,6 +47,13 @@ class CellEvidence:
     mean: np.ndarray
     sd: np.ndarray
 
+    def of(self, effect: int) -> "CellEvidence":
+        """Return the cells of one effect."""
+        own = self.owner == effect
+        tables = (t[:, own] for t in (self.log_evidence, self.mean, self.sd))
+        cells = jax.tree.map(lambda column: column[own], self.cells)
+        return CellEvidence(self.owner[own], cells, *tables)
+
 
 @dataclass(frozen=True)
 class SingleEvidence:
@@ -71,7 +78,7 @@ class SingleEvidence:
     def by_correlation(self, name: str) -> np.ndarray:
         """Return the log evidence of an effect, [correlation]."""
         index = self.names.index(name)
-        parts = [p.log_evidence[:, p.owner == index] for p in self.parts]
+        parts = [part.of(index).log_evidence for part in self.parts]
         return np.logaddexp.reduce(np.concatenate(parts, axis=1), axis=1)
 
 
@@ -117,8 +124,8 @@ def single_evidence(
 def evidence_of_none(rows: LinearRows, sigma: Prior) -> np.ndarray:
     """Return the log evidence without any effect, [correlation]."""
     nothing = np.zeros((1, len(rows.reading)))
-    products = piece_products(rows, nothing, nothing)
-    return base_evidence(common_terms(rows), products.ee[:, 0], sigma)
+    ee = np.asarray(piece_products(rows, nothing, nothing).ee)
+    return base_evidence(common_terms(rows), ee[:, 0], sigma)
 
 
 def _in_blocks(rows: LinearRows, *curves: np.ndarray) -> PieceProducts:
@@ -191,8 +198,8 @@ def rescaled_change(
         single.common, single.products, effects, single.starts, priors["sigma"], scale
     )
     return {
-        name: np.logaddexp.reduce(after.log_evidence[:, after.owner == index], axis=1)
-        - np.logaddexp.reduce(before.log_evidence[:, before.owner == index], axis=1)
+        name: np.logaddexp.reduce(after.of(index).log_evidence, axis=1)
+        - np.logaddexp.reduce(before.of(index).log_evidence, axis=1)
         + np.log(NO_TOLERANCE)
         for index, name in enumerate(single.names)
     }

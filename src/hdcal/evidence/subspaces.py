@@ -1,5 +1,6 @@
 """Hypotheses that are subspaces: unknown structure, members, several amplitudes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import jax
@@ -11,7 +12,6 @@ from hdcal.evidence.closed_form import subspace_evidence
 from hdcal.evidence.effect_curves import effect_curves, padded_records
 from hdcal.evidence.inner_products import CommonTerms, subspace_products
 from hdcal.evidence.kernels import principal
-from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES, make_grid
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
@@ -69,6 +69,26 @@ def mean_evidence(log_evidence: np.ndarray) -> np.ndarray:
     return whole - np.log(log_evidence.shape[1])
 
 
+@dataclass(frozen=True)
+class SubspaceEffect:
+    """An effect with several amplitudes, or of members that differ.
+
+    Attributes:
+        columns: what one unit of each adds [N], a subspace for each shape point,
+            shape (s, j, n).
+        scale: values of the prior sd, in units of the columns, shape (t,).
+        log_weight: log prior probability of each.
+        large: a large physical size, in units of the columns.
+        scatter: whether members differ.
+    """
+
+    columns: np.ndarray
+    scale: np.ndarray
+    log_weight: np.ndarray
+    large: float
+    scatter: bool
+
+
 def is_subspace(effect: type[Effect], case: PreparedCase) -> bool:
     """Return whether an effect is a subspace rather than of one amplitude."""
     if issubclass(effect, Scatter):
@@ -76,60 +96,45 @@ def is_subspace(effect: type[Effect], case: PreparedCase) -> bool:
     return len(make_grid(effect, case.priors).amplitudes) > 1
 
 
-def effect_columns(effect: type[Effect], case: PreparedCase) -> np.ndarray:
-    """Return what one prior sd of each amplitude or member adds [N].
+def subspace_effect(effect: type[Effect], case: PreparedCase) -> SubspaceEffect:
+    """Compute the columns of an effect that is a subspace.
 
     Args:
         effect: with several amplitudes, or of members.
         case: on whose rows it acts.
-
-    Returns:
-        One subspace for each shape point, shape (s, j, n).
     """
     if issubclass(effect, Scatter):
-        return _member_columns(effect, case)[None]
+        return _member_effect(effect, case)
     grid = make_grid(effect, case.priors, kind="subspace")
-    count = len(grid.amplitudes)
-    values = {n: np.repeat(v, count) for n, v in grid.shapes.items()}
-    for index, name in enumerate(grid.amplitudes):
-        values[name] = np.tile(grid.sd * np.eye(count)[index], grid.size)
+    values = grid.one_amplitude_each(grid.shapes)
     found = effect_curves(effect, values, case.base, case.records, case.reading)
-    return found.reshape(grid.size, count, -1)
+    # Scales that are not needed have no weight; all subspaces have equally many.
+    unused = len(_STEPS) - len(SCALES)
+    return SubspaceEffect(
+        found.reshape(grid.size, len(grid.amplitudes), -1),
+        np.append(SCALES, np.ones(unused)),
+        np.log(np.append(SCALE_WEIGHTS, np.full(unused, 1e-300))),
+        large=2.0,
+        scatter=False,
+    )
 
 
-def _member_columns(effect: type[Scatter], case: PreparedCase) -> np.ndarray:
+def _member_effect(effect: type[Scatter], case: PreparedCase) -> SubspaceEffect:
+    """Return what a deviation of one of each member adds, beyond that of no other."""
     label = np.asarray(getattr(case.records, effect.members))
     one = {"sd": np.ones(1)}
     added = effect_curves(effect, one, case.base, case.records, case.reading)[0]
     padded = getattr(padded_records(case.records), effect.members)
     each = added / np.asarray(_scores(padded))[: len(label)]
-    return each * (label == np.unique(label)[:, None])
-
-
-def effect_scales(
-    effect: type[Effect], case: PreparedCase
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return factors on the columns of an effect and their log prior weights."""
-    if not issubclass(effect, Scatter):
-        padding = len(_STEPS) - len(SCALES)
-        weights = np.concatenate([SCALE_WEIGHTS, np.full(padding, 1e-300)])
-        return np.concatenate([SCALES, np.ones(padding)]), np.log(weights)
-    return _half_normal_steps(make_grid(effect, case.priors).sd)
-
-
-def large_scale(effect: type[Effect], case: PreparedCase) -> float:
-    """Return the factor on the columns of an effect of a large physical size."""
-    scatter = issubclass(effect, Scatter)
-    return 2.0 * (make_grid(effect, case.priors).sd if scatter else 1.0)
-
-
-def _half_normal_steps(sd: float) -> tuple[np.ndarray, np.ndarray]:
+    columns = each * (label == np.unique(label)[:, None])
+    sd = make_grid(effect, case.priors).sd
     edges = np.concatenate([[0.0], np.sqrt(_STEPS[1:] * _STEPS[:-1]), [np.inf]])
     mass = sum(
         weight * np.diff(stats.halfnorm.cdf(edges / scale))
         for scale, weight in zip(SCALES, SCALE_WEIGHTS, strict=True)
     )
-    return sd * _STEPS, np.log(np.maximum(mass, 1e-300))
+    log_weight = np.log(np.maximum(mass, 1e-300))
+    return SubspaceEffect(columns[None], sd * _STEPS, log_weight, 2.0 * sd, True)
 
 
 def unknown_scales(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
@@ -139,26 +144,30 @@ def unknown_scales(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
 
 
 def evidence_of_subspaces(
-    rows: LinearRows,
+    case: PreparedCase,
     common: CommonTerms,
-    sigma: Prior,
-    names: tuple[str, ...],
-    tables: list[np.ndarray],
-    scales: list[tuple[np.ndarray, np.ndarray]],
+    effects: Mapping[str, SubspaceEffect],
+    kernels: Mapping[str, np.ndarray],
 ) -> SubspaceEvidence:
     """Compute the evidence of each subspace.
 
     Args:
-        rows: the data.
+        case: the data.
         common: what all hypotheses share.
-        sigma: prior of the noise sd.
-        names: of the subspaces.
-        tables: columns of each, shape (j, n).
-        scales: factors on the columns and their log weights.
+        effects: of the library, by name.
+        kernels: columns of unknown structure by name, shape (j, n).
     """
-    columns = np.stack([principal(np.asarray(t), WIDTH) for t in tables])
-    factor = np.stack([s for s, _ in scales])
-    weight = np.stack([w for _, w in scales])
-    products = subspace_products(rows, columns)
-    found = subspace_evidence(common, products, factor, weight, sigma)
-    return SubspaceEvidence(names, columns, factor, weight, found)
+    names, tables, scales = [], [], []
+    for name, effect in effects.items():
+        names += [name] * len(effect.columns)
+        tables += list(effect.columns)
+        scales += [(effect.scale, effect.log_weight)] * len(effect.columns)
+    names += list(kernels)
+    tables += list(kernels.values())
+    scales += [unknown_scales(case.priors["gap_sd"])] * len(kernels)
+    columns = np.stack([principal(np.asarray(table), WIDTH) for table in tables])
+    scale, log_weight = map(np.stack, zip(*scales, strict=True))
+    products = subspace_products(case.rows, columns)
+    sigma = case.priors["sigma"]
+    found = subspace_evidence(common, products, scale, log_weight, sigma)
+    return SubspaceEvidence(tuple(names), columns, scale, log_weight, found)

@@ -1,6 +1,6 @@
 """Unknown structure: the kernels that these rows can show and no effect spans."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from hdcal.evidence.linear_rows import LinearRows, remove_base
 from hdcal.evidence.local_structure import likeliest_directions
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.prepare import PreparedCase
-from hdcal.evidence.subspaces import WIDTH
+from hdcal.evidence.subspaces import WIDTH, SubspaceEffect, SubspaceEvidence
 
 # Kernels that share the prior of the unknown; a loading that shows fewer leaves the
 # rest of that prior unused, for what it cannot see.
@@ -21,48 +21,51 @@ _SPANNED = 0.9
 def unknown_kernels(
     case: PreparedCase,
     effects: Sequence[PiecewiseEffect],
-    columns: Mapping[str, np.ndarray],
-) -> dict[str, tuple[np.ndarray, float]]:
+    subspaces: Iterable[SubspaceEffect],
+) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     """Return the kernels of unknown structure.
 
     Args:
         case: whose rows show them.
         effects: of the library, in pieces.
-        columns: of the library's subspaces, one table (j, n) for each shape.
+        subspaces: of the library.
 
     Returns:
-        By name the columns of each, shape (WIDTH, n), and log of the number of
-        kernels that it was chosen from.
+        Columns of each by name, shape (WIDTH, n), and log of the number of kernels
+        that it was chosen from.
     """
     chosen = likeliest_directions(case)
     tables = kernel_columns(case.records) | {name: table for name, table, _ in chosen}
     names, kernels = visible_kernels(case.rows, tables, WIDTH)
-    spanned = _spanned(case.rows, kernels, effects, columns)
-    log_counts = {name: log_count for name, _, log_count in chosen}
-    return {
-        name: (kernel, log_counts.get(name, 0.0))
-        for name, kernel, skip in zip(names, kernels, spanned, strict=True)
-        if not skip
+    spanned = _spanned(case.rows, kernels, effects, subspaces)
+    kept = {
+        n: k for n, k, gone in zip(names, kernels, spanned, strict=True) if not gone
     }
+    log_counts = {name: log_count for name, _, log_count in chosen}
+    return kept, {name: log_counts.get(name, 0.0) for name in kept}
 
 
-def mean_over_kernels(evidences: Sequence[np.ndarray], none: np.ndarray) -> np.ndarray:
+def unknown_evidence(
+    subspaces: SubspaceEvidence, log_counts: Mapping[str, float], none: np.ndarray
+) -> np.ndarray:
     """Return the log evidence of unknown structure, [correlation].
 
     Args:
-        evidences: log evidence of each kernel, [correlation].
-        none: the same without any structure, for the shape.
+        subspaces: evidence of each kernel.
+        log_counts: log of the number of kernels that each was chosen from.
+        none: log evidence without any structure, for the shape.
     """
     # Where a loading shows no kernel at all, unknown structure has no evidence.
-    kernels = [np.full_like(none, -np.inf), *evidences]
-    return np.logaddexp.reduce(kernels, axis=0) - np.log(max(len(evidences), _KERNELS))
+    kernels = [np.full_like(none, -np.inf)]
+    kernels += [subspaces.by_correlation(n) - each for n, each in log_counts.items()]
+    return np.logaddexp.reduce(kernels, axis=0) - np.log(max(len(log_counts), _KERNELS))
 
 
 def _spanned(
     rows: LinearRows,
     kernels: np.ndarray,
     effects: Sequence[PiecewiseEffect],
-    columns: Mapping[str, np.ndarray],
+    subspaces: Iterable[SubspaceEffect],
 ) -> np.ndarray:
     """Return which kernels are little more than one effect of the library."""
     flat = kernels.reshape(-1, kernels.shape[-1])
@@ -78,7 +81,7 @@ def _spanned(
     )
     size = np.linalg.norm(left, axis=1, keepdims=True)
     best = captured(left / np.where(size > 0.0, size, 1.0)).max(axis=1)
-    for table in (t for each in columns.values() for t in each):
+    for table in (table for each in subspaces for table in each.columns):
         _, strength, axes = np.linalg.svd(remove_base(rows, table), full_matrices=False)
         axes = axes[strength > 1e-8 * strength[0]]
         best = np.maximum(best, captured(axes).sum(axis=1))

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from hdcal.report.answer import Promise, Sentences
 from hdcal.report.parameters import Interval, ParameterEstimate
-from hdcal.report.posterior_answer import ParameterName, PosteriorAnswer
+from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
 
 _ALWAYS = ["K", "E0", "alpha", "mass", "damping_ratio", "deformation_offset"]
 _ALWAYS += ["initial_deformation", "initial_velocity", "deformation_sigma"]
@@ -25,7 +25,8 @@ class DynamicCalibrationAnswer(PosteriorAnswer):
 
     schema: Literal["hdcal.dynamic-calibration/1"] = "hdcal.dynamic-calibration/1"
     parameters: Annotated[
-        dict[ParameterName, ParameterEstimate], Promise(required=_ALWAYS)
+        dict[str, ParameterEstimate],
+        Promise(required=_ALWAYS, propertyNames=PARAMETER_NAMES),
     ]
     damping_N_s_per_mm: Interval
     damping_ratio: Interval

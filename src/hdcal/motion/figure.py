@@ -82,26 +82,8 @@ def motion_figure(posterior: Posterior, bands: MotionBands) -> Figure:
             markersize=3.0,
             label="measured",
         )
-        for axes, zero in ((below, 0.0), (rest, bands.mean_median_mm)):
-            low, high = bands.new_measurement_lo_mm, bands.new_measurement_hi_mm
-            axes.fill_between(
-                time,
-                low - zero,
-                high - zero,
-                color=BLUE,
-                alpha=0.16,
-                linewidth=0.0,
-                label="one new reading, 95 %",
-            )
-            axes.fill_between(
-                time,
-                bands.mean_lo_mm - zero,
-                bands.mean_hi_mm - zero,
-                color=BLUE,
-                alpha=0.45,
-                linewidth=0.0,
-                label="model, 95 % credible",
-            )
+        _draw_bands(below, time, bands, 0.0)
+        _draw_bands(rest, time, bands, bands.mean_median_mm)
         below.plot(time, bands.mean_median_mm, color=BLUE, linewidth=0.9)
         left = bands.deformation_mm - bands.mean_median_mm
         rest.plot(time[shown], left[shown], ".", color=DARK, markersize=3.0)
@@ -114,6 +96,20 @@ def motion_figure(posterior: Posterior, bands: MotionBands) -> Figure:
         if not posterior.usable:
             watermark(figure)
     return figure
+
+
+def _draw_bands(axes: Axes, time: np.ndarray, bands: MotionBands, zero) -> None:
+    for words, low, high, strength in (
+        (
+            "one new reading, 95 %",
+            bands.new_measurement_lo_mm,
+            bands.new_measurement_hi_mm,
+            0.16,
+        ),
+        ("model, 95 % credible", bands.mean_lo_mm, bands.mean_hi_mm, 0.45),
+    ):
+        shade = {"color": BLUE, "alpha": strength, "linewidth": 0.0}
+        axes.fill_between(time, low - zero, high - zero, label=words, **shade)
 
 
 def _clock(time_s: np.ndarray) -> tuple[np.ndarray, str]:

@@ -9,7 +9,6 @@ from hdcal.motion.bands import motion_bands
 from hdcal.motion.document import motion_document
 from hdcal.motion.figure import motion_figure
 from hdcal.motion.summary import dynamic_answer
-from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
 from hdcal.report.draws_figure import prior_figure, sampler_figure
 from hdcal.report.write import write_report
@@ -43,19 +42,14 @@ def write_motion(
         "priors": prior_figure(posterior),
         "sampler": sampler_figure(posterior),
     }
-
-    def save(folder: Path) -> None:
-        posterior.save(folder / FILE_NAME)
-        table = columns_csv(bands.columns())
-        (folder / "motion.csv").write_text(table, "utf-8", newline="")
-
     write_report(
         target,
         document,
         {"summary.json": found},
         figures,
         kept=["motion"],
-        save=save,
+        tables={"motion.csv": bands.columns()},
+        save=lambda folder: posterior.save(folder / FILE_NAME),
         force=force,
     )
     return document, found

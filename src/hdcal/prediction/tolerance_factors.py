@@ -18,7 +18,7 @@ def check_shares(**shares: float) -> list[Finding]:
     """Return a finding for every share that does not lie between 0 and 1."""
     return [
         Finding(
-            f"--{name.replace('_', '-')}",
+            name,
             f"{value:g} does not lie between 0 and 1",
             "Give a share, such as 0.95",
         )

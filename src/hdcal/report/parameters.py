@@ -72,14 +72,9 @@ class ParameterEstimate(Interval):
 
 def credible_interval(values: np.ndarray) -> Interval:
     """Return median and equal-tailed 95 % credible interval."""
-    return Interval(**interval(values))
-
-
-def interval(values: np.ndarray) -> dict[str, float]:
-    """Return median and equal-tailed 95 % credible interval."""
     tail = (1.0 - INTERVAL) / 2.0
     lo, median, hi = np.quantile(values, [tail, 0.5, 1.0 - tail])
-    return {"median": float(median), "lo": float(lo), "hi": float(hi)}
+    return Interval(float(median), float(lo), float(hi))
 
 
 def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:

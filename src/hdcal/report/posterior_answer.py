@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from hdcal.data.case import Theory
+from hdcal.data.theory_names import Theory
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences
@@ -17,7 +17,8 @@ from hdcal.report.parameters import (
 
 _OneOrMore = Annotated[int, Promise(minimum=1)]
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
-ParameterName = Annotated[str, Promise(pattern=f"^{_NAME}(\\.{_NAME})?$")]
+# What a generated schema says of the names of parameters.
+PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class PosteriorAnswer(Answer):
     """
 
     warnings: Sentences
-    parameters: dict[ParameterName, ParameterEstimate]
+    parameters: dict[str, ParameterEstimate]
     stiffness_N_per_mm: Interval
     flat_directions: Sentences
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]

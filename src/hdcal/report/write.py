@@ -3,8 +3,11 @@
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 
+import numpy as np
+
 from hdcal.report.answer import Answer
 from hdcal.report.canvas import Figure, render
+from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
 from hdcal.report.folder import whole_folder
 from hdcal.report.html import html_page
@@ -20,6 +23,7 @@ def write_report(
     figures: Mapping[str, Figure] | None = None,
     *,
     kept: Collection[str] | None = None,
+    tables: Mapping[str, Mapping[str, np.ndarray]] | None = None,
     save: Callable[[Path], None] | None = None,
     force: bool = False,
 ) -> None:
@@ -32,6 +36,7 @@ def write_report(
         figures: of the document's pictures, by name.
         kept: figures that become files of their own too, as SVG and PNG; by default
             all of them.
+        tables: columns of the CSV files, by the names of the files.
         save: writes what else belongs into the folder.
         force: replace an older result.
 
@@ -45,6 +50,8 @@ def write_report(
             (folder / name).write_text(as_json(answer), "utf-8")
         for name, content in files.items():
             (folder / name).write_bytes(content)
+        for name, columns in (tables or {}).items():
+            (folder / name).write_text(columns_csv(columns), "utf-8", newline="")
         if save is not None:
             save(folder)
 

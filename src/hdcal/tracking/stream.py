@@ -1,34 +1,44 @@
-"""Readings as JSON lines in, answers as JSON lines out, one for each."""
+"""Readings as JSON lines in, what the tracker makes of them as JSON lines out."""
 
 import json
 from collections.abc import Iterator
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 from hdcal.tracking.tracker import SCHEMA, Tracker
 
 # A longer line is no reading; the rest of it is thrown away unread.
 _LONGEST = 1 << 16
+_ENCODER = json.JSONEncoder(allow_nan=False)
 _NUMBERS = {"deformation_mm": "deformation", "force_N": "force"}
 _OPTIONAL = {"temperature_C": "temperature", "time_s": "time"}
 
 
-def answers(tracker: Tracker, lines: BinaryIO) -> Iterator[dict]:
-    """Yield the answer to every line that is not blank, good or bad.
+def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
+    """Answer every line that is not blank, good or bad, before the next is read.
 
     A bad line is answered by what is wrong with it; nothing is learned from it, and
     the stream goes on. Rows count all lines that are answered.
 
     Args:
         tracker: that takes the readings.
-        lines: JSON objects with `deformation_mm` and `force_N`, and where known
+        source: JSON objects with `deformation_mm` and `force_N`, and where known
             `temperature_C`, `time_s` and `run`.
+        sink: takes a line for each.
+
+    Returns:
+        How many lines were no reading.
     """
-    for line in _lines(lines):
+    bad = 0
+    for line in _lines(source):
         try:
-            yield tracker.update(**read_line(line))
+            found = tracker.update(**read_line(line))
         except ValueError as error:
+            bad += 1
             found = {"schema": SCHEMA, "status": "error", "row": tracker.skip()}
-            yield {**found, "error": str(error)}
+            found["error"] = str(error)
+        sink.write(_ENCODER.encode(found) + "\n")
+        sink.flush()
+    return bad
 
 
 def read_line(line: bytes) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from hdcal.data.priors import Prior
 from hdcal.inference.density import POSITIVE
 from hdcal.inference.distributions import bounds, frozen, scaled
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
 from hdcal.physics.chain import Base, Reading, linear_coefficients
 from hdcal.physics.theory import THEORIES
 
@@ -18,7 +17,7 @@ _SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
 
 
 @dataclass(frozen=True)
-class Beginning:
+class StreamPrior:
     """Draws of the force model for a gear on a mounting that was not tested.
 
     Attributes:
@@ -38,7 +37,7 @@ class Beginning:
         return np.asarray(linear_coefficients(self.base, self.reading))
 
 
-def of_posterior(posterior: Posterior, seed: int = 0) -> Beginning:
+def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
     """Return what a posterior says of the stream.
 
     The stream's mounting is a new one, with a zero of its own; where several gears
@@ -48,34 +47,27 @@ def of_posterior(posterior: Posterior, seed: int = 0) -> Beginning:
         posterior: of a calibration that may be used.
         seed: of the new mounting and gear.
     """
-    draws, problem = posterior.draws, posterior.problem
+    draws, problem = dict(posterior.draws), posterior.problem
     rng, size = np.random.default_rng(seed), len(draws["K"])
     stiffness = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
     if problem.specimens:
         sd = draws["specimen_sd"] * np.sqrt(1.0 + 1.0 / problem.specimens)
         stiffness = stiffness * (1.0 + sd * rng.standard_normal(size))
-    of_run = _draw(posterior.priors["run_offset_sd"], rng, size)
+    run_sd = _draw(posterior.priors["run_offset_sd"], rng, size)
     if problem.runs:
-        of_run = draws["run_offset_sd"] * np.sqrt(1.0 + 1.0 / problem.runs)
-    known = float(np.mean(np.asarray(posterior.case.records.force_sd) ** 2))
-    base = Base(
-        stiffness=stiffness,
-        alpha=draws["alpha"],
-        deformation_offset=draws["deformation_offset"],
-        force_offset=draws["force_offset"] + of_run * rng.standard_normal(size),
-        sigma=draws["sigma"],
-    )
-    step = float(problem.step)
-    variance = draws["sigma"] ** 2 + step**2 / 12.0 + known
-    return Beginning(base, variance, _plain(problem), 2.0 * float(np.mean(of_run**2)))
-
-
-def _plain(problem: Problem) -> Reading:
+        run_sd = draws["run_offset_sd"] * np.sqrt(1.0 + 1.0 / problem.runs)
+    draws["force_offset"] = draws["force_offset"] + run_sd * rng.standard_normal(size)
+    stated = float(np.mean(np.asarray(posterior.case.records.force_sd) ** 2))
     reading = problem.reading
-    return Reading(float(reading.radial_per_read), float(reading.reference_temperature))
+    reading = Reading(
+        float(reading.radial_per_read), float(reading.reference_temperature)
+    )
+    return _stream_prior(
+        stiffness, draws, float(problem.step) ** 2 / 12.0 + stated, reading, run_sd
+    )
 
 
-def of_gear(gear: Gear, seed: int = 0) -> Beginning:
+def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
     """Return what the priors of a gear file say of the stream.
 
     Args:
@@ -89,18 +81,19 @@ def of_gear(gear: Gear, seed: int = 0) -> Beginning:
     )
     priors = {**gear.priors, "K": scaled(gear.priors["K"], meant / own)}
     draws = {n: _draw(priors[n], rng, _PRIOR_DRAWS, n in POSITIVE) for n in _SITES}
-    of_run = _draw(gear.scale_priors["run_offset_sd"], rng, _PRIOR_DRAWS)
-    base = Base(
-        stiffness=draws["K"] * draws["E0"] * own,
-        alpha=draws["alpha"],
-        deformation_offset=draws["deformation_offset"],
-        force_offset=draws["force_offset"],
-        sigma=draws["sigma"],
-    )
+    run_sd = _draw(gear.scale_priors["run_offset_sd"], rng, _PRIOR_DRAWS)
     half = 0.5 if gear.reading == "diametral" else 1.0
-    variance = draws["sigma"] ** 2 + gear.force_resolution**2 / 12.0
     reading = Reading(half, gear.reference_temperature)
-    return Beginning(base, variance, reading, 2.0 * float(np.mean(of_run**2)))
+    stiffness = draws["K"] * draws["E0"] * own
+    return _stream_prior(
+        stiffness, draws, gear.force_resolution**2 / 12.0, reading, run_sd
+    )
+
+
+def _stream_prior(stiffness, draws, known_variance, reading, run_sd) -> StreamPrior:
+    base = Base(stiffness=stiffness, **{name: draws[name] for name in _SITES[2:]})
+    variance = draws["sigma"] ** 2 + known_variance
+    return StreamPrior(base, variance, reading, 2.0 * float(np.mean(run_sd**2)))
 
 
 def _draw(prior: Prior, rng, size: int, positive: bool = False) -> np.ndarray:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from hdcal.blind.label import Span
+from hdcal.blind.label import Quantiles
 from hdcal.blind.scoring.estimates import Estimate, median, share
 from hdcal.blind.scoring.scored_case import Cases
 
@@ -40,7 +40,7 @@ def _rms(values: Sequence[float]) -> float:
     return math.sqrt(math.fsum(v * v for v in values) / len(values))
 
 
-def _compare(rows: Iterable[tuple[float, Span]]) -> Sizes:
+def _compare(rows: Iterable[tuple[float, Quantiles]]) -> Sizes:
     # An unfinished answer holds None or NaN, and of nothing there is no relative error.
     kept = [
         (true, span)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from hdcal.data.case import Theory
+from hdcal.data.theory_names import Theory
 from hdcal.report.answer import Answer, Count, Digest, EffectName, Promise
 
 # Smallest and largest value.
@@ -52,7 +52,7 @@ class EffectsInReach:
     """Which effects these data can tell of, and what the others lack."""
 
     testable: tuple[EffectName, ...]
-    not_testable: dict[EffectName, tuple[str, ...]]
+    not_testable: dict[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -84,3 +84,12 @@ def printed_slope(gear: Geometry, modulus: float) -> float:
     bending = modulus * float(gear.wall_thickness) ** 3 / plate
     over = plate / (24.0 * float(gear.radius) ** 3)
     return float(np.pi * bending * over * RING_SERIES)
+
+
+def cubic(deformation: np.ndarray) -> np.ndarray:
+    """Return the force of the article's fitted equation [N].
+
+    Args:
+        deformation: [mm], shape (n,).
+    """
+    return np.polyval([*reversed(CUBIC), 0.0], deformation)

@@ -19,9 +19,9 @@ from hdcal.classical.audit.article import (
     WALL,
     Claim,
     article_gear,
+    cubic,
     outcome,
 )
-from hdcal.classical.audit.theory_claims import cubic
 from hdcal.classical.fit.fit import PolynomialFit, fit
 from hdcal.data.case import Case
 from hdcal.physics.theory import ring
@@ -127,10 +127,24 @@ def _measured_slope(fits) -> Claim:
     )
 
 
-def _fitted_equation(x, y) -> Claim:
+def cubic_misfit(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """Return what the article's cubic leaves of the readings.
+
+    Args:
+        x: deformation [mm], shape (n,).
+        y: force [N], shape (n,).
+
+    Returns:
+        Residuals, shape (n,), and their root mean square [N]; R² about the mean.
+    """
     residual = y - cubic(x)
-    r2 = float(1.0 - residual @ residual / np.sum((y - y.mean()) ** 2))
-    rms, below = float(np.sqrt(np.mean(residual**2))), int(np.sum(residual < 0.0))
+    r2 = 1.0 - residual @ residual / np.sum((y - y.mean()) ** 2)
+    return residual, float(np.sqrt(np.mean(residual**2))), float(r2)
+
+
+def _fitted_equation(x, y) -> Claim:
+    residual, rms, r2 = cubic_misfit(x, y)
+    below = int(np.sum(residual < 0.0))
     return Claim(
         8,
         "The fitted equation is 210.41ω − 15.23ω² + 5.67ω³, with R² above "

@@ -12,8 +12,8 @@ from hdcal.classical.audit.answer import (
 )
 from hdcal.classical.audit.article import TITLE, Claim, Outcome
 from hdcal.classical.audit.audit import DATASET, table_2
+from hdcal.classical.audit.data_claims import cubic_misfit
 from hdcal.classical.audit.document import headline
-from hdcal.classical.audit.theory_claims import cubic
 from hdcal.classical.fit.fit import fit
 from hdcal.classical.fit.notation import model_name
 
@@ -47,7 +47,5 @@ def _fits() -> tuple[AuditedFit | PrintedCurve, ...]:
         AuditedFit(model_name(one.powers), tuple(one.coefficients), one.s, one.r2)
         for one in sorted(fit(case, [1, 2, 3]), key=lambda f: (len(f.powers), -f.dof))
     ]
-    residual = y - cubic(x)
-    r2 = float(1.0 - residual @ residual / np.sum((y - y.mean()) ** 2))
-    rms = float(np.sqrt(np.mean(residual**2)))
+    _, rms, r2 = cubic_misfit(x, y)
     return (*rows, PrintedCurve("the article's cubic", rms, r2))

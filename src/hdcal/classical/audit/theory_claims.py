@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.classical.audit.article import (
-    CUBIC,
     DEFORMATION,
     LENGTH,
     MODULUS,
@@ -167,8 +166,3 @@ def _table_4() -> Claim:
             "implied_slope_N_per_mm": implied,
         },
     )
-
-
-def cubic(deformation: np.ndarray) -> np.ndarray:
-    """Return the force of the article's fitted equation [N]."""
-    return np.polyval([*reversed(CUBIC), 0.0], deformation)

@@ -15,7 +15,7 @@ from scipy.stats import f as f_law
 from scipy.stats import t as t_law
 
 from hdcal.data.case import Case
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings
 
 LEVEL = 0.95
 MOST_DEGREE = 9
@@ -150,33 +150,35 @@ def fit(
 
 
 def _check(name: str, deformation, degrees, wanted) -> None:
-    findings = [
-        Finding("degrees", f"{degree} is out of range", f"Use 1 to {MOST_DEGREE}")
-        for degree in degrees
-        if not 1 <= degree <= MOST_DEGREE
-    ]
-    if not degrees:
-        findings.append(Finding("degrees", "is empty", "Write it like 1,3"))
-    if findings:
-        raise InputError(findings)
+    with Findings() as wrong:
+        for degree in degrees:
+            if not 1 <= degree <= MOST_DEGREE:
+                words = f"{degree} is out of range"
+                wrong.append(Finding("degrees", words, f"Use 1 to {MOST_DEGREE}"))
+        if not degrees:
+            wrong.append(Finding("degrees", "is empty", "Write it like 1,3"))
     distinct = np.unique(deformation)
     scale = np.max(np.abs(distinct))
-    for powers in wanted:
-        have = len(distinct) - (powers[0] == 1 and bool(np.any(distinct == 0.0)))
-        if have < len(powers) or len(deformation) <= len(powers):
-            words = f"{have} different deformations do not fix degree {powers[-1]}"
-        elif _condition(distinct / scale, powers) > _WORST_CONDITION:
-            words = f"degree {powers[-1]} leaves no digits: the deformations lie close"
-        else:
-            continue
-        remedy = "Use a lower degree, or measure at more deformations"
-        findings.append(Finding(name, words, remedy))
-    if findings:
-        raise InputError(dict.fromkeys(findings))
+    with Findings() as wrong:
+        for powers in wanted:
+            degree = powers[-1]
+            have = len(distinct) - (powers[0] == 1 and bool(np.any(distinct == 0.0)))
+            if have < len(powers) or len(deformation) <= len(powers):
+                words = f"{have} different deformations do not fix degree {degree}"
+            elif _condition(distinct / scale, powers) > _WORST_CONDITION:
+                words = f"degree {degree} leaves no digits: the deformations lie close"
+            else:
+                continue
+            remedy = "Use a lower degree, or measure at more deformations"
+            wrong.append(Finding(name, words, remedy))
 
 
-def _condition(deformation: np.ndarray, powers: Sequence[int]) -> float:
-    return float(np.linalg.cond(deformation[:, None] ** np.array(powers)))
+def _columns(x: np.ndarray, powers: Sequence[int]) -> np.ndarray:
+    return x[:, None] ** np.array(powers)
+
+
+def _condition(x: np.ndarray, powers: Sequence[int]) -> float:
+    return float(np.linalg.cond(_columns(x, powers)))
 
 
 def same_conditions(*columns: np.ndarray) -> np.ndarray:
@@ -204,7 +206,7 @@ def fit_powers(
         run: index of the run of each row, or None.
     """
     scale = float(np.max(np.abs(x)))
-    q, r = np.linalg.qr((x / scale)[:, None] ** np.array(powers))
+    q, r = np.linalg.qr(_columns(x / scale, powers))
     target = q.T @ y
     residual = y - q @ target
     squares, dof = float(residual @ residual), len(y) - len(powers)
@@ -273,8 +275,7 @@ def _lack_of_fit(x, y, powers, squares: float, repeats) -> LackOfFit | None:
     free = len(y) - len(larger)
     if free < 1 or len(np.unique(x[x != 0.0])) < len(larger):
         return None
-    design = (x / np.max(np.abs(x)))[:, None] ** np.array(larger)
-    q = np.linalg.qr(design)[0]
+    q = np.linalg.qr(_columns(x / np.max(np.abs(x)), larger))[0]
     left = y - q @ (q.T @ y)
     return _ratio("next degree", squares, float(left @ left), 1, free)
 

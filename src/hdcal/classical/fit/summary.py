@@ -18,7 +18,7 @@ from hdcal.classical.fit.document import DOUBT, headline, notes
 from hdcal.classical.fit.fit import LEVEL, PolynomialFit
 from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
 from hdcal.report.parameters import credible_interval
@@ -67,17 +67,15 @@ def fit_answer(
 
 
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
-    findings = []
     reach = case.gear.geometry.radius * (2 if case.gear.reading == "diametral" else 1)
-    if at is not None and not abs(at) < reach:
-        words = f"{at:g} mm is no deformation of this gear"
-        findings.append(Finding("at", words, "Give it in mm, as read"))
-    if posterior is not None and posterior.case.data_sha256 != case.data_sha256:
-        words = f"is a calibration of other data ({posterior.case.name})"
-        remedy = "Name the result folder that was made from these data"
-        findings.append(Finding("run", words, remedy))
-    if findings:
-        raise InputError(findings)
+    with Findings() as wrong:
+        if at is not None and not abs(at) < reach:
+            words = f"{at:g} mm is no deformation of this gear"
+            wrong.append(Finding("at", words, "Give it in mm, as read"))
+        if posterior is not None and posterior.case.data_sha256 != case.data_sha256:
+            words = f"is a calibration of other data ({posterior.case.name})"
+            remedy = "Name the result folder that was made from these data"
+            wrong.append(Finding("run", words, remedy))
 
 
 def _curve(one: PolynomialFit, at: float | None, best: float | None) -> FittedCurve:

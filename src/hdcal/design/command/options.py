@@ -77,7 +77,7 @@ def limit_options(command: Callable) -> Callable:
 
 
 def _sizes() -> list[str]:
-    from hdcal.design.sizes import SIZES
+    from hdcal.prediction.engine.sizes import SIZES
 
     return list(SIZES)
 

@@ -16,12 +16,12 @@ from hdcal.classical.audit.article import (
     article_gear,
 )
 from hdcal.data.records import Geometry
-from hdcal.design.design_draws import Basis, basis_of
-from hdcal.design.sizes import stiffness_factor
+from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.study.study import force_quantiles
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.theory import article, ring
+from hdcal.prediction.engine.sizes import stiffness_ratio
 
 SCHEMA = "hdcal.article/1"
 
@@ -67,9 +67,9 @@ def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
         NotUsable: the calibration failed its checks.
         InputError: it is of another gear.
     """
-    basis = None if posterior is None else basis_of(posterior)
-    if basis is not None:
-        _check_gear(basis)
+    draws = None if posterior is None else design_draws(posterior)
+    if draws is not None:
+        _check_gear(draws)
     gear = article_gear()
     own = float(gear.wall_thickness), float(gear.radius)
     rows = [(3, at, *own, *forces) for at, *forces in TABLE_3]
@@ -77,11 +77,11 @@ def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
         (4, DEFORMATION, wall, radius, *forces, None)
         for (wall, radius), forces in TABLE_4.items()
     ]
-    return tuple(_row(basis, *row) for row in rows)
+    return tuple(_row(draws, *row) for row in rows)
 
 
 def _row(
-    basis: Basis | None, table, at, wall, radius, original, revised, measured
+    draws: DesignDraws | None, table, at, wall, radius, original, revised, measured
 ) -> ArticleRow:
     geometry = replace(article_gear(), wall_thickness=wall, radius=radius)
     plotted = float(article(geometry, MODULUS)) * at
@@ -96,25 +96,25 @@ def _row(
         article_N=plotted,
         article_revised_N=INFLUENCE * plotted,
         ring_N=float(ring(geometry, MODULUS)) * at,
-        calibrated_N=None if basis is None else _calibrated(basis, wall, radius, at),
+        calibrated_N=None if draws is None else _calibrated(draws, wall, radius, at),
     )
 
 
-def _calibrated(basis: Basis, wall, radius, at) -> dict[str, float]:
-    own = basis.gear.geometry
+def _calibrated(draws: DesignDraws, wall, radius, at) -> dict[str, float]:
+    own = draws.gear.geometry
     geometry = Geometry(wall, radius, own.length, own.load_height, own.poisson)
-    factor = np.array([float(stiffness_factor(basis, geometry))])
-    warm = np.array([basis.gear.reference_temperature])
+    factor = np.array([float(stiffness_ratio(geometry, own, draws.theory))])
+    warm = np.array([draws.gear.reference_temperature])
     shares = np.array([0.5, 0.025, 0.975])
-    found = force_quantiles(basis, factor, np.array([at]), warm, shares)[:, 0]
+    found = force_quantiles(draws, factor, np.array([at]), warm, shares)[:, 0]
     return dict(zip(("median", "lo", "hi"), map(float, found), strict=True))
 
 
-def _check_gear(basis: Basis) -> None:
+def _check_gear(draws: DesignDraws) -> None:
     sizes = ("wall_thickness", "radius", "length")
     theirs = [float(getattr(article_gear(), name)) for name in sizes]
-    ours = [float(getattr(basis.gear.geometry, name)) for name in sizes]
+    ours = [float(getattr(draws.gear.geometry, name)) for name in sizes]
     if not np.allclose(ours, theirs):
         words = "is a calibration of a gear of other sizes than the article's"
         remedy = "Calibrate datasets/xb1-100-80, or leave the run out"
-        raise InputError([Finding(basis.gear.name, words, remedy)])
+        raise InputError([Finding(draws.gear.name, words, remedy)])

@@ -56,30 +56,37 @@ def study_document(found: StudyAnswer, command: str = "") -> Document:
         found: from `study_answer`.
         command: how the result was made.
     """
+    sections = [picture("study", "Force", _STUDY), *_designs(found)]
+    return design_document(found, "study", [_bands(found)], sections, command)
+
+
+def _designs(found: StudyAnswer) -> list[Section]:
+    """Return the designs in a table; of many, only the first are brief."""
     shown = [name for name in HEADINGS if name in found.columns]
     numbers = [HEADINGS[name] for name in shown if name != "material"]
     numbers += ["force [N]", "band [N]", "stress [MPa]"]
+    varied = found.varied or ("deformation_mm",)
+    spare = {HEADINGS[name] for name in shown if name not in varied}
     count = len(found.columns["material"])
     rows = [_row(found, shown, row) for row in range(min(count, _MOST_ROWS))]
-    note = f"Band: {band(found)}. Stress: hoop bending under the load, median."
-    left = "all are in study.csv."
 
-    def table(part: Sequence[Sequence[str]]) -> Table:
-        return Table(["material", *numbers], part, frozenset(numbers))
+    def table(first: int, last: int) -> Table:
+        columns, part = ["material", *numbers], rows[first:last]
+        silent = frozenset(spare | {"stress [MPa]"})
+        return Table(columns, part, frozenset(numbers), spare=silent)
 
-    first = [table(rows[:_FIRST_ROWS]), Text(note, soft=True)]
-    sections = [picture("study", "Force", _STUDY)]
-    if count <= _FIRST_ROWS:
-        sections.append(Section("Designs", first, brief=True))
-    else:
-        words = Text(f"The first {_FIRST_ROWS} of {count}; {left}", soft=True)
-        sections.append(Section("Designs", [*first, words], brief=True))
-        further = [table(rows[_FIRST_ROWS:])]
-        if count > _MOST_ROWS:
-            more = Text(f"The first {_MOST_ROWS} of {count}; {left}", soft=True)
-            further = [*further, more]
+    def cut(at: int) -> list[Text]:
+        words = f"The first {at} of {count}; all are in study.csv."
+        return [Text(words, soft=True)] if count > at else []
+
+    words = f"Band: {band(found)}. Stress: hoop bending under the load, median."
+    note = Text(words, soft=True)
+    first = [table(0, _FIRST_ROWS), note, *cut(_FIRST_ROWS)]
+    sections = [Section("Designs", first, brief=True)]
+    if count > _FIRST_ROWS:
+        further = [table(_FIRST_ROWS, _MOST_ROWS), *cut(_MOST_ROWS)]
         sections.append(Section("Further designs", further))
-    return design_document(found, "study", [_bands(found)], sections, command)
+    return sections
 
 
 def _row(found: StudyAnswer, shown: Sequence[str], row: int) -> list[str]:

@@ -7,6 +7,8 @@ from hdcal.motion.quantities import QUANTITIES
 from hdcal.report.answer import Answer, Promise, Sentences
 from hdcal.report.parameters import Interval
 
+COLUMNS = ["time_s", "force_N", "deformation_lo_mm", "deformation_median_mm"]
+COLUMNS += ["deformation_hi_mm", "tested"]
 _OneOrMore = Annotated[int, Promise(minimum=1)]
 
 
@@ -59,4 +61,4 @@ class ResponseAnswer(Answer):
 class ResponseWithColumns(ResponseAnswer):
     """What `hdcal respond --json` prints: the rows of response.csv too."""
 
-    columns: dict[str, list[float | bool]]
+    columns: Annotated[dict[str, list[float | bool]], Promise(required=COLUMNS)]

@@ -4,9 +4,7 @@ import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
-
-# How far beyond the data still counts as tested [K]: thermometers are no better.
-_NEAR_K = 1.0
+from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
 
 
 def drivers(posterior: Posterior, mass, damping) -> dict[str, str]:
@@ -48,6 +46,5 @@ def tested_rows(posterior: Posterior, temperature: float, lo, hi) -> np.ndarray:
     zero = float(np.median(posterior.draws["deformation_offset"]))
     low = min(0.0, float(np.min(records.deformation)) - zero)
     high = float(np.max(records.deformation)) - zero
-    cold, warm = np.min(records.temperature), np.max(records.temperature)
-    inside = (lo >= low - 1e-9) & (hi <= high + 1e-9)
-    return inside & bool(cold - _NEAR_K <= temperature <= warm + _NEAR_K)
+    inside = (lo >= low - NEAR_MM) & (hi <= high + NEAR_MM)
+    return inside & temperature_is_tested(records, temperature)

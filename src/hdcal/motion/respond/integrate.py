@@ -8,10 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import POSITIVE
-from hdcal.inference.distributions import distribution
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import mass_prior
 from hdcal.inference.posterior import Posterior
@@ -25,6 +22,7 @@ from hdcal.physics.dynamics import (
     natural_frequency,
 )
 from hdcal.physics.effect import Effect, parameters
+from hdcal.prediction.engine.causes import sample_prior
 
 # Draws integrated side by side: all wait for the slowest.
 _CHUNK = 250
@@ -47,19 +45,12 @@ def unseen(posterior: Posterior, values: dict, mass, seed: int):
         moved = np.full(count, float(mass))
     else:
         radial = case_reading(posterior.case).radial_per_read
-        moved = _draw(mass_prior(gear, radial), "mass", of_mass, count)
+        moved = sample_prior(mass_prior(gear, radial), "mass", of_mass, count)
     ratio = gear.dynamic_priors.get("damping_ratio")
     if ratio is None:
         words = "this older result holds no prior of the damping"
         raise InputError([Finding(posterior.case.name, words, "Calibrate again")])
-    return moved, _draw(ratio, "damping_ratio", of_ratio, count)
-
-
-def _draw(prior: Prior, name: str, key, count: int) -> np.ndarray:
-    if prior.family == "fixed":
-        return np.full(count, float(prior.numbers[0]))
-    law = distribution(prior, positive=name in POSITIVE)
-    return np.asarray(law.sample(key, (count,)))
+    return moved, sample_prior(ratio, "damping_ratio", of_ratio, count)
 
 
 def _with_values(effect: type[Effect], values) -> Effect:
@@ -72,12 +63,7 @@ def _each(kept, with_damping, reading, values, temperature, damping, force, time
     """Return states, facts and whether each draw of a batch came through."""
 
     def one(value):
-        effects = tuple(
-            effect(
-                **{name: value[f"{effect.name}.{name}"] for name in parameters(effect)}
-            )
-            for effect in kept
-        )
+        effects = tuple(_with_values(effect, value) for effect in kept)
         stiffness = value["stiffness"] / reading.radial_per_read
         base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
         mass = value["_mass"]

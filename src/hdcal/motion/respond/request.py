@@ -73,6 +73,12 @@ def make_request(
         _check_table(drive, find)
     if findings:
         raise InputError(findings)
+    return _request(drive, amplitude, tones, length, points)
+
+
+def _request(
+    drive: Drive, amplitude: float, tones: list[float], length: float, points: int
+) -> Request:
     if not isinstance(drive, str):
         time, force = (np.asarray(part, dtype=float) for part in drive)
         words = f"a sampled force of {len(time)} rows, linear between them"

@@ -6,20 +6,21 @@ damping are drawn from their priors, and the answer says so.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
 
-from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.physics.dynamics import acting, natural_frequency
+from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 _MOST_DRAWS = 10_000
@@ -69,9 +70,7 @@ class Response:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
-        names = ("time_s", "force_N", "deformation_lo_mm", "deformation_median_mm")
-        names += ("deformation_hi_mm", "tested")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in COLUMNS}
 
     def _repr_html_(self) -> str:
         from hdcal.motion.respond.document import response_document
@@ -119,11 +118,21 @@ def respond(
         InputError: what was asked makes no sense.
     """
     posterior.require_usable()
-    request = _checked(
-        partial(make_request, force, amplitude, frequency, duration, points),
-        _problems(posterior, temperature, mass, damping, draws),
-    )
-    at = _temperature(posterior) if temperature is None else float(temperature)
+    with Findings() as wrong:
+        request = wrong.attempt(
+            make_request, force, amplitude, frequency, duration, points
+        )
+        wrong += _problems(posterior, temperature, mass, damping, draws)
+    assert request is not None
+    return _move(posterior, request, temperature, mass, damping, draws, seed)
+
+
+def _move(
+    posterior: Posterior, request: Request, temperature, mass, damping, draws, seed
+) -> Response:
+    """Integrate every gear of the posterior, and say what its motion rests on."""
+    usual = usual_temperature(posterior.case)
+    at = usual if temperature is None else float(temperature)
     values = thinned(posterior.draws, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
     kept, left = acting(without_scatter(posterior.effects))
@@ -156,13 +165,6 @@ def respond(
     )
 
 
-def _temperature(posterior: Posterior) -> float:
-    """Return the tested temperature nearest to the reference [°C]."""
-    tested = posterior.case.records.temperature
-    reference = posterior.case.gear.reference_temperature
-    return float(np.clip(reference, np.min(tested), np.max(tested)))
-
-
 def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
     """Return the ends and the middle of the band at every time [mm].
 
@@ -176,17 +178,6 @@ def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
         )
     tail = (1.0 - INTERVAL) / 2.0
     return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
-
-
-def _checked(make, findings: list[Finding]) -> Request:
-    """Return the request; raise with its findings and the others at once."""
-    try:
-        request = make()
-    except InputError as error:
-        raise InputError([*error.findings, *findings]) from None
-    if findings:
-        raise InputError(findings)
-    return request
 
 
 def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
@@ -208,13 +199,8 @@ def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
     if not 20 <= draws <= _MOST_DRAWS:
         find("draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
     if temperature is not None:
-        gear = posterior.case.gear
-        rise = abs(temperature - gear.reference_temperature)
-        if not np.isfinite(temperature) or temperature < -273.15:
-            find("temperature", "is below absolute zero", "Give it in °C")
-        elif np.median(posterior.draws["alpha"]) * rise >= 0.5:
-            words = "the linear law E(T) would lose half of Young's modulus"
-            find("temperature", words, "Give it in °C")
+        gear, values = posterior.case.gear, posterior.draws
+        findings += temperature_findings(gear, values, np.array([temperature]))
     return findings
 
 

@@ -6,29 +6,29 @@ effects have not begun.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import partial
-from typing import Literal
 
 import jax
 import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import build_effects, member_base
-from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem, case_reading
-from hdcal.physics.chain import predict_reading
-from hdcal.physics.effect import Noise
-from hdcal.prediction.forces import grid_records
+from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
+from hdcal.prediction.engine.conditions import (
+    DIRECTIONS,
+    SENSE,
+    Direction,
+    is_tested,
+    temperature_findings,
+    usual_sd,
+    usual_temperature,
+)
+from hdcal.prediction.engine.forces import grid_records
+from hdcal.prediction.engine.mixture import draw_quantiles
+from hdcal.prediction.engine.readings import readings
 
-Direction = Literal["up", "down"]
-DIRECTIONS: tuple[Direction, ...] = ("up", "down")
-_SENSE = {"up": 1.0, "down": -1.0}
 # Rows predicted at a time: with 4000 draws a block takes 64 MB.
 _BLOCK = 2000
 _MOST_TEMPERATURES = 6
-# How far beyond the data still counts as tested [K]: thermometers are no better.
-_NEAR_K = 1.0
 
 
 @dataclass(frozen=True)
@@ -73,94 +73,8 @@ class Bands:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-@jax.jit
-def _predict_block(problem: Problem, values, records: Records, keys):
-    """Return mean, mean with gap and a new reading: [draw, row] each."""
-    gap = problem.discrepancy
-    columns = None if gap is None else gap.columns(records.deformation)
-
-    def one(value, key):
-        of_run, of_specimen, of_noise = jax.random.split(key, 3)
-        effects = build_effects(problem, value)
-        base = member_base(problem, value)
-        mean, noise = predict_reading(base, effects, records, problem.reading)
-        other = _new_member(problem, value, of_run, of_specimen)
-        base = member_base(problem, {**value, **other}, 0, 0)
-        new, _ = predict_reading(base, effects, records, problem.reading)
-        leftover = 0.0 if columns is None else columns @ value["gap_weights"]
-        error = _reading_error(of_noise, noise, problem.step)
-        return mean, mean + leftover, new + leftover + error
-
-    return jax.vmap(one)(values, keys)
-
-
-def _reading_error(key, noise: Noise, step):
-    """Draw the error of a reading [N], the same quantile in every row.
-
-    Bands are row by row, so that rows may share their random numbers; they are then
-    smooth and do not depend on which other rows are asked for. Rounding is uniform
-    over its step for the same reason.
-    """
-    pick, normal, rounding = jax.random.split(key, 3)
-    sd = noise.sd[jax.random.categorical(pick, noise.log_weight)]
-    uniform = jax.random.uniform(rounding, minval=-0.5, maxval=0.5)
-    return sd * jax.random.normal(normal) + step * uniform
-
-
-def _new_member(problem: Problem, value, of_run, of_specimen) -> dict:
-    """Draw a run and a specimen that were not tested.
-
-    Tested deviations are from the mean of the tested, so that a new one also carries
-    the distance of that mean from the population's.
-    """
-    new = {}
-    if problem.runs:
-        sd = value["run_offset_sd"] * np.sqrt(1.0 + 1.0 / problem.runs)
-        new["run_offset"] = sd * jax.random.normal(of_run, (1,))
-    if problem.specimens:
-        sd = value["specimen_sd"] * np.sqrt(1.0 + 1.0 / problem.specimens)
-        new["specimen_deviation"] = sd * jax.random.normal(of_specimen, (1,))
-    return new
-
-
-def _check_grid(deformation, temperature, direction, interval) -> None:
-    findings = []
-
-    def find(name, problem, remedy):
-        findings.append(Finding(name, problem, remedy))
-
-    if deformation.size == 0 or not np.isfinite(deformation).all():
-        find("--deformation", "is empty or not finite", "give numbers in mm")
-    if temperature.size == 0 or not np.isfinite(temperature).all():
-        find("--temperature", "is empty or not finite", "give numbers in °C")
-    elif temperature.min() < -273.15:
-        find("--temperature", "is below absolute zero", "give numbers in °C")
-    if direction not in _SENSE:
-        find("--direction", f"'{direction}' is unknown", "use up or down")
-    if not 0.0 < interval < 1.0:
-        find("--interval", f"{interval} is not between 0 and 1", "use e.g. 0.95")
-    if findings:
-        raise InputError(findings)
-
-
-def _check_size(deformation, temperature, posterior: Posterior) -> None:
-    """Refuse what is a slip of the unit, as the reader of the data does."""
-    gear, findings = posterior.case.gear, []
-    limit = gear.geometry.radius / case_reading(posterior.case).radial_per_read
-    worst = float(np.max(np.abs(deformation)))
-    if worst >= limit:
-        problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
-        findings.append(Finding("--deformation", problem, "Give it in mm"))
-    rise = np.max(np.abs(temperature - gear.reference_temperature))
-    if np.median(posterior.draws["alpha"]) * rise >= 0.5:
-        problem = "the linear law E(T) would lose half of Young's modulus"
-        findings.append(Finding("--temperature", problem, "Give it in °C"))
-    if findings:
-        raise InputError(findings)
-
-
 def predict(
-    posterior: Posterior,
+    posterior: Models,
     deformation: Sequence[float] | np.ndarray,
     temperature: Sequence[float] | np.ndarray | None = None,
     direction: Direction = "up",
@@ -172,7 +86,8 @@ def predict(
     """Predict the force at every pair of deformation and temperature.
 
     Args:
-        posterior: from `calibrate` or `Posterior.load`.
+        posterior: from `calibrate` or `Posterior.load`; or several, each with the
+            probability of its model.
         deformation: as read [mm], shape (n,).
         temperature: of the specimen [°C], shape (t,); by default the tested one
             nearest to the reference.
@@ -188,35 +103,37 @@ def predict(
         NotUsable: the posterior failed its checks.
         InputError: empty or non-finite input.
     """
-    if not allow_failed:
-        posterior.require_usable()
-    gear = posterior.case.gear
-    if temperature is None:
-        measured = posterior.case.records.temperature
-        temperature = [
-            np.clip(gear.reference_temperature, np.min(measured), np.max(measured))
-        ]
+    causes = causes_of(posterior, allow_failed=allow_failed)
+    case = causes[0].posterior.case
+    warm = usual_temperature(case) if temperature is None else temperature
     along = np.atleast_1d(np.asarray(deformation, dtype=float))
-    levels = np.atleast_1d(np.asarray(temperature, dtype=float))
-    _check_grid(along, levels, direction, interval)
-    _check_size(along, levels, posterior)
+    levels = np.atleast_1d(np.asarray(warm, dtype=float))
+    _check(likeliest(causes), along, levels, direction, interval)
+    return _bands(causes, along, levels, direction, interval, seed)
+
+
+def _bands(
+    causes: Sequence[Cause],
+    along: np.ndarray,
+    levels: np.ndarray,
+    direction: Direction,
+    interval: float,
+    seed: int,
+) -> Bands:
+    """Return the bands at every pair of deformation and temperature."""
+    case = causes[0].posterior.case
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
-    sense = np.full(len(at), _SENSE[direction])
-    values = posterior.draws
-    size = len(values["K"])
+    sense = np.full(len(at), SENSE[direction])
+    known_sd = usual_sd(case.records)
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
-    keys = jax.random.split(jax.random.key(seed), size)
-    # A new reading is as good as the tested ones were on average.
-    known_sd = float(np.sqrt(np.mean(posterior.case.records.force_sd**2)))
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
         records = grid_records(at[rows], warm[rows], sense[rows], known_sd)
-        parts = _predict_block(posterior.problem, values, records, keys)
-        blocks.append(np.stack([np.quantile(part, tails, axis=0) for part in parts]))
+        blocks.append(_quantiles(causes, records, tails, seed))
     physics, with_gap, new = np.concatenate(blocks, axis=2)
-    if posterior.problem.discrepancy is None:
-        with_gap = np.full_like(physics, np.nan)
+    tested = is_tested(case.records, deformation=at, temperature=warm, sense=sense)
+    usable = all(cause.posterior.usable for cause in causes)
     return Bands(
         at,
         warm,
@@ -224,57 +141,83 @@ def predict(
         *physics,
         *with_gap,
         *new,
-        tested=_tested(posterior.case.records, at, warm, sense),
-        usable=np.full(len(at), posterior.usable),
+        tested=tested,
+        usable=np.full(len(at), usable),
     )
 
 
-def _tested(records: Records, deformation, temperature, sense) -> np.ndarray:
-    def within(values, measured, slack):
-        low, high = np.min(measured), np.max(measured)
-        return (values >= low - slack) & (values <= high + slack)
+def _quantiles(causes: Sequence[Cause], records: Records, tails, seed: int):
+    """Return quantiles of mean, mean with leftover and new reading: [3, 3, row]."""
+    parts = []
+    for cause in causes:
+        keys = jax.random.split(jax.random.key(seed), cause.size)
+        parts.append(readings(cause.problem, cause.values, records, keys))
+    tables = [np.concatenate(kind) for kind in zip(*parts, strict=True)]
+    if len(causes) == 1:
+        found = [np.quantile(table, tails, axis=0) for table in tables]
+    else:
+        weights = np.concatenate([cause.weights for cause in causes])
+        found = [draw_quantiles(table, weights, tails) for table in tables]
+    if all(cause.problem.discrepancy is None for cause in causes):
+        found[1] = np.full_like(found[1], np.nan)
+    return np.stack(found)
 
-    return (
-        within(deformation, records.deformation, 1e-9)
-        & within(temperature, records.temperature, _NEAR_K)
-        & np.isin(sense, np.asarray(records.sense))
-    )
+
+def _check(cause: Cause, deformation, temperature, direction, interval) -> None:
+    """Refuse what cannot be asked, slips of the unit as the data's reader does."""
+    gear, findings = cause.posterior.case.gear, []
+
+    def find(name, problem, remedy):
+        findings.append(Finding(name, problem, remedy))
+
+    limit = gear.geometry.radius / cause.problem.reading.radial_per_read
+    if deformation.size == 0 or not np.isfinite(deformation).all():
+        find("deformation", "is empty or not finite", "give numbers in mm")
+    elif (worst := float(np.max(np.abs(deformation)))) >= limit:
+        problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
+        find("deformation", problem, "Give it in mm")
+    if temperature.size == 0 or not np.isfinite(temperature).all():
+        find("temperature", "is empty or not finite", "give numbers in °C")
+    else:
+        findings += temperature_findings(gear, cause.values, temperature)
+    if direction not in DIRECTIONS:
+        find("direction", f"'{direction}' is unknown", "use up or down")
+    if not 0.0 < interval < 1.0:
+        find("interval", f"{interval} is not between 0 and 1", "use e.g. 0.95")
+    if findings:
+        raise InputError(findings)
 
 
-def default_bands(posterior: Posterior, interval: float = 0.95) -> Bands:
+def default_bands(models: Models, interval: float = 0.95) -> Bands:
     """Return the bands of a result folder: the tested range and a tenth beyond.
 
     One block per tested temperature (three over the range if there are many) and
     per direction that was tested.
+
+    Args:
+        models: a posterior, or several with the probabilities of their models, over
+            which the bands average.
+        interval: probability inside the bands.
     """
-    records, gear = posterior.case.records, posterior.case.gear
+    case = causes_of(models, allow_failed=True)[0].posterior.case
+    records, nominal = case.records, case.gear.nominal_deformation
     ends = [0.0, float(np.min(records.deformation)), float(np.max(records.deformation))]
-    if gear.nominal_deformation is not None:
-        ends.append(gear.nominal_deformation)
+    if nominal is not None:
+        ends.append(nominal)
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
     grid = np.linspace(low - (beyond if low < 0.0 else 0.0), high + beyond, 67)
     # The ends of the data themselves, so that the tested range shows whole.
     grid = np.union1d(grid, ends)
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
     # Rounded together, but never out of what was measured.
-    levels = np.unique(
-        np.clip(
-            np.round(records.temperature, 1),
-            np.min(records.temperature),
-            np.max(records.temperature),
-        )
-    )
+    levels = np.unique(np.clip(np.round(records.temperature, 1), cold, warm))
     if len(levels) > _MOST_TEMPERATURES:
         levels = np.linspace(levels[0], levels[-1], 3)
-    make = partial(
-        predict, posterior, grid, levels, interval=interval, allow_failed=True
-    )
-    sides: list[Direction] = [
-        side for side in DIRECTIONS if _SENSE[side] in np.asarray(records.sense)
+    parts = [
+        predict(models, grid, levels, side, interval=interval, allow_failed=True)
+        for side in DIRECTIONS
+        if SENSE[side] in np.asarray(records.sense)
     ]
-    parts = [make(side) for side in sides]
-    joined = {
-        f.name: np.concatenate([getattr(part, f.name) for part in parts])
-        for f in fields(Bands)
-    }
-    return Bands(**joined)
+    tables = [part.columns() for part in parts]
+    return Bands(**{n: np.concatenate([t[n] for t in tables]) for n in tables[0]})

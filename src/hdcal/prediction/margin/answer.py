@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
 from hdcal.prediction.margin.result import INTERVAL, Margin
-from hdcal.report.answer import Answer, Count, Promise, Sentences, Words
+from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
+from hdcal.report.posterior_answer import CalibratedGear
 
 # A bound of that name is one of a population of gears.
 _BASIS_RULE = {
@@ -14,21 +15,12 @@ _BASIS_RULE = {
 
 
 @dataclass(frozen=True)
-class GearModel:
-    """Which gear it is, and how it is modelled."""
-
-    name: str
-    material: str
-    theory: str
-
-
-@dataclass(frozen=True)
 class DataUsed:
     """Which data a calibration is of."""
 
     name: str
-    rows: int
-    sha256: str
+    rows: Count
+    sha256: Digest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,5 +48,5 @@ class MarginAnswer(Margin, Answer):
     kinds: dict[str, str]
     seed: Count
     versions: Annotated[dict[str, str], Promise(required=["hdcal"])]
-    gear: GearModel
+    gear: CalibratedGear
     data: DataUsed

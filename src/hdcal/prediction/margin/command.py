@@ -59,7 +59,7 @@ def margin(console: Console, run, out, force, **asked):
     could not tell apart are averaged over by their probability.
     """
     keep_compilations()
-    from hdcal.prediction.causes import read_models
+    from hdcal.prediction.engine.causes import read_models
     from hdcal.prediction.margin.document import margin_report
     from hdcal.prediction.margin.margin import margin as bounds_of
     from hdcal.prediction.margin.summary import margin_answer

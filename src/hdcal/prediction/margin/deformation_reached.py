@@ -5,25 +5,26 @@ gets beyond w is the share that needs less at w.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import optimistix as optx
 
-from hdcal.prediction.mixture import Mixture, weighted_quantile
-from hdcal.prediction.population_force import Outlook, member_mixture
+from hdcal.prediction.engine.mixture import Mixture, quantile_weights
+from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
+from hdcal.prediction.margin.request import Criteria
 
 # The search ends at this multiple of the tested deformation: what lies beyond rests
 # on nothing.
 REACH = 2.0
-# Halvings: of a range of a millimetre 2e-12 mm are left.
-_HALVINGS = 40
+# A deformation is found to this many mm, its share or force to as much [-, N].
+_CLOSE, _MOST_STEPS = 1e-11, 64
 
 
 @dataclass(frozen=True)
-class Reached:
+class DeformationReached:
     """The deformation that a force reaches; None where none in the range does.
 
     Attributes:
@@ -49,113 +50,79 @@ class Reached:
     tested: bool
 
 
-def search_range(low: float, high: float) -> tuple[float, float]:
-    """Return where a deformation is looked for, given the tested ones [mm]."""
-    return min(0.0, REACH * low), max(0.0, REACH * high)
-
-
-def reach(
-    outlooks: Sequence[tuple[float, Outlook]],
-    force: float,
-    temperature: float,
-    content: float,
-    confidence: float,
-) -> Reached:
+def deformation_reached(
+    forces: Sequence[PopulationForce],
+    given: float,
+    criteria: Criteria,
+) -> DeformationReached:
     """Return the deformation at which the members need a force.
 
     Args:
-        outlooks: of each model, with its probability.
-        force: given [N].
-        temperature: of the specimen [°C].
-        content: share of the population within each bound.
-        confidence: of each bound.
+        forces: of each cause, at the temperature in question.
+        given: force [N].
+        criteria: content and confidence of the bounds.
     """
-    question = outlooks[0][1].question
-    low, high = float(question.low), float(question.high)
-    ends = search_range(low, high)
-    parts, weights = [], []
-    for share, outlook in outlooks:
-        shares = jnp.array([content, 1.0 - content])
-        parts.append(np.asarray(_solve(outlook, force, temperature, shares, ends)))
-        size = len(parts[-1])
-        weights.append(np.full(size, share / size))
-    found, weight = np.concatenate(parts), np.concatenate(weights)
+    where = forces[0].conditions
+    low, high, warm = map(float, (where.low, where.high, where.temperature))
+    ends = min(0.0, REACH * low), max(0.0, REACH * high)
+    shares = jnp.array([criteria.content, 1.0 - criteria.content])
+    parts = [
+        _solve(
+            force.cause.problem,
+            force.cause.values,
+            force.whose,
+            force.conditions,
+            given,
+            shares,
+            ends,
+        )
+        for force in forces
+    ]
+    found = np.concatenate(parts)
+    weights = np.concatenate([force.cause.weights for force in forces])
 
     def at(column: int, share: float) -> float | None:
         # Draws that never get there count as infinitely far.
-        value, used = weighted_quantile(found[:, column], weight, share)
-        whole = np.isfinite(found[used > 0.0, column]).all()
-        return float(value) if whole else None
+        used = quantile_weights(found[:, column], weights, share)
+        values = found[used > 0.0, column]
+        return float(used[used > 0.0] @ values) if np.isfinite(values).all() else None
 
     numbers = at(2, 0.5), at(2, 0.025), at(2, 0.975)
-    bounds = at(0, 1.0 - confidence), at(1, confidence)
+    sure = criteria.confidence
+    bounds = at(0, 1.0 - sure), at(1, sure)
     tested = all(n is not None and low <= n <= high for n in (*numbers, *bounds))
-    return Reached(force, temperature, ends, *numbers, *bounds, tested)
+    return DeformationReached(given, warm, ends, *numbers, *bounds, tested)
 
 
-def _solve(outlook: Outlook, force, temperature, shares, ends):
-    return _solve_all(
-        outlook.posterior.problem,
-        dict(outlook.values),
-        outlook.question,
-        jnp.asarray(temperature, float),
-        outlook.nodes,
-        jnp.asarray(force, float),
-        shares,
-        jnp.asarray(ends),
-        population=outlook.population,
-        quantity=outlook.quantity,
-        rounded=outlook.rounded,
-    )
-
-
-@partial(jax.jit, static_argnames=("population", "quantity", "rounded"))
-def _solve_all(
-    problem,
-    values,
-    question,
-    temperature,
-    nodes,
-    force,
-    shares,
-    ends,
-    *,
-    population,
-    quantity,
-    rounded,
-):
+@jax.jit
+def _solve(problem, values, whose, conditions, given, shares, ends):
     """Return deformations [draw, 3]: at both shares and for the mean, [mm]."""
+    low, high = ends
+    method = optx.Bisection(rtol=0.0, atol=_CLOSE, flip=False)
 
-    def one(value):
+    def of_draw(value):
         def excess(deformation, row):
-            parts = member_mixture(
-                problem,
-                value,
-                question=question.at(deformation),
-                temperature=temperature,
-                scale=jnp.ones(()),
-                nodes=nodes,
-                population=population,
-                quantity=quantity,
-            )
-            step = problem.step if rounded else 0.0
-            mixture = Mixture(*parts, step, rounded)
+            there = replace(conditions, deformation=deformation)
+            parts = member_mixture(problem, value, whose, there)
+            step = problem.step if whose.rounded else 0.0
+            mixture = Mixture(*parts, step, whose.rounded)
             # Positive where the force does not get this far.
-            short = shares[jnp.minimum(row, 1)] - mixture.below(force)
-            return jnp.where(row == 2, mixture.centre() - force, short)
+            short = shares[jnp.minimum(row, 1)] - mixture.below(given)
+            return jnp.where(row == 2, mixture.centre() - given, short)
 
         def solve(row):
-            def halve(_, ends):
-                low, high = ends
-                middle = 0.5 * (low + high)
-                far = excess(middle, row) > 0.0
-                return jnp.where(far, low, middle), jnp.where(far, middle, high)
-
-            low, high = jax.lax.fori_loop(0, _HALVINGS, halve, (ends[0], ends[1]))
-            found = 0.5 * (low + high)
-            found = jnp.where(excess(ends[1], row) <= 0.0, np.inf, found)
-            return jnp.where(excess(ends[0], row) > 0.0, -np.inf, found)
+            found = optx.root_find(
+                excess,
+                method,
+                0.5 * (low + high),
+                row,
+                options={"lower": low, "upper": high},
+                max_steps=_MOST_STEPS,
+                throw=False,
+            ).value
+            found = jnp.where(excess(high, row) <= 0.0, np.inf, found)
+            return jnp.where(excess(low, row) > 0.0, -np.inf, found)
 
         return jax.vmap(solve)(jnp.arange(3))
 
-    return jax.vmap(one)(values)
+    return jax.vmap(of_draw)(values)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.prediction.engine.population import Population
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
@@ -16,7 +17,6 @@ from hdcal.prediction.margin.sentences import (
     newtons,
     next_steps,
 )
-from hdcal.prediction.population import Population
 from hdcal.report.document import (
     Document,
     Picture,

@@ -3,22 +3,29 @@
 These change the stiffness; what was calibrated stays.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
 
-from hdcal.prediction.mixture import Mixture, weighted_quantile
-from hdcal.prediction.population_force import Outlook
-from hdcal.prediction.size_tolerances import (
+from hdcal.data.case import Theory
+from hdcal.data.records import Geometry
+from hdcal.inference.problem import Problem
+from hdcal.prediction.engine.conditions import Conditions
+from hdcal.prediction.engine.mixture import Mixture, quantile_weights
+from hdcal.prediction.engine.population import Whose
+from hdcal.prediction.engine.population_force import PopulationForce, mixtures
+from hdcal.prediction.engine.sizes import (
     SIZES,
     matters,
-    relative_stiffness,
-    sizes,
-    tolerance_nodes,
+    shifted,
+    stiffness_ratio,
+    tolerance_strata,
 )
+from hdcal.prediction.margin.request import Criteria
 
 _MPA_PER_GPA = 1e3
 
@@ -42,91 +49,111 @@ class Gradient:
     bound_N_per_percent: float
 
 
-def design_point(outlook: Outlook) -> dict[str, float]:
-    """Return the inputs of `bound_of`: sizes [mm], modulus [GPa] and K, by name."""
-    case, draws = outlook.posterior.case, outlook.values
-    geometry, theory = case.gear.geometry, outlook.posterior.theory
-    point = {
-        f"{name}_mm": value
-        for name, value in sizes(geometry).items()
-        if matters(name, geometry, theory)
-    }
-    modulus = float(np.median(draws["E0"])) / _MPA_PER_GPA
-    return {**point, "E0_GPa": modulus, "K": float(np.median(draws["K"]))}
+class Redesign(eqx.Module):
+    """The forces of a population as a function of the gear's sizes, modulus and K.
 
-
-def mixture_at(outlook: Outlook, temperature, tolerances, point, origin) -> Mixture:
-    """Return the forces of a gear of other sizes, modulus or influence coefficient.
-
-    Args:
-        outlook: of the calibrated gear.
-        temperature: of the specimen [°C].
+    Attributes:
+        problem: structure.
+        values: draws by site: [draw, …].
+        whose: force it is.
+        conditions: of the calibrated gear.
+        geometry: of it.
         tolerances: ± by field [mm].
-        point: inputs by name; may be traced.
-        origin: the calibrated gear's, from `design_point`.
+        origin: its sizes [mm], modulus [GPa] and K, by name.
+        theory: of the stiffness.
     """
-    geometry, theory = outlook.posterior.case.gear.geometry, outlook.posterior.theory
-    shifts = {
-        name.removesuffix("_mm"): point[name] - origin[name]
-        for name in SIZES
-        if name in point
-    }
-    scale = relative_stiffness(geometry, shifts, theory)
-    scale = scale * (point["E0_GPa"] / origin["E0_GPa"]) * (point["K"] / origin["K"])
-    changed = replace(
-        geometry, **{name: getattr(geometry, name) + by for name, by in shifts.items()}
+
+    problem: Problem
+    values: dict
+    whose: Whose
+    conditions: Conditions
+    geometry: Geometry
+    tolerances: dict[str, float]
+    origin: dict[str, float]
+    theory: Theory = eqx.field(static=True)
+
+    @classmethod
+    def of(cls, force: PopulationForce) -> "Redesign":
+        """Return the forces of a population as they are."""
+        posterior, values = force.cause.posterior, dict(force.cause.values)
+        geometry, theory = posterior.case.gear.geometry, posterior.theory
+        origin = {
+            name: float(getattr(geometry, field))
+            for name, field in SIZES.items()
+            if matters(field, geometry, theory)
+        }
+        origin["E0_GPa"] = float(np.median(values["E0"])) / _MPA_PER_GPA
+        origin["K"] = float(np.median(values["K"]))
+        return cls(
+            problem=posterior.problem,
+            values=values,
+            whose=force.whose,
+            conditions=force.conditions,
+            geometry=geometry,
+            tolerances=dict(force.tolerances),
+            origin=origin,
+            theory=theory,
+        )
+
+    def mixture(self, point: Mapping[str, Any]) -> Mixture:
+        """Return the forces of a gear with other inputs, named as in `origin`."""
+        shifts = {
+            field: point[name] - self.origin[name]
+            for name, field in SIZES.items()
+            if name in point
+        }
+        changed = shifted(self.geometry, shifts)
+        scale = stiffness_ratio(changed, self.geometry, self.theory)
+        for name in ("E0_GPa", "K"):
+            scale = scale * (point[name] / self.origin[name])
+        strata = tolerance_strata(changed, self.tolerances, self.theory)
+        there = replace(self.conditions, scale=scale, strata=strata)
+        return mixtures(self.problem, self.values, self.whose, there)
+
+
+@jax.jit
+def _mean_slopes(gear: Redesign):
+    """Return the derivative of the mean force, averaged over the draws, by input."""
+    return jax.jacfwd(lambda point: gear.mixture(point).centre().mean())(gear.origin)
+
+
+@jax.jit
+def _bound_slopes(gear: Redesign, weights, content):
+    """Return the derivative of a weighted sum of the draws' quantiles, by input."""
+    return jax.jacfwd(lambda point: weights @ gear.mixture(point).quantile(content))(
+        gear.origin
     )
-    nodes = tolerance_nodes(changed, tolerances, theory)
-    return outlook.mixture(temperature, scale, nodes)
 
 
 def gradients(
-    outlooks: Sequence[tuple[float, Outlook]],
-    temperature: float,
-    tolerances: dict[str, float],
-    quantiles: np.ndarray,
-    weights: np.ndarray,
-    content: float,
-    confidence: float,
+    forces: Sequence[PopulationForce], quantiles: np.ndarray, criteria: Criteria
 ) -> tuple[Gradient, ...]:
     """Return the exact derivatives of the upper bound at one temperature.
 
     Args:
-        outlooks: of each model, with its probability.
-        temperature: of the specimen [°C].
-        tolerances: ± by field [mm].
-        quantiles: of the population in each draw of all models, shape (d,).
-        weights: of the draws.
-        content: of the bound.
-        confidence: of the bound.
+        forces: of each cause, at that temperature.
+        quantiles: of the population in each draw of all causes, shape (d,).
+        criteria: content and confidence of the bound.
     """
+    gears = [Redesign.of(force) for force in forces]
+    weights = np.concatenate([force.cause.weights for force in forces])
     # The bound lies between two draws: only their derivatives are in it.
-    _, used = weighted_quantile(quantiles, weights, confidence)
-    origin = design_point(outlooks[0][1])
-    bound = dict.fromkeys(origin, 0.0)
-    force = dict.fromkeys(origin, 0.0)
+    used = quantile_weights(quantiles, weights, criteria.confidence)
+    origin = gears[0].origin
+    bound, mean = dict.fromkeys(origin, 0.0), dict.fromkeys(origin, 0.0)
     start = 0
-    for share, outlook in outlooks:
-        size = len(outlook.values["K"])
-        part = used[start : start + size]
-        start += size
-        own = design_point(outlook)
-        at = partial(mixture_at, temperature=temperature, tolerances=tolerances)
-
-        def centre(point, outlook=outlook, own=own, at=at):
-            return at(outlook, point=point, origin=own).centre().mean()
-
-        def upper(point, outlook=outlook, own=own, at=at, part=part):
-            few = {n: column[part > 0.0] for n, column in outlook.values.items()}
-            mixture = at(replace(outlook, values=few), point=point, origin=own)
-            return part[part > 0.0] @ mixture.quantile(content)
-
-        for name, slope in jax.jit(jax.jacfwd(centre))(own).items():
-            force[name] += share * float(slope)
-        if part.any():
-            for name, slope in jax.jit(jax.jacfwd(upper))(own).items():
-                bound[name] += float(slope)
+    for force, gear in zip(forces, gears, strict=True):
+        part = used[start : start + force.cause.size]
+        start += force.cause.size
+        for name, slope in _mean_slopes(gear).items():
+            mean[name] += force.cause.probability * float(slope)
+        if not part.any():
+            continue
+        few = {name: column[part > 0.0] for name, column in gear.values.items()}
+        few, part = replace(gear, values=few), part[part > 0.0]
+        for name, slope in _bound_slopes(few, part, criteria.content).items():
+            bound[name] += float(slope)
     return tuple(
-        Gradient(n, v, bound[n], force[n], 0.01 * v * bound[n])
+        Gradient(n, v, bound[n], mean[n], 0.01 * v * bound[n])
         for n, v in origin.items()
     )

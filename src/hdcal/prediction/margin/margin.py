@@ -4,31 +4,32 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hdcal.inference.posterior import Posterior
-from hdcal.prediction.bands.bands import Direction
-from hdcal.prediction.forces import Quantity
+from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
+from hdcal.prediction.engine.conditions import (
+    SENSE,
+    Direction,
+    is_tested,
+)
+from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.population import Population, widest
+from hdcal.prediction.engine.population_force import PopulationForce, population_force
+from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
-    Answers,
-    Asked,
-    ask,
+    PopulationDraws,
     level_of,
     model_bounds,
+    population_draws,
     worst_level,
 )
-from hdcal.prediction.margin.checks import Models, check_margin, usable_members
-from hdcal.prediction.margin.deformation_reached import reach
+from hdcal.prediction.margin.checks import check_margin
+from hdcal.prediction.margin.deformation_reached import deformation_reached
 from hdcal.prediction.margin.document import population_words
 from hdcal.prediction.margin.gradients import gradients
-from hdcal.prediction.margin.remarks import extrapolations, is_tested, remarks
-from hdcal.prediction.margin.result import Margin
-from hdcal.prediction.margin.variance_shares import shares
-from hdcal.prediction.population import Population, widest
-from hdcal.prediction.population_force import MOST_DRAWS, Outlook, Question, look_out
-from hdcal.prediction.size_tolerances import tolerance_nodes
+from hdcal.prediction.margin.remarks import extrapolations, remarks
+from hdcal.prediction.margin.request import Criteria, MarginRequest
+from hdcal.prediction.margin.result import Level, Margin
+from hdcal.prediction.margin.variance_shares import variance_shares
 from hdcal.prediction.tolerance_factors import BASES
-
-# A content beyond this only the normal law tells.
-_TAIL = 0.9999
 
 
 def margin(
@@ -53,8 +54,8 @@ def margin(
     Args:
         models: a posterior, or several with the probabilities of their models.
         deformation: as read [mm].
-        temperature: of the specimen [°C], one or several; the worst of them counts.
-            By default the tested one nearest to the reference.
+        temperature: of the specimen [°C]; of several the worst counts. By default
+            the tested one nearest to the reference.
         limit_force: capacity [N] whose exceedance is asked for.
         given_force: force [N] whose deformation is asked for.
         content: share of the population within each one-sided bound.
@@ -74,131 +75,94 @@ def margin(
         NotUsable: a calibration failed its checks.
         InputError: what is asked cannot be answered; holds every finding.
     """
-    members = usable_members(models)
-    likeliest = max(members, key=lambda member: member[0])[1]
-    required = content if required_probability is None else required_probability
-    warm = _temperatures(likeliest, temperature)
-    named = {n: float(t) for n, t in (tolerances or {}).items()}
-    check_margin(
-        likeliest,
-        deformation=deformation,
-        temperature=warm,
-        forces={"limit_force": limit_force, "given_force": given_force},
-        shares={"content": content, "confidence": confidence}
-        | ({} if required_probability is None else {"required_probability": required}),
-        draws=sum(min(len(m.draws["K"]), MOST_DRAWS) for _, m in members),
-        population=population,
-        quantity=quantity,
-        direction=direction,
-        tolerances=named,
-    )
-    whose = population or widest(likeliest.problem)
-    by_field = {n.removesuffix("_mm"): t for n, t in named.items() if t > 0.0}
-    outlooks = [
-        (
-            share,
-            _outlook(model, deformation, direction, whose, quantity, by_field, seed),
-        )
-        for share, model in members
-    ]
-    asked = Asked(content, confidence, required, limit_force)
-    answers = ask(outlooks, warm, asked)
-    levels = tuple(
-        level_of(
-            {name: table[i] for name, table in answers.draws.items()},
-            answers.weights,
-            asked,
-            answers.predicted[i],
-            float(t),
-            is_tested(likeliest, deformation, t, direction == "down"),
-        )
-        for i, t in enumerate(warm)
-    )
-    worst = worst_level(answers, asked, levels)
-    reached = None
-    if given_force is not None:
-        reached = reach(outlooks, given_force, worst.temperature_C, content, confidence)
-    slopes, parts = (), ()
+    sizes = {name: float(width) for name, width in (tolerances or {}).items()}
+    about = direction, sizes, population, quantity, given_force, seed
+    request = MarginRequest(deformation, temperature, *about)
+    criteria = Criteria(content, confidence, required_probability, limit_force)
+    return _margin(causes_of(models), request, criteria, sensitivities)
+
+
+def _margin(
+    causes: Sequence[Cause],
+    request: MarginRequest,
+    criteria: Criteria,
+    sensitivities: bool,
+) -> Margin:
+    main = likeliest(causes)
+    warm = request.temperatures(main.posterior.case)
+    check_margin(causes, request, warm, criteria)
+    whose = request.population or widest(main.problem)
+    widths = {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0}
+    forces = [_force(cause, whose, request, widths) for cause in causes]
+    draws = population_draws(forces, warm, criteria)
+    levels = _levels(draws, main, request, warm, criteria)
+    worst = worst_level(draws, criteria, levels)
+    there = [force.at(worst.temperature_C) for force in forces]
+    reached, slopes, shares = None, (), ()
+    if request.given_force is not None:
+        reached = deformation_reached(there, request.given_force, criteria)
     if sensitivities:
-        slopes, parts = _sensitivities(outlooks, answers, worst, by_field, asked, seed)
-    chance = worst.exceedance and worst.exceedance.probability
-    main = next(o for _, o in outlooks if o.posterior is likeliest)
-    ordered = [(1.0, main), *((s, o) for s, o in outlooks if o is not main)]
+        upper = draws.table["upper"][list(warm).index(worst.temperature_C)]
+        slopes = gradients(there, upper, criteria)
+        shares = variance_shares(there, request.seed)
     return Margin(
-        deformation_mm=float(deformation),
-        direction=direction,
-        quantity=quantity,
+        deformation_mm=float(request.deformation),
+        direction=request.direction,
+        quantity=request.quantity,
         population=whose,
-        population_words=population_words(whose, likeliest.problem),
-        basis=_basis(whose, content, confidence),
-        content=content,
-        confidence=confidence,
-        required_probability=required,
-        limit_force_N=limit_force,
-        tolerances_mm=named,
+        population_words=population_words(whose, main.problem),
+        basis=_basis(whose, criteria),
+        content=criteria.content,
+        confidence=criteria.confidence,
+        required_probability=criteria.required,
+        limit_force_N=criteria.limit_force,
+        tolerances_mm=request.tolerances,
         levels=levels,
         worst=worst,
         reached=reached,
-        models=model_bounds(outlooks, answers, asked),
+        models=model_bounds(forces, draws, criteria),
         gradients=slopes,
-        shares=parts,
-        extrapolated=extrapolations(main, warm),
-        remarks=remarks(ordered, chance, max(content, required) > _TAIL),
+        shares=shares,
+        extrapolated=extrapolations(forces, warm),
+        remarks=remarks(forces, worst.exceedance, criteria),
     )
 
 
-def _temperatures(posterior: Posterior, asked) -> np.ndarray:
-    if asked is not None:
-        return np.atleast_1d(np.asarray(asked, dtype=float))
-    measured = posterior.case.records.temperature
-    reference = posterior.case.gear.reference_temperature
-    return np.atleast_1d(np.clip(reference, np.min(measured), np.max(measured)))
-
-
-def _outlook(
-    model: Posterior, deformation, direction, population, quantity, tolerances, seed
-) -> Outlook:
-    records, geometry = model.case.records, model.case.gear.geometry
-    low, high = float(records.deformation.min()), float(records.deformation.max())
-    question = Question(
-        deformation=float(deformation),
-        # Down from the largest deformation tested, or from where it is asked for.
-        turn=max(high, float(deformation)),
-        # A new reading is as good as the tested ones were on average.
-        known_sd=float(np.sqrt(np.mean(records.force_sd**2))),
-        low=low,
-        high=high,
-        down=direction == "down",
-    )
-    return look_out(
-        model,
-        question,
-        population=population,
-        quantity=quantity,
-        nodes=tolerance_nodes(geometry, tolerances, model.theory),
-        seed=seed,
+def _force(
+    cause: Cause, whose: Population, request: MarginRequest, widths: dict[str, float]
+) -> PopulationForce:
+    return population_force(
+        cause,
+        request.deformation,
+        whose,
+        quantity=request.quantity,
+        direction=request.direction,
+        tolerances=widths,
+        seed=request.seed,
     )
 
 
-def _sensitivities(outlooks, answers: Answers, worst, tolerances, asked: Asked, seed):
-    """Return gradients and shares at the worst temperature."""
-    warm = worst.temperature_C
-    row = answers.temperatures.index(warm)
-    slopes = gradients(
-        outlooks,
-        warm,
-        tolerances,
-        answers.draws["upper"][row],
-        answers.weights,
-        asked.content,
-        asked.confidence,
+def _levels(
+    draws: PopulationDraws, main: Cause, request: MarginRequest, warm, criteria
+) -> tuple[Level, ...]:
+    """Return what holds at each temperature [°C]."""
+    tested = is_tested(
+        main.posterior.case.records,
+        deformation=request.deformation,
+        temperature=warm,
+        sense=SENSE[request.direction],
     )
-    return slopes, shares(outlooks, warm, tolerances, seed)
+    tables = [{n: t[i] for n, t in draws.table.items()} for i in range(len(warm))]
+    places = zip(tables, draws.predicted, warm, tested, strict=True)
+    return tuple(
+        level_of(table, draws.weights, criteria, ahead, float(at), bool(inside))
+        for table, ahead, at, inside in places
+    )
 
 
-def _basis(population: Population, content: float, confidence: float) -> str:
+def _basis(population: Population, criteria: Criteria) -> str:
     """Return the name that a bound of these shares has, if of a population of gears."""
     if population != "specimens":
         return ""
-    pair = (content, confidence)
+    pair = (criteria.content, criteria.confidence)
     return next((name for name, shares in BASES.items() if shares == pair), "")

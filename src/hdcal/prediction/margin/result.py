@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-from hdcal.prediction.bands.bands import Direction
-from hdcal.prediction.forces import Quantity
-from hdcal.prediction.margin.deformation_reached import Reached
+from hdcal.prediction.engine.conditions import Direction
+from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.population import Population
+from hdcal.prediction.margin.deformation_reached import DeformationReached
 from hdcal.prediction.margin.gradients import Gradient
-from hdcal.prediction.margin.variance_shares import Share
-from hdcal.prediction.population import Population
+from hdcal.prediction.margin.variance_shares import VarianceShare
 from hdcal.prediction.tolerance_factors import BASES
 from hdcal.report.answer import Promise, Real, Sentences, Words
 from hdcal.report.parameters import Interval
@@ -132,10 +132,10 @@ class Margin:
     tolerances_mm: Mapping[str, Size]
     levels: Annotated[tuple[Level, ...], Promise(minItems=1)]
     worst: Level
-    reached: Reached | None
+    reached: DeformationReached | None
     models: tuple[ModelBound, ...]
     gradients: tuple[Gradient, ...]
-    shares: tuple[Share, ...]
+    shares: tuple[VarianceShare, ...]
     extrapolated: Sentences
     remarks: Sentences
 

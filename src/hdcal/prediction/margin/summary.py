@@ -1,10 +1,11 @@
 """A margin as an answer."""
 
 from hdcal.inference.posterior import Posterior, versions
-from hdcal.prediction.margin.answer import DataUsed, GearModel, MarginAnswer
+from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
 from hdcal.prediction.margin.document import CALIBRATION_SHARE
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
+from hdcal.report.posterior_answer import CalibratedGear
 
 KINDS = {
     "force_N": "mean of the population, equal-tailed credible interval",
@@ -38,6 +39,6 @@ def margin_answer(
         kinds=KINDS,
         seed=seed,
         versions=versions(),
-        gear=GearModel(gear.name, gear.material, posterior.theory),
+        gear=CalibratedGear(gear.name, gear.material, posterior.theory),
         data=DataUsed(case.name, len(case.records.force), case.data_sha256),
     )

@@ -1,4 +1,4 @@
-"""Loading programs: what a rig did, before any force was read."""
+"""Loadings: what a rig did, before any force was read."""
 
 import numpy as np
 
@@ -73,4 +73,4 @@ def _records(deformation, *, known, **columns) -> Records:
     return Records(deformation=deformation, known=known, **(neutral | columns))
 
 
-PROGRAMS = {"rich": rich, "lean": lean}
+LOADINGS = {"rich": rich, "lean": lean}

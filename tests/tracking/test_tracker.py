@@ -10,7 +10,7 @@ from scipy import stats
 
 from hdcal.data.priors import Prior
 from hdcal.errors import InputError, NotUsable
-from hdcal.tracking.stream_prior import of_gear
+from hdcal.tracking.stream_prior import prior_from_gear
 from hdcal.tracking.tracker import Tracker
 
 # About as well known as after a calibration, so that streams start near the truth.
@@ -34,7 +34,7 @@ def start(gear) -> Tracker:
 @pytest.fixture(scope="module")
 def truths(gear):
     """Draws of the same beginning: coefficients and noise sd."""
-    begin = of_gear(gear, seed=9)
+    begin = prior_from_gear(gear, seed=9)
     return begin.coefficients(), np.sqrt(begin.variance)
 
 
@@ -174,9 +174,9 @@ def test_settings_out_of_range_are_all_named(gear):
     with pytest.raises(InputError) as caught:
         Tracker(gear, alarm_rows=1.0, forget=1.5, reopen=-1.0)
     assert [f.file for f in caught.value.findings] == [
-        "--alarm-rows",
-        "--forget",
-        "--reopen",
+        "alarm_rows",
+        "forget",
+        "reopen",
     ]
 
 
@@ -186,3 +186,10 @@ def test_a_failed_calibration_gives_nothing():
 
     with pytest.raises(NotUsable):
         Tracker(SimpleNamespace(require_usable=refuse))  # type: ignore[arg-type]
+
+
+def test_a_calibration_with_a_discrepancy_is_refused():
+    problem = SimpleNamespace(discrepancy=object())
+    known = SimpleNamespace(require_usable=lambda: None, problem=problem)
+    with pytest.raises(InputError, match="known: holds a leftover discrepancy"):
+        Tracker(known)  # type: ignore[arg-type]

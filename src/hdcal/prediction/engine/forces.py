@@ -1,11 +1,12 @@
-"""The force that one draw predicts, for gears and mountings like the tested ones.
+"""The force that one draw predicts for one gear in one mounting.
 
-Every answer about the future rests on this: bands, margins, designs and studies.
+Every answer about the future rests on `force_of`: bands, margins, designs and studies.
 """
 
 from dataclasses import replace
 from typing import Literal, get_args
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -20,10 +21,11 @@ from hdcal.physics.effect import Noise
 # load is what acts on the gear.
 Quantity = Literal["reading", "load"]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-_OF_THE_GEAR = frozenset({"deformation", "force"})
+# Stages of the effects that are the gear's: mounted in the rig, and by itself.
+_STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"force"})}
 
 
-def grid_records(deformation, temperature, sense, known_sd: float) -> Records:
+def grid_records(deformation, temperature, sense, known_sd) -> Records:
     """Return rows that were not measured: immediate readings on a fresh reset.
 
     Args:
@@ -56,7 +58,8 @@ def force_of(
     records: Records,
     *,
     factor: Float[Array, ""] | float = 1.0,
-    quantity: Quantity = "reading",
+    zero: Float[Array, ""] | float = 0.0,
+    quantity: Quantity | Literal["gear"] = "reading",
 ) -> tuple[Float[Array, " n"], Noise]:
     """Compute mean force and noise of one draw, without the leftover discrepancy.
 
@@ -66,30 +69,47 @@ def force_of(
         records: from `grid_records`.
         factor: stiffness relative to the tested gear's [-]: another geometry, or
             another specimen.
+        zero: of another mounting, from the mean of the tested ones [N].
         quantity: `reading` includes the zero of the force and the effects of the
-            sensor; `load` leaves them out.
+            sensor; `load` leaves them out; `gear` also leaves out the zero of the
+            deformation and the compliance of the rig.
 
     Returns:
         Mean force [N], and the noise of a reading of it.
     """
     effects = build_effects(problem, values)
     base = member_base(problem, values)
-    base = replace(base, stiffness=base.stiffness * factor)
-    if quantity == "load":
+    base = replace(
+        base, stiffness=base.stiffness * factor, force_offset=base.force_offset + zero
+    )
+    if quantity != "reading":
         base = replace(base, force_offset=jnp.zeros_like(base.force_offset))
-        effects = tuple(e for e in effects if e.stage in _OF_THE_GEAR)
+        effects = tuple(e for e in effects if e.stage in _STAGES[quantity])
+    if quantity == "gear":
+        nothing = jnp.zeros_like(base.deformation_offset)
+        base = replace(base, deformation_offset=nothing)
     return predict_reading(base, effects, records, problem.reading)
 
 
-def gear_force(
+def leftover_of(problem: Problem, values: Values, deformation) -> Float[Array, " n"]:
+    """Return the fitted leftover discrepancy of one draw at deformations as read [N].
+
+    Zero where none was fitted; beyond the tested range the fit simply goes on.
+    """
+    if problem.discrepancy is None:
+        return jnp.zeros(len(deformation))
+    return problem.discrepancy.columns(deformation) @ values["gap_weights"]
+
+
+@jax.jit
+def gear_forces(
     problem: Problem,
     values: Values,
     deformation: Float[Array, " n"],
     temperature: Float[Array, " n"],
-    *,
-    factor: Float[Array, " n"] | Float[Array, ""] | float = 1.0,
-) -> Float[Array, " n"]:
-    """Compute the force on a gear at a deformation of its own, without the rig.
+    factor: Float[Array, "..."] | float = 1.0,
+) -> Float[Array, "n draw"]:
+    """Compute the force of every draw on gears at a deformation of their own.
 
     A product has neither the rig's zeros nor its compliance: ω is what the gear sees,
     counted from its free shape. Left are the force model, effects on the force and,
@@ -98,32 +118,25 @@ def gear_force(
 
     Args:
         problem: structure.
-        values: parameters of one draw.
+        values: draws by site: [draw, …].
         deformation: radial ω [mm].
         temperature: of the gear [°C].
-        factor: stiffness relative to the tested gear's [-]; the leftover discrepancy
-            is taken to grow with it.
+        factor: stiffness relative to the tested gear's [-], broadcast to [draw, n];
+            the leftover discrepancy is taken to grow with it.
 
     Returns:
         Force [N].
     """
-    sense = np.ones(len(deformation))
+    count = len(deformation)
     as_read = deformation / problem.reading.radial_per_read
-    records = grid_records(as_read, temperature, sense, 0.0)
+    records = grid_records(as_read, temperature, np.ones(count), 0.0)
     # A run for each row: what remembers starts from rest in each.
-    own = np.arange(len(deformation))
-    records = replace(records, run=own, specimen=own)
-    base = member_base(problem, values)
-    zero = jnp.zeros(())
-    base = replace(
-        base,
-        stiffness=base.stiffness * factor,
-        deformation_offset=zero,
-        force_offset=zero,
-    )
-    effects = [e for e in build_effects(problem, values) if e.stage == "force"]
-    force, _ = predict_reading(base, effects, records, problem.reading)
-    if problem.discrepancy is not None:
-        columns = problem.discrepancy.columns(as_read + values["deformation_offset"])
-        force = force + factor * (columns @ values["gap_weights"])
-    return force
+    records = replace(records, run=np.arange(count), specimen=np.arange(count))
+
+    def of_draw(value, own):
+        force, _ = force_of(problem, value, records, factor=own, quantity="gear")
+        place = as_read + value["deformation_offset"]
+        return force + own * leftover_of(problem, value, place)
+
+    factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
+    return jax.vmap(of_draw, out_axes=1)(values, factor)

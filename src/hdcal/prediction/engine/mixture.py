@@ -159,10 +159,10 @@ def pooled(parts: Sequence[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
     return Mixture(weight, mean, sd, first.step, first.rounded)
 
 
-def weighted_quantile(
+def quantile_weights(
     values: np.ndarray, weights: np.ndarray, share: float
-) -> tuple[float, np.ndarray]:
-    """Return a quantile over draws, and how much of each draw is in it.
+) -> np.ndarray:
+    """Return how much of each draw is in a quantile over draws.
 
     Args:
         values: shape (d,).
@@ -170,8 +170,8 @@ def weighted_quantile(
         share: of the weight below.
 
     Returns:
-        The quantile between two neighbouring draws, and weights with Σ = 1 that
-        give it from the values; also the derivative of it by each value.
+        Weights with Σ = 1 that give the quantile, between two neighbouring draws, from
+        the values; also the derivative of it by each value.
     """
     order = np.argsort(values, kind="stable")
     sorted_weights = weights[order]
@@ -182,5 +182,22 @@ def weighted_quantile(
     used = np.zeros(len(values))
     used[order[upper]] += part
     used[order[upper - 1]] += 1.0 - part
+    return used
+
+
+def weighted_quantile(values: np.ndarray, weights: np.ndarray, share: float) -> float:
+    """Return a quantile over draws; arguments are those of `quantile_weights`."""
+    used = quantile_weights(values, weights, share)
     chosen = used > 0.0
-    return float(used[chosen] @ values[chosen]), used
+    return float(used[chosen] @ values[chosen])
+
+
+def draw_quantiles(
+    values: np.ndarray, weights: np.ndarray, shares: np.ndarray
+) -> np.ndarray:
+    """Return quantiles over draws [d, n] at every row, shape (q, n)."""
+    order = np.argsort(values, axis=0)
+    ranked, own = np.take_along_axis(values, order, axis=0), weights[order]
+    places = (np.cumsum(own, axis=0) - 0.5 * own) / np.sum(weights)
+    columns = zip(places.T, ranked.T, strict=True)
+    return np.stack([np.interp(shares, place, row) for place, row in columns], axis=1)

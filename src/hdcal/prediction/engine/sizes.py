@@ -1,10 +1,10 @@
-"""Tolerances of the gear's sizes, as what they make of the stiffness.
+"""Sizes of a gear: what they and their tolerances make of the stiffness.
 
 All of them act through one number, the stiffness over that of the calibrated gear.
 """
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,8 +17,13 @@ from hdcal.data.records import Array, Geometry
 from hdcal.errors import Finding
 from hdcal.physics.theory import THEORIES
 
-# The sizes that may have a tolerance, as people name them.
-SIZES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")
+# The sizes that may change or have a tolerance, as people name them, and their field.
+SIZES = {
+    "wall_thickness_mm": "wall_thickness",
+    "radius_mm": "radius",
+    "length_mm": "length",
+    "load_height_mm": "load_height",
+}
 # Gears whose stiffness is computed, and the strata in which they are kept. These are
 # narrower towards both ends, which a high content asks for.
 _LOG2_GEARS, _STRATA = 13, 32
@@ -26,7 +31,7 @@ _LOG2_GEARS, _STRATA = 13, 32
 _LARGEST = 0.5
 
 
-class Nodes(eqx.Module):
+class StiffnessStrata(eqx.Module):
     """The distribution of the factor of the stiffness, in strata.
 
     Attributes:
@@ -47,48 +52,43 @@ def check_tolerances(
     findings = []
 
     def find(name, words, remedy):
-        findings.append(Finding("--tolerance", f"{name} {words}", remedy))
+        findings.append(Finding("tolerances", f"{name} {words}", remedy))
 
     for name, size in tolerances.items():
         if name not in SIZES:
             find(f"'{name}'", "is no size with a tolerance", f"Use {', '.join(SIZES)}")
             continue
-        field = name.removesuffix("_mm")
-        nominal = float(getattr(geometry, field))
+        nominal = float(getattr(geometry, SIZES[name]))
         if not np.isfinite(size) or size < 0.0:
             find(name, f"= {size:g} is no tolerance", "Give the ± part, in mm")
         elif size > _LARGEST * nominal:
             find(name, f"= {size:g} on a size of {nominal:g} mm", "Give it in mm")
-        elif not matters(field, geometry, theory):
+        elif not matters(SIZES[name], geometry, theory):
             words = f"does not enter the theory '{theory}'"
-            find(name, words, "Leave it out, or calibrate with --theory cup")
+            find(name, words, "Leave it out, or calibrate with the theory cup")
     return findings
 
 
 def matters(field: str, geometry: Geometry, theory: Theory) -> bool:
     """Tell whether a size enters a theory's stiffness."""
-    stiffness = THEORIES[theory]
-    larger = replace(geometry, **{field: 1.01 * float(getattr(geometry, field))})
-    return float(stiffness(larger, 1.0)) != float(stiffness(geometry, 1.0))
+    larger = shifted(geometry, {field: 0.01 * float(getattr(geometry, field))})
+    return float(stiffness_ratio(larger, geometry, theory)) != 1.0
 
 
-def relative_stiffness(geometry: Geometry, shifts, theory: Theory):
-    """Return the stiffness of changed gears over that of the nominal one.
-
-    Args:
-        geometry: nominal.
-        shifts: change of each size by field [mm], arrays of one shape.
-        theory: of the stiffness.
-    """
-    changed = replace(
-        geometry, **{name: getattr(geometry, name) + by for name, by in shifts.items()}
-    )
-    return THEORIES[theory](changed, 1.0) / THEORIES[theory](geometry, 1.0)
+def shifted(geometry: Geometry, shifts: Mapping) -> Geometry:
+    """Return the geometry with sizes changed by so much [mm], by field."""
+    moved = {name: getattr(geometry, name) + by for name, by in shifts.items()}
+    return replace(geometry, **moved)
 
 
-def tolerance_nodes(
+def stiffness_ratio(geometry: Geometry, tested: Geometry, theory: Theory):
+    """Return the stiffness of a gear over that of the tested one, modulus aside [-]."""
+    return THEORIES[theory](geometry, 1.0) / THEORIES[theory](tested, 1.0)
+
+
+def tolerance_strata(
     geometry: Geometry, tolerances: Mapping[str, float], theory: Theory
-) -> Nodes:
+) -> StiffnessStrata:
     """Return the factor's distribution; each size is uniform within its limits.
 
     Uniform is what is believed of a size of which only limits are known (JCGM
@@ -100,25 +100,14 @@ def tolerance_nodes(
         theory: of the stiffness.
     """
     if not tolerances:
-        return Nodes(jnp.ones(1), jnp.zeros(1), jnp.ones(1))
+        return StiffnessStrata(jnp.ones(1), jnp.zeros(1), jnp.ones(1))
     points = qmc.Sobol(len(tolerances), scramble=True, rng=0)
     unit = 2.0 * points.random_base2(_LOG2_GEARS) - 1.0
     shifts = {n: t * unit[:, i] for i, (n, t) in enumerate(tolerances.items())}
-    factor = jnp.sort(relative_stiffness(geometry, shifts, theory))
+    factor = jnp.sort(stiffness_ratio(shifted(geometry, shifts), geometry, theory))
     ends = 0.5 - 0.5 * np.cos(np.pi * np.arange(_STRATA + 1) / _STRATA)
-    ends = np.round(ends * len(unit)).astype(int)
-    stratum = np.repeat(np.arange(_STRATA), np.diff(ends))
-    count = np.diff(ends)
+    count = np.diff(np.round(ends * len(unit)).astype(int))
+    stratum = np.repeat(np.arange(_STRATA), count)
     mean = jnp.zeros(_STRATA).at[stratum].add(factor) / count
     square = jnp.zeros(_STRATA).at[stratum].add((factor - mean[stratum]) ** 2) / count
-    return Nodes(mean, jnp.sqrt(square), count / len(unit))
-
-
-def sizes(geometry: Geometry) -> dict[str, float]:
-    """Return every size that may have a tolerance, by field [mm]."""
-    wanted = {name.removesuffix("_mm") for name in SIZES}
-    return {
-        f.name: float(getattr(geometry, f.name))
-        for f in fields(Geometry)
-        if f.name in wanted
-    }
+    return StiffnessStrata(mean, jnp.sqrt(square), count / len(unit))

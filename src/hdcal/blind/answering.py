@@ -1,0 +1,179 @@
+"""Answer a blind check: case by case, each kept as soon as it is there."""
+
+import tempfile
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import closing
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hdcal.blind.answer_files import AnswerFiles
+from hdcal.blind.diagnosers import (
+    DIAGNOSERS,
+    Diagnoser,
+    families,
+    fingerprint,
+    withheld_from,
+)
+from hdcal.blind.seal import Entry, canonical, digest
+from hdcal.blind.sealed_set import CASES, SET, BlindSet, read_set, refusal
+from hdcal.cli.processes import completed
+from hdcal.data.reading import read_case
+from hdcal.diagnosis.library import choose_library
+from hdcal.errors import Finding, HdcalError, InputError
+from hdcal.inference.sample import Progress
+
+# Name of the case, its answer, and what is wrong: of the last two one is empty.
+CaseOutcome = tuple[str, dict[str, Any], tuple[Finding, ...]]
+
+
+@dataclass(frozen=True)
+class CaseTask:
+    """How one case is to be answered, wherever that happens.
+
+    Attributes:
+        entry: the case.
+        diagnose: the diagnoser.
+        library: withheld from every case, as `--library` reads it.
+        fingerprint: hash of what the answer has to be made by.
+    """
+
+    entry: Entry
+    diagnose: Diagnoser
+    library: str | None
+    fingerprint: str
+
+
+def answer_set(
+    folder: Path | str,
+    *,
+    diagnosers: Mapping[str, Diagnoser] = DIAGNOSERS,
+    by: str = "hdcal",
+    library: str | None = None,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Answer every case of a set and freeze the answers.
+
+    The same call after an interruption goes on where the first one stopped.
+
+    Args:
+        folder: the set.
+        diagnosers: who can answer, by name; to be importable by other processes.
+        by: who answers.
+        library: `minus:NAME[,NAME]`, withheld from every case.
+        jobs: processes on this machine.
+        scheduler: address of a Dask scheduler whose workers answer instead.
+        progress: called with how many cases of how many are answered.
+
+    Returns:
+        The frozen answers as plain data.
+
+    Raises:
+        InputError: the set, older answers or a case are not what they should be.
+    """
+    if by not in diagnosers:
+        words, known = f"nobody is called '{by[:60]}'", ", ".join(sorted(diagnosers))
+        raise refusal("--by", words, f"Known are: {known}")
+    choose_library(library)
+    found = read_set(folder)
+    _check_libraries(found)
+    entries = {entry.case: entry for entry in found.manifest.cases}
+    answers, made_by = AnswerFiles(found, by), fingerprint(library)
+    answers.check_free()
+    kept = answers.kept(made_by)
+    made = diagnosers[by], library, digest(canonical(made_by))
+    tasks = [CaseTask(entries[case], *made) for case in entries if case not in kept]
+    # Closed whatever happens: no process works on for an answer that is not kept.
+    with closing(_outcomes(found, tasks, jobs, scheduler)) as outcomes:
+        for done, (case, answer, findings) in enumerate(outcomes, len(kept) + 1):
+            if findings:
+                raise InputError(findings)
+            answers.write(entries[case], answer, made_by)
+            if progress is not None:
+                progress(done, len(entries))
+    return answers.freeze(made_by, families(), library or "")
+
+
+def _check_libraries(found: BlindSet) -> None:
+    """Check that this library holds what the cases of a set withhold."""
+    libraries = {entry.library for entry in found.manifest.cases}
+    for library in sorted(filter(None, libraries)):
+        try:
+            choose_library(library)
+        except InputError as error:
+            words = f"asks for the library '{library}', which hdcal cannot make: "
+            words += error.findings[0].problem
+            remedy = "Answer it with the version of hdcal that made it"
+            raise refusal(found.folder / SET, words, remedy) from None
+
+
+def _outcomes(
+    found: BlindSet, tasks: list[CaseTask], jobs: int, scheduler: str | None
+) -> Generator[CaseOutcome, None, None]:
+    if not tasks:
+        return
+    if scheduler is not None:
+        from hdcal.cli.cluster import completed_on_cluster
+
+        work = _travelling(found, tasks)
+        yield from completed_on_cluster(answer_there, work, scheduler)
+        return
+    # A task names its case itself; the list of all would travel with each.
+    place = replace(found, manifest=replace(found.manifest, cases=()))
+    for _, outcome in completed(answer_here, [(place, t) for t in tasks], jobs):
+        yield outcome
+
+
+def _travelling(found: BlindSet, tasks: list[CaseTask]) -> Iterator[tuple]:
+    """Yield tasks with their data, read only when a worker is about to be free."""
+    gear = found.gear()
+    for task in tasks:
+        yield task, found.csv(task.entry), gear
+
+
+def answer_here(found: BlindSet, task: CaseTask) -> CaseOutcome:
+    """Answer a case that this machine's disk holds."""
+    try:
+        csv, gear = found.csv(task.entry), found.gear()
+    except InputError as error:
+        return task.entry.case, {}, error.findings
+    return answer_bytes(task, csv, gear)
+
+
+def answer_there(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
+    """Answer a case on a worker of a cluster, which shares no disk with anyone."""
+    from hdcal.cli.compilation_cache import keep_compilations
+
+    keep_compilations()
+    return answer_bytes(task, csv, gear)
+
+
+def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
+    """Answer a case from the bytes of its files."""
+    name = task.entry.case
+    if digest(canonical(fingerprint(task.library))) != task.fingerprint:
+        words = "mixed versions: a worker runs other code, priors or packages"
+        remedy = "Give every worker the version that asks"
+        return name, {}, (Finding(f"{CASES}/{name}.csv", words, remedy),)
+    library = choose_library(withheld_from(task.entry.library, task.library))
+    try:
+        with tempfile.TemporaryDirectory(prefix="hdcal-") as place:
+            table, rig = Path(place, f"{name}.csv"), Path(place, "gear.toml")
+            table.write_bytes(csv)
+            rig.write_bytes(gear)
+            case = read_case(table, rig)
+        return name, task.diagnose(case, library).plain(), ()
+    except InputError as error:
+        here = (replace(one, file=Path(one.file).name) for one in error.findings)
+        return name, {}, tuple(here)
+    except OSError as error:
+        words = f"cannot be answered ({error.strerror or error})"
+        remedy = "Check space and permissions where temporary files go"
+        return name, {}, (Finding(f"{CASES}/{name}.csv", words, remedy),)
+    except HdcalError:
+        raise
+    except Exception as error:
+        # Of a thousand cases the one that failed has to be known.
+        raise RuntimeError(f"{name}: {type(error).__name__}: {error}") from error

@@ -1,0 +1,110 @@
+"""Is there a gap? The residual test, and what follows from it before any name."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.diagnosis.adequacy import move_inadequate_to_unknown
+from hdcal.diagnosis.model_posterior import ModelPosterior
+from hdcal.diagnosis.verdict import Gap, Where
+from hdcal.diagnosis.where import (
+    FALSE_ALARM,
+    declared_directions,
+    describe_where,
+    interval,
+)
+from hdcal.evidence.case_evidence import NONE, QUANTISATION, CaseEvidence
+from hdcal.evidence.residual_test import residual_test
+from hdcal.evidence.smooth_gap import (
+    AdditiveBasis,
+    SmoothGap,
+    additive_basis,
+    fit_smooth_gap,
+)
+from hdcal.report.parameters import Interval
+
+_NOT_SEEN = Interval(np.nan, np.nan, np.nan)
+
+
+@dataclass(frozen=True)
+class Detection:
+    """Outcome of the search for a gap.
+
+    Attributes:
+        posterior: over hypotheses; where there is a gap, those that leave more than
+            noise have lost probability to unknown.
+        correlation: posterior mean of the noise's AR(1) coefficient.
+        where: the residual test and the smooth gap in values for people.
+        noise_sd: of a reading beside the base model [N].
+        basis: of the smooth gap; None where no gap is detected.
+        smooth: the smooth gap; None where none is detected.
+        rounding_step: of rounded readings, where nothing else is detected [N].
+    """
+
+    posterior: ModelPosterior
+    correlation: float
+    where: Where
+    noise_sd: float
+    basis: AdditiveBasis | None = None
+    smooth: SmoothGap | None = None
+    rounding_step: float | None = None
+
+    @property
+    def detected(self) -> bool:
+        """Whether there is a gap."""
+        return self.smooth is not None
+
+    def gap(self, case: Case, noise_sd: float | None) -> Gap:
+        """Return whether there is a gap and how large it is.
+
+        Args:
+            case: for the largest force.
+            noise_sd: of a reading [N]; None for that of the base model.
+        """
+        size = _NOT_SEEN if self.smooth is None else interval(self.smooth.rms)
+        return Gap(
+            self.detected,
+            1.0 - self.posterior.probabilities[NONE],
+            size,
+            self.noise_sd if noise_sd is None else noise_sd,
+            size.median / float(np.max(np.abs(case.records.force))),
+            self.correlation,
+            self.rounding_step,
+        )
+
+
+def detect_gap(
+    evidence: CaseEvidence,
+    posterior: ModelPosterior,
+    case: Case,
+    rng: np.random.Generator,
+) -> Detection:
+    """Test the base model; where it fails, test the hypotheses and fit a smooth gap.
+
+    Args:
+        evidence: of the hypotheses.
+        posterior: over them.
+        case: whose rows are tested.
+        rng: source of randomness.
+    """
+    prepared = evidence.prepared
+    correlation = float(posterior.correlation @ prepared.rows.correlations)
+    cells, directions = declared_directions(evidence, case)
+    tested = residual_test(prepared, correlation, directions, rng)
+    significant = tested.p_value <= FALSE_ALARM
+    rounded = QUANTISATION in posterior.top.split("+")
+    if not (significant or rounded):
+        where = describe_where(evidence, case, cells, tested, None)
+        return Detection(posterior, correlation, where, tested.noise_sd)
+    # Draws of its own: what follows does not depend on how many were tested.
+    posterior = move_inadequate_to_unknown(
+        evidence, posterior, case, correlation, rng.spawn(1)[0]
+    )
+    basis = additive_basis(prepared)
+    smooth = fit_smooth_gap(prepared, basis, correlation, rng)
+    where = describe_where(evidence, case, cells, tested, smooth)
+    step = None if significant else evidence.rounding_step
+    return Detection(
+        posterior, correlation, where, tested.noise_sd, basis, smooth, step
+    )

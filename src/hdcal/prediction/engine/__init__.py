@@ -1,0 +1,1 @@
+"""The one engine for forces: whose, under which conditions, over which causes."""

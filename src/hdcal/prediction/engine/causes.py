@@ -1,0 +1,183 @@
+"""The causes that an answer averages over: models, each with its probability."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from hdcal.data.prior import Prior
+from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.inference.density import POSITIVE, Values
+from hdcal.inference.distributions import distribution
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+
+VERDICT = "verdict.json"
+SCHEMA = "hdcal.verdict/1"
+# What a posterior of a diagnosis knows of the diagnosis: its own hypothesis, and the
+# probabilities of all that were calibrated.
+ORIGIN = "diagnosis"
+
+Models = Posterior | Sequence[tuple[float, Posterior]]
+# What an uncertainty comes from.
+Driver = Literal["data", "prior", "given"]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One model of what was measured.
+
+    Attributes:
+        probability: of the model; those of all causes sum to 1.
+        posterior: from `calibrate`.
+        values: its draws by site, in code units: [draw, …].
+    """
+
+    probability: float
+    posterior: Posterior
+    values: Values
+
+    @property
+    def problem(self) -> Problem:
+        """Structure of the model."""
+        return self.posterior.problem
+
+    @property
+    def size(self) -> int:
+        """Number of draws."""
+        return len(self.values["K"])
+
+    @property
+    def weights(self) -> np.ndarray:
+        """Weight of each draw among those of all causes."""
+        return np.full(self.size, self.probability / self.size)
+
+    @property
+    def name(self) -> str:
+        """What the model is called among the hypotheses of a diagnosis."""
+        effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
+        return effects or ("none" if self.problem.discrepancy is None else "unknown")
+
+    def driver(self, name: str) -> Driver:
+        """Return whether data or prior determine a parameter."""
+        found = self.posterior.diagnoses.get(name)
+        return "data" if found is not None and found.driven_by == "data" else "prior"
+
+
+def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...]:
+    """Return models as causes whose probabilities sum to 1.
+
+    Args:
+        models: a posterior, or several with the probabilities of their models.
+        allow_failed: also calibrations that failed their checks.
+
+    Raises:
+        NotUsable: a calibration failed its checks.
+        InputError: there are none, or they are not of the same data.
+    """
+    listed = [(1.0, models)] if isinstance(models, Posterior) else list(models)
+    total = sum(share for share, _ in listed)
+    cases = {model.case.data_sha256 for _, model in listed}
+    if not listed or not total > 0.0 or any(share < 0.0 for share, _ in listed):
+        words, remedy = "hold no probability", "Give (probability, posterior) pairs"
+        raise InputError([Finding("models", words, remedy)])
+    if len(cases) > 1:
+        words, remedy = "are not of the same data", "Give models of one case"
+        raise InputError([Finding("models", words, remedy)])
+    for _, model in listed if not allow_failed else ():
+        model.require_usable()
+    return tuple(
+        Cause(share / total, model, model.draws) for share, model in listed if share > 0
+    )
+
+
+def likeliest(causes: Sequence[Cause]) -> Cause:
+    """Return the cause of the highest probability."""
+    return max(causes, key=lambda cause: cause.probability)
+
+
+def sample_prior(prior: Prior, name: str, key, count: int) -> np.ndarray:
+    """Return draws of a parameter from its prior, shape (count,).
+
+    Args:
+        prior: in code units.
+        name: of the parameter; some cannot be negative.
+        key: JAX random key.
+        count: number of draws.
+    """
+    if prior.family == "fixed":
+        return np.full(count, float(prior.numbers[0]))
+    law = distribution(prior, positive=name in POSITIVE)
+    return np.asarray(law.sample(key, (count,)))
+
+
+def read_models(run: Path | str) -> list[tuple[float, Posterior]]:
+    """Return the models of a folder of `hdcal calibrate` or `hdcal diagnose`.
+
+    Args:
+        run: the folder, or a single posterior file.
+
+    Raises:
+        NotUsable: the diagnosis failed.
+        InputError: a file is missing, changed or of another version.
+    """
+    run = Path(run)
+    if not (run / VERDICT).is_file():
+        return [(1.0, Posterior.load(run))]
+    found = _read_verdict(run / VERDICT)
+    if found["status"] != "ok":
+        reasons = "; ".join(map(str, found.get("reasons", [])))
+        raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
+    refits = found.get("refits", [])
+    if not refits:
+        words = "holds no calibrated model"
+        remedy = "Diagnose again without --quick, or calibrate"
+        raise InputError([Finding(str(run), words, remedy)])
+    loaded, findings = [], []
+    for refit in refits:
+        try:
+            loaded.append(Posterior.load(run / refit["file"]))
+        except InputError as error:
+            findings += error.findings
+    if findings:
+        raise InputError(findings)
+    return _weighed(run, refits, loaded)
+
+
+def _read_verdict(path: Path) -> dict:
+    """Return a verdict of this version with whole entries for its models."""
+    words, remedy = "is not a verdict that hdcal wrote", "Diagnose again"
+    try:
+        found = json.loads(path.read_text("utf-8"))
+        schema = str(found["schema"])
+        if schema == SCHEMA and _is_whole(found):
+            return found
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        schema = SCHEMA
+    if schema != SCHEMA:
+        words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMA}"
+        remedy = "Use the hdcal that wrote it, or diagnose again"
+    raise InputError([Finding(str(path), words, remedy)])
+
+
+def _is_whole(found: dict) -> bool:
+    """Tell whether every model has a name, a probability and a file of this folder."""
+    refits = found.get("refits", [])
+    names = {refit["hypothesis"]: refit["probability"] for refit in refits}
+    inside = all(Path(refit["file"]).name == refit["file"] for refit in refits)
+    return inside and len(names) == len(refits) and isinstance(found["status"], str)
+
+
+def _weighed(run: Path, refits, loaded) -> list[tuple[float, Posterior]]:
+    """Return the models with what their own files, which are sealed, say of them."""
+    told = {refit["hypothesis"]: refit["probability"] for refit in refits}
+    for refit, posterior in zip(refits, loaded, strict=True):
+        origin = posterior.settings.get(ORIGIN, {})
+        if origin != {"hypothesis": refit["hypothesis"], "probabilities": told}:
+            words = f"does not belong to {refit['file']}: one of them was changed"
+            remedy = "Take the folder as it was written, or diagnose again"
+            raise InputError([Finding(str(run / VERDICT), words, remedy)])
+    return list(zip(told.values(), loaded, strict=True))

@@ -1,0 +1,131 @@
+"""The conditions of a force: where, how warm, which way, and what was tested of it."""
+
+from typing import Literal, get_args
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.records import Array, Records
+from hdcal.errors import Finding
+from hdcal.inference.density import Values
+from hdcal.prediction.engine.sizes import StiffnessStrata
+
+Direction = Literal["up", "down"]
+DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
+SENSE = {"up": 1.0, "down": -1.0}
+# How far beyond the data still counts as tested: thermometers are no better [K], and
+# a deformation is compared with itself as it was written [mm].
+NEAR_K, NEAR_MM = 1.0, 1e-9
+_ABSOLUTE_ZERO = -273.15
+# More than this loss of Young's modulus is a slip of the unit [-].
+_MOST_LOSS = 0.5
+
+
+class Conditions(eqx.Module):
+    """Under which conditions a force is asked for.
+
+    Attributes:
+        deformation: as read [mm].
+        temperature: of the specimen [°C].
+        turn: where the movement turned before it came down [mm].
+        known_sd: stated sd of a reading [N].
+        low: end of the tested deformation [mm].
+        high: other end [mm].
+        scale: stiffness over that of the calibrated gear [-]: other sizes, modulus, K.
+        strata: of the stiffness within the tolerances of the sizes.
+        down: whether the deformation is reached from above.
+    """
+
+    deformation: Float[Array, ""] | float
+    temperature: Float[Array, ""] | float
+    turn: Float[Array, ""] | float
+    known_sd: Float[Array, ""] | float
+    low: Float[Array, ""] | float
+    high: Float[Array, ""] | float
+    scale: Float[Array, ""] | float
+    strata: StiffnessStrata
+    down: bool = eqx.field(static=True)
+
+
+def conditions_of(
+    case: Case,
+    deformation: float,
+    direction: Direction,
+    strata: StiffnessStrata,
+) -> Conditions:
+    """Return the conditions at a deformation [mm], at the usual temperature."""
+    records = case.records
+    low, high = float(records.deformation.min()), float(records.deformation.max())
+    return Conditions(
+        deformation=float(deformation),
+        temperature=usual_temperature(case),
+        # Down from the largest deformation tested, or from where it is asked for.
+        turn=max(high, float(deformation)),
+        known_sd=usual_sd(records),
+        low=low,
+        high=high,
+        scale=1.0,
+        strata=strata,
+        down=direction == "down",
+    )
+
+
+def usual_temperature(case: Case) -> float:
+    """Return the tested temperature nearest to the reference [°C]."""
+    tested = case.records.temperature
+    reference = case.gear.reference_temperature
+    return float(np.clip(reference, np.min(tested), np.max(tested)))
+
+
+def usual_sd(records: Records) -> float:
+    """Return the stated sd of a new reading: as good as the tested on average [N]."""
+    return float(np.sqrt(np.mean(records.force_sd**2)))
+
+
+def is_tested(records: Records, *, deformation, temperature, sense) -> np.ndarray:
+    """Tell where the data hold a deformation, a temperature and a direction.
+
+    Args:
+        records: the data.
+        deformation: in the same terms as the data [mm].
+        temperature: of the specimen [°C].
+        sense: of the movement, +1 or −1.
+    """
+    return (
+        _within(deformation, records.deformation, NEAR_MM)
+        & temperature_is_tested(records, temperature)
+        & np.isin(sense, np.asarray(records.sense))
+    )
+
+
+def temperature_is_tested(records: Records, temperature) -> np.ndarray:
+    """Tell which temperatures [°C] lie within those of the data."""
+    return _within(temperature, records.temperature, NEAR_K)
+
+
+def _within(values, measured, slack: float) -> np.ndarray:
+    low, high = np.min(measured), np.max(measured)
+    return (values >= low - slack) & (values <= high + slack)
+
+
+def temperature_findings(
+    gear: Gear, values: Values, temperature: np.ndarray, name: str = "temperature"
+) -> list[Finding]:
+    """Return what is impossible about temperatures [°C].
+
+    Args:
+        gear: tells the reference.
+        values: draws by site.
+        temperature: at least one.
+        name: of the parameter.
+    """
+    # What is no number is no temperature either.
+    if not np.min(temperature) >= _ABSOLUTE_ZERO:
+        return [Finding(name, "is below absolute zero", "Give it in °C")]
+    rise = np.max(np.abs(temperature - gear.reference_temperature))
+    if np.median(values["alpha"]) * rise >= _MOST_LOSS:
+        words = "the linear law E(T) would lose half of Young's modulus"
+        return [Finding(name, words, "Give it in °C")]
+    return []

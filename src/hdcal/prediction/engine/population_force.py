@@ -1,0 +1,218 @@
+"""The forces of the members of a population, as each draw of a cause expects them.
+
+Given the parameters of one draw, the force of one future member is a mixture of
+normals. What is not known but the same for every member (parameters, the centre of
+the population, the leftover discrepancy) is a matter of the draw and never scatter.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+from scipy.stats import qmc
+
+from hdcal.inference.density import Values
+from hdcal.inference.distributions import frozen
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.prediction.engine.causes import Cause
+from hdcal.prediction.engine.conditions import Conditions, Direction, conditions_of
+from hdcal.prediction.engine.forces import Quantity, force_of, grid_records
+from hdcal.prediction.engine.mixture import Mixture
+from hdcal.prediction.engine.population import Population, Whose
+from hdcal.prediction.engine.sizes import tolerance_strata
+
+# More draws than this change no digit that is printed.
+MOST_DRAWS = 8000
+# Where effects bend the force, a specimen's deviation is split: this share of its sd
+# goes to nodes, the rest is narrow enough to go along the tangent.
+_AT_NODES, _SPLIT = 0.8, 7
+# Standard normal scores of each draw: of the population's centre of gears and of
+# mountings, and of the leftover beyond the tested deformation.
+SCORES = "_scores"
+
+
+@dataclass(frozen=True)
+class PopulationForce:
+    """The forces of a population, as one cause expects them.
+
+    Attributes:
+        cause: with what each draw holds for true of the whole population.
+        whose: force it is.
+        conditions: under which.
+        tolerances: ± of the sizes by field of the geometry [mm].
+    """
+
+    cause: Cause
+    whose: Whose
+    conditions: Conditions
+    tolerances: Mapping[str, float]
+
+    def at(self, temperature: float) -> "PopulationForce":
+        """Return the forces at another temperature [°C]."""
+        warm = replace(self.conditions, temperature=jnp.asarray(temperature, float))
+        return replace(self, conditions=warm)
+
+    def mixture(self) -> Mixture:
+        """Return the mixture of every draw [draw, component]."""
+        cause = self.cause
+        return mixtures(cause.problem, cause.values, self.whose, self.conditions)
+
+
+def population_force(
+    cause: Cause,
+    deformation: float,
+    population: Population,
+    *,
+    quantity: Quantity = "reading",
+    direction: Direction = "up",
+    tolerances: Mapping[str, float] | None = None,
+    seed: int = 0,
+) -> PopulationForce:
+    """Return the forces of a population under one cause.
+
+    Args:
+        cause: from `causes_of`.
+        deformation: as read [mm].
+        population: whose force; see `check_population`.
+        quantity: which force.
+        direction: of the movement.
+        tolerances: ± by field of the geometry [mm].
+        seed: of what the data leave open about the centre of the population.
+    """
+    case, theory = cause.posterior.case, cause.posterior.theory
+    widths = dict(tolerances or {})
+    strata = tolerance_strata(case.gear.geometry, widths, theory)
+    rounded = quantity == "reading" and float(cause.problem.step) > 0.0
+    return PopulationForce(
+        replace(cause, values=_with_scores(cause, seed)),
+        Whose(population, quantity, rounded),
+        conditions_of(case, deformation, direction, strata),
+        widths,
+    )
+
+
+def _with_scores(cause: Cause, seed: int) -> dict[str, np.ndarray]:
+    """Return draws, thinned where they are many, with what the data leave open."""
+    kept = np.linspace(0, cause.size - 1, min(cause.size, MOST_DRAWS))
+    kept = kept.round().astype(int)
+    values = {name: column[kept] for name, column in cause.values.items()}
+    spread = qmc.Sobol(5, rng=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
+    spread = np.clip(spread[: len(kept)], 1e-9, 1.0 - 1e-9)
+    values[SCORES] = stats.norm.ppf(spread[:, :3])
+    for column, name in enumerate(("gap_sd", "gap_length"), start=3):
+        if name not in values:
+            values[name] = _prior_draws(cause.posterior, name, spread[:, column])
+    return values
+
+
+def _prior_draws(posterior: Posterior, name: str, levels: np.ndarray) -> np.ndarray:
+    prior = posterior.priors[name]
+    if prior.family == "fixed":
+        return np.full(len(levels), float(prior.numbers[0]))
+    return np.asarray(frozen(prior).ppf(levels))
+
+
+@jax.jit
+def mixtures(
+    problem: Problem, values: Values, whose: Whose, conditions: Conditions
+) -> Mixture:
+    """Return the forces of future members for every draw, shape [draw, component]."""
+
+    def one(value):
+        return member_mixture(problem, value, whose, conditions)
+
+    weight, mean, sd = jax.vmap(one)(values)
+    step = problem.step if whose.rounded else 0.0
+    return Mixture(weight, mean, sd, step, whose.rounded)
+
+
+def member_mixture(
+    problem: Problem, value: Values, whose: Whose, conditions: Conditions
+):
+    """Return weight, mean and sd of the components of one draw.
+
+    Tested deviations are from the mean of the tested members. The population's own
+    centre lies sd/√n from it, known to nobody: one place of it in each draw.
+    """
+    gears, mountings = whose.tested_gears(problem), whose.tested_mountings(problem)
+    strata = conditions.strata
+    own = value["specimen_sd"] if gears else 0.0
+    centre = own * value[SCORES][0] / np.sqrt(max(gears, 1))
+    place, share, tangent = _split(bool(gears and problem.effects))
+    base = conditions.scale * strata.factor[:, None]
+    factor = base * (1.0 + centre + own * place)
+    within = factor * (strata.width / strata.factor)[:, None]
+    width2 = ((base * own * tangent) ** 2 + within**2).ravel()
+
+    def at(factor):
+        return member_force(problem, value, whose.quantity, conditions, factor)
+
+    one = jnp.ones(())
+    mean, slope, (log_weight, noise) = jax.vmap(
+        lambda f: jax.jvp(at, (f,), (one,), has_aux=True)
+    )(factor.ravel())
+    zero = value["run_offset_sd"] if mountings else 0.0
+    shift = zero * value[SCORES][1] / np.sqrt(max(mountings, 1))
+    shift = shift + leftover(problem, value, conditions)
+    variance = noise**2 + zero**2 + (slope**2 * width2)[:, None]
+    # The root of zero has no derivative.
+    spread = jnp.sqrt(variance + 1e-24)
+    weight = (strata.weight[:, None] * share).reshape(-1, 1) * jnp.exp(log_weight)
+    mean = jnp.broadcast_to((mean + shift)[:, None], spread.shape)
+    return weight.ravel(), mean.ravel(), spread.ravel()
+
+
+def _split(bent: bool):
+    """Return nodes and weights of a standard normal, and the sd that is left over."""
+    if not bent:
+        return np.zeros(1), np.ones(1), 1.0
+    place, share = np.polynomial.hermite_e.hermegauss(_SPLIT)
+    return _AT_NODES * place, share / share.sum(), np.sqrt(1.0 - _AT_NODES**2)
+
+
+def member_force(
+    problem: Problem, value: Values, quantity: Quantity, conditions: Conditions, factor
+):
+    """Return the mean force of one member, and weights and sds of its noise."""
+    along, sense = [conditions.deformation], [1.0]
+    if conditions.down:
+        along, sense = [conditions.turn, conditions.deformation], [1.0, -1.0]
+    path = jnp.stack([jnp.asarray(each, float) for each in along])
+    warmth = jnp.full(len(along), conditions.temperature)
+    records = grid_records(path, warmth, np.array(sense), conditions.known_sd)
+    mean, noise = force_of(problem, value, records, factor=factor, quantity=quantity)
+    if quantity == "load":
+        return mean[-1], (jnp.zeros(1), jnp.zeros(1))
+    return mean[-1], (noise.log_weight, noise.sd[:, -1])
+
+
+def leftover_sd(values: Values, conditions: Conditions):
+    """Return the sd of what is new in the leftover beyond the tested range [N].
+
+    At a distance d beyond the tested deformation s √(1 − exp(−(d/ℓ)²)).
+    """
+    at, low, high = conditions.deformation, conditions.low, conditions.high
+    beyond = jnp.maximum(jnp.maximum(low - at, at - high), 0.0)
+    length = values["gap_length"] * (high - low)
+    new = -jnp.expm1(-((beyond / length) ** 2))
+    # The root has no derivative at zero.
+    return values["gap_sd"] * (jnp.sqrt(jnp.where(new > 0.0, new, 1.0)) * (new > 0.0))
+
+
+def leftover(problem: Problem, value: Values, conditions: Conditions):
+    """Return the leftover discrepancy of one draw [N].
+
+    Where it was fitted and tested this is what was found. Beyond the tested
+    deformation it is a new normal, beside what the end of the tested range still
+    tells; both from the prior where no discrepancy was fitted.
+    """
+    found = leftover_sd(value, conditions) * value[SCORES][2]
+    if problem.discrepancy is None or "gap_weights" not in value:
+        return found
+    at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)
+    columns = problem.discrepancy.columns_beyond(at, value["gap_length"])
+    return found + (columns @ value["gap_weights"])[0]

@@ -1,0 +1,54 @@
+"""What is asked of a margin."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.prediction.engine.conditions import Direction, usual_temperature
+from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.population import Population
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """What the bounds and the capacity have to keep.
+
+    Attributes:
+        content: share of the population within each bound.
+        confidence: of each bound.
+        required_probability: that a capacity is to meet; None for the content.
+        limit_force: capacity [N], or None.
+    """
+
+    content: float
+    confidence: float
+    required_probability: float | None
+    limit_force: float | None
+
+    @property
+    def required(self) -> float:
+        """Probability that a capacity is to meet."""
+        asked = self.required_probability
+        return self.content if asked is None else asked
+
+
+@dataclass(frozen=True)
+class MarginRequest:
+    """Whose force, and under which conditions; attributes are those of `margin`."""
+
+    deformation: float
+    temperature: float | Sequence[float] | np.ndarray | None
+    direction: Direction
+    tolerances: Mapping[str, float]
+    population: Population | None
+    quantity: Quantity
+    given_force: float | None
+    seed: int
+
+    def temperatures(self, case: Case) -> np.ndarray:
+        """Return all temperatures that are asked for [°C]."""
+        asked = self.temperature
+        asked = usual_temperature(case) if asked is None else asked
+        return np.atleast_1d(np.asarray(asked, dtype=float))

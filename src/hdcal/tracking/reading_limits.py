@@ -1,0 +1,84 @@
+"""Which numbers can be a reading of a gear, and which of them were tested."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from hdcal.data.case import Gear
+from hdcal.inference.posterior import Posterior
+from hdcal.tracking.stream_prior import StreamPrior
+
+_COLDEST, _NEAR_K, _NEAR_MM = -273.15, 1.0, 1e-9
+# Beyond it a force [N] or a time [s] was not measured, and squares would overflow.
+_MOST = 1e12
+
+
+@dataclass(frozen=True)
+class ReadingLimits:
+    """What a reading of one gear has to be.
+
+    Attributes:
+        radius: of the gear, in the deformation as read [mm].
+        hottest: temperature at which half of the modulus is lost [°C].
+        needs: what the effects look at.
+        tested: ends of deformation [mm] and of temperature [°C], or None.
+    """
+
+    radius: float
+    hottest: float
+    needs: frozenset[str] = frozenset()
+    tested: tuple[float, ...] | None = None
+
+    def check(self, deformation, force, temperature, time) -> None:
+        """Refuse numbers that are no reading; what they are says `Tracker.update`.
+
+        Raises:
+            ValueError: one is missing, not finite or none of this gear.
+        """
+        given = {"deformation": deformation, "force": force}
+        given |= {"temperature": temperature, "time": time}
+        for name, value in given.items():
+            if value is None and name in self.needs:
+                raise ValueError(f"the {name} is missing, and an effect needs it")
+            if value is not None and not isfinite(value):
+                raise ValueError(f"the {name} is not finite")
+        if abs(deformation) >= self.radius:
+            raise ValueError(
+                f"a deformation of {deformation:g} mm is none of this gear"
+            )
+        if abs(force) > _MOST or abs(time or 0.0) > _MOST:
+            raise ValueError("the force or the time is no measured one")
+        if temperature is not None and temperature < _COLDEST:
+            raise ValueError("the temperature is below absolute zero")
+        if temperature is not None and temperature > self.hottest:
+            raise ValueError(f"{temperature:g} °C leaves nothing of the stiffness")
+
+    def were_tested(self, deformation: float, temperature: float) -> bool | None:
+        """Return whether the calibration's data hold such rows; None without data."""
+        if self.tested is None:
+            return None
+        low, high, cold, warm = self.tested
+        return low <= deformation <= high and cold <= temperature <= warm
+
+
+def reading_limits(known: Posterior | Gear, prior: StreamPrior) -> ReadingLimits:
+    """Return the limits of a gear.
+
+    Args:
+        known: what the stream begins with.
+        prior: of the stream, from the same.
+    """
+    gear = known if isinstance(known, Gear) else known.case.gear
+    # Where the linear law E(T) has lost half of the modulus; never hotter than that.
+    alpha = max(float(np.median(prior.base.alpha)), 1e-5)
+    radius = float(gear.geometry.radius) / prior.reading.radial_per_read
+    hottest = gear.reference_temperature + 0.5 / alpha
+    if isinstance(known, Gear):
+        return ReadingLimits(radius, hottest)
+    rows = known.case.records
+    low, high = np.min(rows.deformation), np.max(rows.deformation)
+    cold, warm = np.min(rows.temperature), np.max(rows.temperature)
+    ends = (low - _NEAR_MM, high + _NEAR_MM, cold - _NEAR_K, warm + _NEAR_K)
+    needs = frozenset().union(*(effect.needs for effect in known.problem.effects))
+    return ReadingLimits(radius, hottest, needs, tuple(map(float, ends)))

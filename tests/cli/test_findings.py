@@ -1,0 +1,44 @@
+"""A finding about a parameter is printed as one about the option."""
+
+import pytest
+from commands import Hdcal
+from moving import still_posterior
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (["predict", "--deformation", "99"], "--deformation: 99 mm on a radius"),
+        (["margin", "--deformation", "99"], "--deformation: 99 mm on a radius"),
+        (["margin", "--deformation", ".4", "--content", "9"], "--content: 9 does"),
+        (
+            ["margin", "--deformation", ".4", "--tolerance", "size_mm=1"],
+            "--tolerance: 'size_mm' is no size",
+        ),
+        (["design", "--window", ".4:.3"], "--window: 0.4:0.3 is empty"),
+        (
+            ["design", "--window", ".3:.4", "--spring-rate", "9:1"],
+            "--spring-rate: 9:1 is no range",
+        ),
+        (
+            ["design", "--window", ".3:.4", "--temperature=-300:0"],
+            "--temperature: is below absolute zero",
+        ),
+        (
+            ["design", "--limit-force", "9", "--vary", "radius_mm=38:42"],
+            "--limit-force: no radius between 38 and 42 mm meets 9 N",
+        ),
+        (
+            ["study", "--vary", "radius_mm=38", "--material", "stel"],
+            "--material: unknown material 'stel'",
+        ),
+        (["respond", "--force", "step", "--draws", "3"], "--draws: 3 is no usable"),
+        (["respond", "--force", "step", "--mass-kg", "-1"], "--mass-kg: -1 kg is no"),
+        (["respond", "--force", "step", "--amplitude", "0"], "--amplitude: 0 drives"),
+    ],
+)
+def test_every_command_speaks_of_its_options(here: Hdcal, tmp_path, asked, words):
+    still_posterior(K=0.02).save(tmp_path / "posterior.nc")
+    done = here(asked[0], tmp_path, *asked[1:])
+    assert done.returncode == 2, done.stderr
+    assert f"hdcal: {words}" in " ".join(done.stderr.split())
