@@ -52,7 +52,9 @@ def linearise(
     columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     sd, slopes, stiffening = jax.tree.map(
         lambda part: np.asarray(part)[:rows],
-        _derivatives(problem, values, padded, columns, _free_parameters(problem, values)),
+        _derivatives(
+            problem, values, padded, columns, _free_parameters(problem, values)
+        ),
     )
     columns = None if columns is None else columns[:rows]
     members, place = _members(problem, values, records, columns, stiffening)
