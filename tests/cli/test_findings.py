@@ -1,8 +1,12 @@
 """A finding about a parameter is printed as one about the option."""
 
 import pytest
-from commands import Hdcal
+from commands import XB1, Hdcal
 from moving import still_posterior
+
+from hdcal import InputError
+from hdcal.calibration.calibrate import choose_effects
+from hdcal.inference.sample import check_settings
 
 
 @pytest.mark.parametrize(
@@ -45,3 +49,26 @@ def test_every_command_speaks_of_its_options(here: Hdcal, tmp_path, asked, words
     done = here(asked[0], tmp_path, *asked[1:])
     assert done.returncode == 2, done.stderr
     assert f"hdcal: {words}" in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        (["--chains", "1"], "--chains: 1 is too few. Use 2 or more."),
+        (["--draws", "3"], "--draws: 3 is too few. Use 4 or more."),
+        (["--effect", "outlier"], "--effect: no effect is called 'outlier'."),
+    ],
+)
+def test_calibrate_speaks_of_its_options(here: Hdcal, asked, words):
+    done = here("calibrate", XB1, *asked)
+    assert done.returncode == 2, done.stderr
+    assert f"hdcal: {words}" in " ".join(done.stderr.split())
+
+
+def test_the_library_speaks_of_its_parameters():
+    with pytest.raises(InputError) as short:
+        check_settings(chains=1, warmup=0, draws=3)
+    with pytest.raises(InputError) as unknown:
+        choose_effects(["outlier"])
+    named = [f.file for error in (short, unknown) for f in error.value.findings]
+    assert named == ["chains", "warmup", "draws", "effects"]

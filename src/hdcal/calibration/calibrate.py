@@ -38,14 +38,19 @@ def choose_effects(
     Raises:
         InputError: a name is not in the library; the nearest one is suggested.
     """
-    check_names(names, registry, "--effect")
+    check_names(names, registry, "effects")
     return tuple(registry[name] for name in dict.fromkeys(names))
 
 
 def check_names(
-    names: Sequence[str], registry: Mapping[str, type[Effect]], option: str
+    names: Sequence[str], registry: Mapping[str, type[Effect]], parameter: str
 ) -> None:
     """Check that effects are in the library.
+
+    Args:
+        names: of effects.
+        registry: the library.
+        parameter: that the names were given as, for the finding.
 
     Raises:
         InputError: a name is not; the nearest one is suggested.
@@ -57,7 +62,7 @@ def check_names(
             hint = f"Did you mean '{near[0]}'? " if near else ""
             findings.append(
                 Finding(
-                    option,
+                    parameter,
                     f"no effect is called '{name}'",
                     f"{hint}The library holds: {', '.join(sorted(registry))}",
                 )

@@ -52,7 +52,9 @@ def linearise(
     columns = discrepancy_columns(problem.discrepancy, padded.deformation)
     sd, slopes, stiffening = jax.tree.map(
         lambda part: np.asarray(part)[:rows],
-        _derivatives(problem, values, padded, columns, _moving(problem, values)),
+        _derivatives(
+            problem, values, padded, columns, _free_parameters(problem, values)
+        ),
     )
     columns = None if columns is None else columns[:rows]
     members, place = _members(problem, values, records, columns, stiffening)
@@ -60,7 +62,7 @@ def linearise(
     return Linearisation(sd, slopes, members, place)
 
 
-def _moving(problem: Problem, values) -> tuple[str, ...]:
+def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
     """Return the parameters of the mean that are not fixed."""
     of_mean = {effect.name for effect in problem.effects if effect.stage != "noise"}
     sizes = [name for name in values if name.partition(".")[0] in of_mean]

@@ -195,7 +195,7 @@ def check_settings(chains: int, warmup: int, draws: int) -> None:
     """
     least = {"chains": (chains, 2), "warmup": (warmup, 1), "draws": (draws, 4)}
     findings = [
-        Finding(f"--{name}", f"{value} is too few", f"use {low} or more")
+        Finding(name, f"{value} is too few", f"use {low} or more")
         for name, (value, low) in least.items()
         if value < low
     ]
