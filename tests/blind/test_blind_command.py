@@ -170,7 +170,7 @@ def test_an_opening_prints_every_row_of_the_bar(blind, fresh: Path):
     said = " ".join(done.stdout.split())
     bar = json.loads((fresh / "result" / "scores.json").read_text())["bar"]
     assert "hdcal on 3 cases (3 without a gap)" in said
-    assert "0.0 % 0.0 … 56.1 % 3 ≤ 5 % met, not firmly" in said
+    assert "met, not firmly 0.0 % ≤ 5 % 0.0 … 56.1 % 3" in said
     empty = sum(row["value"] is None for row in bar)
     # The headline says it once more.
     assert said.count("no cases") == empty + 1

@@ -12,11 +12,11 @@ from hdcal.inference.discrepancy import (
 )
 
 
-def test_the_gap_takes_no_offset_and_no_slope(program):
-    gap = build_discrepancy(program.deformation)
-    basis = np.asarray(gap.columns(program.deformation))
+def test_the_gap_takes_no_offset_and_no_slope(loading):
+    gap = build_discrepancy(loading.deformation)
+    basis = np.asarray(gap.columns(loading.deformation))
     assert basis.shape == (180, BASIS_SIZE)
-    line = np.column_stack([np.ones(180), program.deformation])
+    line = np.column_stack([np.ones(180), loading.deformation])
     norms = np.linalg.norm(line, axis=0)[:, None] * np.linalg.norm(basis, axis=0)
     assert np.max(np.abs(line.T @ basis) / norms) < 1e-10
     # It is not empty: what is left bends.

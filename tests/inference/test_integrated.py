@@ -28,17 +28,17 @@ predict_rows = jax.jit(density.predict_rows)
 pointwise = jax.jit(density.pointwise_log_likelihood)
 
 
-def labelled(program, seed, *, known, runs=1, specimens=1, sds=(0.0,)):
-    """Return the program with labels, stated sds and some force."""
+def labelled(loading, seed, *, known, runs=1, specimens=1, sds=(0.0,)):
+    """Return the loading with labels, stated sds and some force."""
     rng = np.random.default_rng(seed)
-    rows = len(program.deformation)
+    rows = len(loading.deformation)
     return dataclasses.replace(
-        program,
-        deformation=program.deformation + rng.normal(0.0, 0.01, rows),
+        loading,
+        deformation=loading.deformation + rng.normal(0.0, 0.01, rows),
         run=np.arange(rows) % runs,
         specimen=np.sort(np.arange(rows) % specimens),
         force_sd=rng.choice(sds, rows),
-        force=200.0 * program.deformation + rng.normal(0.0, 2.0, rows),
+        force=200.0 * loading.deformation + rng.normal(0.0, 2.0, rows),
         known=frozenset(known),
     )
 
@@ -100,9 +100,9 @@ def random_values(seed):
         (9, 4, 2, (0.5,)),
     ],
 )
-def test_compressed_is_row_by_row(program, rows, runs, specimens, sds, seed, reading):
+def test_compressed_is_row_by_row(loading, rows, runs, specimens, sds, seed, reading):
     rng = np.random.default_rng(seed)
-    some = jax.tree.map(lambda leaf: leaf[:rows], program)
+    some = jax.tree.map(lambda leaf: leaf[:rows], loading)
     records = labelled(some, seed, known=(), runs=runs, specimens=specimens, sds=sds)
     slope, offset = rng.uniform(100.0, 300.0, specimens), rng.normal(0.0, 3.0, runs)
     alpha, zero, sigma, step = 4e-4, 0.01, 0.8, 0.5
@@ -131,8 +131,8 @@ def test_compressed_is_row_by_row(program, rows, runs, specimens, sds, seed, rea
     assert float(found) == pytest.approx(slow, rel=1e-11)
 
 
-def test_a_compressed_problem_is_its_rows(program, gear):
-    records = labelled(program, 5, known={"force_sd"}, sds=(0.1, 0.4))
+def test_a_compressed_problem_is_its_rows(loading, gear):
+    records = labelled(loading, 5, known={"force_sd"}, sds=(0.1, 0.4))
     problem = build_problem(case_of(records, gear), SHIPPED)
     assert problem.records is None
     values = random_values(1)
@@ -242,10 +242,10 @@ STRUCTURES = {
 
 
 @pytest.fixture(params=sorted(STRUCTURES))
-def structured(request, program, gear):
+def structured(request, loading, gear):
     known, with_gap = STRUCTURES[request.param]
     records = labelled(
-        program,
+        loading,
         11,
         known=known,
         runs=4 if "run" in known else 1,

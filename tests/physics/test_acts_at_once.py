@@ -25,8 +25,8 @@ def together_and_alone(name, base, records, reading):
 
 
 @pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.acts_at_once])
-def test_what_acts_at_once_remembers_nothing(name, base, program, reading):
-    whole, alone = together_and_alone(name, base, program, reading)
+def test_what_acts_at_once_remembers_nothing(name, base, loading, reading):
+    whole, alone = together_and_alone(name, base, loading, reading)
     assert alone == pytest.approx(whole, rel=1e-12, abs=1e-12)
     assert EFFECTS[name].stage in ("deformation", "force")
     # The motion holds deformation, speed and temperature; no angle, run or gear.
@@ -34,8 +34,8 @@ def test_what_acts_at_once_remembers_nothing(name, base, program, reading):
 
 
 @pytest.mark.parametrize("name", ["relaxation", "hysteresis", "stiffness_fatigue"])
-def test_a_memory_is_noticed_by_the_same_test(name, base, program, reading):
-    whole, alone = together_and_alone(name, base, program, reading)
+def test_a_memory_is_noticed_by_the_same_test(name, base, loading, reading):
+    whole, alone = together_and_alone(name, base, loading, reading)
     assert np.max(np.abs(alone - whole)) > 1e-3
 
 

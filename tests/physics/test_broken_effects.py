@@ -90,12 +90,12 @@ def liar(monkeypatch, effect):
 
 
 def test_the_honest_one_passes(
-    monkeypatch, scattered, program, base, reading, differences
+    monkeypatch, scattered, loading, base, reading, differences
 ):
     liar(monkeypatch, Liar)
     test_effects.test_null_changes_nothing("liar", 0, scattered, base, reading)
     test_effects.test_at_its_typical_size_it_does_something(
-        "liar", program, base, reading
+        "liar", loading, base, reading
     )
     for size in (test_effects.null, test_effects.typical):
         test_effects.test_gradients_are_finite(
@@ -107,11 +107,11 @@ def test_the_honest_one_passes(
     test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
     test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
     test_effect_needs.test_it_uses_what_it_needs(
-        "liar", "temperature", program, base, reading
+        "liar", "temperature", loading, base, reading
     )
     for covariate in test_effect_needs.LICENCES:
         test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "liar", covariate, program, base, reading
+            "liar", covariate, loading, base, reading
         )
     test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
 
@@ -147,19 +147,19 @@ def test_wrong_symmetry(monkeypatch, scattered, base, reading):
         test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
 
 
-def test_undeclared_covariate(monkeypatch, program, base, reading):
+def test_undeclared_covariate(monkeypatch, loading, base, reading):
     liar(monkeypatch, LooksAtTime)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "liar", "time", program, base, reading
+            "liar", "time", loading, base, reading
         )
 
 
-def test_needless_need(monkeypatch, program, base, reading):
+def test_needless_need(monkeypatch, loading, base, reading):
     liar(monkeypatch, NeedsNothing)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_uses_what_it_needs(
-            "liar", "temperature", program, base, reading
+            "liar", "temperature", loading, base, reading
         )
 
 
@@ -176,11 +176,11 @@ def test_spoils_others(monkeypatch, scattered, base, reading):
         test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
 
 
-def test_not_to_be_found(monkeypatch, program, base, reading):
+def test_not_to_be_found(monkeypatch, loading, base, reading):
     liar(monkeypatch, NotToBeFound)
     with pytest.raises(AssertionError):
         test_effect_recovery.test_recovered_from_its_own_data(
-            "liar", program, base, reading
+            "liar", loading, base, reading
         )
 
 

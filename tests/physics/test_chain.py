@@ -115,10 +115,10 @@ def test_stages_not_their_listing_decide_the_order(scattered, base, reading):
     np.testing.assert_array_equal(noise_again.sd, noise.sd)
 
 
-def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, program):
+def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, loading):
     """Away from the corner the stated formulas hold: max(0, ω − ω_c) and |ω|."""
     deformation = np.linspace(3.0 * SLACK, 0.54, 180)
-    records = dataclasses.replace(program, deformation=deformation)
+    records = dataclasses.replace(loading, deformation=deformation)
     base = dataclasses.replace(base, deformation_offset=0.0, alpha=0.0)
 
     def mean(*effects):

@@ -17,13 +17,13 @@ STAGES = ("deformation", "force", "sensor", "noise")
 
 
 @everyone
-def test_the_declaration_is_complete(name, program):
+def test_the_declaration_is_complete(name, loading):
     effect = EFFECTS[name]
     assert effect.name == name
     assert effect.stage in STAGES
     assert effect.symmetry in ("odd", "even", "none")
     assert effect.family
-    assert effect.needs <= program.known | BEYOND_RECORDS
+    assert effect.needs <= loading.known | BEYOND_RECORDS
     declared = parameters(effect)
     assert list(declared) == [field.name for field in dataclasses.fields(effect)]
     assert declared

@@ -73,7 +73,7 @@ def matters(name, what, records, base, reading) -> bool:
     if what == "force_sd":
         before, after = before[rows:], after[rows:]
     if what == "order":
-        # The reversed program has the same deformations in reversed rows.
+        # The reversed loading has the same deformations in reversed rows.
         for run in np.unique(records.run):
             own = np.flatnonzero(records.run == run)
             after[own] = after[own[::-1]].copy()
@@ -82,8 +82,8 @@ def matters(name, what, records, base, reading) -> bool:
 
 @everyone
 @pytest.mark.parametrize("covariate", sorted(LICENCES))
-def test_it_looks_at_nothing_undeclared(name, covariate, program, base, reading):
-    if matters(name, covariate, program, base, reading):
+def test_it_looks_at_nothing_undeclared(name, covariate, loading, base, reading):
+    if matters(name, covariate, loading, base, reading):
         assert EFFECTS[name].needs & LICENCES[covariate]
 
 
@@ -95,10 +95,10 @@ def test_it_looks_at_nothing_undeclared(name, covariate, program, base, reading)
         for need in sorted(EFFECTS[name].needs - BEYOND_RECORDS)
     ],
 )
-def test_it_uses_what_it_needs(name, need, program, base, reading):
+def test_it_uses_what_it_needs(name, need, loading, base, reading):
     used = [
         covariate
         for covariate in sorted(CARRIERS[need])
-        if matters(name, covariate, program, base, reading)
+        if matters(name, covariate, loading, base, reading)
     ]
     assert used

@@ -21,7 +21,7 @@ SIGMA_KNOWN = {"quantisation"}
 
 
 @pytest.mark.parametrize("name", TESTABLE)
-def test_recovered_from_its_own_data(name, program, base, reading):
+def test_recovered_from_its_own_data(name, loading, base, reading):
     """Maximum likelihood finds a typical effect within four standard errors.
 
     The zero of the deformation is known here; it is the rest of the chain that
@@ -41,7 +41,7 @@ def test_recovered_from_its_own_data(name, program, base, reading):
 
     one = jnp.ones(len(scale))
     effects, made_by = chain(one)
-    records = noisy(program, made_by, reading, effects)
+    records = noisy(loading, made_by, reading, effects)
 
     def cost(point):
         effects, base = chain(point)

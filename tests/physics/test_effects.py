@@ -36,16 +36,16 @@ def test_null_changes_nothing(name, seed, scattered, base, reading):
 
 
 @everyone
-def test_at_its_typical_size_it_does_something(name, program, base, reading):
-    records = noisy(program, base, reading, ())
+def test_at_its_typical_size_it_does_something(name, loading, base, reading):
+    records = noisy(loading, base, reading, ())
     found = contribution([typical(name)], (), base, records, reading)
     assert np.max(np.abs(found)) > 1e-3
 
 
-def rest(program):
-    """Return the program with the gear never touched."""
-    zero = np.zeros(len(program.deformation))
-    return dataclasses.replace(program, deformation=zero, rate=zero)
+def rest(loading):
+    """Return the loading with the gear never touched."""
+    zero = np.zeros(len(loading.deformation))
+    return dataclasses.replace(loading, deformation=zero, rate=zero)
 
 
 @everyone

@@ -70,11 +70,11 @@ def score(effects, base, records, reading):
 score_and_slope = jax.jit(jax.value_and_grad(score, argnums=(0, 1, 2)))
 
 
-def noisy(program, base, reading, effects):
+def noisy(loading, base, reading, effects):
     """Return the records with readings of the chain itself."""
-    mean, noise = compiled_chain(base, tuple(effects), program, reading)
+    mean, noise = compiled_chain(base, tuple(effects), loading, reading)
     drawn = draw_reading(jax.random.key(len(mean)), mean, noise)
-    return dataclasses.replace(program, force=drawn)
+    return dataclasses.replace(loading, force=drawn)
 
 
 def numbers(records):

@@ -66,11 +66,12 @@ def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
     problem, draws = posterior.moving, posterior.draws
     rows = np.linspace(0, len(draws["mass"]) - 1, _DRAWS).astype(int)
     values = {name: draw[rows] for name, draw in draws.items()}
-    mean, new = _predict(problem, values, jax.random.key(seed))
-    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
+    predicted = _predict(problem, values, jax.random.key(seed))
     real = slice(problem.count)
-    low, middle, high = np.quantile(mean[:, real], tails, axis=0)
-    new_low, _, new_high = np.quantile(new[:, real], tails, axis=0)
+    mean, new = (np.asarray(part)[:, real] for part in predicted)
+    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
+    low, middle, high = np.quantile(mean, tails, axis=0)
+    new_low, _, new_high = np.quantile(new, tails, axis=0)
     return MotionBands(
         np.asarray(problem.time[real]),
         np.asarray(problem.force[real]),

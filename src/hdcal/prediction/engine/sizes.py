@@ -103,7 +103,9 @@ def tolerance_strata(
         return StiffnessStrata(jnp.ones(1), jnp.zeros(1), jnp.ones(1))
     points = qmc.Sobol(len(tolerances), scramble=True, rng=0)
     unit = 2.0 * points.random_base2(_LOG2_GEARS) - 1.0
-    shifts = {n: t * unit[:, i] for i, (n, t) in enumerate(tolerances.items())}
+    # In one order, whatever that of the dict: JAX sorts the keys of a traced one.
+    fields = [field for field in SIZES.values() if field in tolerances]
+    shifts = {n: tolerances[n] * unit[:, i] for i, n in enumerate(fields)}
     factor = jnp.sort(stiffness_ratio(shifted(geometry, shifts), geometry, theory))
     ends = 0.5 - 0.5 * np.cos(np.pi * np.arange(_STRATA + 1) / _STRATA)
     count = np.diff(np.round(ends * len(unit)).astype(int))

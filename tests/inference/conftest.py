@@ -1,0 +1,10 @@
+"""Records on which every effect can be seen."""
+
+from effect_records import (  # noqa: F401
+    base,
+    differences,
+    gear,
+    loading,
+    reading,
+    scattered,
+)

@@ -1,0 +1,128 @@
+"""Fixtures: loadings on which every effect can be seen, and a slow derivative."""
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.flatten_util import ravel_pytree
+
+from hdcal.data.records import Geometry, Records
+from hdcal.physics.chain import Base, Reading
+
+EVERYTHING = frozenset(
+    {
+        "temperature",
+        "time",
+        "angle",
+        "force_sd",
+        "run",
+        "specimen",
+        "unloading",
+        "holds",
+        "rates",
+        "cycles",
+        "runs",
+        "specimens",
+    }
+)
+
+
+@pytest.fixture(scope="session")
+def gear() -> Geometry:
+    """The article's gear, loaded below the rim."""
+    return Geometry(0.68, 40.0, 70.0, 62.0, 0.3)
+
+
+@pytest.fixture(scope="session")
+def base() -> Base:
+    """An ordinary gear on an ordinary rig."""
+    return Base(209.0, 3.1e-4, 0.004, 1.5, 0.5)
+
+
+@pytest.fixture(scope="session")
+def reading() -> Reading:
+    """A rig that reads the radial displacement."""
+    return Reading(1.0, 20.0)
+
+
+@pytest.fixture(scope="session")
+def loading() -> Records:
+    """Three gears at three temperatures: up, hold, down fast; up and down slowly."""
+    top = 0.54
+    deformation = np.concatenate(
+        [
+            np.linspace(0.0, top, 20),
+            np.full(5, top),
+            np.linspace(top, 0.0, 16)[1:],
+            np.linspace(0.0, top, 11)[1:],
+            np.linspace(top, 0.0, 11)[1:],
+        ]
+    )
+    step = np.repeat([1.0, 20.0, 1.0, 8.0, 8.0], [20, 5, 15, 10, 10])
+    direction = np.repeat([1.0, 0.0, -1.0, 1.0, -1.0], [20, 5, 15, 10, 10])
+    sense = np.where(direction == 0.0, 1.0, direction)
+    rate = np.diff(deformation, prepend=-top / 19) / step
+    rows = 3 * len(deformation)
+    return Records(
+        deformation=np.tile(deformation, 3),
+        temperature=np.repeat([20.0, 80.0, 50.0], len(deformation)),
+        time=np.tile(np.cumsum(step), 3),
+        angle=np.linspace(0.0, 6.0 * np.pi, rows),
+        direction=np.tile(direction, 3),
+        sense=np.tile(sense, 3),
+        rate=np.tile(rate, 3),
+        run=np.repeat([0, 1, 2], len(deformation)),
+        specimen=np.repeat([0, 1, 2], len(deformation)),
+        force=np.zeros(rows),
+        force_sd=np.zeros(rows),
+        known=EVERYTHING,
+    )
+
+
+@pytest.fixture(scope="session")
+def scattered() -> Callable[[int], Records]:
+    """Return a maker of records without any order or sense, three runs of eight."""
+
+    def make(seed: int) -> Records:
+        rng = np.random.default_rng(seed)
+        rows = 24
+        run = np.repeat([0, 1, 2], 8)
+        sense = rng.choice([-1.0, 1.0], rows)
+        return Records(
+            deformation=rng.uniform(-0.5, 0.5, rows),
+            temperature=rng.uniform(-20.0, 90.0, rows),
+            time=np.tile(np.cumsum(rng.uniform(1.0, 60.0, 8)), 3),
+            angle=rng.uniform(0.0, 2.0 * np.pi, rows),
+            direction=sense * rng.choice([0.0, 1.0], rows),
+            sense=sense,
+            rate=rng.normal(0.0, 0.02, rows),
+            run=run,
+            specimen=run,
+            force=rng.normal(0.0, 60.0, rows),
+            force_sd=rng.uniform(0.0, 0.5, rows),
+            known=EVERYTHING,
+        )
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def differences() -> Callable:
+    """Return the slow derivative: fourth-order central differences, leaf by leaf."""
+
+    def gradient(function: Callable, point, step: float = 1e-3, least: float = 1e-3):
+        flat, unravel = ravel_pytree(point)
+        flat = np.asarray(flat)
+        slope = np.zeros(len(flat))
+        for index in range(len(flat)):
+            h = step * max(abs(flat[index]), least)
+            unit = np.eye(len(flat))[index] * h
+            near = function(unravel(jnp.asarray(flat + unit)))
+            near -= function(unravel(jnp.asarray(flat - unit)))
+            far = function(unravel(jnp.asarray(flat + 2.0 * unit)))
+            far -= function(unravel(jnp.asarray(flat - 2.0 * unit)))
+            slope[index] = (8.0 * float(near) - float(far)) / (12.0 * h)
+        return slope
+
+    return gradient
