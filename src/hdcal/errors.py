@@ -12,8 +12,11 @@ T = TypeVar("T")
 class Finding:
     """One thing wrong with an input, and what to do about it.
 
+    A parameter of the library is written in backticks within the words; a command
+    says its own option in its place.
+
     Attributes:
-        file: the input the finding is about, as the user named it.
+        file: the input the finding is about, as the user named it, or a parameter.
         problem: what is wrong, one sentence without a full stop.
         remedy: what to do, one sentence without a full stop.
         row: line of the file, 1 = header line; None when it concerns the file.

@@ -26,3 +26,19 @@ def test_findings_name_options_and_arguments(parameter, row, shown):
     with pytest.raises(InputError) as caught:
         asked.main([], standalone_mode=False)
     assert [finding.file for finding in caught.value.findings] == [shown]
+
+
+def test_parameters_within_the_words_are_options_too():
+    @command()
+    @click.option("--column", "columns", multiple=True)
+    @click.option("--force", is_flag=True)
+    def asked(columns, force):
+        words = "`columns` force=… is wrong, as `hdcal check` says"
+        raise InputError([Finding("data.csv", words, "Say `force` without `quick`")])
+
+    with pytest.raises(InputError) as caught:
+        asked.main([], standalone_mode=False)
+    assert str(caught.value) == (
+        "data.csv: --column force=… is wrong, as `hdcal check` says. "
+        "Say --force without `quick`."
+    )

@@ -203,4 +203,4 @@ def test_no_gear_says_what_to_do(folder):
     (folder / "data.csv").write_text(H)
     findings = findings_of(folder / "data.csv")
     assert len(findings) == 2
-    assert "--gear" in findings[1].remedy
+    assert "`gear`" in findings[1].remedy

@@ -1,11 +1,15 @@
-"""A command of hdcal: findings about a parameter are said of its option."""
+"""A command of hdcal: what is found about a parameter is said of its option."""
 
+import re
 from dataclasses import replace
 from functools import partial
 
 import click
 
-from hdcal.errors import InputError
+from hdcal.errors import Finding, InputError
+
+# How findings write a parameter within their words.
+_NAMED = re.compile(r"`(\w+)`")
 
 
 class Command(click.Command):
@@ -21,12 +25,18 @@ class Command(click.Command):
         try:
             return super().invoke(ctx)
         except InputError as error:
-            raise InputError(
-                replace(finding, file=options[finding.file])
-                if finding.file in options and finding.row is None
-                else finding
-                for finding in error.findings
-            ) from error
+            raise InputError(_of_options(f, options) for f in error.findings) from error
+
+
+def _of_options(finding: Finding, options: dict[str, str]) -> Finding:
+    """Return a finding with options in place of the library's parameters."""
+
+    def words(text: str) -> str:
+        return _NAMED.sub(lambda name: options.get(name[1], name[0]), text)
+
+    file = finding.file if finding.row else options.get(finding.file, finding.file)
+    said = {"problem": words(finding.problem), "remedy": words(finding.remedy)}
+    return replace(finding, file=file, **said)
 
 
 def _shown(parameter: click.Parameter) -> str:

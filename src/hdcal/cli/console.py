@@ -53,19 +53,19 @@ class Console:
         return shlex.join(["hdcal", *sys.argv[1:]])
 
     def check_target(
-        self, out: str | None, force: bool, option: str = "--force"
+        self, out: str | None, force: bool, replace: str = "force"
     ) -> None:
         """Note where a result could not be written, before any work is done.
 
         Args:
             out: the folder to make, or None.
             force: whether an older result may be replaced.
-            option: what to say to replace it.
+            replace: the parameter that says so.
         """
         if out is not None:
             from hdcal.report.folder import check_target
 
-            self.wrong.attempt(check_target, out, force=force, option=option)
+            self.wrong.attempt(check_target, out, force=force, replace=replace)
 
     def answer(
         self,

@@ -82,7 +82,7 @@ def match_columns(
         if quantity not in QUANTITIES:
             near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
             hint = f"Did you mean {near[0]}? " if near else ""
-            words = f"--column {quantity}=… names no quantity that hdcal knows"
+            words = f"`columns` {quantity}=… names no quantity that hdcal knows"
             findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
     columns: dict[str, Column] = {}
     for quantity in quantities:
@@ -157,7 +157,7 @@ def _name_remedy(quantity: str, headers: Sequence[str]) -> str:
     near += get_close_matches(example, headers, 1, 0.6)
     named = near[0] if near else "HEADER"
     unit = "[UNIT]" if _split_brackets(named)[1] is None else ""
-    return f"Name it like {example}, or say --column '{quantity}={named}{unit}'"
+    return f"Name it like {example}, or say `columns` '{quantity}={named}{unit}'"
 
 
 def _mapped(
@@ -167,7 +167,7 @@ def _mapped(
     # a header may itself end in brackets, so the whole text is tried as well
     wholes = {_squeezed(wanted), _squeezed(name)}
     hits = [i for i, header in enumerate(table.headers) if _squeezed(header) in wholes]
-    option = f"--column {quantity}="
+    option = f"`columns` {quantity}="
     if not hits:
         near = get_close_matches(name, table.headers, 1, 0.4)
         remedy = f"Use a header of the file, such as '{near[0]}'" if near else ""

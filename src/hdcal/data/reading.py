@@ -128,5 +128,5 @@ def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:
 
 def _no_gear(data: Path) -> Finding:
     words = "no gear file was named, and there is no gear.toml beside the data"
-    remedy = "Say --gear FILE.toml, or use a folder with data.csv and gear.toml"
+    remedy = "Say `gear` FILE.toml, or use a folder with data.csv and gear.toml"
     return Finding(str(data), words, remedy)

@@ -28,7 +28,7 @@ class DynamicPosterior(Posterior):
             InputError: always.
         """
         words = "this is a calibration of the moving gear, which knows no force zero"
-        remedy = "Take one without --dynamic, or ask hdcal respond"
+        remedy = "Take one of the gear at rest, or ask how the gear responds"
         raise InputError([Finding(self.case.name, words, remedy)])
 
     @cached_property

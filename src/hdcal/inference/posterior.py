@@ -172,11 +172,11 @@ class Posterior:
 
 
 def _of_another_kind(file, wanted: str) -> Finding:
-    words, remedy = {
-        "static": ("is a calibration of the moving gear", "without --dynamic"),
-        "dynamic": ("is a calibration of the gear at rest", "with --dynamic"),
-    }[wanted]
-    return Finding(str(file), words, f"Name the folder of a calibration {remedy}")
+    needed, found = "of the gear at rest", "of the moving gear"
+    if wanted == "dynamic":
+        needed, found = found, needed
+    remedy = f"Name the folder of a calibration {needed}"
+    return Finding(str(file), f"is a calibration {found}", remedy)
 
 
 def _look_up(names, library, file) -> tuple[type[Effect], ...]:

@@ -125,6 +125,6 @@ def misfits(posterior: Posterior) -> tuple[str, ...]:
         return ()
     return tuple(
         "This takes the model's shape for right, but its residuals have one. "
-        f"{shape.words.rstrip('.')}. Diagnose, or calibrate --with-gap."
+        f"{shape.words.rstrip('.')}. Diagnose, or calibrate with a gap."
         for shape in residuals(posterior).structure
     )

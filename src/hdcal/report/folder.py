@@ -78,7 +78,7 @@ def check_target(
     *,
     force: bool = False,
     ours: Callable[[Path], bool] = is_result,
-    option: str = "--force",
+    replace: str = "force",
 ) -> None:
     """Refuse a result that could not be written, before any work is done.
 
@@ -86,7 +86,7 @@ def check_target(
         target: the folder to make.
         force: whether an older result may be replaced.
         ours: tells what in an older folder may be replaced.
-        option: what to say on the command line to replace it.
+        replace: the parameter that replaces it.
 
     Raises:
         InputError: it exists, is a file, or its parent cannot be written to.
@@ -94,7 +94,7 @@ def check_target(
     _check_place(Path(target))
     real = _real(target)
     if real.is_dir():
-        _check_existing(real, target, force, ours, option)
+        _check_existing(real, target, force, ours, replace)
     elif real.exists():
         raise _refusal(target, "is a file", "Name a folder that does not exist yet")
 
@@ -110,7 +110,7 @@ def check_file(target: Path | str, *, force: bool = False) -> None:
     if real.is_dir():
         raise _refusal(target, "is a folder", "Name a file")
     if real.exists() and not force:
-        remedy = "Name another file, or say --force to replace it"
+        remedy = "Name another file, or say `force` to replace it"
         raise _refusal(target, "exists already", remedy)
 
 
@@ -215,10 +215,10 @@ def _check_existing(
     target: Path | str,
     force: bool,
     ours: Callable[[Path], bool],
-    option: str,
+    replace: str,
 ) -> None:
     if not force:
-        remedy = f"Name another folder with --out, or say {option} to replace it"
+        remedy = f"Name another folder with `out`, or say `{replace}` to replace it"
         raise _refusal(target, "exists already", remedy)
     foreign = sorted(
         entry.name
@@ -227,7 +227,7 @@ def _check_existing(
     )
     if foreign:
         words = f"holds '{foreign[0]}', which hdcal did not write"
-        remedy = f"{option} replaces results only: name another folder"
+        remedy = f"`{replace}` replaces results only: name another folder"
         raise _refusal(target, words, remedy)
 
 
@@ -246,7 +246,7 @@ def _is_verdict(entry: Path) -> bool:
 
 
 def _refusal(target: Path | str, problem: str, remedy: str) -> InputError:
-    return InputError([Finding(str(target) or "--out", problem, remedy)])
+    return InputError([Finding(str(target) or "out", problem, remedy)])
 
 
 def _unwritable(target: Path | str, error: OSError) -> InputError:

@@ -49,7 +49,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     """
     out = out if out is not None else f"{Path(run).resolve().name}-response"
     with console.wrong:
-        console.check_target(out, replace, "--replace")
+        console.check_target(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
     keep_compilations()
     from hdcal.inference.dynamic_posterior import load_any
