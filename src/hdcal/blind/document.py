@@ -160,7 +160,7 @@ def _measured(
 
 
 def _beside_others(found: Scores) -> Section:
-    brier: Mapping[Any, Estimate] = found.brier
+    brier = found.brier
     lines = [{**row, "brier": brier.get(row["name"])} for row in found.rivals]
     note = (
         "The oracle knows the size of the gap, the noise and the rig, and that an "
@@ -190,8 +190,7 @@ def _confused(found: Scores) -> Section:
         columns = ["truth", "answered", "cases"]
         long = frozenset({"truth", "answered"})
         blocks.append(Table(columns, rows, frozenset({"cases"}), long))
-    counted: Mapping[str, Any] = found.pairs
-    pairs = [(words, with_span(counted[key])) for key, words in _PAIRS]
+    pairs = [(words, with_span(found.pairs[key])) for key, words in _PAIRS]
     heading = f"Two effects at once ({found.pairs['n']} cases)"
     blocks.append(Details(heading, [Facts(pairs)], folded=False))
     return Section("Who is taken for whom", blocks)

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from hdcal.blind.scoring.estimates import Estimate, share
 from hdcal.blind.scoring.proper_scores import log_score
@@ -18,7 +19,7 @@ PAIR, OUTSIDE, WITHHELD, REAL = "pair", "outside", "withheld", "real"
 
 
 # A line of a table, by column: names, counts and estimates.
-Row = dict[str, str | int | tuple[float, float] | Estimate | None]
+Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
