@@ -7,15 +7,14 @@ from typing import Any
 
 import click
 
+from hdcal.blind.command.forms import check_forms
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import force_option, is_given, json_option
+from hdcal.cli.options import force_option, json_option
 
 # With fewer somebody could draw the cases of every seed and look which ones fit.
 _SEED_BITS = 128
-# Parameters of one form only; of each the first two are needed.
-_DRAWN, _REAL = ("cases", "mix", "seed", "program"), ("cause", "gear", "withhold")
 _HELP = {
     "seed": "Of the draws; it has to stay secret [default: random].",
     "program": "Let every case go through what this measurement did [default: the "
@@ -43,7 +42,7 @@ _HELP = {
 def make(console: Console, source, out, key, force, **given) -> None:
     """Seal cases drawn from a mix, or one measurement with a stated cause."""
     one_thread_for_algebra()
-    _check_forms(real=source is not None)
+    check_forms(real=source is not None)
     from hdcal.blind.answer import SetAnswer
     from hdcal.blind.sealed_set import check_free, write_set
 
@@ -77,14 +76,3 @@ def _measured(source, gear, cause, withhold, **_) -> dict[str, Any]:
         source, gear=gear, cause=cause, withhold=withhold
     )
     return {"drawn": [(table, label)], "gear": gear}
-
-
-def _check_forms(real: bool) -> None:
-    """Refuse a mixture of the two forms of `make`, or half of one."""
-    own, foreign = (_REAL, _DRAWN) if real else (_DRAWN, _REAL)
-    for name in own[:2]:
-        if not is_given(name):
-            raise click.UsageError(f"Missing option '--{name}'.")
-    for name in filter(is_given, foreign):
-        form = "with" if real else "without"
-        raise click.UsageError(f"--{name} means nothing {form} --from.")
