@@ -9,7 +9,7 @@ import sys
 
 import click
 
-from hdcal.blind.command import blind
+from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects

@@ -13,8 +13,9 @@ from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 
 from hdcal.blind.figure import bar_figure, confusion_figure
 from hdcal.blind.label import CaseAnswer, Label
-from hdcal.blind.result_files import score_files
-from hdcal.blind.scoring.scores import score
+from hdcal.blind.result_folder import write_result
+from hdcal.blind.scoring.bar import BarResult
+from hdcal.blind.scoring.scores import Scores, score
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.folder import OUTPUTS
@@ -26,14 +27,8 @@ NAUGHTY = (
 )
 
 
-def write_scores(found: dict, folder: Path) -> None:
-    """Write all files of a result."""
-    for name, content in score_files(found).items():
-        (folder / name).write_bytes(content)
-
-
 @cache
-def made(count: int, rename: str | None = None) -> dict:
+def made(count: int, rename: str | None = None) -> Scores:
     """Return scores of a made-up diagnoser that is right three times in four."""
     rng = np.random.default_rng(4)
     labels, answers, rival = [], [], []
@@ -75,7 +70,7 @@ SETS = {
 def folder(request, tmp_path_factory) -> Path:
     """A written report, one kind after the other."""
     target = tmp_path_factory.mktemp(request.param)
-    write_scores(made(*SETS[request.param]), target)
+    write_result(target, made(*SETS[request.param]))
     return target
 
 
@@ -120,17 +115,22 @@ def test_everything_is_written_and_may_be_replaced(folder: Path):
     assert names <= OUTPUTS
 
 
+def fields_of(value) -> dict:
+    """Return the fields of a dataclass, with the names that JSON gives them."""
+    return {name.rstrip("_"): field for name, field in vars(value).items()}
+
+
 def test_the_json_holds_the_scores_and_no_nan(tmp_path: Path):
     found = made(40)
-    write_scores(found, tmp_path)
+    write_result(tmp_path, found)
     text = (tmp_path / "scores.json").read_text("utf-8")
     assert "NaN" not in text and "Infinity" not in text
     # Tuples become lists, nothing else changes.
-    assert json.loads(text) == json.loads(json.dumps(found))
+    assert json.loads(text) == json.loads(json.dumps(found, default=fields_of))
 
 
 def test_names_from_outside_stay_names(tmp_path: Path):
-    write_scores(made(120, NAUGHTY), tmp_path)
+    write_result(tmp_path, made(120, NAUGHTY))
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "<script" not in page
     assert "&lt;script&gt;alert" in page
@@ -141,27 +141,27 @@ def test_names_from_outside_stay_names(tmp_path: Path):
 
 def test_met_and_missed_are_said_in_words(tmp_path: Path):
     found = made(400)
-    write_scores(found, tmp_path)
+    write_result(tmp_path, found)
     page = (tmp_path / "report.html").read_text("utf-8")
     tags = Counter(re.findall(r'<span class="tag [^"]*">(\w+)', page))
-    assert tags["met"] == found["summary"]["met"] > 0
-    assert tags["missed"] == found["summary"]["missed"] > 0
-    assert tags["no"] == found["summary"]["open"]
-    assert all(row["what"] in page for row in found["bar"] if "'" not in row["what"])
+    assert tags["met"] == found.summary.met > 0
+    assert tags["missed"] == found.summary.missed > 0
+    assert tags["no"] == found.summary.open
+    assert all(row.what in page for row in found.bar if "'" not in row.what)
 
 
 def test_the_same_scores_give_the_same_files(tmp_path: Path):
     for name in ("one", "two"):
         (tmp_path / name).mkdir()
-        write_scores(made(30), tmp_path / name)
+        write_result(tmp_path / name, made(30))
     for entry in (tmp_path / "one").iterdir():
         assert entry.read_bytes() == (tmp_path / "two" / entry.name).read_bytes()
 
 
-ROW = {
-    "what": "x", "value": 0.934, "lo": 0.9, "hi": 0.95, "n": 10, "target": 0.9,
-    "direction": "at least", "unit": "share", "interval": "", "met": True, "firm": True,
-}  # fmt: skip
+ROW = BarResult(
+    key="x", what="x", value=0.934, lo=0.9, hi=0.95, n=10, interval="", target=0.9,
+    direction="at least", unit="share", met=True, firm=True,
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ ROW = {
             ("no target", "93.4 %", "–", "–"),
         ),
         (
-            {"met": None, "value": None, "lo": None, "target": [0.85, 0.95]},
+            {"met": None, "value": None, "lo": None, "target": (0.85, 0.95)},
             ("no cases", "–", "–", "85 … 95 %"),
         ),
         (
@@ -188,18 +188,18 @@ ROW = {
     ],
 )
 def test_a_row_in_words(changes: dict, words: tuple):
-    row = bar_row(ROW | changes)
-    assert (str(row["word"]), row["value"], row["span"], row["target"]) == words
+    _, word, value, target, span, *_ = bar_row(replace(ROW, **changes))
+    assert (str(word), value, span, target) == words
 
 
 def test_a_number_with_its_interval_in_words():
     assert with_span(ROW) == "93.4 % (90.0 … 95.0 %)"
     assert with_span(None) == "–"
-    assert span({"lo": -1.234, "hi": 0.5}, "nat") == "−1.23 … 0.50"
+    assert span(replace(ROW, lo=-1.234, hi=0.5), "nat") == "−1.23 … 0.50"
 
 
 def test_a_number_past_the_edge_of_its_panel_stands_at_the_edge():
-    rows = [ROW | {"value": -5.0, "lo": -6.0, "hi": 7.0, "unit": "points"}]
+    rows = [replace(ROW, value=-5.0, lo=-6.0, hi=7.0, unit="points")]
     axes = bar_figure(rows).axes[0]
     low, high = axes.get_xlim()
     places = [x for line in axes.lines for x in line.get_xdata()]
@@ -208,14 +208,14 @@ def test_a_number_past_the_edge_of_its_panel_stands_at_the_edge():
 
 def test_figures_are_drawn_of_the_scores_alone():
     found = made(60)
-    drawn = bar_figure(found["bar"])
+    drawn = bar_figure(found.bar)
     assert len(drawn.axes) == 2
     shown = [
         text.get_text().replace("\n", " ") for text in drawn.axes[0].get_yticklabels()
     ]
-    rows = [r for r in found["bar"] if r["value"] is not None and r["unit"] != "p"]
-    assert shown == [r["what"] for r in rows if r["unit"] in ("share", "points")]
-    matrix = confusion_figure(found["confusion"])
+    rows = [r for r in found.bar if r.value is not None and r.unit != "p"]
+    assert shown == [r.what for r in rows if r.unit in ("share", "points")]
+    matrix = confusion_figure(found.confusion)
     texts = [text.get_text() for text in matrix.axes[0].texts]
-    counts = [n for line in found["confusion"]["counts"] for n in line if n]
+    counts = [n for line in found.confusion.counts for n in line if n]
     assert texts == [str(n) for n in counts]

@@ -5,6 +5,7 @@ import pytest
 
 from hdcal.blind.answering import answer_set
 from hdcal.blind.open import open_set
+from hdcal.blind.scoring.scores import Scores
 from hdcal.blind.sealed_set import write_set
 from hdcal.blind.virtual_rig.cases import GEAR_TOML, draw_cases
 from hdcal.physics.registry import EFFECTS
@@ -14,14 +15,14 @@ CASES, SEED = 16, 20
 
 
 @pytest.fixture(scope="module")
-def scores(tmp_path_factory) -> dict:
+def scores(tmp_path_factory) -> Scores:
     folder = tmp_path_factory.mktemp("slice") / "set"
     key = folder.with_suffix(".key")
     drawn = draw_cases("prior", CASES, SEED)
     write_set(folder, drawn, GEAR_TOML, key, mix="prior", seed=SEED)
     for name in ("hdcal", "bic", "r2", "none"):
         answer_set(folder, by=name)
-    return open_set(folder, key).result["scores"]
+    return open_set(folder, key).scores
 
 
 def guess(label) -> float:
@@ -33,13 +34,13 @@ def guess(label) -> float:
 
 def test_its_log_score_is_best(scores):
     """Better than the rivals', and than knowing how the cases were drawn."""
-    found = {name: each["value"] for name, each in scores["log_score"].items()}
+    found = {name: each.value for name, each in scores.log_score.items()}
     assert max(found, key=lambda name: found[name]) == "hdcal"
     known = [guess(label) for _, label in draw_cases("prior", CASES, SEED)]
     assert found["hdcal"] > np.mean(known) + 0.5
 
 
 def test_it_names_nothing_where_nothing_is(scores):
-    rows = {row["key"]: row for row in scores["bar"]}
-    assert rows["named_on_null"]["n"] >= 4
-    assert rows["named_on_null"]["value"] == 0.0
+    rows = {row.key: row for row in scores.bar}
+    assert rows["named_on_null"].n >= 4
+    assert rows["named_on_null"].value == 0.0

@@ -52,16 +52,16 @@ def test_false_alarms_by_hand():
     answers = [said(x.case, **quiet, detected=x.case != "q0") for x in labels[:5]]
     answers.append(said("strong"))
     found = scored(labels, answers)
-    assert row(found, "false_alarm_iid")["value"] == 0.75
-    assert row(found, "false_alarm_ar")["n"] == 1
-    assert row(found, "named_on_null")["value"] == pytest.approx(1 / 6)
+    assert row(found, "false_alarm_iid").value == 0.75
+    assert row(found, "false_alarm_ar").n == 1
+    assert row(found, "named_on_null").value == pytest.approx(1 / 6)
 
 
 def test_detection_counts_from_five_standard_errors_on():
     labels = [truth("a", r=0.5), truth("b", r=0.5, rows=99), truth("c", r=5.0)]
     answers = [said(x.case, detected=x.case != "c") for x in labels]
     found = row(scored(labels, answers), "detected")
-    assert (found["n"], found["value"], found["met"]) == (2, 0.5, False)
+    assert (found.n, found.value, found.met) == (2, 0.5, False)
 
 
 def test_the_first_effect_and_the_distance_to_the_oracle_by_hand():
@@ -70,22 +70,22 @@ def test_the_first_effect_and_the_distance_to_the_oracle_by_hand():
     wrong = {"drift": 0.6, "slack": 0.4}
     answers = [said("0", chances=wrong), said("1"), said("2", verdict="ambiguous")]
     found = scored(labels, answers)
-    assert row(found, "top1_rich_r1")["value"] == pytest.approx(2 / 3)
+    assert row(found, "top1_rich_r1").value == pytest.approx(2 / 3)
     # The oracle is right once of two, the answers as well, on the other case.
     away = row(found, "oracle_r1")
-    assert (away["value"], away["n"]) == (0.0, 2)
-    assert away["lo"] < 0.0 < away["hi"]
-    assert row(found, "top1_r1_2")["n"] == 3
-    assert row(found, "top1_rich_r0.5")["met"] is None
+    assert (away.value, away.n) == (0.0, 2)
+    assert away.lo < 0.0 < away.hi
+    assert row(found, "top1_r1_2").n == 3
+    assert row(found, "top1_rich_r0.5").met is None
 
 
 def test_programs_and_withheld_truths_do_not_mix_into_the_first_effect():
     labels = [truth("a", program="ramp"), truth("b", withheld=("slack",))]
     found = scored(labels, [said("a"), said("b", effect="drift")])
-    assert row(found, "top1_rich_r1")["n"] == 0
-    assert row(found, "top1_r1_2")["n"] == 1
-    assert row(found, "named_withheld")["value"] == 1.0
-    assert row(found, "precision")["n"] == 1
+    assert row(found, "top1_rich_r1").n == 0
+    assert row(found, "top1_r1_2").n == 1
+    assert row(found, "named_withheld").value == 1.0
+    assert row(found, "precision").n == 1
 
 
 def test_the_set_by_hand():
@@ -93,9 +93,9 @@ def test_the_set_by_hand():
     sets = [("slack",), ("drift", "slack"), ("drift",), ("drift", "none", "unknown")]
     answers = [said(str(i), set=names) for i, names in enumerate(sets)]
     found = scored(labels, answers)
-    assert row(found, "set_holds")["value"] == 0.5
-    assert row(found, "set_size")["value"] == 1.75
-    assert row(found, "set_size")["met"] is False
+    assert row(found, "set_holds").value == 0.5
+    assert row(found, "set_size").value == 1.75
+    assert row(found, "set_size").met is False
 
 
 def test_precision_counts_names_over_all_kinds():
@@ -109,7 +109,7 @@ def test_precision_counts_names_over_all_kinds():
     ]
     answers = [said(x.case) for x in labels[:5]] + [said("f", verdict="ambiguous")]
     found = row(scored(labels, answers), "precision")
-    assert (found["n"], found["value"]) == (5, 0.6)
+    assert (found.n, found.value) == (5, 0.6)
 
 
 def test_what_the_library_does_not_hold():
@@ -121,9 +121,9 @@ def test_what_the_library_does_not_hold():
     ]
     answers = [said("0"), *(said(str(i), "unknown", None) for i in range(1, 5))]
     found = scored(labels, answers)
-    assert (row(found, "unknown_spanned")["value"]) == 0.5
-    assert (row(found, "named_spanned")["value"]) == 0.5
-    assert row(found, "unknown_unspanned")["n"] == 1
+    assert (row(found, "unknown_spanned").value) == 0.5
+    assert (row(found, "named_spanned").value) == 0.5
+    assert row(found, "unknown_unspanned").n == 1
 
 
 def test_sizes_by_hand():
@@ -137,11 +137,11 @@ def test_sizes_by_hand():
         said("2", amplitude={"drift.rate": (9.0, 8.0, 10.0)}),
     ]
     found = scored(labels, answers)
-    assert row(found, "amplitude")["value"] == pytest.approx((0.1 + 0.5) / 2)
-    assert row(found, "amplitude_holds")["value"] == 0.5
-    assert row(found, "amplitude_holds")["target"] == [0.85, 0.95]
-    assert row(found, "gap")["value"] == pytest.approx(0.5)
-    assert row(found, "gap_holds")["value"] == 0.5
+    assert row(found, "amplitude").value == pytest.approx((0.1 + 0.5) / 2)
+    assert row(found, "amplitude_holds").value == 0.5
+    assert row(found, "amplitude_holds").target == (0.85, 0.95)
+    assert row(found, "gap").value == pytest.approx(0.5)
+    assert row(found, "gap_holds").value == 0.5
 
 
 def test_the_closed_share_counts_where_the_effect_is_right():
@@ -155,20 +155,20 @@ def test_the_closed_share_counts_where_the_effect_is_right():
     ]
     closures = {name: 0.9 for name in "abcd"}
     found = row(scored(labels, answers, closures=closures), "closed")
-    assert (found["n"], found["value"]) == (1, pytest.approx(0.1))
-    assert found["met"] is False
-    assert row(scored(labels, answers), "closed")["met"] is None
+    assert (found.n, found.value) == (1, pytest.approx(0.1))
+    assert found.met is False
+    assert row(scored(labels, answers), "closed").met is None
 
 
 def test_met_is_the_value_and_firm_the_interval():
     labels = [truth(str(i), "null", (), 0.0) for i in range(1000)]
     few = [said(str(i), "none", None, detected=i < 45) for i in range(1000)]
     found = row(scored(labels, few), "false_alarm_iid")
-    assert (found["met"], found["firm"]) == (True, False)
+    assert (found.met, found.firm) == (True, False)
     none = [replace(answer, detected=False) for answer in few]
     found = row(scored(labels, none), "false_alarm_iid")
-    assert (found["met"], found["firm"]) == (True, True)
-    assert found["interval"] == "Wilson 95 %"
+    assert (found.met, found.firm) == (True, True)
+    assert found.interval == "Wilson 95 %"
 
 
 # Proper scores
@@ -183,8 +183,8 @@ def test_log_and_brier_scores_by_hand():
     ]
     found = scored(labels, answers)
     log = (math.log(0.5) + math.log(1e-6)) / 2
-    assert found["log_score"]["hdcal"]["value"] == pytest.approx(log)
-    assert found["log_score"]["hdcal"]["n"] == 2
-    assert found["brier"]["hdcal"]["value"] == pytest.approx(
+    assert found.log_score["hdcal"].value == pytest.approx(log)
+    assert found.log_score["hdcal"].n == 2
+    assert found.brier["hdcal"].value == pytest.approx(
         (0.25 + 0.0625 + 0.0625 + 2.0) / 2
     )

@@ -89,11 +89,9 @@ def test_calibration_is_taken_over_the_chosen_cases():
     labels = [truth(str(i)) for i in range(60)]
     answers = [said(str(i), effect="slack" if i < 30 else "drift") for i in range(60)]
     good = scored(labels, answers, calibration_cases={str(i) for i in range(30)})
-    assert row(good, "calibration_top")["value"] == 0.0
-    assert row(good, "calibration_top")["n"] == 30
-    assert row(scored(labels, answers), "calibration_top")["value"] == pytest.approx(
-        0.5
-    )
+    assert row(good, "calibration_top").value == 0.0
+    assert row(good, "calibration_top").n == 30
+    assert row(scored(labels, answers), "calibration_top").value == pytest.approx(0.5)
 
 
 def test_the_reliability_table_by_hand():
@@ -101,12 +99,12 @@ def test_the_reliability_table_by_hand():
     names = ["slack", "slack", "drift", "slack"]
     labels = [truth(str(i), names=(name,)) for i, name in enumerate(names)]
     answers = [said(label.case, chances=chances) for label in labels]
-    found = scored(labels, answers)["reliability"]
-    (own,) = found["top"]["bins"]
-    assert (own["stated"], own["true"], own["n"]) == (0.75, 0.75, 4)
-    assert found["top"]["floor"]["hi"] >= found["top"]["floor"]["mean"] > 0.0
-    assert found["effects"]["statements"] == 8
-    assert [line["effect"] for line in found["classwise"]] == ["drift", "slack"]
+    found = scored(labels, answers).reliability
+    (own,) = found.top.bins
+    assert (own.stated, own.true, own.n) == (0.75, 0.75, 4)
+    assert found.top.floor.hi >= found.top.floor.mean > 0.0
+    assert found.effects.statements == 8
+    assert [line.effect for line in found.classwise] == ["drift", "slack"]
 
 
 # Detection limits
@@ -117,17 +115,17 @@ def test_the_detection_limit_comes_back():
     r = np.exp(rng.uniform(np.log(0.05), np.log(2.0), 3000))
     middle, slope = math.log(0.3), 4.0
     chance = ALARM + (1 - ALARM) / (1 + np.exp(-slope * (np.log(r) - middle)))
-    found = fit(r, (rng.random(3000) < chance).astype(float))
+    found = fit("x", r, (rng.random(3000) < chance).astype(float))
     true = math.exp(middle + math.log((0.9 - ALARM) / 0.1) / slope)
-    assert found["lo"] < true < found["hi"]
-    assert found["r90"] == pytest.approx(true, rel=0.06)
-    assert (np.diff(found["curve"]["fraction"]) >= 0.0).all()
+    assert found.lo < true < found.hi
+    assert found.r90 == pytest.approx(true, rel=0.06)
+    assert (np.diff(found.curve.fraction) >= 0.0).all()
 
 
 def test_a_limit_that_is_not_reached_is_null_and_one_below_all_is_said_to_be():
     r = np.array([0.1, 0.2, 0.5] * 10)
-    never = fit(r, np.zeros(30))
-    assert (never["r90"], never["hi"], never["reached"]) == (None, None, False)
-    always = fit(np.array([1.0, 2.0, 5.0] * 30), np.ones(90))
-    assert always["r90"] == pytest.approx(1.0)
-    assert always["below_all"] and always["reached"]
+    never = fit("x", r, np.zeros(30))
+    assert (never.r90, never.hi, never.reached) == (None, None, False)
+    always = fit("x", np.array([1.0, 2.0, 5.0] * 30), np.ones(90))
+    assert always.r90 == pytest.approx(1.0)
+    assert always.below_all and always.reached

@@ -66,7 +66,7 @@ def test_a_stamp_shows_every_change():
 
 def test_a_commitment_is_that_of_salt_label_and_data():
     salt, plain = new_salt(), label("a")
-    expected = digest(bytes.fromhex(salt) + canonical(plain.plain()) + CSV.encode())
+    expected = digest(bytes.fromhex(salt) + canonical(plain) + CSV.encode())
     assert commit(plain, salt, CSV) == expected
     others = (
         commit(plain, new_salt(), CSV),

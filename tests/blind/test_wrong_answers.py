@@ -8,7 +8,7 @@ from handmade import order_of
 from honest import EFFECTS, FAMILIES, PAIRS, Check, make_check, worded
 
 from hdcal.blind.label import CaseAnswer
-from hdcal.blind.scoring.bar import bar
+from hdcal.blind.scoring.bar import BarResult, bar
 from hdcal.blind.scoring.file_order import order_dependence
 from hdcal.blind.scoring.reliability import reliabilities
 from hdcal.blind.scoring.scored_case import match_answers
@@ -44,17 +44,17 @@ def check() -> Check:
     return make_check()
 
 
-def rows_of(check: Check, answers: Sequence[CaseAnswer]) -> dict[str, dict]:
+def rows_of(check: Check, answers: Sequence[CaseAnswer]) -> dict[str, BarResult]:
     """Return the rows of the bar by key, without the rest of the score."""
     cases = match_answers(check.labels, answers, name="hdcal", all_of_them=True)
     stated = reliabilities([c for c in cases if c.label.case in check.mixed])
     rows = bar(cases, check.closures, stated, order_dependence(cases))
-    return {row["key"]: row for row in rows}
+    return {row.key: row for row in rows}
 
 
 def missed(check: Check, answers: Sequence[CaseAnswer]) -> set[str]:
     """Return the keys of the rows that are missed."""
-    return {key for key, row in rows_of(check, answers).items() if row["met"] is False}
+    return {key for key, row in rows_of(check, answers).items() if row.met is False}
 
 
 def changed(
@@ -81,16 +81,16 @@ def certain(answer: CaseAnswer, effect: str) -> CaseAnswer:
 
 def test_the_honest_one_meets_every_row(check: Check):
     rows = rows_of(check, check.answers)
-    open_rows = {key for key, row in rows.items() if row["met"] is None}
+    open_rows = {key for key, row in rows.items() if row.met is None}
     assert open_rows == NO_TARGET
-    assert all(row["met"] for key, row in rows.items() if key not in NO_TARGET)
-    assert all(row["n"] >= 20 for row in rows.values())
+    assert all(row.met for key, row in rows.items() if key not in NO_TARGET)
+    assert all(row.n >= 20 for row in rows.values())
 
 
 def test_the_score_holds_these_rows(check: Check):
     plain = {"calibration_cases": check.mixed, "closures": check.closures}
     found = score(check.labels, {"hdcal": check.answers}, FAMILIES, **plain)
-    assert found["bar"] == [*rows_of(check, check.answers).values()]
+    assert found.bar == [*rows_of(check, check.answers).values()]
 
 
 def test_the_honest_one_meets_them_with_other_cases():
@@ -98,7 +98,7 @@ def test_the_honest_one_meets_them_with_other_cases():
     other = make_check(800, seed=11)
     rows = rows_of(other, other.answers)
     for key in ("calibration_top", "calibration_effects", "precision", "order"):
-        assert rows[key]["met"], key
+        assert rows[key].met, key
 
 
 def test_one_who_always_names_the_same_effect(check: Check):
@@ -134,9 +134,9 @@ def sharpened(answer: CaseAnswer) -> CaseAnswer:
 
 def test_one_who_is_surer_than_he_may_be(check: Check):
     rows = rows_of(check, changed(check, sharpened))
-    failed = {key for key, row in rows.items() if row["met"] is False}
+    failed = {key for key, row in rows.items() if row.met is False}
     assert failed == {"calibration_top", "calibration_effects"}
-    assert rows["top1_rich_r0.5"]["met"] and rows["top1_rich_r1"]["met"]
+    assert rows["top1_rich_r0.5"].met and rows["top1_rich_r1"].met
 
 
 def test_one_who_is_less_sure_than_he_could_be(check: Check):
@@ -167,11 +167,8 @@ def test_one_who_answers_with_the_truth_next_door(check: Check):
     ]
     assert "order" in missed(check, answers)
     found = order_of(check.labels, answers)
-    assert found["truth_of_neighbour"]["p_value"] < 0.01
-    assert (
-        found["truth_of_neighbour"]["seen"]
-        > 1.5 * (found["truth_of_neighbour"]["expected"])
-    )
+    assert found.truth_of_neighbour.p_value < 0.01
+    assert found.truth_of_neighbour.seen > 1.5 * (found.truth_of_neighbour.expected)
 
 
 def test_cases_that_are_not_shuffled_are_seen(check: Check):
@@ -180,10 +177,10 @@ def test_cases_that_are_not_shuffled_are_seen(check: Check):
     labels = [replace(label, case=names[label.case]) for label in check.labels]
     answers = [replace(a, case=names[a.case]) for a in check.answers]
     found = order_of(labels, answers)
-    assert found["truth_itself"]["p_value"] < 0.01
+    assert found.truth_itself.p_value < 0.01
     # The order held the truth, but these answers took nothing from it.
-    assert found["p_value"] > 0.01
-    assert order_of(check.labels, check.answers)["truth_itself"]["p_value"] > 0.01
+    assert found.p_value > 0.01
+    assert order_of(check.labels, check.answers).truth_itself.p_value > 0.01
 
 
 def test_one_whose_intervals_are_too_narrow_or_too_wide(check: Check):

@@ -1,9 +1,10 @@
 """Labels and answers in a few words, for examples that a hand can reckon."""
 
 from hdcal.blind.label import CaseAnswer, Label
-from hdcal.blind.scoring.file_order import order_dependence
+from hdcal.blind.scoring.bar import BarResult
+from hdcal.blind.scoring.file_order import FileOrder, order_dependence
 from hdcal.blind.scoring.scored_case import match_answers
-from hdcal.blind.scoring.scores import score
+from hdcal.blind.scoring.scores import Scores, score
 
 KINDS = {"slack": "rig", "friction": "rig", "drift": "time"}
 
@@ -22,15 +23,15 @@ def said(case="a", verdict="named", effect="slack", chances=None, **more) -> Cas
     )
 
 
-def scored(labels, answers, **more) -> dict:
+def scored(labels, answers, **more) -> Scores:
     return score(labels, {"hdcal": answers}, KINDS, **more)
 
 
-def order_of(labels, answers) -> dict:
+def order_of(labels, answers) -> FileOrder:
     """Return how answers go with the order of the files."""
     cases = match_answers(labels, answers, name="answers", all_of_them=False)
     return order_dependence(cases)
 
 
-def row(found: dict, key: str) -> dict:
-    return next(row for row in found["bar"] if row["key"] == key)
+def row(found: Scores, key: str) -> BarResult:
+    return next(row for row in found.bar if row.key == key)

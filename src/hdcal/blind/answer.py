@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from hdcal.blind.scoring.scores import Scores
+from hdcal.blind.seal import Entry
 from hdcal.report.answer import Answer, Digest
 
 
@@ -12,7 +14,7 @@ class SetAnswer(Answer):
 
     schema: Literal["hdcal.blind/1"] = "hdcal.blind/1"
     commitment: Digest
-    cases: tuple[dict[str, str], ...]
+    cases: tuple[Entry, ...]
     gear_sha256: Digest
     sealed_sha256: Digest
     versions: dict[str, str]
@@ -42,11 +44,17 @@ class ScoredAnswers:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScoresAnswer(Answer):
-    """What `hdcal blind open` answers: whose answers, and their scores."""
+class Opening:
+    """Which set was opened and whose answers were scored, as in opening.json."""
 
     schema: Literal["hdcal.blind-result/1"] = "hdcal.blind-result/1"
     set_commitment: Digest
     mix: str | None
     answers: dict[str, ScoredAnswers]
-    scores: dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScoresAnswer(Opening, Answer):
+    """What `hdcal blind open` answers: whose answers, and their scores."""
+
+    scores: Scores

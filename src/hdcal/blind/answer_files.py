@@ -31,7 +31,7 @@ class AnswerFiles:
     def __init__(self, found: BlindSet, by: str):
         if not is_name(by):
             words = f"'{by[:60]}' cannot be part of a file's name"
-            raise refusal("--by", words, "Use letters, digits, - and _")
+            raise refusal("by", words, "Use letters, digits, - and _")
         self.set, self.by = found, by
         self.folder = found.folder / f"{_PREFIX}{by}"
         self.file = found.folder / f"{_PREFIX}{by}.json"
@@ -86,7 +86,7 @@ class AnswerFiles:
         return data
 
     def write(
-        self, entry: Entry, answer: dict[str, Any], fingerprint: Mapping[str, Any]
+        self, entry: Entry, answer: CaseAnswer, fingerprint: Mapping[str, Any]
     ) -> None:
         """Write one answer, whole or not at all."""
         data = {

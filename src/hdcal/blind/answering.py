@@ -15,6 +15,7 @@ from hdcal.blind.diagnosers import (
     fingerprint,
     withheld_from,
 )
+from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import Entry, canonical, digest
 from hdcal.blind.sealed_set import CASES, SET, BlindSet, read_set, refusal
 from hdcal.cli.processes import completed
@@ -23,8 +24,8 @@ from hdcal.diagnosis.library import choose_library
 from hdcal.errors import Finding, HdcalError, InputError
 from hdcal.inference.sample import Progress
 
-# Name of the case, its answer, and what is wrong: of the last two one is empty.
-CaseOutcome = tuple[str, dict[str, Any], tuple[Finding, ...]]
+# Name of the case, and its answer or else what is wrong.
+CaseOutcome = tuple[str, CaseAnswer | None, tuple[Finding, ...]]
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,7 @@ def answer_set(
     """
     if by not in diagnosers:
         words, known = f"nobody is called '{by[:60]}'", ", ".join(sorted(diagnosers))
-        raise refusal("--by", words, f"Known are: {known}")
+        raise refusal("by", words, f"Known are: {known}")
     choose_library(library)
     found = read_set(folder)
     _check_libraries(found)
@@ -88,7 +89,7 @@ def answer_set(
     # Closed whatever happens: no process works on for an answer that is not kept.
     with closing(_outcomes(found, tasks, jobs, scheduler)) as outcomes:
         for done, (case, answer, findings) in enumerate(outcomes, len(kept) + 1):
-            if findings:
+            if answer is None:
                 raise InputError(findings)
             answers.write(entries[case], answer, made_by)
             if progress is not None:
@@ -138,7 +139,7 @@ def answer_here(found: BlindSet, task: CaseTask) -> CaseOutcome:
     try:
         csv, gear = found.csv(task.entry), found.gear()
     except InputError as error:
-        return task.entry.case, {}, error.findings
+        return task.entry.case, None, error.findings
     return answer_bytes(task, csv, gear)
 
 
@@ -156,7 +157,7 @@ def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
     if digest(canonical(fingerprint(task.library))) != task.fingerprint:
         words = "mixed versions: a worker runs other code, priors or packages"
         remedy = "Give every worker the version that asks"
-        return name, {}, (Finding(f"{CASES}/{name}.csv", words, remedy),)
+        return name, None, (Finding(f"{CASES}/{name}.csv", words, remedy),)
     library = choose_library(withheld_from(task.entry.library, task.library))
     try:
         with tempfile.TemporaryDirectory(prefix="hdcal-") as place:
@@ -164,14 +165,14 @@ def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
             table.write_bytes(csv)
             rig.write_bytes(gear)
             case = read_case(table, rig)
-        return name, task.diagnose(case, library).plain(), ()
+        return name, task.diagnose(case, library), ()
     except InputError as error:
         here = (replace(one, file=Path(one.file).name) for one in error.findings)
-        return name, {}, tuple(here)
+        return name, None, tuple(here)
     except OSError as error:
         words = f"cannot be answered ({error.strerror or error})"
         remedy = "Check space and permissions where temporary files go"
-        return name, {}, (Finding(f"{CASES}/{name}.csv", words, remedy),)
+        return name, None, (Finding(f"{CASES}/{name}.csv", words, remedy),)
     except HdcalError:
         raise
     except Exception as error:

@@ -1,9 +1,13 @@
 """The report of a blind check, from its scores."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from hdcal.blind.label import CaseAnswer, Label
+from hdcal.blind.scoring.estimates import Estimate
+from hdcal.blind.scoring.file_order import FileOrder, TestedFileOrder
+from hdcal.blind.scoring.reliability import Reliabilities
+from hdcal.blind.scoring.scores import Scores
 from hdcal.blind.words import (
     bar_row,
     limit_row,
@@ -63,49 +67,40 @@ _PAIRS = (
 )
 
 
-def headline(found: Mapping[str, Any]) -> str:
-    """Return how many promises were kept, in one sentence."""
-    count = found["summary"]
-    return (
-        f"{count['met']} met, {count['missed']} missed of the rows that were promised; "
-        f"{count['open']} have no target or no cases."
-    )
-
-
 def scores_document(
-    found: Mapping[str, Any],
+    found: Scores,
     labels: Sequence[Label] = (),
     answers: Mapping[str, Sequence[CaseAnswer]] | None = None,
 ) -> Document:
     """Return the report; its pictures: bar, confusion, reliability and detection.
 
     Args:
-        found: from `hdcal.blind.scoring.scores.score`, as plain data.
+        found: from `hdcal.blind.scoring.scores.score`.
         labels: the truth, where what was said of measured data is to be shown.
         answers: by diagnoser, in the order of the labels.
     """
-    kinds = found["cases"]["kinds"]
+    kinds, count = found.cases.kinds, found.summary
     listed = ", ".join(f"{n} {_KINDS.get(kind, kind)}" for kind, n in kinds.items())
-    rows = [bar_row(row) for row in found["bar"]]
-    missed = [str(row["what"]) for row in rows if str(row["word"])[:6] == "missed"]
+    missed = [row.what for row in found.bar if row.met is False]
     groups = {
-        "size of the gap": found["by_r"],
-        "program": found["by_program"],
-        "noise": found["by_noise"],
-        "effect": found["by_effect"],
-        "family": found["by_family"],
+        "size of the gap": found.by_r,
+        "program": found.by_program,
+        "noise": found.by_noise,
+        "effect": found.by_effect,
+        "family": found.by_family,
     }
-    notes = [(name.replace("_", " "), words) for name, words in found["notes"].items()]
+    notes = [(name.replace("_", " "), words) for name, words in found.notes.items()]
     return Document(
         name=_TITLE,
         kind="scores",
-        subtitle=f"{found['diagnoser']} on {found['cases']['n']} cases"
+        subtitle=f"{found.diagnoser} on {found.cases.n} cases"
         + (f" ({listed})" if listed else "")
         + " whose truth was sealed until every answer was given.",
-        headline=headline(found),
+        headline=f"{count.met} met, {count.missed} missed of the rows that were "
+        f"promised; {count.open} have no target or no cases.",
         notices=notices(("Missed", missed)),
         sections=[
-            _promised(rows, bool(set(kinds) - {"real"})),
+            _promised(found, brief=bool(set(kinds) - {"real"})),
             *_measured(labels, answers or {}),
             _beside_others(found),
             _confused(found),
@@ -113,19 +108,19 @@ def scores_document(
             _detection(found),
             Section(
                 "How near the sizes come",
-                [_grid("size of the gap", found["by_r"], _SIZES)],
+                [_grid("size of the gap", found.by_r, _SIZES)],
             ),
             *(
                 Section(f"By {name}", [_grid(name, lines, _FIRST)])
                 for name, lines in groups.items()
             ),
-            Section("Order of the files", [Facts(_order(found["order"]))]),
+            Section("Order of the files", [Facts(_order(found.order))]),
             Section("How it was reckoned", [Facts(notes)]),
         ],
     )
 
 
-def _promised(rows: list[dict], brief: bool) -> Section:
+def _promised(found: Scores, brief: bool) -> Section:
     caption = (
         "Green: where the target is met. Dot: met. Red cross: missed. Grey diamond: no "
         "target. Line: 95 % interval; at the edge: beyond it. The same numbers stand "
@@ -135,10 +130,9 @@ def _promised(rows: list[dict], brief: bool) -> Section:
         "bar", "Every row with its interval against its target", caption, tall=True
     )
     numbers = ("found", "target", "95 % interval", "cases")
-    keys = ("what", "word", "value", "target", "span", "n", "interval")
     table = Table(
         ["row", "", *numbers, "interval by"],
-        [[row[key] for key in keys] for row in rows],
+        [bar_row(row) for row in found.bar],
         frozenset(numbers),
         frozenset({"row"}),
     )
@@ -165,9 +159,9 @@ def _measured(
         yield Section("Measured data", [table, Text(words)], brief=True)
 
 
-def _beside_others(found: Mapping[str, Any]) -> Section:
-    brier = found["brier"]
-    lines = [{**row, "brier": brier.get(row["name"])} for row in found["rivals"]]
+def _beside_others(found: Scores) -> Section:
+    brier = found.brier
+    lines = [{**row, "brier": brier.get(row["name"])} for row in found.rivals]
     note = (
         "The oracle knows the size of the gap, the noise and the rig, and that an "
         "effect acts: nobody can be right more often. Below each number: 95 % "
@@ -177,7 +171,7 @@ def _beside_others(found: Mapping[str, Any]) -> Section:
     return Section("Beside others", blocks)
 
 
-def _confused(found: Mapping[str, Any]) -> Section:
+def _confused(found: Scores) -> Section:
     caption = (
         "Cases by truth (row) and most probable answer (column); shade: share of the "
         "row. Framed: right."
@@ -186,41 +180,41 @@ def _confused(found: Mapping[str, Any]) -> Section:
     blocks: list[Block] = [Picture("confusion", shows, caption, tall=True)]
     rows = [
         [
-            truth_word(row["truth"]),
-            truth_word(row["answer"]),
-            f"{row['n']} of {row['of']}",
+            truth_word(row.truth),
+            truth_word(row.answer),
+            f"{row.n} of {row.of}",
         ]
-        for row in found["mix_ups"]
+        for row in found.mix_ups
     ]
     if rows:
         columns = ["truth", "answered", "cases"]
         long = frozenset({"truth", "answered"})
         blocks.append(Table(columns, rows, frozenset({"cases"}), long))
-    pairs = [(words, with_span(found["pairs"][key])) for key, words in _PAIRS]
-    heading = f"Two effects at once ({found['pairs']['n']} cases)"
+    pairs = [(words, with_span(found.pairs[key])) for key, words in _PAIRS]
+    heading = f"Two effects at once ({found.pairs['n']} cases)"
     blocks.append(Details(heading, [Facts(pairs)], folded=False))
     return Section("Who is taken for whom", blocks)
 
 
-def _reliability(found: Mapping[str, Any]) -> Section:
+def _reliability(found: Scores) -> Section:
     caption = (
         "Dots on the dashed line: what is stated with 70 % is true seven times in ten. "
         "Below it: too sure."
     )
     shows = "Stated probability against the share that was true"
     picture = Picture("reliability", shows, caption)
-    facts = Facts(_calibration(found["reliability"]))
+    facts = Facts(_calibration(found.reliability))
     return Section("Whether probabilities mean what they say", [picture, facts])
 
 
-def _detection(found: Mapping[str, Any]) -> Section:
+def _detection(found: Scores) -> Section:
     caption = (
         "Dots: fraction detected with 95 % interval. Curve and band: fitted. Dashed: "
         "where nine of ten are detected."
     )
     shows = "Fraction detected against the size of the gap, by effect"
     blocks: list[Block] = [Picture("detection", shows, caption, tall=True)]
-    rows = [limit_row(curve) for curve in found["detection"]]
+    rows = [limit_row(curve) for curve in found.detection]
     if rows:
         numbers = ("cases", "r for 90 %", "95 % interval")
         long = frozenset({"effect"})
@@ -228,12 +222,9 @@ def _detection(found: Mapping[str, Any]) -> Section:
     return Section("From which size on a gap is detected", blocks)
 
 
-def _sizes(found: Mapping[str, Any]) -> Section:
-    table = _grid("size of the gap", found["by_r"], _SIZES)
-    return Section("How near the sizes come", [table])
-
-
-def _grid(first: str, lines: Sequence[Mapping], columns: Sequence[tuple]) -> Table:
+def _grid(
+    first: str, lines: Iterable[Mapping[str, Any]], columns: Sequence[tuple]
+) -> Table:
     """Return numbers of groups of cases, each with its interval below it."""
     heads = [words for _, words, _ in columns]
     rows = [
@@ -248,49 +239,47 @@ def _grid(first: str, lines: Sequence[Mapping], columns: Sequence[tuple]) -> Tab
     return Table(titles, rows, frozenset(titles[1:]), frozenset({first}))
 
 
-def _cell(entry: Mapping | None, unit: str) -> str:
-    if entry is None or entry["value"] is None:
+def _cell(entry: Estimate | None, unit: str) -> str:
+    if entry is None or entry.value is None:
         return "–"
     ends = span(entry, unit)
-    return shown(entry["value"], unit) + (f"\n{ends}" if ends != "–" else "")
+    return shown(entry.value, unit) + (f"\n{ends}" if ends != "–" else "")
 
 
-def _calibration(table: dict) -> list[tuple[str, str]]:
+def _calibration(found: Reliabilities) -> list[tuple[str, str]]:
     rows = []
-    for key, words in (
-        ("top", "most probable hypothesis"),
-        ("effects", "single effects given 5 % or more"),
+    for entry, words in (
+        (found.top, "most probable hypothesis"),
+        (found.effects, "single effects given 5 % or more"),
     ):
-        entry = table[key]
-        floor = entry["floor"]
+        floor = entry.floor
         rows.append((f"error, {words}", with_span(entry, "points")))
-        rows.append((f"before debiasing, {words}", shown(entry["plug_in"], "points")))
+        rows.append((f"before debiasing, {words}", shown(entry.plug_in, "points")))
         texts = "–"
         if floor is not None:
-            mean, high = shown(floor["mean"], "points"), shown(floor["hi"], "points")
+            mean, high = shown(floor.mean, "points"), shown(floor.hi, "points")
             texts = f"{mean} on average, up to {high} in 95 % of such checks"
         rows.append((f"of a perfectly calibrated one, {words}", texts))
-    each = [row["value"] for row in table["classwise"] if row["value"] is not None]
+    each = [row.value for row in found.classwise if row.value is not None]
     average = sum(each) / len(each) if each else None
     rows.append(("mean over effects, all statements", shown(average, "points")))
     return rows
 
 
-def _order(found: dict) -> list[tuple[str, str]]:
-    rows = [("p-value, that answers do not depend on order", _p(found))]
-    for key, words in (
-        ("same_as_neighbour", "same answer as the next file"),
-        ("truth_of_neighbour", "answer is the truth of a neighbour"),
-        ("truth_itself", "same truth as the next file (how well it was shuffled)"),
-    ):
-        if key in found:
-            entry = found[key]
-            texts = f"{entry['seen']}, expected {entry['expected']:.0f}"
-            rows.append((words, f"{texts}, p = {shown(entry['p_value'], 'p')}"))
-    for key, words in (("first", "first half"), ("second", "second half")):
-        rows.append((f"right in the {words}", with_span(found[f"{key}_half_right"])))
+def _order(found: FileOrder) -> list[tuple[str, str]]:
+    p_value = shown(found.p_value, "p")
+    rows = [("p-value, that answers do not depend on order", p_value)]
+    if isinstance(found, TestedFileOrder):
+        for entry, words in (
+            (found.same_as_neighbour, "same answer as the next file"),
+            (found.truth_of_neighbour, "answer is the truth of a neighbour"),
+            (
+                found.truth_itself,
+                "same truth as the next file (how well it was shuffled)",
+            ),
+        ):
+            texts = f"{entry.seen}, expected {entry.expected:.0f}"
+            rows.append((words, f"{texts}, p = {shown(entry.p_value, 'p')}"))
+    rows.append(("right in the first half", with_span(found.first_half_right)))
+    rows.append(("right in the second half", with_span(found.second_half_right)))
     return rows
-
-
-def _p(found: dict) -> str:
-    return shown(found["p_value"], "p")

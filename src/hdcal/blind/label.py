@@ -1,6 +1,6 @@
 """What is sealed about a case, and what a diagnoser answered."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 CaseKind = Literal["null", "effect", "pair", "outside", "real"]
@@ -50,10 +50,6 @@ class Label:
     oracle: dict[str, float] = field(default_factory=dict)
     mix: str = ""
 
-    def plain(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return asdict(self)
-
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "Label":
         """Return the label of plain data."""
@@ -98,10 +94,6 @@ class CaseAnswer:
     amplitude: dict[str, Quantiles] = field(default_factory=dict)
     closed: Quantiles | None = None
     noise_sd: float | None = None
-
-    def plain(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return asdict(self)
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":

@@ -6,17 +6,18 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from hdcal.blind.answer import Opening, ScoredAnswers
 from hdcal.blind.answer_files import AnswerFiles, frozen_names
 from hdcal.blind.closures import closures
 from hdcal.blind.label import CaseAnswer
-from hdcal.blind.result_files import score_files
-from hdcal.blind.scoring.scores import JUDGED, score
+from hdcal.blind.result_folder import write_result
+from hdcal.blind.scoring.scores import JUDGED, Scores, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
-from hdcal.report.folder import check_target, whole_folder, write_whole
+from hdcal.report.folder import check_target, write_whole
 from hdcal.report.plain import as_json
 
-OPENED_SCHEMA, RESULT_SCHEMA = "hdcal.blind-opened/1", "hdcal.blind-result/1"
+OPENED_SCHEMA = "hdcal.blind-opened/1"
 RESULT = "result"
 
 
@@ -26,17 +27,17 @@ class OpenedSet:
 
     Attributes:
         folder: where the result is.
-        result: scores, and whose answers they are of.
+        opening: whose answers were scored.
+        scores: of them.
         secret: the labels.
         answers: of each diagnoser, in the order of the labels.
-        families: of the library's effects.
     """
 
     folder: Path
-    result: dict[str, Any]
+    opening: Opening
+    scores: Scores
     secret: Sealed
     answers: dict[str, list[CaseAnswer]]
-    families: dict[str, str]
 
 
 def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet:
@@ -60,29 +61,27 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet
     secret = _unsealed(found, key)
     chosen = list(by or everyone)
     answers = {name: frozen[name][1] for name in chosen}
-    families = dict(frozen[chosen[0]][0]["families"])
-    judged = JUDGED if JUDGED in answers else chosen[0]
-    result = {
-        "schema": RESULT_SCHEMA,
-        "set_commitment": found.manifest.commitment,
-        "mix": secret.mix,
-        "answers": {
-            name: {
-                "sha256": hashes[name],
-                "blind": frozen[name][0]["blind"] and first.get(name) == hashes[name],
-            }
+    opening = Opening(
+        set_commitment=found.manifest.commitment,
+        mix=secret.mix,
+        answers={
+            name: ScoredAnswers(
+                hashes[name],
+                frozen[name][0]["blind"] and first.get(name) == hashes[name],
+            )
             for name in chosen
         },
-        "scores": score(
-            secret.labels,
-            answers,
-            families,
-            closures(found, secret.labels, answers[judged]),
-            {label.case for label in secret.labels if label.mix == "prior"} or None,
-            judged,
-        ),
-    }
-    opened = OpenedSet(found.folder / RESULT, result, secret, answers, families)
+    )
+    judged = JUDGED if JUDGED in answers else chosen[0]
+    scores = score(
+        secret.labels,
+        answers,
+        dict(frozen[chosen[0]][0]["families"]),
+        closures(found, secret.labels, answers[judged]),
+        {label.case for label in secret.labels if label.mix == "prior"} or None,
+        judged,
+    )
+    opened = OpenedSet(found.folder / RESULT, opening, scores, secret, answers)
     _write(found, opened, hashes if before is None else None)
     return opened
 
@@ -140,13 +139,6 @@ def _write(found: BlindSet, opened: OpenedSet, hashes: dict[str, str] | None) ->
         }
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(record)))
-    files = score_files(opened.result["scores"], opened.secret.labels, opened.answers)
-    with whole_folder(opened.folder, force=True) as building:
-        for name, content in files.items():
-            (building / name).write_bytes(content)
-        about = {n: v for n, v in opened.result.items() if n != "scores"}
-        for name, data in (
-            ("opening.json", about),
-            ("labels.json", opened.secret.plain()),
-        ):
-            (building / name).write_text(as_json(data), "utf-8")
+    others = {"opening.json": opened.opening, "labels.json": opened.secret.plain()}
+    labels = opened.secret.labels
+    write_result(opened.folder, opened.scores, labels, opened.answers, others)

@@ -9,7 +9,7 @@ import json
 import re
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from typing import Any
 
 from cryptography.fernet import Fernet, InvalidToken
@@ -40,8 +40,13 @@ def canonical(data: Any) -> bytes:
         sort_keys=True,
         separators=(",", ":"),
         allow_nan=False,
-        default=lambda value: value.tolist(),  # NumPy's numbers and arrays
+        default=_known_to_json,
     ).encode()
+
+
+def _known_to_json(value: Any) -> Any:
+    # A dataclass, or else one of NumPy's numbers and arrays.
+    return asdict(value) if is_dataclass(value) else value.tolist()  # type: ignore[arg-type]
 
 
 def digest(data: bytes) -> str:
@@ -96,7 +101,7 @@ def commit(label: Label, salt: str, csv_sha256: str) -> str:
     # Salt and hash have one length, so that no two triples give the same bytes.
     if len(random) != _SALT_BYTES or not _HASH.fullmatch(csv_sha256):
         raise Broken("holds a salt or a hash of the wrong length")
-    return digest(random + canonical(label.plain()) + csv_sha256.encode())
+    return digest(random + canonical(label) + csv_sha256.encode())
 
 
 @dataclass(frozen=True)
@@ -135,8 +140,8 @@ class Manifest:
     @property
     def commitment(self) -> str:
         """Hash that promises data, gear and labels of the whole set."""
-        cases = [asdict(entry) for entry in self.cases]
-        return digest(canonical({"cases": cases, "gear_sha256": self.gear_sha256}))
+        promised = {"cases": self.cases, "gear_sha256": self.gear_sha256}
+        return digest(canonical(promised))
 
     def plain(self) -> dict[str, Any]:
         """Return plain data for JSON."""
@@ -210,7 +215,7 @@ class Sealed:
             "schema": LABELS_SCHEMA,
             "mix": self.mix,
             "seed": self.seed,
-            "labels": [{"salt": salt, "label": one.plain()} for salt, one in pairs],
+            "labels": [{"salt": salt, "label": one} for salt, one in pairs],
         }
 
 

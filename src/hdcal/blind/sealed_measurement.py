@@ -34,13 +34,13 @@ def sealed_measurement(
     truth, withheld = _names(cause), _names(withhold or "")
     findings: list[Finding] = []
     if truth != (UNKNOWN,):
-        findings += _unknown_names(truth, "--cause")
-    findings += _unknown_names(withheld, "--withhold")
+        findings += _unknown_names(truth, "cause")
+    findings += _unknown_names(withheld, "withhold")
     if not truth:
-        findings.append(Finding("--cause", "names nothing", "Say it, or 'unknown'"))
+        findings.append(Finding("cause", "names nothing", "Say it, or 'unknown'"))
     for name in sorted(set(truth) & set(withheld)):
         words, remedy = f"'{name}' is withheld", "Say --cause unknown, or keep it"
-        findings.append(Finding("--cause", words, remedy))
+        findings.append(Finding("cause", words, remedy))
     rows = 0
     try:
         rows = len(read_case(source, gear).records.force)

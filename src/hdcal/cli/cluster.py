@@ -83,4 +83,4 @@ def _client(address: str) -> Iterator[Any]:
 
 
 def _refusal(problem: str, remedy: str) -> InputError:
-    return InputError([Finding("--scheduler", problem, remedy)])
+    return InputError([Finding("scheduler", problem, remedy)])

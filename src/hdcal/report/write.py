@@ -2,10 +2,10 @@
 
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from hdcal.report.answer import Answer
 from hdcal.report.canvas import Figure, render
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
@@ -19,7 +19,7 @@ PAGE = "report.html"
 def write_report(
     target: Path | str,
     document: Document,
-    answers: Mapping[str, Answer],
+    answers: Mapping[str, Any],
     figures: Mapping[str, Figure] | None = None,
     *,
     kept: Collection[str] | None = None,
@@ -32,7 +32,7 @@ def write_report(
     Args:
         target: the folder to make.
         document: the report.
-        answers: JSON answers by the names of their files.
+        answers: dataclasses or plain data of the JSON files, by name.
         figures: of the document's pictures, by name.
         kept: figures that become files of their own too, as SVG and PNG; by default
             all of them.

@@ -2,13 +2,33 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from hdcal.blind.scoring.estimates import Estimate, mean, share
-from hdcal.blind.scoring.reliability import Reliability
+from hdcal.blind.scoring.file_order import FileOrder
+from hdcal.blind.scoring.reliability import Reliabilities
 from hdcal.blind.scoring.scored_case import UNKNOWN, Cases, null_cases
 from hdcal.blind.scoring.sizes import amplitude_sizes, closed_errors, gap_sizes
 from hdcal.blind.scoring.tables import precision
+
+Direction = Literal["at least", "at most", "within"]
+
+
+@dataclass(frozen=True)
+class _Titles:
+    key: str
+    what: str
+
+
+@dataclass(frozen=True)
+class BarResult(Estimate, _Titles):
+    """One promise with what was found: met by the value, firm by its interval."""
+
+    target: float | tuple[float, float] | None
+    direction: Direction | None
+    unit: str
+    met: bool | None
+    firm: bool | None
 
 
 @dataclass(frozen=True)
@@ -23,7 +43,7 @@ class BarRow:
     """
 
     what: str
-    direction: Literal["at least", "at most", "within"] | None = None
+    direction: Direction | None = None
     target: float | tuple[float, float] | None = None
     unit: str = "share"
 
@@ -37,24 +57,21 @@ class BarRow:
             return value >= self.target - 1e-9
         return value <= self.target + 1e-9
 
-    def compared(self, key: str, found: Estimate) -> dict[str, Any]:
-        """Return promise and estimate as plain data for JSON.
-
-        `met` compares the value itself with the target; `firm` tells whether the whole
-        interval is on the same side.
-        """
+    def compared(self, key: str, found: Estimate) -> BarResult:
+        """Return the promise with what was found."""
         met = self.met_by(found.value)
         ends = [self.met_by(found.lo), self.met_by(found.hi)]
-        return {
-            "key": key,
-            "what": self.what,
-            **found.plain(),
-            "target": [*self.target] if isinstance(self.target, tuple) else self.target,
-            "direction": self.direction,
-            "unit": self.unit,
-            "met": met,
-            "firm": None if None in ends else ends == [met, met],
-        }
+        return BarResult(
+            key=key,
+            value=found.value,
+            lo=found.lo,
+            hi=found.hi,
+            n=found.n,
+            interval=found.interval,
+            met=met,
+            firm=None if None in ends else ends == [met, met],
+            **vars(self),
+        )
 
 
 _LISTED = "outside the library, of the list given beforehand"
@@ -109,10 +126,10 @@ ROWS = {
 def bar(
     cases: Cases,
     closures: Mapping[str, float],
-    stated: Mapping[str, Reliability],
-    order: Mapping[str, Any],
-) -> list[dict[str, Any]]:
-    """Return every row of the bar with what was found, as plain data for JSON.
+    stated: Reliabilities,
+    order: FileOrder,
+) -> list[BarResult]:
+    """Return every row of the bar with what was found.
 
     Args:
         cases: of the diagnoser whose answers are held against it.
@@ -120,14 +137,14 @@ def bar(
         stated: from `reliabilities`.
         order: from `order_dependence`.
     """
-    p = order["p_value"]
-    n = order["n"] if p is not None else 0
+    p = order.p_value
+    n = order.n if p is not None else 0
     found = {
         **_detections(cases),
         **_causes(cases),
         **_sizes(cases, closures),
-        "calibration_top": stated["top"].error,
-        "calibration_effects": stated["effects"].error,
+        "calibration_top": stated.top,
+        "calibration_effects": stated.effects,
         "order": Estimate(p, None, None, n, "permutation test"),
     }
     return [row.compared(key, found[key]) for key, row in ROWS.items()]

@@ -1,12 +1,12 @@
 """From which size on a gap is detected, by effect."""
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import expit
 
-from hdcal.blind.scoring.estimates import share
-from hdcal.blind.scoring.scored_case import Cases
+from hdcal.blind.scoring.estimates import Estimate, OfEffect, share
+from hdcal.blind.scoring.scored_case import Cases, ScoredCase
 
 METHOD = (
     "Fraction detected = 5 % + 95 % logistic(s (log r - m)), 5 % being the gate's own "
@@ -18,21 +18,68 @@ ALARM = 0.05
 _WANTED = 0.9
 
 
-def detection(cases: Cases) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class _Size:
+    r: float
+
+
+@dataclass(frozen=True)
+class DetectedShare(Estimate, _Size):
+    """The fraction detected of gaps of one size r."""
+
+
+@dataclass(frozen=True)
+class FittedFraction:
+    """The fitted fraction detected over r, with its 95 % band."""
+
+    r: list[float]
+    fraction: list[float]
+    lo: list[float]
+    hi: list[float]
+
+
+@dataclass(frozen=True)
+class DetectionCurve(OfEffect):
+    """From which size on an effect is detected.
+
+    Attributes:
+        n: number of cases.
+        points: fraction detected by size.
+        r90: size of which 90 % are detected; None above all that were tried.
+        lo: lower end of its interval.
+        hi: upper end.
+        reached: whether it is within what was tried, or below.
+        below_all: whether it is below all that were tried.
+        curve: the fit.
+    """
+
+    n: int
+    points: list[DetectedShare]
+    r90: float | None
+    lo: float | None
+    hi: float | None
+    reached: bool
+    below_all: bool
+    curve: FittedFraction
+
+
+def detection(cases: Cases) -> list[DetectionCurve]:
     """Return the detection curve of every effect, of those in the library and not."""
-    own = [c for c in cases if c.one_effect and c.label.r > 0.0]
-    names = sorted({case.label.truth[0] for case in own})
-    return [_curve(n, [c for c in own if c.label.truth[0] == n]) for n in names]
+    own: dict[str, list[ScoredCase]] = {}
+    for case in cases:
+        if case.one_effect and case.label.r > 0.0:
+            own.setdefault(case.label.truth[0], []).append(case)
+    return [
+        fit(
+            name,
+            np.array([case.label.r for case in own[name]]),
+            np.array([case.answer.detected for case in own[name]], dtype=float),
+        )
+        for name in sorted(own)
+    ]
 
 
-def _curve(name: str, cases: Cases) -> dict[str, Any]:
-    r = np.array([case.label.r for case in cases])
-    hit = np.array([case.answer.detected for case in cases], dtype=float)
-    fitted = fit(r, hit)
-    return {"effect": name, "n": len(cases), "points": points(r, hit), **fitted}
-
-
-def points(r: np.ndarray, hit: np.ndarray) -> list[dict[str, Any]]:
+def _points(r: np.ndarray, hit: np.ndarray) -> list[DetectedShare]:
     """Return the fraction detected by size, sizes within a factor of √2 together."""
     places = np.round(2.0 * np.log2(r))
     found = []
@@ -40,14 +87,15 @@ def points(r: np.ndarray, hit: np.ndarray) -> list[dict[str, Any]]:
         own = places == place
         fraction = share(hit[own])
         middle = float(np.exp(np.mean(np.log(r[own]))))
-        found.append({"r": middle, **fraction.plain()})
+        found.append(DetectedShare(r=middle, **vars(fraction)))
     return found
 
 
-def fit(r: np.ndarray, hit: np.ndarray) -> dict[str, Any]:
+def fit(effect: str, r: np.ndarray, hit: np.ndarray) -> DetectionCurve:
     """Return the fitted curve and r90.
 
     Args:
+        effect: whose gaps they were.
         r: sizes, all positive.
         hit: whether each was detected.
     """
@@ -65,19 +113,18 @@ def fit(r: np.ndarray, hit: np.ndarray) -> dict[str, Any]:
     curves = np.array([_fraction(x, middle, slope).ravel() for x in grid])
     band = np.array([_quantiles(c, weight, (0.025, 0.975)) for c in curves])
     r90, lo, hi = _quantiles(limits, weight, (0.5, 0.025, 0.975))
-    return {
-        "r90": _within(r90, low, high),
-        "lo": _within(lo, low, high),
-        "hi": _within(hi, low, high),
-        "reached": bool(r90 <= high),
-        "below_all": bool(r90 < low),
-        "curve": {
-            "r": np.exp(grid).tolist(),
-            "fraction": (curves @ weight / weight.sum()).tolist(),
-            "lo": band[:, 0].tolist(),
-            "hi": band[:, 1].tolist(),
-        },
-    }
+    fraction = curves @ weight / weight.sum()
+    return DetectionCurve(
+        effect,
+        len(r),
+        _points(r, hit),
+        *(_within(end, low, high) for end in (r90, lo, hi)),
+        reached=bool(r90 <= high),
+        below_all=bool(r90 < low),
+        curve=FittedFraction(
+            np.exp(grid).tolist(), fraction.tolist(), *band.T.tolist()
+        ),
+    )
 
 
 def _fraction(log_r: float, middle: np.ndarray, slope: np.ndarray) -> np.ndarray:

@@ -2,8 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtri
@@ -34,9 +33,12 @@ class Estimate:
     n: int
     interval: str
 
-    def plain(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return asdict(self)
+
+@dataclass(frozen=True)
+class OfEffect:
+    """The effect that something is about; as the last base its field comes first."""
+
+    effect: str
 
 
 def share(hits: Iterable[float | bool]) -> Estimate:

@@ -7,26 +7,57 @@ neighbours get the same answer, and how often an answer is what is true next doo
 """
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.blind.scoring.estimates import SEED, share
+from hdcal.blind.scoring.estimates import SEED, Estimate, share
 from hdcal.blind.scoring.scored_case import Cases
 
 _PERMUTATIONS = 1000
 
 
-def order_dependence(cases: Cases) -> dict[str, Any]:
+@dataclass(frozen=True)
+class PermutationTest:
+    """A count, its mean over permutations, and how often they give as many."""
+
+    seen: int
+    expected: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class FileOrder:
+    """How answers go with the order of the files; of few cases no more than this.
+
+    Attributes:
+        n: number of cases.
+        p_value: that they do not, Bonferroni over both comparisons; None with fewer
+            than three cases.
+        first_half_right: share of right answers.
+        second_half_right: the same.
+    """
+
+    n: int
+    p_value: float | None
+    first_half_right: Estimate
+    second_half_right: Estimate
+
+
+@dataclass(frozen=True)
+class TestedFileOrder(FileOrder):
+    """The same with both comparisons, and with the first one of the truth alone."""
+
+    same_as_neighbour: PermutationTest
+    truth_of_neighbour: PermutationTest
+    truth_itself: PermutationTest
+
+
+def order_dependence(cases: Cases) -> FileOrder:
     """Return how answers go with the order of the files, by a permutation test.
 
     Args:
         cases: in any order; names of cases, sorted, make the order of the files.
-
-    Returns:
-        p_value (Bonferroni over both comparisons; None with fewer than three
-        cases), each comparison with what is expected, the same test of the truth
-        alone, and the share of right answers in both halves.
     """
     found = sorted((c for c in cases if c.truth), key=lambda c: c.label.case)
     truth = _codes([str(case.truth) for case in found])
@@ -34,23 +65,14 @@ def order_dependence(cases: Cases) -> dict[str, Any]:
     true, stated = both[: len(found)], both[len(found) :]
     half = len(found) // 2
     right = stated == true
-    result = {
-        "n": len(found),
-        "p_value": None,
-        "first_half_right": share(right[:half]).plain(),
-        "second_half_right": share(right[half:]).plain(),
-    }
+    halves = share(right[:half]), share(right[half:])
     if len(found) < 3:
-        return result
+        return FileOrder(len(found), None, *halves)
     same = _tested(lambda a: _agree(a, a), stated, truth)
     next_truth = _tested(lambda a: _agree(a, true) + _agree(true, a), stated, truth)
-    return {
-        **result,
-        "p_value": min(1.0, 2.0 * min(same["p_value"], next_truth["p_value"])),
-        "same_as_neighbour": same,
-        "truth_of_neighbour": next_truth,
-        "truth_itself": _tested(lambda a: _agree(a, a), true, np.zeros_like(true)),
-    }
+    itself = _tested(lambda a: _agree(a, a), true, np.zeros_like(true))
+    p_value = min(1.0, 2.0 * min(same.p_value, next_truth.p_value))
+    return TestedFileOrder(len(found), p_value, *halves, same, next_truth, itself)
 
 
 def _codes(names: list[str]) -> np.ndarray:
@@ -64,8 +86,8 @@ def _agree(one: np.ndarray, two: np.ndarray) -> int:
 
 def _tested(
     statistic: Callable[[np.ndarray], int], values: np.ndarray, group: np.ndarray
-) -> dict[str, Any]:
-    """Return a count, what permuting within groups gives, and how often as many."""
+) -> PermutationTest:
+    """Return a count beside what permuting within groups gives."""
     rng = np.random.default_rng(SEED)
     own = np.argsort(group, kind="stable")
     counts = np.empty(_PERMUTATIONS)
@@ -74,8 +96,5 @@ def _tested(
         permuted[own] = values[np.lexsort((rng.random(len(values)), group))]
         counts[place] = statistic(permuted)
     seen = statistic(values)
-    return {
-        "seen": seen,
-        "expected": float(counts.mean()),
-        "p_value": float((1 + np.sum(counts >= seen)) / (1 + _PERMUTATIONS)),
-    }
+    p_value = (1 + np.sum(counts >= seen)) / (1 + _PERMUTATIONS)
+    return PermutationTest(seen, float(counts.mean()), float(p_value))

@@ -8,14 +8,14 @@ from hdcal.blind.scoring.estimates import mean, share
 from hdcal.blind.scoring.proper_scores import log_score
 from hdcal.blind.scoring.scored_case import Cases, ScoredCase
 from hdcal.blind.scoring.sizes import amplitude_sizes, closed_errors, gap_sizes
-from hdcal.blind.scoring.tables import plain, precision
+from hdcal.blind.scoring.tables import Row, precision
 
 _NOISES = {"iid": "independent", "ar": "serially correlated"}
 
 
 def groups(
     cases: Cases, families: Mapping[str, str], closures: Mapping[str, float]
-) -> dict[str, list[dict[str, Any]]]:
+) -> dict[str, Any]:
     """Return the numbers of every group of cases, by what they are grouped by.
 
     Args:
@@ -25,7 +25,7 @@ def groups(
     """
     known = [c for c in cases if c.plain_effect]
 
-    def by(own: Cases, word: Callable[[ScoredCase], str]) -> list[dict[str, Any]]:
+    def by(own: Cases, word: Callable[[ScoredCase], str]) -> list[Row]:
         found: dict[str, list[ScoredCase]] = {}
         for case in own:
             found.setdefault(word(case), []).append(case)
@@ -46,7 +46,7 @@ def groups(
     }
 
 
-def _by_size(cases: Cases) -> list[tuple[dict[str, Any], list[ScoredCase]]]:
+def _by_size(cases: Cases) -> list[tuple[Row, Cases]]:
     """Return groups by size of the gap, sizes within a factor of 2 together."""
     found: dict[int, list[ScoredCase]] = {}
     for case in cases:
@@ -63,12 +63,13 @@ def _by_size(cases: Cases) -> list[tuple[dict[str, Any], list[ScoredCase]]]:
 
 def _numbers(
     cases: Cases, families: Mapping[str, str], closures: Mapping[str, float]
-) -> dict[str, Any]:
+) -> Row:
     """Return the numbers that every table shows, of some cases."""
     known = [c for c in cases if c.plain_effect]
     null = [c for c in cases if c.label.kind == "null"]
     amplitude, gap = amplitude_sizes(cases), gap_sizes(cases)
-    found = {
+    return {
+        "n": len(cases),
         "top1": share(c.credit for c in known),
         "family": share(_family_right(c, families) for c in known),
         "oracle": share(c.oracle_credit for c in known if c.label.oracle),
@@ -85,7 +86,6 @@ def _numbers(
         "closed": closed_errors(cases, closures),
         "log_score": log_score(cases),
     }
-    return {"n": len(cases), **plain(found)}
 
 
 def _family_right(case: ScoredCase, families: Mapping[str, str]) -> bool:

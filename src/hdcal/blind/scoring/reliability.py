@@ -11,12 +11,11 @@ same would show by the same estimator: mean and 95 % point of simulations.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
 
-from hdcal.blind.scoring.estimates import BOOTSTRAP, SEED, Estimate, share
+from hdcal.blind.scoring.estimates import BOOTSTRAP, SEED, Estimate, OfEffect, share
 from hdcal.blind.scoring.scored_case import Cases
 
 ESTIMATOR = (
@@ -119,44 +118,78 @@ def errors(
 
 
 @dataclass(frozen=True)
-class Reliability:
-    """Whether statements hold as often as stated.
+class Bin:
+    """Statements of about the same probability, and the share that was true."""
 
-    Attributes:
-        error: the debiased calibration error.
-        table: what it comes from, as plain data.
-    """
-
-    error: Estimate
-    table: dict[str, Any]
-
-    def plain(self) -> dict[str, Any]:
-        """Return plain data for JSON."""
-        return {**self.error.plain(), **self.table}
+    from_: float
+    to: float
+    stated: float
+    true: float | None
+    lo: float | None
+    hi: float | None
+    n: int
 
 
-def reliabilities(cases: Cases) -> dict[str, Reliability]:
-    """Return the reliability of what is said first, and of each effect given 5 %."""
-    return {
-        "top": reliability(top_statements(cases)),
-        "effects": reliability(effect_statements(cases, least=_LEAST_STATED)),
-    }
+@dataclass(frozen=True)
+class Floor:
+    """What a perfectly calibrated diagnoser would show: mean and 95 % point."""
+
+    mean: float
+    hi: float
+
+
+@dataclass(frozen=True)
+class Reliability(Estimate):
+    """The debiased calibration error of statements, and what it comes from."""
+
+    plug_in: float | None
+    floor: Floor | None
+    statements: int
+    bins: list[Bin]
+
+
+@dataclass(frozen=True)
+class EffectError(Estimate, OfEffect):
+    """The debiased calibration error of all statements of one effect."""
+
+
+@dataclass(frozen=True)
+class Reliabilities:
+    """Of the most probable hypothesis, effects given 5 % or more, each effect alone."""
+
+    top: Reliability
+    effects: Reliability
+    classwise: list[EffectError]
+
+
+def reliabilities(cases: Cases) -> Reliabilities:
+    """Return whether statements hold as often as stated."""
+    names = sorted({name for case in cases for name in case.answer.inclusion})
+    return Reliabilities(
+        reliability(top_statements(cases)),
+        reliability(effect_statements(cases, least=_LEAST_STATED)),
+        [
+            EffectError(
+                effect=name, **vars(calibration_error(effect_statements(cases, name)))
+            )
+            for name in names
+        ],
+    )
 
 
 def reliability(found: Statements) -> Reliability:
     """Return the calibration error of statements, and the table it comes from."""
-    n, error = len(found.stated), calibration_error(found)
+    n, error = len(found.stated), vars(calibration_error(found))
     if not n:
-        nothing = {"plug_in": None, "floor": None, "statements": 0, "bins": []}
-        return Reliability(error, nothing)
+        return Reliability(**error, plug_in=None, floor=None, statements=0, bins=[])
     places = bin_of(found.stated)
-    table = {
-        "plug_in": errors(places, found.stated, found.true, np.ones(n))[0],
-        "floor": _floor(places, found),
-        "statements": n,
-        "bins": [_bin(found, places == place) for place in range(places.max() + 1)],
-    }
-    return Reliability(error, table)
+    return Reliability(
+        **error,
+        plug_in=errors(places, found.stated, found.true, np.ones(n))[0],
+        floor=_floor(places, found),
+        statements=n,
+        bins=[_bin(found, places == place) for place in range(places.max() + 1)],
+    )
 
 
 def calibration_error(found: Statements) -> Estimate:
@@ -168,15 +201,6 @@ def calibration_error(found: Statements) -> Estimate:
     _, value = errors(places, found.stated, found.true, np.ones(n))
     low, high = _spread(places, found, value) if cases > 1 else (None, None)
     return Estimate(value, low, high, cases, BOOTSTRAP)
-
-
-def effect_errors(cases: Cases) -> list[dict[str, Any]]:
-    """Return the calibration error of each effect alone, as plain data."""
-    names = sorted({name for case in cases for name in case.answer.inclusion})
-    return [
-        {"effect": name, **calibration_error(effect_statements(cases, name)).plain()}
-        for name in names
-    ]
 
 
 def _spread(places, found: Statements, value: float) -> tuple[float, float]:
@@ -192,25 +216,17 @@ def _spread(places, found: Statements, value: float) -> tuple[float, float]:
     return float(np.clip(value + low, 0.0, value)), float(value + max(high, 0.0))
 
 
-def _floor(places: np.ndarray, found: Statements) -> dict[str, float]:
+def _floor(places: np.ndarray, found: Statements) -> Floor:
     rng = np.random.default_rng(SEED + 1)
     one = np.ones(len(found.stated))
     repeats = [
         errors(places, found.stated, rng.random(len(one)) < found.stated, one)[1]
         for _ in range(_REPEATS)
     ]
-    return {"mean": float(np.mean(repeats)), "hi": float(np.quantile(repeats, 0.95))}
+    return Floor(float(np.mean(repeats)), float(np.quantile(repeats, 0.95)))
 
 
-def _bin(found: Statements, own: np.ndarray) -> dict[str, Any]:
-    true = share(found.true[own])
-    stated = found.stated[own]
-    return {
-        "from": float(stated.min()),
-        "to": float(stated.max()),
-        "stated": float(stated.mean()),
-        "true": true.value,
-        "lo": true.lo,
-        "hi": true.hi,
-        "n": true.n,
-    }
+def _bin(found: Statements, own: np.ndarray) -> Bin:
+    true, stated = share(found.true[own]), found.stated[own]
+    ends = float(stated.min()), float(stated.max())
+    return Bin(*ends, float(stated.mean()), true.value, true.lo, true.hi, true.n)

@@ -1,26 +1,26 @@
-"""The score of a blind check: answers against labels, as plain data."""
+"""The score of a blind check: answers against labels."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Literal
 
 from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring import file_order, tables
-from hdcal.blind.scoring.bar import bar
-from hdcal.blind.scoring.detection import METHOD, detection
-from hdcal.blind.scoring.file_order import order_dependence
+from hdcal.blind.scoring.bar import BarResult, bar
+from hdcal.blind.scoring.detection import METHOD, DetectionCurve, detection
+from hdcal.blind.scoring.estimates import Estimate
+from hdcal.blind.scoring.file_order import (
+    FileOrder,
+    TestedFileOrder,
+    order_dependence,
+)
 from hdcal.blind.scoring.groups import groups
 from hdcal.blind.scoring.proper_scores import FLOOR, brier_score, log_score
-from hdcal.blind.scoring.reliability import (
-    ESTIMATOR,
-    effect_errors,
-    reliabilities,
-)
+from hdcal.blind.scoring.reliability import ESTIMATOR, Reliabilities, reliabilities
 from hdcal.blind.scoring.scored_case import match_answers
 
-SCHEMA = "hdcal.blind-scores/1"
 JUDGED = "hdcal"
-_WORDS = ((True, "met"), (False, "missed"), (None, "open"))
 NOTES = {
     "met": (
         "Met compares the value itself with the target; firm says whether the whole "
@@ -48,6 +48,52 @@ NOTES = {
 }
 
 
+@dataclass(frozen=True)
+class CaseCounts:
+    """How many cases were judged, and how many labels are of each kind."""
+
+    n: int
+    kinds: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How many rows of the bar were met, were missed, or have no target or no cases."""
+
+    met: int
+    missed: int
+    open: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scores:
+    """Every score of a blind check, as in scores.json; `notes` says how they are made.
+
+    Those by diagnoser and `rivals` are of all who answered, the others of `diagnoser`.
+    """
+
+    schema: Literal["hdcal.blind-scores/1"] = "hdcal.blind-scores/1"
+    diagnoser: str
+    cases: CaseCounts
+    bar: list[BarResult]
+    summary: Summary
+    log_score: dict[str, Estimate]
+    brier: dict[str, Estimate]
+    confusion: tables.Confusion
+    mix_ups: list[tables.MixUp]
+    reliability: Reliabilities
+    detection: list[DetectionCurve]
+    by_r: list[tables.Row]
+    by_program: list[tables.Row]
+    by_noise: list[tables.Row]
+    by_effect: list[tables.Row]
+    by_family: list[tables.Row]
+    pairs: tables.Row
+    rivals: list[tables.Row]
+    order: TestedFileOrder | FileOrder
+    notes: dict[str, str] = field(default_factory=lambda: NOTES)
+
+
 def score(
     labels: Sequence[Label],
     answers: Mapping[str, Sequence[CaseAnswer]],
@@ -55,8 +101,8 @@ def score(
     closures: Mapping[str, float] | None = None,
     calibration_cases: set[str] | None = None,
     judged: str = JUDGED,
-) -> dict[str, Any]:
-    """Return every score of a blind check, as plain data for JSON.
+) -> Scores:
+    """Return every score of a blind check.
 
     Args:
         labels: the truth, as the opened seal shows it.
@@ -76,25 +122,23 @@ def score(
     own, known = found[judged], closures or {}
     everyone = {label.case for label in labels}
     wanted = everyone if calibration_cases is None else calibration_cases
-    chosen = [case for case in own if case.label.case in wanted]
-    stated, order = reliabilities(chosen), order_dependence(own)
+    stated = reliabilities([case for case in own if case.label.case in wanted])
+    order = order_dependence(own)
     rows = bar(own, known, stated, order)
     confused = tables.confusion(own, families)
-    return {
-        "schema": SCHEMA,
-        "diagnoser": judged,
-        "cases": {"n": len(own), "kinds": dict(Counter(x.kind for x in labels))},
-        "bar": rows,
-        "summary": {word: sum(r["met"] is m for r in rows) for m, word in _WORDS},
-        "log_score": {name: log_score(c).plain() for name, c in found.items()},
-        "brier": {name: brier_score(c).plain() for name, c in found.items()},
-        "confusion": confused,
-        "mix_ups": tables.mix_ups(confused),
-        "reliability": {**tables.plain(stated), "classwise": effect_errors(chosen)},
-        "detection": detection(own),
+    return Scores(
+        diagnoser=judged,
+        cases=CaseCounts(len(own), dict(Counter(x.kind for x in labels))),
+        bar=rows,
+        summary=Summary(*(sum(r.met is m for r in rows) for m in (True, False, None))),
+        log_score={name: log_score(c) for name, c in found.items()},
+        brier={name: brier_score(c) for name, c in found.items()},
+        confusion=confused,
+        mix_ups=tables.mix_ups(confused),
+        reliability=stated,
+        detection=detection(own),
         **groups(own, families, known),
-        "pairs": tables.pairs(own),
-        "rivals": tables.rivals(found, own),
-        "order": order,
-        "notes": NOTES,
-    }
+        pairs=tables.pairs(own),
+        rivals=tables.rivals(found, own),
+        order=order,
+    )

@@ -2,11 +2,11 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from hdcal.blind.scoring.estimates import Estimate, share
 from hdcal.blind.scoring.proper_scores import log_score
-from hdcal.blind.scoring.reliability import Reliability
 from hdcal.blind.scoring.scored_case import (
     NONE,
     UNKNOWN,
@@ -18,7 +18,31 @@ from hdcal.blind.scoring.scored_case import (
 PAIR, OUTSIDE, WITHHELD, REAL = "pair", "outside", "withheld", "real"
 
 
-def confusion(cases: Cases, families: Mapping[str, str]) -> dict[str, Any]:
+# A line of a table, by column: names, counts and estimates.
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Confusion:
+    """How often each truth (row) got each answer (column) as the most probable."""
+
+    truths: list[str]
+    answers: list[str]
+    families: dict[str, str]
+    counts: list[list[int]]
+
+
+@dataclass(frozen=True)
+class MixUp:
+    """A wrong answer, and of how many cases with the same truth."""
+
+    truth: str
+    answer: str
+    n: int
+    of: int
+
+
+def confusion(cases: Cases, families: Mapping[str, str]) -> Confusion:
     """Return how often each truth got each hypothesis as the most probable one.
 
     Args:
@@ -28,12 +52,12 @@ def confusion(cases: Cases, families: Mapping[str, str]) -> dict[str, Any]:
     counts = Counter((_row(case), _column(case.top)) for case in cases)
     rows = _sorted({row for row, _ in counts}, families)
     columns = _sorted({column for _, column in counts} | {NONE, UNKNOWN}, families)
-    return {
-        "truths": rows,
-        "answers": columns,
-        "families": {n: families[n] for n in (*rows, *columns) if n in families},
-        "counts": [[counts[row, column] for column in columns] for row in rows],
-    }
+    return Confusion(
+        rows,
+        columns,
+        {n: families[n] for n in (*rows, *columns) if n in families},
+        [[counts[row, column] for column in columns] for row in rows],
+    )
 
 
 def _row(case: ScoredCase) -> str:
@@ -56,53 +80,56 @@ def _sorted(names: set[str], families: Mapping[str, str]) -> list[str]:
     return sorted(names, key=lambda n: (last.get(n, 0), families.get(n, "~"), n))
 
 
-def mix_ups(table: Mapping[str, Any], most: int = 12) -> list[dict[str, Any]]:
+def mix_ups(table: Confusion, most: int = 12) -> list[MixUp]:
     """Return the most frequent wrong answers of a confusion matrix."""
     right = {WITHHELD: UNKNOWN, OUTSIDE: UNKNOWN}
     found = [
-        {"truth": truth, "answer": answer, "n": n, "of": sum(counts)}
-        for truth, counts in zip(table["truths"], table["counts"], strict=True)
-        for answer, n in zip(table["answers"], counts, strict=True)
+        MixUp(truth, answer, n, sum(counts))
+        for truth, counts in zip(table.truths, table.counts, strict=True)
+        for answer, n in zip(table.answers, counts, strict=True)
         if n and truth != REAL and answer != right.get(truth, truth)
     ]
-    return sorted(found, key=lambda row: -row["n"])[:most]
+    return sorted(found, key=lambda row: -row.n)[:most]
 
 
-def pairs(cases: Cases) -> dict[str, Any]:
+def pairs(cases: Cases) -> Row:
     """Return how often two effects at once are found."""
     own = [c for c in cases if c.label.kind == "pair" and not c.label.withheld]
 
     def both(case: ScoredCase) -> set[str | None]:
         return {case.answer.effect, case.answer.second_effect}
 
-    found = {
+    return {
+        "n": len(own),
         "pair_first": share(c.top == c.truth for c in own),
         "both_in_set": share(set(c.label.truth) <= set(c.answer.set) for c in own),
         "both_named": share(both(c) == set(c.label.truth) for c in own),
         "one_named_wrong": share(c.named and not c.named_right for c in own),
     }
-    return {"n": len(own), **plain(found)}
 
 
-def rivals(found: Mapping[str, Cases], own: Cases) -> list[dict[str, Any]]:
+def rivals(found: Mapping[str, Cases], own: Cases) -> list[Row]:
     """Return what each diagnoser achieves, and the bound that the oracle sets.
 
     Args:
         found: cases by diagnoser.
         own: of the judged one, for the oracle, who knows that an effect acts.
     """
-    rows = []
+    rows: list[Row] = []
     for name, cases in found.items():
         silent = [*null_cases(cases, "iid"), *null_cases(cases, "ar")]
-        numbers = {
-            **_first([c for c in cases if c.plain_effect], lambda c: c.credit),
-            "false_alarms": share(c.answer.detected for c in silent),
-            "precision": precision(cases),
-            "log_score": log_score(cases),
-        }
-        rows.append({"name": name, "n": len(cases), **plain(numbers)})
+        rows.append(
+            {
+                "name": name,
+                "n": len(cases),
+                **_first([c for c in cases if c.plain_effect], lambda c: c.credit),
+                "false_alarms": share(c.answer.detected for c in silent),
+                "precision": precision(cases),
+                "log_score": log_score(cases),
+            }
+        )
     known = [c for c in own if c.plain_effect and c.label.oracle]
-    bound = plain(_first(known, lambda c: c.oracle_credit))
+    bound = _first(known, lambda c: c.oracle_credit)
     unknown = dict.fromkeys(("false_alarms", "precision", "log_score"))
     return [*rows, {"name": "oracle bound", "n": len(known), **bound, **unknown}]
 
@@ -119,8 +146,3 @@ def _first(cases: Cases, credit: Callable[[ScoredCase], float]) -> dict[str, Est
 def precision(cases: Cases) -> Estimate:
     """Return how often a named effect is one that acts, none withheld."""
     return share(c.named_right for c in cases if c.named and not c.label.withheld)
-
-
-def plain(found: Mapping[str, Estimate | Reliability]) -> dict[str, Any]:
-    """Return plain data for JSON."""
-    return {key: value.plain() for key, value in found.items()}

@@ -60,7 +60,7 @@ def draw_cases(
         The measurement file and the label of each.
 
     Raises:
-        InputError: a loading shows next to nothing.
+        InputError: no mix has this name, or a loading shows next to nothing.
     """
     rng = np.random.default_rng(seed)
     digits = len(str(count))

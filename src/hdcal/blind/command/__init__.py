@@ -1,0 +1,1 @@
+"""`hdcal blind` and its commands."""

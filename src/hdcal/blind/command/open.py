@@ -1,0 +1,44 @@
+"""`hdcal blind open`: everything verified, the labels decrypted, the answers scored."""
+
+from pathlib import Path
+
+import click
+
+from hdcal.cli.command import command
+from hdcal.cli.console import Console
+from hdcal.cli.options import json_option
+
+
+@command("open", short_help="Verify everything, decrypt the labels, score.")
+@click.argument("folder", metavar="DIR")
+@click.option("--key", metavar="FILE", required=True, help="Key of the set.")
+@click.option(
+    "--by",
+    metavar="NAME",
+    multiple=True,
+    help="Whose answers to score [default: all of them].",
+)
+@json_option
+@click.pass_obj
+def open_(console: Console, folder, key, by) -> None:
+    """Open DIR, score its frozen answers, and write DIR/result."""
+    from hdcal.blind.answer import ScoresAnswer
+    from hdcal.blind.document import scores_document
+    from hdcal.blind.open import open_set
+    from hdcal.report.terminal import terminal_lines
+
+    opened = open_set(folder, Path(key), tuple(dict.fromkeys(by)))
+    console.result(f"commitment {opened.opening.set_commitment}")
+    for name, one in opened.opening.answers.items():
+        console.result(f"answers {one.sha256} by '{name}'")
+        if not one.blind:
+            words = "were frozen after the set was opened"
+            console.words(f"NOT BLIND: the answers of '{name}' {words}")
+    console.words(f"verified and scored: {opened.folder}")
+    document = scores_document(opened.scores, opened.secret.labels, opened.answers)
+    if console.json:
+        words = {"headline": document.headline, "next_step": None}
+        found = {**vars(opened.opening), "scores": opened.scores}
+        console.data(ScoresAnswer(status="ok", reasons=(), **words, **found))
+    else:
+        console.table(*terminal_lines(document, str(opened.folder)))
