@@ -39,7 +39,7 @@ def sealed_measurement(
     if not truth:
         findings.append(Finding("cause", "names nothing", "Say it, or 'unknown'"))
     for name in sorted(set(truth) & set(withheld)):
-        words, remedy = f"'{name}' is withheld", "Say --cause unknown, or keep it"
+        words, remedy = f"'{name}' is withheld", "Say `cause` unknown, or keep it"
         findings.append(Finding("cause", words, remedy))
     rows = 0
     try:

@@ -150,10 +150,10 @@ def check_free(target: Path | str, key: Path, *, force: bool = False) -> None:
     check_target(target, force=force, ours=_of_plain_set(target))
     if key.resolve().is_relative_to(Path(os.path.realpath(target))):
         words = "would lie inside the set, which it opens"
-        raise refusal(key, words, "Name a place outside with --key")
+        raise refusal(key, words, "Name a place outside with `key`")
     if os.path.lexists(key):
         words = "exists already, and may be the only key to another set"
-        raise refusal(key, words, "Name another file with --key, or move it away")
+        raise refusal(key, words, "Name another file with `key`, or move it away")
     if not key.parent.is_dir():
         words = "its parent folder does not exist"
         raise refusal(key, words, "Make that first")
@@ -227,7 +227,7 @@ def _key_file(path: Path, key: bytes) -> Iterator[None]:
         descriptor = os.open(path, flags, 0o600)
     except OSError as error:
         words = f"cannot be written ({error.strerror or error})"
-        raise refusal(path, words, "Name another file with --key") from error
+        raise refusal(path, words, "Name another file with `key`") from error
     try:
         with open(descriptor, "wb") as stream:
             stream.write(key + b"\n")
