@@ -36,11 +36,12 @@ from hdcal.design.sizes import (
 )
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
 from hdcal.prediction.engine.sizes import SIZES
 
 
 @dataclass(frozen=True)
-class InverseDesign:
+class InverseDesign(Shown):
     """The design that keeps the limits, and what it was chosen among.
 
     Attributes:
@@ -79,13 +80,6 @@ class InverseDesign:
     def drawing(self) -> Geometry:
         """The chosen gear's sizes [mm]."""
         return geometry_with(self.basis.gear.geometry, self.chosen.sizes)
-
-    def _repr_html_(self) -> str:
-        from hdcal.design.document import inverse_document
-        from hdcal.design.summary import inverse_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(inverse_document(inverse_answer(self)))
 
 
 def inverse_design(

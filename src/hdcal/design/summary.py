@@ -1,4 +1,4 @@
-"""Designs as answers."""
+"""Designs as answers, and all that their result folders hold."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -24,6 +24,7 @@ from hdcal.design.answer import (
 )
 from hdcal.design.candidate import Candidate
 from hdcal.design.design_draws import DesignDraws
+from hdcal.design.document import generator_document, inverse_document
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sentences import (
     generator_headline,
@@ -36,8 +37,10 @@ from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
+from hdcal.report.write import Report
 
 D = TypeVar("D", bound=DesignAnswer)
+_FILE = "design.json"
 
 
 def origin(basis: DesignDraws, interval: float, interval_kind: str) -> dict[str, Any]:
@@ -100,6 +103,25 @@ def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
         warnings=found.warnings,
     )
     return in_words(told, generator_headline(told), generator_words(told))
+
+
+def generator_report(
+    found: WaveGenerator, command: str = ""
+) -> Report[GeneratorAnswer]:
+    """Return all that `hdcal design --window` leaves behind.
+
+    Args:
+        found: from `wave_generator`.
+        command: how the result was made.
+    """
+
+    def figures():
+        from hdcal.design.figure import generator_figures
+
+        return generator_figures(found)
+
+    answer = generator_answer(found)
+    return Report(generator_document(answer, command), answer, _FILE, figures)
 
 
 def _numbers(values: np.ndarray) -> tuple[float, ...]:
@@ -223,6 +245,23 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
         warnings=found.warnings,
     )
     return in_words(told, inverse_headline(told), inverse_words(told))
+
+
+def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAnswer]:
+    """Return all that `hdcal design --limit-force` leaves behind.
+
+    Args:
+        found: from `inverse_design`.
+        command: how the result was made.
+    """
+
+    def figures():
+        from hdcal.design.figure import inverse_figures
+
+        return inverse_figures(found)
+
+    answer = inverse_answer(found)
+    return Report(inverse_document(answer, command), answer, _FILE, figures)
 
 
 def _candidate(one: Candidate) -> CandidateAnswer:

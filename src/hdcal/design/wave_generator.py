@@ -14,6 +14,7 @@ from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
 
 # Default range of the spring rate, relative to the gear's own stiffness.
 RATE_RANGE = (0.01, 100.0)
@@ -22,7 +23,7 @@ _ALONG = 9
 
 
 @dataclass(frozen=True)
-class WaveGenerator:
+class WaveGenerator(Shown):
     """The elastic wave generator that meets a window, and how it was judged.
 
     Attributes:
@@ -59,13 +60,6 @@ class WaveGenerator:
         """
         forces = self.forces if level is None else self.forces[:, level : level + 1]
         return set_points(self.chosen.rate, self.window, forces)
-
-    def _repr_html_(self) -> str:
-        from hdcal.design.document import generator_document
-        from hdcal.design.summary import generator_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(generator_document(generator_answer(self)))
 
 
 def wave_generator(

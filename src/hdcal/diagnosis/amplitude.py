@@ -44,7 +44,8 @@ def amplitude_of(
         size = _spread(evidence, name)
     else:
         field, size = _largest(evidence, name, library[name])
-    return Amplitude(name, field, declared[field].unit, size)
+    unit = declared[field].unit
+    return Amplitude(**vars(size), effect=name, parameter=field, unit=unit)
 
 
 def _piecewise_amplitude(

@@ -80,7 +80,7 @@ def with_sampled_size(which: Which, fits: Refits) -> Which:
     draws = posterior.draws.get(f"{size.effect}.{size.parameter}")
     if draws is None or not posterior.usable:
         return which
-    return replace(which, amplitude=replace(size, size=interval(draws)))
+    return replace(which, amplitude=replace(size, **vars(interval(draws))))
 
 
 def failure_reasons(fits: Refits) -> tuple[str, ...]:

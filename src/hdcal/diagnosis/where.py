@@ -24,6 +24,11 @@ def interval(draws) -> Interval:
     return Interval(float(middle), float(low), float(high))
 
 
+def about(middle: float, half_width: float) -> Interval:
+    """Return the interval of a given half-width about its middle."""
+    return Interval(middle, middle - half_width, middle + half_width)
+
+
 def declared_directions(
     evidence: CaseEvidence, case: Case
 ) -> tuple[list[DeclaredCell], Directions]:
@@ -94,8 +99,7 @@ def describe_where(
                 cell.stop,
                 cell.unit,
                 int(cell.rows.sum()),
-                float(tested.bias[index]),
-                float(tested.half_width[index]),
+                about(float(tested.bias[index]), float(tested.half_width[index])),
                 float(tested.z[index]),
                 float(np.sum(left**2 * cell.rows) / total),
             )

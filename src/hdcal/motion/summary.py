@@ -1,12 +1,17 @@
-"""A dynamic calibration as an answer: the numbers and words of its summary.json."""
+"""A dynamic calibration as an answer, and all that its result folder holds."""
+
+from functools import cache
 
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.posterior import FILE_NAME
 from hdcal.motion.answer import DynamicCalibrationAnswer
-from hdcal.motion.document import ASSUMPTIONS, headline, next_steps
+from hdcal.motion.bands import MotionBands, motion_bands
+from hdcal.motion.document import ASSUMPTIONS, headline, motion_document, next_steps
 from hdcal.report.parameters import credible_interval
 from hdcal.report.posterior_answer import posterior_entries
+from hdcal.report.write import Report
 
 
 def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
@@ -29,4 +34,40 @@ def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
         natural_frequency_Hz=free,
         damped_frequency_Hz=credible_interval(damped),
         assumptions=ASSUMPTIONS,
+    )
+
+
+def dynamic_report(
+    posterior: DynamicPosterior, command: str = ""
+) -> Report[DynamicCalibrationAnswer]:
+    """Return all that `hdcal calibrate --dynamic` leaves behind.
+
+    Args:
+        posterior: from `calibrate_dynamic`.
+        command: how the result was made, for its provenance.
+    """
+    found = dynamic_answer(posterior)
+
+    @cache
+    def bands() -> MotionBands:
+        return motion_bands(posterior)
+
+    def figures():
+        from hdcal.motion.figure import motion_figure
+        from hdcal.report.draws_figure import prior_figure, sampler_figure
+
+        return {
+            "motion": motion_figure(posterior, bands()),
+            "priors": prior_figure(posterior),
+            "sampler": sampler_figure(posterior),
+        }
+
+    return Report(
+        motion_document(posterior, found, command),
+        found,
+        "summary.json",
+        figures,
+        kept=["motion"],
+        tables=lambda: {"motion.csv": bands().columns()},
+        save=lambda folder: posterior.save(folder / FILE_NAME),
     )

@@ -14,7 +14,7 @@ from hdcal.classical.fit.answer import (
     ForceAt,
     LackOfFitAnswer,
 )
-from hdcal.classical.fit.document import DOUBT, headline, notes
+from hdcal.classical.fit.document import DOUBT, fit_document, headline, notes
 from hdcal.classical.fit.fit import LEVEL, PolynomialFit
 from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
@@ -22,6 +22,7 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
 from hdcal.report.parameters import credible_interval
+from hdcal.report.write import Report
 
 KIND = "confidence interval (t), independent normal errors of one size"
 
@@ -64,6 +65,28 @@ def fit_answer(
         bayesian=None if posterior is None else _beside(posterior, at),
         notes=(*case.notes, *notes(case)),
     )
+
+
+def fit_report(
+    case: Case,
+    fits: Sequence[PolynomialFit],
+    command: str = "",
+    *,
+    at: float | None = None,
+    posterior: Posterior | None = None,
+) -> Report[FitAnswer]:
+    """Return all that `hdcal fit` leaves behind.
+
+    Args and errors are those of `fit_answer`; `command` says how it was made.
+    """
+
+    def figures():
+        from hdcal.classical.fit.figure import fit_figure
+
+        return {"fit": fit_figure(case, fits)}
+
+    found = fit_answer(case, fits, at=at, posterior=posterior)
+    return Report(fit_document(case, found, command), found, "fit.json", figures)
 
 
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:

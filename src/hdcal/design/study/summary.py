@@ -4,9 +4,15 @@ from collections.abc import Sequence
 
 from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
 from hdcal.design.study.article_tables import ArticleRow
-from hdcal.design.study.document import ARTICLE_HEADLINE, study_headline, study_words
+from hdcal.design.study.document import (
+    ARTICLE_HEADLINE,
+    study_document,
+    study_headline,
+    study_words,
+)
 from hdcal.design.study.study import Study
 from hdcal.design.summary import in_words, origin
+from hdcal.report.write import Report
 
 
 def study_answer(found: Study) -> StudyAnswer:
@@ -23,6 +29,29 @@ def study_answer(found: Study) -> StudyAnswer:
         warnings=found.warnings,
     )
     return in_words(told, study_headline(told), study_words(told))
+
+
+def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
+    """Return all that `hdcal study` leaves behind.
+
+    Args:
+        found: from `study`.
+        command: how the result was made.
+    """
+
+    def figures():
+        from hdcal.design.study.figure import study_figure
+
+        return {"study": study_figure(found)}
+
+    answer = study_answer(found)
+    return Report(
+        study_document(answer, command),
+        answer,
+        "study.json",
+        figures,
+        tables=lambda: {"study.csv": found.columns},
+    )
 
 
 def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:

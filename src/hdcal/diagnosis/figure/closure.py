@@ -90,7 +90,7 @@ def _rung(model: str) -> str:
 
 
 def _draw_closed(axes: Axes, shrink: Closure) -> None:
-    heading(axes, "CovariateShare of the gap closed")
+    heading(axes, "Share of the gap closed")
     if shrink.closed is None or not np.isfinite(shrink.closed.median):
         _say(axes, shrink.reason or "not computed")
         return

@@ -1,4 +1,4 @@
-"""A response as an answer: the numbers and words of response.json."""
+"""A response as an answer, and all that its result folder holds."""
 
 import numpy as np
 
@@ -8,9 +8,10 @@ from hdcal.motion.respond.answer import (
     ResponseAnswer,
     ResponseWithColumns,
 )
-from hdcal.motion.respond.document import headline, next_steps
+from hdcal.motion.respond.document import headline, next_steps, response_document
 from hdcal.motion.respond.respond import Response
 from hdcal.report.parameters import INTERVAL
+from hdcal.report.write import Report
 
 
 def response_answer(response: Response) -> ResponseAnswer:
@@ -42,6 +43,29 @@ def response_answer(response: Response) -> ResponseAnswer:
         remarks=response.remarks,
         draws=response.draws,
         points=len(response.time_s),
+    )
+
+
+def response_report(response: Response, command: str = "") -> Report[ResponseAnswer]:
+    """Return all that `hdcal respond` leaves behind.
+
+    Args:
+        response: from `respond`.
+        command: how the result was made.
+    """
+
+    def figures():
+        from hdcal.motion.figure import response_figure
+
+        return {"response": response_figure(response)}
+
+    found = response_answer(response)
+    return Report(
+        response_document(response, found, command),
+        found,
+        "response.json",
+        figures,
+        tables=lambda: {"response.csv": response.columns()},
     )
 
 

@@ -80,7 +80,7 @@ def margin_document(found: Margin) -> Document:
     )
 
 
-def margin_report(
+def whole_document(
     found: MarginAnswer, posterior: Posterior, command: str = ""
 ) -> Document:
     """Return the report of a margin, with whose it is and how it was made.
