@@ -68,12 +68,7 @@ def _stiffness(found: Interval) -> str:
 
 
 def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
-    """Return what would make the answer better, most urgent first.
-
-    Args:
-        posterior: from `calibrate`.
-        left: its residuals.
-    """
+    """Return what would make the answer better, most urgent first."""
     if not posterior.usable:
         return [
             "Do not use this result. Calibrate with more warm-up and draws; if it "
@@ -88,13 +83,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
 def calibration_document(
     posterior: Posterior, found: CalibrationAnswer, command: str = ""
 ) -> Document:
-    """Return the report; its pictures are calibration, priors, residuals and sampler.
-
-    Args:
-        posterior: from `calibrate`.
-        found: from `calibration_answer`.
-        command: how the result was made.
-    """
+    """Return the report: pictures calibration, priors, residuals and sampler."""
     effects = ", ".join(found.effects).replace("_", " ")
     return Document(
         name=posterior.case.gear.name,

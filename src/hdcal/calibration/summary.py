@@ -58,12 +58,7 @@ def calibration_answer(
 def calibration_report(
     posterior: Posterior, command: str = ""
 ) -> Report[CalibrationAnswer]:
-    """Return all that `hdcal calibrate` leaves behind.
-
-    Args:
-        posterior: from `calibrate`.
-        command: how the result was made, for its provenance.
-    """
+    """Return all that `hdcal calibrate` leaves behind."""
     left = residuals(posterior)
     found = calibration_answer(posterior, left)
 

@@ -33,11 +33,7 @@ _FINE, _COARSE = 41, 21
 
 
 def generator_figures(found: WaveGenerator) -> dict[str, Figure]:
-    """Return the figures of a wave generator by name.
-
-    Args:
-        found: from `wave_generator`.
-    """
+    """Return the figures of a wave generator by name."""
     ring, at = found.basis.gear.geometry, 0.5 * sum(found.window)
     shape = profile_figure(ring, _modulus(found.basis), at)
     return {"design": generator_figure(found), "profile": shape}
@@ -59,11 +55,7 @@ def _modulus(basis: DesignDraws) -> float:
 
 
 def generator_figure(found: WaveGenerator) -> Figure:
-    """Draw the balance of spring and gear, and the probability over the spring rate.
-
-    Args:
-        found: from `wave_generator`.
-    """
+    """Draw the balance of spring and gear, and the probability over the spring rate."""
     with style():
         figure = Figure(figsize=(9.4, 4.2), layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -132,11 +124,7 @@ def _probability(axes: Axes, found: WaveGenerator) -> None:
 
 
 def inverse_figure(found: InverseDesign) -> Figure:
-    """Draw the force over the free sizes, the limit, and what was chosen.
-
-    Args:
-        found: from `inverse_design`, with at least one free size.
-    """
+    """Draw the force over the free sizes, the limit, and what was chosen."""
     with style():
         figure = Figure(figsize=(7.6, 4.4), layout="constrained")
         axes = figure.subplots()

@@ -71,11 +71,7 @@ def _error(probability: float, draws: int) -> float:
 
 
 def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
-    """Return an elastic wave generator as an answer, ready for JSON.
-
-    Args:
-        found: from `wave_generator`.
-    """
+    """Return an elastic wave generator as an answer, ready for JSON."""
     levels = range(len(found.temperatures))
     told = GeneratorAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
@@ -108,12 +104,7 @@ def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
 def generator_report(
     found: WaveGenerator, command: str = ""
 ) -> Report[GeneratorAnswer]:
-    """Return all that `hdcal design --window` leaves behind.
-
-    Args:
-        found: from `wave_generator`.
-        command: how the result was made.
-    """
+    """Return all that `hdcal design --window` leaves behind."""
 
     def figures():
         from hdcal.design.figure import generator_figures
@@ -221,11 +212,7 @@ def _stress(basis: DesignDraws, draws: np.ndarray) -> dict[str, Any]:
 
 
 def inverse_answer(found: InverseDesign) -> InverseAnswer:
-    """Return an inverse design as an answer, ready for JSON.
-
-    Args:
-        found: from `inverse_design`.
-    """
+    """Return an inverse design as an answer, ready for JSON."""
     told = InverseAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
         asked=LimitAsked(
@@ -248,12 +235,7 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
 
 
 def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAnswer]:
-    """Return all that `hdcal design --limit-force` leaves behind.
-
-    Args:
-        found: from `inverse_design`.
-        command: how the result was made.
-    """
+    """Return all that `hdcal design --limit-force` leaves behind."""
 
     def figures():
         from hdcal.design.figure import inverse_figures

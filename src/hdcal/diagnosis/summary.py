@@ -21,13 +21,7 @@ INTERVAL = 0.9
 def verdict_answer(
     verdict: Verdict, *, seed: int = 0, quick: bool = False
 ) -> VerdictAnswer:
-    """Return a verdict as its JSON answer.
-
-    Args:
-        verdict: from `diagnose`.
-        seed: it was made with.
-        quick: whether nothing was sampled.
-    """
+    """Return a verdict as its JSON answer."""
     case, gear, where = verdict.case, verdict.case.gear, verdict.where
     found = VerdictAnswer(
         status=verdict.status,
@@ -82,14 +76,7 @@ def verdict_answer(
 def verdict_report(
     verdict: Verdict, command: str = "", *, seed: int = 0, quick: bool = False
 ) -> Report[VerdictAnswer]:
-    """Return all that `hdcal diagnose` leaves behind for one case.
-
-    Args:
-        verdict: from `diagnose`.
-        command: how the result was made, for its provenance.
-        seed: the diagnosis was made with.
-        quick: whether nothing was sampled.
-    """
+    """Return all that `hdcal diagnose` leaves behind for one case."""
     refit = corrected(verdict)
     found = verdict_answer(verdict, seed=seed, quick=quick)
 

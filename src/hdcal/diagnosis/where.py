@@ -72,15 +72,7 @@ def describe_where(
     tested: ResidualTest,
     smooth: SmoothGap | None,
 ) -> Where:
-    """Put the outcome of the residual test into values for people.
-
-    Args:
-        evidence: for the order of the rows.
-        case: whose rows were tested.
-        cells: that were declared.
-        tested: outcome of the residual test.
-        smooth: the smooth gap, None when none is detected.
-    """
+    """Put the outcome of the residual test into values for people."""
     order = evidence.prepared.order
     residual, gap = np.empty(len(order)), np.zeros(len(order))
     residual[order] = tested.residual

@@ -29,15 +29,7 @@ def identify_cause(
     library: dict[str, type[Effect]],
     rng: np.random.Generator,
 ) -> Which:
-    """Return the verdict on the cause.
-
-    Args:
-        evidence: of the hypotheses.
-        posterior: over them.
-        detected: whether there is a gap.
-        library: the effects by name.
-        rng: source of randomness.
-    """
+    """Return the verdict on the cause."""
     word = verdict_word(posterior, detected)
     ranked = sorted(posterior.inclusion, key=lambda n: -posterior.inclusion[n])
     named = word in ("named", "ambiguous") and bool(ranked)

@@ -52,13 +52,7 @@ def next_steps(posterior: DynamicPosterior) -> list[str]:
 def motion_document(
     posterior: DynamicPosterior, found: DynamicCalibrationAnswer, command: str = ""
 ) -> Document:
-    """Return the report; its pictures are motion, priors and sampler.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-        found: from `dynamic_answer`.
-        command: how the result was made.
-    """
+    """Return the report; its pictures are motion, priors and sampler."""
     return Document(
         name=posterior.case.gear.name,
         kind="dynamic calibration",

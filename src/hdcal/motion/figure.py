@@ -21,11 +21,7 @@ from hdcal.report.canvas import (
 
 
 def response_figure(response: Response) -> Figure:
-    """Draw the force, and below it the band of the deformation.
-
-    Args:
-        response: from `respond`.
-    """
+    """Draw the force, and below it the band of the deformation."""
     time, unit = _clock(response.time_s)
     with style():
         figure, above, below = _panels(unit)
@@ -63,12 +59,7 @@ def response_figure(response: Response) -> Figure:
 
 
 def motion_figure(posterior: Posterior, bands: MotionBands) -> Figure:
-    """Draw a calibrated record: force, deformation with bands, and what is left.
-
-    Args:
-        posterior: whose name and status are shown.
-        bands: from `motion_bands`.
-    """
+    """Draw a calibrated record: force, deformation with bands, and what is left."""
     time, unit = _clock(bands.time_s)
     shown = thinned(len(time))
     with style():

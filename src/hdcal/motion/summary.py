@@ -15,11 +15,7 @@ from hdcal.report.write import Report
 
 
 def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
-    """Return a dynamic calibration as an answer, ready for JSON.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-    """
+    """Return a dynamic calibration as an answer, ready for JSON."""
     draws = posterior.draws
     ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
     damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
@@ -40,12 +36,7 @@ def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
 def dynamic_report(
     posterior: DynamicPosterior, command: str = ""
 ) -> Report[DynamicCalibrationAnswer]:
-    """Return all that `hdcal calibrate --dynamic` leaves behind.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-        command: how the result was made, for its provenance.
-    """
+    """Return all that `hdcal calibrate --dynamic` leaves behind."""
     found = dynamic_answer(posterior)
 
     @cache

@@ -29,13 +29,7 @@ _MOST_COLUMNS = 3
 
 
 def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> Figure:
-    """Draw force over deformation, and below it the distance from the fit.
-
-    Args:
-        posterior: names, status.
-        bands: from `default_bands`.
-        left: residuals of the same posterior.
-    """
+    """Draw force over deformation, and below it the distance from the fit."""
     gear = posterior.case.gear
     levels = np.unique(bands.temperature_C)
     colours = temperature_colours(levels)

@@ -49,13 +49,7 @@ def notes(case: Case) -> Iterator[str]:
 
 
 def fit_document(case: Case, found: FitAnswer, command: str = "") -> Document:
-    """Return the report of classical fits; its picture is called fit.
-
-    Args:
-        case: that was fitted.
-        found: from `fit_answer`.
-        command: how the result was made.
-    """
+    """Return the report of classical fits; its picture is called fit."""
     lacking = [
         one.model
         for one in found.fits

@@ -16,11 +16,7 @@ from hdcal.report.write import Report
 
 
 def study_answer(found: Study) -> StudyAnswer:
-    """Return a study as an answer, ready for JSON, its table by column.
-
-    Args:
-        found: from `study`.
-    """
+    """Return a study as an answer, ready for JSON, its table by column."""
     told = StudyAnswer(
         **origin(found.basis, found.interval, found.interval_kind),
         varied=found.varied,
@@ -32,12 +28,7 @@ def study_answer(found: Study) -> StudyAnswer:
 
 
 def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
-    """Return all that `hdcal study` leaves behind.
-
-    Args:
-        found: from `study`.
-        command: how the result was made.
-    """
+    """Return all that `hdcal study` leaves behind."""
 
     def figures():
         from hdcal.design.study.figure import study_figure
@@ -55,11 +46,7 @@ def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
 
 
 def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:
-    """Return the article's tables as an answer, ready for JSON.
-
-    Args:
-        rows: from `article_rows`.
-    """
+    """Return the article's tables as an answer, ready for JSON."""
     return ArticleAnswer(
         reasons=(), headline=ARTICLE_HEADLINE, next_step=None, rows=tuple(rows)
     )

@@ -15,11 +15,7 @@ from hdcal.report.write import Report
 
 
 def response_answer(response: Response) -> ResponseAnswer:
-    """Return a response without its rows as an answer, ready for JSON.
-
-    Args:
-        response: from `respond`.
-    """
+    """Return a response without its rows as an answer, ready for JSON."""
     posterior = response.posterior
     moving = isinstance(posterior, DynamicPosterior)
     estimates = {n: QuantityEstimate(**one) for n, one in response.estimates.items()}
@@ -47,12 +43,7 @@ def response_answer(response: Response) -> ResponseAnswer:
 
 
 def response_report(response: Response, command: str = "") -> Report[ResponseAnswer]:
-    """Return all that `hdcal respond` leaves behind.
-
-    Args:
-        response: from `respond`.
-        command: how the result was made.
-    """
+    """Return all that `hdcal respond` leaves behind."""
 
     def figures():
         from hdcal.motion.figure import response_figure

@@ -29,23 +29,13 @@ _DRIVEN_WORDS = {
 
 
 def margin_figures(found: Margin, name: str) -> dict[str, Figure]:
-    """Return the figures of a margin by name; without shares there is no tornado.
-
-    Args:
-        found: from `margin`.
-        name: of the gear.
-    """
+    """Return the figures of a margin by name; without shares there is no tornado."""
     drawn = {"margin": margin_figure(found, name)}
     return drawn | ({"tornado": tornado_figure(found)} if found.shares else {})
 
 
 def margin_figure(found: Margin, name: str) -> Figure:
-    """Draw the force needed with its bounds, over temperature where there are several.
-
-    Args:
-        found: from `margin`.
-        name: of the gear.
-    """
+    """Draw the force needed with its bounds, over temperature if there are several."""
     several = len(found.levels) > 1
     with style():
         height = 6.0 if several else 2.9

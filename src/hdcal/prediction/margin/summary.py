@@ -22,13 +22,7 @@ KINDS = {
 def margin_answer(
     found: Margin, posterior: Posterior, *, seed: int = 0
 ) -> MarginAnswer:
-    """Return a margin as an answer, ready for JSON.
-
-    Args:
-        found: from `margin`.
-        posterior: of the likeliest model.
-        seed: it was made with.
-    """
+    """Return a margin as an answer, ready for JSON."""
     gear, case = posterior.case.gear, posterior.case
     return MarginAnswer(
         reasons=(),
@@ -48,14 +42,7 @@ def margin_answer(
 def margin_report(
     found: Margin, posterior: Posterior, command: str = "", *, seed: int = 0
 ) -> Report[MarginAnswer]:
-    """Return all that `hdcal margin` leaves behind.
-
-    Args:
-        found: from `margin`.
-        posterior: of the likeliest model.
-        command: how the result was made.
-        seed: it was made with.
-    """
+    """Return all that `hdcal margin` leaves behind."""
 
     def figures():
         from hdcal.prediction.margin.figure import margin_figures
