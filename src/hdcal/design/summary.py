@@ -14,11 +14,9 @@ from hdcal.design.answer import (
     GearByGear,
     GeneratorAnswer,
     InverseAnswer,
-    LimitAsked,
     SetPoint,
     SpringCurve,
     StressAtWindow,
-    WindowAsked,
     WindowForces,
     WindowKept,
 )
@@ -72,15 +70,10 @@ def _error(probability: float, draws: int) -> float:
 
 def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
     """Return an elastic wave generator as an answer, ready for JSON."""
-    levels = range(len(found.temperatures))
+    levels = range(len(found.asked.temperature_C))
     told = GeneratorAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
-        asked=WindowAsked(
-            window_mm=found.window,
-            temperature_C=_numbers(found.temperatures),
-            probability=found.required,
-            setting_sd_mm=found.setting_sd,
-        ),
+        asked=found.asked,
         population=found.gear.words,
         spring=_spring(found),
         set_point=_set_point(found),
@@ -135,12 +128,13 @@ def _spring(found: WaveGenerator) -> ChosenSpring:
 
 
 def _middle(found: WaveGenerator) -> float:
-    return 0.5 * sum(found.window)
+    return 0.5 * sum(found.asked.window_mm)
 
 
 def _reference(found: WaveGenerator) -> int:
     """Return which of the temperatures is nearest to the reference."""
-    off = np.abs(found.temperatures - found.basis.gear.reference_temperature)
+    levels = np.asarray(found.asked.temperature_C)
+    off = np.abs(levels - found.basis.gear.reference_temperature)
     return int(np.argmin(off))
 
 
@@ -149,21 +143,21 @@ def _set_point(found: WaveGenerator) -> SetPoint:
     level = _reference(found)
     return SetPoint(
         deformation_mm=_middle(found),
-        temperature_C=float(found.temperatures[level]),
+        temperature_C=found.asked.temperature_C[level],
         force_N=credible_interval(found.forces[1, level]),
     )
 
 
 def _forces(found: WaveGenerator, level: int) -> WindowForces:
     ends = map(credible_interval, found.forces[:, level])
-    return WindowForces(float(found.temperatures[level]), *ends)
+    return WindowForces(found.asked.temperature_C[level], *ends)
 
 
 def _kept(found: WaveGenerator, level: int) -> WindowKept:
     low, high = found.intervals(level)
     x = found.chosen.interference + found.error
     return WindowKept(
-        temperature_C=float(found.temperatures[level]),
+        temperature_C=found.asked.temperature_C[level],
         zero_backlash=float(np.mean(x >= low)),
         no_jam=float(np.mean(x <= high)),
         inside=float(np.mean((x >= low) & (x <= high))),
@@ -174,21 +168,23 @@ def _adjusted(found: WaveGenerator) -> GearByGear:
     """Return the range of set points when each gear is given its own."""
     low, high = found.intervals()
     own = 0.5 * (low + high)
-    ends = np.array([0.5 - found.required / 2.0, 0.5 + found.required / 2.0])
+    ends = np.array(
+        [0.5 - found.asked.probability / 2.0, 0.5 + found.asked.probability / 2.0]
+    )
     reach = np.quantile(own, ends)
     first, last = _numbers(reach)
     soft, firm = _numbers(found.chosen.rate * (reach - _middle(found)))
     return GearByGear(
         probability=found.chosen.adjusted,
-        share_of_gears=found.required,
+        share_of_gears=found.asked.probability,
         interference_mm=(first, last),
         preload_N=(soft, firm),
     )
 
 
 def _window_stress(found: WaveGenerator) -> StressAtWindow:
-    basis, at = found.basis, found.window[1]
-    rise = found.temperatures - basis.gear.reference_temperature
+    basis, at = found.basis, found.asked.window_mm[1]
+    rise = np.asarray(found.asked.temperature_C) - basis.gear.reference_temperature
     warm = np.max(1.0 - np.asarray(basis.values["alpha"])[:, None] * rise, axis=1)
     modulus = np.asarray(basis.values["E0"]) * warm
     draws = np.asarray(peak_stress(basis.gear.geometry, modulus, at))
@@ -215,14 +211,7 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
     """Return an inverse design as an answer, ready for JSON."""
     told = InverseAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
-        asked=LimitAsked(
-            deformation_mm=found.deformation,
-            temperature_C=_numbers(found.temperatures),
-            limit_force_N=found.limit_force,
-            limit_stress_MPa=found.limit_stress,
-            probability=found.required,
-            bounds=found.bounds,
-        ),
+        asked=found.asked,
         population=found.gear.words,
         design=_candidate(found.chosen),
         tested=_candidate(found.tested),
