@@ -1,6 +1,6 @@
 """A calibration in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import THEORY_WORDS
@@ -19,7 +19,6 @@ from hdcal.report.document import (
 from hdcal.report.parameters import Interval
 from hdcal.report.posterior_sections import (
     check_section,
-    failed_headline,
     parameter_section,
     prior_section,
 )
@@ -49,17 +48,8 @@ _LACKING: Mapping[str, str] = {
 }
 
 
-def headline(stiffness: Interval, reasons: Sequence[str]) -> str:
-    """Return the answer in one sentence.
-
-    Args:
-        stiffness: at the reference temperature [N/mm].
-        reasons: why the calibration must not be used, if so.
-    """
-    return failed_headline(reasons) if reasons else _stiffness(stiffness)
-
-
-def _stiffness(found: Interval) -> str:
+def headline(found: Interval) -> str:
+    """Return the stiffness at the reference temperature in one sentence."""
     middle, span = estimate(found)
     return (
         f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
@@ -92,7 +82,7 @@ def calibration_document(
         f"({found.data.name}), theory “{found.gear.theory}”"
         f"{', with ' * bool(effects)}{effects}.",
         # Of a failed calibration the page shows it struck through.
-        headline=_stiffness(found.stiffness_N_per_mm),
+        headline=headline(found.stiffness_N_per_mm),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[

@@ -39,13 +39,12 @@ def calibration_answer(
         left: its residuals, if they are at hand.
     """
     left = left or residuals(posterior)
-    entries = posterior_entries(posterior)
-    entries["warnings"] += tuple(shape.words for shape in left.structure)
     steps = tuple(next_steps(posterior, left))
+    stiffness = credible_interval(posterior.draws["stiffness"])
+    entries = posterior_entries(posterior, headline(stiffness), steps)
+    entries["warnings"] += tuple(shape.words for shape in left.structure)
     return CalibrationAnswer(
         **entries,
-        headline=headline(entries["stiffness_N_per_mm"], posterior.reasons),
-        next_step=steps[0] if steps else None,
         K_by_theory=K_by_theory(posterior),
         K_note=ARTICLE_NOTE,
         residuals=tuple(ResidualShape(**vars(shape)) for shape in left.structure),

@@ -22,6 +22,7 @@ from hdcal.report.canvas import (
     PURPLE,
     RED,
     heading,
+    note,
     plain,
     style,
     temperature_colours,
@@ -105,16 +106,8 @@ def _probability(axes: Axes, found: WaveGenerator) -> None:
         rates, adjusted, color=ORANGE, linestyle="-.", label="each gear adjusted"
     )
     axes.axhline(found.asked.probability, color=RED, linewidth=0.9, linestyle=":")
-    axes.annotate(
-        f"required {found.asked.probability:g}",
-        (rates[-1], found.asked.probability),
-        xytext=(0, -4),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        color=RED,
-        fontsize=8.5,
-    )
+    words, at = f"required {found.asked.probability:g}", found.asked.probability
+    note(axes, words, (rates[-1], at), (0, -4), ha="right", va="top", color=RED)
     chosen = found.chosen
     axes.plot(chosen.rate, chosen.together, "o", color=DARK, zorder=5)
     axes.set_ylim(min(0.0 if min(together) < 0.9 else min(together) - 0.01, 0.98), None)

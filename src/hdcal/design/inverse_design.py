@@ -111,15 +111,11 @@ def inverse_design(
     """
     draws = design_draws(source, seed=seed)
     at = draws.nominal_deformation if deformation is None else deformation
-    asked = LimitAsked(
-        # Without any number the finding about it is told with the others.
-        deformation_mm=np.nan if at is None else at,
-        temperature_C=tuple(with_reference(draws, temperatures).tolist()),
-        limit_force_N=limit_force,
-        limit_stress_MPa=limit_stress,
-        probability=probability,
-        bounds=dict(vary),
-    )
+    # Without any number the finding about it is told with the others.
+    at = np.nan if at is None else at
+    levels = tuple(with_reference(draws, temperatures).tolist())
+    limits = limit_force, limit_stress, probability
+    asked = LimitAsked(at, levels, *limits, dict(vary))
     with Findings() as wrong:
         wrong += _findings(draws, asked, materials)
         listed = materials or [draws.material]

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
-from hdcal.diagnosis.verdict import Verdict, member_files
+from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
-from hdcal.inference.posterior import Posterior, versions
+from hdcal.inference.posterior import FILE_NAME, Posterior, versions
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.prediction.engine.causes import ORIGIN
@@ -33,11 +33,7 @@ def verdict_answer(
         interval=INTERVAL,
         gap=verdict.gap,
         where=WhereAnswer(
-            p_value=where.p_value,
-            statistics=where.statistics,
-            shares=where.shares,
-            regions=where.regions,
-            cells=where.cells,
+            where.p_value, where.statistics, where.shares, where.regions, where.cells
         ),
         which=verdict.which,
         shrink=verdict.shrink,
@@ -127,6 +123,13 @@ def write_verdict(
     if report:
         write_files(report_files(told.document, told.figures()), folder)
     return told.answer
+
+
+def member_files(verdict: Verdict) -> dict[str, str]:
+    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
+    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
+    files = {name: f"posterior-{name}.nc" for name in ranked}
+    return files | dict.fromkeys(ranked[:1], FILE_NAME)
 
 
 def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
-from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.report.answer import Count, EffectName, Probability, Promise, Real, Words
 from hdcal.report.parameters import Interval
@@ -296,10 +296,3 @@ class Verdict(Shown):
     def status(self) -> Literal["ok", "failed"]:
         """Return whether the result may be used."""
         return "failed" if self.reasons else "ok"
-
-
-def member_files(verdict: Verdict) -> dict[str, str]:
-    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
-    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
-    files = {name: f"posterior-{name}.nc" for name in ranked}
-    return files | dict.fromkeys(ranked[:1], FILE_NAME)

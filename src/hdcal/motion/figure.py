@@ -12,6 +12,7 @@ from hdcal.report.canvas import (
     DARK,
     GREY,
     ORANGE,
+    beyond,
     heading,
     plain,
     style,
@@ -28,20 +29,17 @@ def response_figure(response: Response) -> Figure:
         _draw_force(above, time, response.force_N)
         lo, hi = response.deformation_lo_mm, response.deformation_hi_mm
         tested = np.asarray(response.tested)
-        # Neighbouring stretches share a point, else a white slit opens between them.
-        beyond = (
-            ~tested | np.append(~tested[1:], False) | np.append(False, ~tested[:-1])
-        )
+        untested = beyond(tested)
         shade = {"color": BLUE, "linewidth": 0.0}
         below.fill_between(
             time, lo, hi, where=tested, alpha=0.4, label="95 % credible band", **shade
         )
-        if beyond.any():
+        if untested.any():
             below.fill_between(
                 time,
                 lo,
                 hi,
-                where=beyond,
+                where=untested,
                 facecolor=BLUE,
                 edgecolor=BLUE,
                 alpha=0.18,

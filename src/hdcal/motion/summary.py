@@ -20,11 +20,9 @@ def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
     ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
     damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
     free = credible_interval(frequency)
-    steps = next_steps(posterior)
+    entries = posterior_entries(posterior, headline(free), next_steps(posterior))
     return DynamicCalibrationAnswer(
-        **posterior_entries(posterior),
-        headline=headline(free, posterior.reasons),
-        next_step=steps[0] if steps else None,
+        **entries,
         damping_N_s_per_mm=credible_interval(draws["damping"]),
         damping_ratio=credible_interval(ratio),
         natural_frequency_Hz=free,

@@ -12,9 +12,8 @@ from hdcal.classical.fit.answer import (
     FittedCurve,
     FittedData,
     ForceAt,
-    LackOfFitAnswer,
 )
-from hdcal.classical.fit.document import DOUBT, fit_document, headline, notes
+from hdcal.classical.fit.document import fit_document, headline, notes
 from hdcal.classical.fit.fit import LEVEL, PolynomialFit
 from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
@@ -125,7 +124,7 @@ def _curve(one: PolynomialFit, at: float | None, best: float | None) -> FittedCu
         r2_adjusted=one.r2_adjusted,
         aicc=one.aicc,
         aicc_over_best=None if one.aicc is None or best is None else one.aicc - best,
-        lack_of_fit=_lack_of_fit(one),
+        lack_of_fit=one.lack_of_fit,
         held_out_rows_N=one.held_out,
         held_out_runs_N=one.held_out_runs,
         condition_number=one.condition_number,
@@ -133,14 +132,6 @@ def _curve(one: PolynomialFit, at: float | None, best: float | None) -> FittedCu
         if at is None
         else ForceAt(**{f"{name}_N": value for name, value in one.at(at).items()}),
     )
-
-
-def _lack_of_fit(one: PolynomialFit) -> LackOfFitAnswer | None:
-    lack = one.lack_of_fit
-    if lack is None:
-        return None
-    too_simple = lack.p_value < DOUBT
-    return LackOfFitAnswer(lack.against, lack.F, lack.dof, lack.p_value, too_simple)
 
 
 def _highest_first(one: PolynomialFit) -> tuple[float, ...]:

@@ -16,6 +16,7 @@ from hdcal.report.canvas import (
     ORANGE,
     RED,
     heading,
+    name_rows,
     plain,
     style,
     thinned,
@@ -153,10 +154,8 @@ def _draw_labels(axes: Axes, covariate: str, cells: list[Cell]) -> None:
         axes.plot(bias, [place - 0.31, place + 0.31], color=colour, lw=2.2)
     axes.use_sticky_edges = False
     axes.axvline(0.0, color=DARK, linewidth=0.8)
-    axes.set_yticks(range(len(shown)), [plain(cell.label, 34) for cell in shown])
-    axes.tick_params(axis="y", labelsize=8, length=0)
+    name_rows(axes, [plain(cell.label, 34) for cell in shown], size=8)
     axes.set_ylim(-0.6, len(shown) - 0.4)
-    axes.grid(False, axis="y")
     more = f" (worst {len(shown)} of {len(cells)})" if len(shown) < len(cells) else ""
     heading(axes, f"By {plain(covariate, 40)}{more}")
     axes.set_xlabel("measured − model [N]")
