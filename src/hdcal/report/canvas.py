@@ -115,7 +115,7 @@ def heading(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="left", fontweight="bold", color=DARK)
 
 
-def note(axes: Axes, text: str, at: Sequence[float], shift, **look: Any) -> None:
+def note(axes: Axes, text: str, at: tuple[Any, Any], shift, **look: Any) -> None:
     """Write a small text beside a place, shifted by so many points."""
     axes.annotate(
         text, at, xytext=shift, textcoords="offset points", fontsize=8.5, **look
