@@ -122,8 +122,8 @@ def _sizes(verdict: Verdict, task: Task, drawn: causes.Drawn) -> dict:
         row |= {"closed": far.closed.median, "placebo": far.placebo_closed}
         row |= {"closed_lo": far.closed.lo, "closed_hi": far.closed.hi}
     if found is not None and drawn.amplitude is not None:
-        error = found.size.median / drawn.amplitude - 1.0
-        inside = found.size.lo <= drawn.amplitude <= found.size.hi
+        error = found.median / drawn.amplitude - 1.0
+        inside = found.lo <= drawn.amplitude <= found.hi
         row |= {"amplitude_error": error, "amplitude_inside": bool(inside)}
     return row
 

@@ -15,13 +15,15 @@ from commands import XB1, Done, Hdcal
 from hdcal.data.gear import read_gear
 from hdcal.design.answer import GeneratorAnswer, InverseAnswer
 from hdcal.design.inverse_design import inverse_design
-from hdcal.design.result_folder import write_generator, write_inverse, write_study
 from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
 from hdcal.design.study.study import study
+from hdcal.design.study.summary import study_report
+from hdcal.design.summary import generator_report, inverse_report
 from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.report.answer import Answer, json_schema
+from hdcal.report.write import write_report
 
 WALL = "wall_thickness_mm=0.5:0.8"
 FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
@@ -49,11 +51,14 @@ def folders(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pa
     gear = replace(posterior.case.gear, name=name)
     posterior = replace(posterior, case=replace(posterior.case, gear=gear))
     sizes = {"wall_thickness_mm": (0.5, 0.8), "radius_mm": (38.0, 45.0)}
-    write_generator(wave_generator(posterior, (0.38, 0.42)), base / "generator")
+    spring = wave_generator(posterior, (0.38, 0.42))
+    write_report(generator_report(spring), base / "generator")
     among = ["40CrNiMoA", "Ti-6Al-4V"]
-    write_inverse(inverse_design(posterior, sizes, 70.0, materials=among), base / "inv")
+    made = inverse_design(posterior, sizes, 70.0, materials=among)
+    write_report(inverse_report(made), base / "inv")
     vary = {"wall_thickness_mm": [0.6, 0.7], "radius_mm": [38, 40, 42]}
-    write_study(study(posterior, vary, materials=among), base / "study")
+    tabulated = study(posterior, vary, materials=among)
+    write_report(study_report(tabulated), base / "study")
     return {name: base / name for name in ("generator", "inv", "study")}
 
 
@@ -233,12 +238,13 @@ def test_bad_input_is_told_and_nothing_written(
 def test_the_longest_table_is_cut_and_says_so(folders: dict[str, Path]):
     gear = read_gear(XB1 / "gear.toml")
     many = study(gear, {"wall_thickness_mm": [0.6 + 1e-4 * i for i in range(201)]})
-    document, answer = write_study(many, folders["study"].parent / "many")
+    told = study_report(many)
+    write_report(told, folders["study"].parent / "many")
     page = (folders["study"].parent / "many" / "report.html").read_text("utf-8")
     assert page.count("<td>40CrNiMoA</td>") == 200
     assert "The first 40 of 201" in page and "The first 200 of 201" in page
-    assert len(answer.columns["material"]) == 201
-    brief = [section for section in document.sections if section.brief]
+    assert len(told.answer.columns["material"]) == 201
+    brief = [section for section in told.document.sections if section.brief]
     assert [len(block.rows) for block in brief[0].blocks[:1]] == [40]
 
 

@@ -125,7 +125,7 @@ def test_choosing_on_the_same_draws_flatters_little():
 def test_the_softest_that_meets_it_is_found(given):
     draws = given(known(2000))
     found = wave_generator(draws.gear, WINDOW, temperatures=[-20.0, 80.0])
-    assert found.temperatures.tolist() == [-20.0, 20.0, 80.0]
+    assert found.asked.temperature_C == (-20.0, 20.0, 80.0)
     assert found.chosen.together >= 0.99
     softer = [s for s in found.springs if s.rate < found.chosen.rate]
     assert softer and all(s.together < 0.99 for s in softer)

@@ -77,7 +77,7 @@ def test_friction_is_named(friction):
     assert friction.which.effect == "coulomb_friction"
     assert friction.gap.detected and friction.where.p_value <= 0.05
     size = friction.which.amplitude
-    assert size is not None and size.size.lo < 0.8 < size.size.hi
+    assert size is not None and size.lo < 0.8 < size.hi
     assert friction.shrink.closed is not None and friction.shrink.closed.median > 0.8
     assert friction.status == "ok"
     assert_consistent(friction)
@@ -141,7 +141,7 @@ def test_the_article_s_gap_has_several_possible_causes(article):
 
 
 def test_what_was_not_measured_is_not_tested(article):
-    not_testable = article.which.not_testable
+    not_testable = {one.effect: one.needs for one in article.which.not_testable}
     assert not_testable["coulomb_friction"] == ("unloading",)
     assert not_testable["thermal_zero_drift"] == ("temperature",)
     assert not set(not_testable) & set(article.which.inclusion)
@@ -231,7 +231,7 @@ def test_rounded_readings_are_named():
     )
     assert verdict.gap.detected
     assert verdict.which.effect == "quantisation"
-    assert verdict.which.amplitude.size.median == pytest.approx(2.0)
+    assert verdict.which.amplitude.median == pytest.approx(2.0)
     # Rounding is noise: there is no mean force that it could close.
     assert verdict.shrink.closed is None
     assert "noise" in verdict.shrink.reason

@@ -10,9 +10,10 @@ import pytest
 from rigs import cycles, make_case
 from verdicts import KINDS, named
 
-from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer, WhereAnswer
+from hdcal.diagnosis.answer import VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.places import places
 from hdcal.diagnosis.summary import verdict_answer
+from hdcal.diagnosis.verdict import Cell
 from hdcal.diagnosis.words import NO_PROOF, PROPORTIONAL
 from hdcal.report.answer import json_schema
 from hdcal.report.parameters import Interval
@@ -213,7 +214,8 @@ def test_of_many_pairs_of_one_shape_those_that_matter_are_named():
 )
 def test_a_gap_without_a_range_that_is_off(statistic: str, words: str):
     verdict = named()
-    cells = tuple(replace(c, bias_N=0.0) for c in verdict.where.cells)
+    none = Interval(0.0, -1.0, 1.0)
+    cells = tuple(replace(c, bias_N=none) for c in verdict.where.cells)
     chances = {"largest": 3.0, "p_spread": 0.5, "p_largest": 0.6, statistic: 0.001}
     where = replace(verdict.where, cells=cells, statistics=chances)
     gap = replace(verdict.gap, rms_N=Interval(1.5, 1.0, 2.0))
@@ -233,12 +235,12 @@ def test_touching_ranges_of_one_sign_are_one_place():
     assert len(found["where"]["regions"]) == 5
 
 
-def cell(covariate: str, low: float, high: float, bias: float) -> CellAnswer:
+def cell(covariate: str, low: float, high: float, bias: float) -> Cell:
     """Return a cell, as far as words are made of it."""
     label = {"run": "run 3", "direction": "unloading"}.get(covariate, "loading, 1 mm")
     unit = {"time": "s", "temperature": "°C"}.get(covariate, "")
     size = Interval(bias, bias, bias)
-    return CellAnswer(covariate, label, low, high, unit, 1, size, 1.0, 1.0)
+    return Cell(covariate, label, low, high, unit, 1, size, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -253,7 +255,7 @@ def cell(covariate: str, low: float, high: float, bias: float) -> CellAnswer:
         (cell("direction × deformation", 0.0, 1.0, 1.0), "for loading, 1 mm"),
     ],
 )
-def test_places_in_words(region: CellAnswer, words: str):
+def test_places_in_words(region: Cell, words: str):
     ends = cell("time", 0.0, 1.0, 0.0), cell("time", 1.0, 2000.0, 0.0)
     where = WhereAnswer(0.0, {}, (), (region,), (region, *ends))
     assert list(places(where)) == [(words, 1.0)]

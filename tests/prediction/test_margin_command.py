@@ -12,7 +12,7 @@ from commands import Hdcal
 from posteriors import batch, single, stiffer
 from verdicts import ambiguous, failed
 
-from hdcal.diagnosis.result_folder import write_verdict
+from hdcal.diagnosis.summary import write_verdict
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.causes import ORIGIN, read_models
 from hdcal.prediction.margin.answer import MarginAnswer

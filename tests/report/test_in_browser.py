@@ -8,7 +8,7 @@ from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 from commands import Done
 from verdicts import KINDS, named
 
-from hdcal.diagnosis.result_folder import write_verdict
+from hdcal.diagnosis.summary import write_verdict
 from hdcal.inference.posterior import Posterior
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}

@@ -87,7 +87,7 @@ def test_checks_become_warnings_remarks_and_reasons():
         Check("by hand", outcome, f"said {outcome}")
         for outcome in ("passed", "note", "warning", "failed")
     )
-    found = posterior_entries(replace(single(), checks=checks))
+    found = posterior_entries(replace(single(), checks=checks), "", ())
     assert found["status"] == "failed"
     assert found["reasons"] == ("by hand: said failed",)
     assert found["warnings"] == ("Said warning",)

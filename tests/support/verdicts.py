@@ -17,10 +17,12 @@ from hdcal.diagnosis.verdict import (
     Gap,
     LadderEntry,
     NextRun,
+    NotTestable,
     Verdict,
     Where,
     Which,
 )
+from hdcal.diagnosis.where import about
 from hdcal.report.parameters import Interval
 
 NOISE = 0.3
@@ -35,7 +37,8 @@ def _cell(covariate, label, start, stop, unit, rows, residual) -> Cell:
     bias = float(np.mean(residual[rows]))
     share = float(np.sum(residual[rows] ** 2) / np.sum(residual**2))
     z = bias / error
-    return Cell(covariate, label, start, stop, unit, count, bias, 3.2 * error, z, share)
+    span = about(bias, 3.2 * error)
+    return Cell(covariate, label, start, stop, unit, count, span, z, share)
 
 
 def _ranges(name, values, residual, count, unit):
@@ -62,8 +65,8 @@ def _cells(case: Case, residual) -> tuple[Cell, ...]:
             here = records.sense == sense
             cells.append(_cell("direction", word, NAN, NAN, "", here, residual))
             for part in _ranges("", records.deformation, residual, 3, "mm"):
-                rows = here & (records.deformation >= part.start)
-                rows &= records.deformation <= part.stop
+                rows = here & (records.deformation >= part.from_)
+                rows &= records.deformation <= part.to
                 words = f"{word}, {part.label}"
                 product = "direction × deformation"
                 cells.append(_cell(product, words, NAN, NAN, "", rows, residual))
@@ -138,7 +141,7 @@ def _which(verdict, probabilities, **other) -> Which:
         "second_effect": None,
         "set": (),
         "amplitude": None,
-        "not_testable": {"ovality": ("angle",)},
+        "not_testable": (NotTestable("ovality", ("angle",)),),
         "not_excited": (),
         "inseparable": (),
         "sensitivity": {"wide": 0.95, "narrow": 0.93},
@@ -179,13 +182,13 @@ def named() -> Verdict:
     gap = 3.1 * depth**4 - 2.2 * (records.sense < 0) * depth * (1 - depth) * 4
     rest = {"coulomb_friction+hysteresis": 0.02, "coulomb_friction": 0.01}
     chances = {"hysteresis": 0.94, **rest, "unknown": 0.02, "none": 0.01}
-    size = Interval(0.045, 0.040, 0.051)
+    size = 0.045, 0.040, 0.051
     which = _which(
         "named",
         chances,
         effect="hysteresis",
         set=("hysteresis",),
-        amplitude=Amplitude("hysteresis", "hysteresis.loop_width", "mm", size),
+        amplitude=Amplitude(*size, "hysteresis", "hysteresis.loop_width", "mm"),
         inseparable=(
             *(("seating_slack", f"other_{i}") for i in range(5)),
             ("coulomb_friction", "hysteresis"),
@@ -242,10 +245,10 @@ def ambiguous() -> Verdict:
         },
         effect="progressive_stiffening",
         set=("progressive_stiffening", "seating_slack"),
-        not_testable={
-            "coulomb_friction": ("unloading",),
-            "charge_leakage": ("holds", "time"),
-        },
+        not_testable=(
+            NotTestable("coulomb_friction", ("unloading",)),
+            NotTestable("charge_leakage", ("holds", "time")),
+        ),
         stability=0.6,
     )
     shrink = replace(

@@ -97,7 +97,7 @@ def answer_of(verdict: Verdict) -> CaseAnswer:
         p_value=verdict.where.p_value,
         # Where no gap is detected its size is not estimated.
         gap=_span(gap.rms_N) if gap.detected else None,
-        amplitude={f"{size.effect}.{size.parameter}": _span(size.size)} if size else {},
+        amplitude={f"{size.effect}.{size.parameter}": _span(size)} if size else {},
         closed=_span(verdict.shrink.closed) if verdict.shrink.closed else None,
         noise_sd=gap.noise_sd_N,
     )

@@ -13,7 +13,8 @@ from hdcal.blind.figure import (
 )
 from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring.scores import Scores
-from hdcal.report.write import write_report
+from hdcal.report.plain import as_json
+from hdcal.report.write import Report, write_report
 
 
 def write_result(
@@ -35,12 +36,19 @@ def write_result(
     Raises:
         InputError: as `write_report`.
     """
-    figures = {
-        "bar": bar_figure(scores.bar),
-        "confusion": confusion_figure(scores.confusion),
-        "reliability": reliability_figure(scores.reliability),
-        "detection": detection_figure(scores.detection),
-    }
+
+    def figures():
+        return {
+            "bar": bar_figure(scores.bar),
+            "confusion": confusion_figure(scores.confusion),
+            "reliability": reliability_figure(scores.reliability),
+            "detection": detection_figure(scores.detection),
+        }
+
+    def save(folder: Path) -> None:
+        for name, content in (others or {}).items():
+            (folder / name).write_text(as_json(content), "utf-8")
+
     document = scores_document(scores, labels, answers)
-    files = {"scores.json": scores, **(others or {})}
-    write_report(target, document, files, figures, force=True)
+    report = Report(document, scores, "scores.json", figures, save=save)
+    write_report(report, target, force=True)

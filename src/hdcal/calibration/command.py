@@ -61,14 +61,13 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
     keep_compilations()
     if dynamic:
         from hdcal.motion.dynamic_calibration import calibrate_dynamic as sample
-        from hdcal.motion.result_folder import write_motion as write
+        from hdcal.motion.summary import dynamic_report as report
     else:
         from hdcal.calibration.calibrate import calibrate as sample
-        from hdcal.calibration.result_folder import write_calibration as write
+        from hdcal.calibration.summary import calibration_report as report
 
     for note in case.notes:
         console.words(note)
     with progress_bar() as progress:
         posterior: Any = sample(case, progress=progress, **settings)
-    document, found = write(posterior, out, command=console.command, force=force)
-    return console.answer(document, found, out)
+    return console.report(report(posterior, console.command), out, force=force)

@@ -1,6 +1,6 @@
 """A calibration in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import THEORY_WORDS
@@ -19,7 +19,6 @@ from hdcal.report.document import (
 from hdcal.report.parameters import Interval
 from hdcal.report.posterior_sections import (
     check_section,
-    failed_headline,
     parameter_section,
     prior_section,
 )
@@ -49,17 +48,8 @@ _LACKING: Mapping[str, str] = {
 }
 
 
-def headline(stiffness: Interval, reasons: Sequence[str]) -> str:
-    """Return the answer in one sentence.
-
-    Args:
-        stiffness: at the reference temperature [N/mm].
-        reasons: why the calibration must not be used, if so.
-    """
-    return failed_headline(reasons) if reasons else _stiffness(stiffness)
-
-
-def _stiffness(found: Interval) -> str:
+def headline(found: Interval) -> str:
+    """Return the stiffness at the reference temperature in one sentence."""
     middle, span = estimate(found)
     return (
         f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
@@ -68,12 +58,7 @@ def _stiffness(found: Interval) -> str:
 
 
 def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
-    """Return what would make the answer better, most urgent first.
-
-    Args:
-        posterior: from `calibrate`.
-        left: its residuals.
-    """
+    """Return what would make the answer better, most urgent first."""
     if not posterior.usable:
         return [
             "Do not use this result. Calibrate with more warm-up and draws; if it "
@@ -88,13 +73,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
 def calibration_document(
     posterior: Posterior, found: CalibrationAnswer, command: str = ""
 ) -> Document:
-    """Return the report; its pictures are calibration, priors, residuals and sampler.
-
-    Args:
-        posterior: from `calibrate`.
-        found: from `calibration_answer`.
-        command: how the result was made.
-    """
+    """Return the report: pictures calibration, priors, residuals and sampler."""
     effects = ", ".join(found.effects).replace("_", " ")
     return Document(
         name=posterior.case.gear.name,
@@ -103,7 +82,7 @@ def calibration_document(
         f"({found.data.name}), theory “{found.gear.theory}”"
         f"{', with ' * bool(effects)}{effects}.",
         # Of a failed calibration the page shows it struck through.
-        headline=_stiffness(found.stiffness_N_per_mm),
+        headline=headline(found.stiffness_N_per_mm),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[

@@ -1,13 +1,22 @@
-"""A calibration as an answer: the numbers and words of summary.json."""
+"""A calibration as an answer, and all that its result folder holds."""
+
+from functools import cache
 
 from hdcal.calibration.answer import CalibrationAnswer, ResidualShape
-from hdcal.calibration.document import ARTICLE_NOTE, headline, next_steps
-from hdcal.inference.posterior import Posterior
+from hdcal.calibration.document import (
+    ARTICLE_NOTE,
+    calibration_document,
+    headline,
+    next_steps,
+)
+from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
+from hdcal.report.write import Report
 
 
 def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
@@ -30,19 +39,52 @@ def calibration_answer(
         left: its residuals, if they are at hand.
     """
     left = left or residuals(posterior)
-    entries = posterior_entries(posterior)
-    entries["warnings"] += tuple(shape.words for shape in left.structure)
     steps = tuple(next_steps(posterior, left))
+    stiffness = credible_interval(posterior.draws["stiffness"])
+    entries = posterior_entries(posterior, headline(stiffness), steps)
+    entries["warnings"] += tuple(shape.words for shape in left.structure)
     return CalibrationAnswer(
         **entries,
-        headline=headline(entries["stiffness_N_per_mm"], posterior.reasons),
-        next_step=steps[0] if steps else None,
         K_by_theory=K_by_theory(posterior),
         K_note=ARTICLE_NOTE,
         residuals=tuple(ResidualShape(**vars(shape)) for shape in left.structure),
         next_steps=steps,
         effects=tuple(effect.name for effect in posterior.effects),
         with_gap=bool(posterior.settings["with_gap"]),
+    )
+
+
+def calibration_report(
+    posterior: Posterior, command: str = ""
+) -> Report[CalibrationAnswer]:
+    """Return all that `hdcal calibrate` leaves behind."""
+    left = residuals(posterior)
+    found = calibration_answer(posterior, left)
+
+    @cache
+    def bands() -> Bands:
+        return default_bands(posterior)
+
+    def figures():
+        from hdcal.calibration.figure.bands import calibration_figure
+        from hdcal.calibration.figure.residuals import residual_figure
+        from hdcal.report.draws_figure import prior_figure, sampler_figure
+
+        return {
+            "calibration": calibration_figure(posterior, bands(), left),
+            "residuals": residual_figure(posterior, left),
+            "priors": prior_figure(posterior),
+            "sampler": sampler_figure(posterior),
+        }
+
+    return Report(
+        calibration_document(posterior, found, command),
+        found,
+        "summary.json",
+        figures,
+        kept=["calibration"],
+        tables=lambda: {"bands.csv": bands().columns()},
+        save=lambda folder: posterior.save(folder / FILE_NAME),
     )
 
 

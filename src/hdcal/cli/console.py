@@ -19,6 +19,7 @@ from hdcal.report.plain import as_json, printable
 if TYPE_CHECKING:
     from hdcal.report.answer import Answer
     from hdcal.report.document import Document
+    from hdcal.report.write import Report
 
 
 class Console:
@@ -88,6 +89,22 @@ class Console:
         if self.json:
             self.data(answer)
         return 0 if answer.status == "ok" else 1
+
+    def report(
+        self, report: "Report[Answer]", folder: str | None, *, force: bool
+    ) -> int:
+        """Write a result folder if one is wanted, show the answer, return its code.
+
+        Args:
+            report: what to write and show.
+            folder: to make, or None.
+            force: replace an older result.
+        """
+        from hdcal.report.write import write_report
+
+        if folder is not None:
+            write_report(report, folder, force=force)
+        return self.answer(report.document, report.answer, folder)
 
     def result(self, text: str) -> None:
         """Print the result for people; with --json it moves to standard error."""

@@ -57,7 +57,14 @@ class StressAtWindow(StressAnswer):
 
 @dataclass(frozen=True)
 class WindowAsked:
-    """What a wave generator was asked for."""
+    """What a wave generator was asked for.
+
+    Attributes:
+        window_mm: lo and hi of the deformation.
+        temperature_C: at all of which it has to hold.
+        probability: with which it has to hold.
+        setting_sd_mm: scatter of the set point as built.
+    """
 
     window_mm: Ends
     temperature_C: Numbers
@@ -148,7 +155,16 @@ class GeneratorAnswer(DesignAnswer):
 
 @dataclass(frozen=True)
 class LimitAsked:
-    """What an inverse design was asked for."""
+    """What an inverse design was asked for.
+
+    Attributes:
+        deformation_mm: radial, of the gear.
+        temperature_C: at all of which the limits hold.
+        limit_force_N: that must not be exceeded.
+        limit_stress_MPa: hoop bending; None for the yield strength, if one is known.
+        probability: share of the draws that have to keep each limit.
+        bounds: of each free size [mm] by edge name.
+    """
 
     deformation_mm: float
     temperature_C: Numbers

@@ -50,12 +50,7 @@ _PROFILE = (
 
 
 def generator_document(found: GeneratorAnswer, command: str = "") -> Document:
-    """Return the report of a wave generator; its pictures are design and profile.
-
-    Args:
-        found: from `generator_answer`.
-        command: how the result was made.
-    """
+    """Return the report of a wave generator; its pictures are design and profile."""
     sections = [
         _about(found.population),
         picture("design", "Spring and gear", _BALANCE),
@@ -69,12 +64,7 @@ def generator_document(found: GeneratorAnswer, command: str = "") -> Document:
 
 
 def inverse_document(found: InverseAnswer, command: str = "") -> Document:
-    """Return the report of an inverse design; its pictures are design and profile.
-
-    Args:
-        found: from `inverse_answer`.
-        command: how the result was made.
-    """
+    """Return the report of an inverse design; its pictures are design and profile."""
     free = [picture("design", "Force and limit", _LIMIT)] if found.asked.bounds else []
     sections = [
         _about(found.population),

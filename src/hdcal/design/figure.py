@@ -22,6 +22,7 @@ from hdcal.report.canvas import (
     PURPLE,
     RED,
     heading,
+    note,
     plain,
     style,
     temperature_colours,
@@ -33,12 +34,8 @@ _FINE, _COARSE = 41, 21
 
 
 def generator_figures(found: WaveGenerator) -> dict[str, Figure]:
-    """Return the figures of a wave generator by name.
-
-    Args:
-        found: from `wave_generator`.
-    """
-    ring, at = found.basis.gear.geometry, 0.5 * sum(found.window)
+    """Return the figures of a wave generator by name."""
+    ring, at = found.basis.gear.geometry, 0.5 * sum(found.asked.window_mm)
     shape = profile_figure(ring, _modulus(found.basis), at)
     return {"design": generator_figure(found), "profile": shape}
 
@@ -50,8 +47,9 @@ def inverse_figures(found: InverseDesign) -> dict[str, Figure]:
         found: from `inverse_design`; where no size is free there is no map.
     """
     modulus = _modulus(found.chosen.basis)
-    shape = {"profile": profile_figure(found.drawing, modulus, found.deformation)}
-    return ({"design": inverse_figure(found)} if found.bounds else {}) | shape
+    ring = profile_figure(found.drawing, modulus, found.asked.deformation_mm)
+    free = {"design": inverse_figure(found)} if found.asked.bounds else {}
+    return {**free, "profile": ring}
 
 
 def _modulus(basis: DesignDraws) -> float:
@@ -59,11 +57,7 @@ def _modulus(basis: DesignDraws) -> float:
 
 
 def generator_figure(found: WaveGenerator) -> Figure:
-    """Draw the balance of spring and gear, and the probability over the spring rate.
-
-    Args:
-        found: from `wave_generator`.
-    """
+    """Draw the balance of spring and gear, and the probability over the spring rate."""
     with style():
         figure = Figure(figsize=(9.4, 4.2), layout="constrained")
         left, right = figure.subplots(1, 2)
@@ -73,11 +67,11 @@ def generator_figure(found: WaveGenerator) -> Figure:
 
 
 def _balance(axes: Axes, found: WaveGenerator) -> None:
-    low, high = found.window
+    low, high = found.asked.window_mm
     wide = high - low
     along = np.linspace(max(low - 1.5 * wide, 0.02 * low), high + 1.5 * wide, _FINE)
-    ends = found.temperatures[[0, -1]] if len(found.temperatures) > 1 else None
-    levels = found.temperatures if ends is None else ends
+    levels = np.asarray(found.asked.temperature_C)
+    levels = levels[:: max(len(levels) - 1, 1)]  # the coldest and the warmest
     forces = found.gear.forces(along, levels)
     bands = np.quantile(forces, _TAILS, axis=2)
     for index, colour in enumerate(temperature_colours(levels)):
@@ -111,17 +105,9 @@ def _probability(axes: Axes, found: WaveGenerator) -> None:
     axes.semilogx(
         rates, adjusted, color=ORANGE, linestyle="-.", label="each gear adjusted"
     )
-    axes.axhline(found.required, color=RED, linewidth=0.9, linestyle=":")
-    axes.annotate(
-        f"required {found.required:g}",
-        (rates[-1], found.required),
-        xytext=(0, -4),
-        textcoords="offset points",
-        ha="right",
-        va="top",
-        color=RED,
-        fontsize=8.5,
-    )
+    axes.axhline(found.asked.probability, color=RED, linewidth=0.9, linestyle=":")
+    words, at = f"required {found.asked.probability:g}", found.asked.probability
+    note(axes, words, (rates[-1], at), (0, -4), ha="right", va="top", color=RED)
     chosen = found.chosen
     axes.plot(chosen.rate, chosen.together, "o", color=DARK, zorder=5)
     axes.set_ylim(min(0.0 if min(together) < 0.9 else min(together) - 0.01, 0.98), None)
@@ -132,15 +118,11 @@ def _probability(axes: Axes, found: WaveGenerator) -> None:
 
 
 def inverse_figure(found: InverseDesign) -> Figure:
-    """Draw the force over the free sizes, the limit, and what was chosen.
-
-    Args:
-        found: from `inverse_design`, with at least one free size.
-    """
+    """Draw the force over the free sizes, the limit, and what was chosen."""
     with style():
         figure = Figure(figsize=(7.6, 4.4), layout="constrained")
         axes = figure.subplots()
-        if len(found.bounds) == 1:
+        if len(found.asked.bounds) == 1:
             _along_one(axes, found)
         else:
             _over_two(figure, axes, found)
@@ -153,27 +135,25 @@ def _spreads(found: InverseDesign, sizes: dict) -> np.ndarray:
 
 
 def _along_one(axes: Axes, found: InverseDesign) -> None:
-    name, (low, high) = next(iter(found.bounds.items()))
+    name, (low, high) = next(iter(found.asked.bounds.items()))
     along = np.linspace(low, high, _FINE)
     table = _spreads(found, {name: along})
     axes.fill_between(along, table[0], table[2], color=BLUE, alpha=0.25, linewidth=0)
     axes.plot(along, table[1], color=BLUE, label="median and 95 % band")
-    words = f"not exceeded with probability {found.required:g}"
+    words = f"not exceeded with probability {found.asked.probability:g}"
     axes.plot(along, table[3], color=PURPLE, linestyle="--", label=words)
-    axes.axhline(found.limit_force, color=RED, linewidth=0.9, label="limit")
+    axes.axhline(found.asked.limit_force_N, color=RED, linewidth=0.9, label="limit")
     axes.plot(
         found.chosen.sizes[name], found.chosen.force, "o", color=DARK, label="chosen"
     )
     axes.set_xlabel(f"{named(name)} [mm]")
     axes.set_ylabel("force [N]")
     axes.legend(loc="best")
-    heading(
-        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
-    )
+    heading(axes, _title(found))
 
 
 def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
-    (first, ends), (second, span) = list(found.bounds.items())[:2]
+    (first, ends), (second, span) = list(found.asked.bounds.items())[:2]
     x, y = np.linspace(*ends, _COARSE), np.linspace(*span, _COARSE)
     rest = {n: v for n, v in found.chosen.sizes.items() if n not in (first, second)}
     a, b = (grid.ravel() for grid in np.meshgrid(x, y))
@@ -181,21 +161,26 @@ def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
     kept = _spreads(found, {**others, first: a, second: b})[-1]
     table = kept.reshape(len(y), len(x))
     drawn = axes.contourf(x, y, table, 20, cmap="cividis")
-    figure.colorbar(drawn, ax=axes, label=f"force kept with {found.required:g} [N]")
-    axes.contour(x, y, table, [found.limit_force], colors=RED, linewidths=1.6)
+    figure.colorbar(
+        drawn, ax=axes, label=f"force kept with {found.asked.probability:g} [N]"
+    )
+    axes.contour(x, y, table, [found.asked.limit_force_N], colors=RED, linewidths=1.6)
     geometry = found.basis.gear.geometry
     own = [float(getattr(geometry, n.removesuffix("_mm"))) for n in (first, second)]
     mark = {"markersize": 8, "markeredgecolor": "white", "linestyle": ""}
     axes.plot(*own, "s", color=GREY, label="tested gear", **mark)
     best = [found.chosen.sizes[n] for n in (first, second)]
     axes.plot(*best, "o", color=DARK, label="chosen", **mark)
-    axes.plot([], [], color=RED, label=f"limit {found.limit_force:g} N")
+    axes.plot([], [], color=RED, label=f"limit {found.asked.limit_force_N:g} N")
     axes.set_xlabel(f"{named(first)} [mm]")
     axes.set_ylabel(f"{named(second)} [mm]")
     axes.legend(loc="upper right", frameon=True, facecolor="white")
-    heading(
-        axes, f"Force at {found.deformation:g} mm, {plain(found.chosen.basis.material)}"
-    )
+    heading(axes, _title(found))
+
+
+def _title(found: InverseDesign) -> str:
+    material = plain(found.chosen.basis.material)
+    return f"Force at {found.asked.deformation_mm:g} mm, {material}"
 
 
 def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Figure:

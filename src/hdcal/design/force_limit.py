@@ -1,7 +1,7 @@
 """The force and stress that a gear exceeds rarely, differentiable in all its sizes."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 
 import equinox as eqx
@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
+from hdcal.design.answer import LimitAsked
 from hdcal.design.design_draws import DesignDraws
 from hdcal.design.next_gear import NextGear
 from hdcal.design.sizes import geometry_with
@@ -17,21 +18,6 @@ from hdcal.physics.profile import peak_stress
 from hdcal.physics.theory import Scalar
 from hdcal.prediction.engine.sampled_gears import SampledGears
 from hdcal.prediction.engine.sizes import SIZES
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What the next gear has to keep.
-
-    Attributes:
-        force: [N].
-        stress: hoop bending [MPa]; None for the yield strength, where one is known.
-        probability: share of the draws that have to keep each limit.
-    """
-
-    force: float
-    stress: float | None
-    probability: float
 
 
 class Target(eqx.Module):
@@ -60,37 +46,22 @@ class Target(eqx.Module):
     rank: int = eqx.field(static=True)
 
     @classmethod
-    def of(
-        cls,
-        draws: DesignDraws,
-        gear: NextGear,
-        deformation: float,
-        temperatures: np.ndarray,
-        limits: Limits,
-    ) -> "Target":
-        """Return the target of a material.
-
-        Args:
-            draws: of the material in use.
-            gear: how the next one differs.
-            deformation: radial [mm].
-            temperatures: at all of which the limits hold [°C].
-            limits: to be kept.
-        """
+    def of(cls, draws: DesignDraws, gear: NextGear, asked: LimitAsked) -> "Target":
+        """Return the target of the material whose draws they are."""
         strength = draws.yield_strength
-        if limits.stress is not None:
-            strength = np.full(draws.size, limits.stress)
+        if asked.limit_stress_MPa is not None:
+            strength = np.full(draws.size, asked.limit_stress_MPa)
         elif strength is None:
             strength = np.full(draws.size, np.inf)
         return cls(
             gears=replace(gear.gears, values=dict(draws.values)),
             drawing=draws.drawing,
-            deformation=deformation,
-            temperatures=temperatures,
-            limit_force=limits.force,
+            deformation=asked.deformation_mm,
+            temperatures=np.asarray(asked.temperature_C),
+            limit_force=asked.limit_force_N,
             limit_stress=strength,
             # Every smaller draw keeps the limit too: never fewer than were asked for.
-            rank=ceil(limits.probability * draws.size - 1e-9) - 1,
+            rank=ceil(asked.probability * draws.size - 1e-9) - 1,
         )
 
     def drawn(self, place: Mapping[str, Scalar]) -> Geometry:

@@ -16,6 +16,7 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.records import Geometry
+from hdcal.design.answer import LimitAsked
 from hdcal.design.candidate import Candidate, best_candidate, candidate, elasticities
 from hdcal.design.checks import (
     name_findings,
@@ -26,7 +27,7 @@ from hdcal.design.checks import (
     unseen_findings,
 )
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.design.force_limit import Limits, Target
+from hdcal.design.force_limit import Target
 from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import (
@@ -36,22 +37,18 @@ from hdcal.design.sizes import (
 )
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
 from hdcal.prediction.engine.sizes import SIZES
 
 
 @dataclass(frozen=True)
-class InverseDesign:
+class InverseDesign(Shown):
     """The design that keeps the limits, and what it was chosen among.
 
     Attributes:
         basis: what the draws belong to.
         gear: whom the limits are for.
-        bounds: of each free size [mm] by edge name.
-        deformation: radial, of the gear [mm].
-        temperatures: at which the limits hold [°C].
-        limit_force: [N].
-        limit_stress: [MPa], or None for the yield strength.
-        required: probability with which each limit is kept.
+        asked: limits, place and bounds.
         chosen: the nearest to the tested gear.
         candidates: one for each material.
         tested: the tested gear itself.
@@ -62,12 +59,7 @@ class InverseDesign:
 
     basis: DesignDraws
     gear: NextGear
-    bounds: Mapping[str, tuple[float, float]]
-    deformation: float
-    temperatures: np.ndarray
-    limit_force: float
-    limit_stress: float | None
-    required: float
+    asked: LimitAsked
     chosen: Candidate
     candidates: tuple[Candidate, ...]
     tested: Candidate
@@ -79,13 +71,6 @@ class InverseDesign:
     def drawing(self) -> Geometry:
         """The chosen gear's sizes [mm]."""
         return geometry_with(self.basis.gear.geometry, self.chosen.sizes)
-
-    def _repr_html_(self) -> str:
-        from hdcal.design.document import inverse_document
-        from hdcal.design.summary import inverse_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(inverse_document(inverse_answer(self)))
 
 
 def inverse_design(
@@ -126,65 +111,56 @@ def inverse_design(
     """
     draws = design_draws(source, seed=seed)
     at = draws.nominal_deformation if deformation is None else deformation
-    levels = with_reference(draws, temperatures)
-    limits = Limits(limit_force, limit_stress, probability)
+    # Without any number the finding about it is told with the others.
+    at = np.nan if at is None else at
+    levels = tuple(with_reference(draws, temperatures).tolist())
+    limits = limit_force, limit_stress, probability
+    asked = LimitAsked(at, levels, *limits, dict(vary))
     with Findings() as wrong:
-        wrong += _findings(draws, vary, at, levels, limits, materials)
+        wrong += _findings(draws, asked, materials)
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
         gear = wrong.attempt(next_gear, draws, tolerances, seed)
     assert gear is not None
-    return _nearest_design(draws, filter(None, made), gear, vary, (at, levels, limits))
+    return _nearest_design(draws, filter(None, made), gear, asked)
 
 
 def _nearest_design(
-    draws: DesignDraws, made: Iterable[DesignDraws], gear: NextGear, vary, place
+    draws: DesignDraws, made: Iterable[DesignDraws], gear: NextGear, asked: LimitAsked
 ) -> InverseDesign:
-    """Return the nearest of the designs of all materials.
-
-    Args:
-        draws: of the tested gear.
-        made: the same of each material.
-        gear: how the next one differs.
-        vary: bounds of the free sizes [mm] by edge name.
-        place: deformation [mm], temperatures [°C] and limits.
-    """
-    at, levels, limits = place
-    found = [best_candidate(one, Target.of(one, gear, *place), vary) for one in made]
+    """Return the nearest to the tested gear of the designs of all materials."""
+    vary = asked.bounds
+    found = [best_candidate(one, Target.of(one, gear, asked), vary) for one in made]
     met = [one for one in found if one.met]
     if not met:
-        raise InputError([_unmet(found, vary, at, limits)])
+        raise InputError([_unmet(found, asked)])
     chosen = min(met, key=lambda one: one.change)
-    kept = Target.of(chosen.basis, gear, *place)
+    kept = Target.of(chosen.basis, gear, asked)
+    place = np.array([asked.deformation_mm]), np.asarray(asked.temperature_C)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
     return InverseDesign(
         basis=draws,
         gear=gear,
-        bounds=dict(vary),
-        deformation=at,
-        temperatures=levels,
-        limit_force=limits.force,
-        limit_stress=limits.stress,
-        required=limits.probability,
+        asked=asked,
         chosen=chosen,
         candidates=tuple(found),
-        tested=candidate(draws, Target.of(draws, gear, *place), {}),
+        tested=candidate(draws, Target.of(draws, gear, asked), {}),
         target=kept,
         elasticities=elasticities(kept, chosen.sizes),
         warnings=(
-            *beyond_tested(draws, np.array([at]), levels),
+            *beyond_tested(draws, *place),
             *far_from_tested(draws, sizes),
             *draws.misfits,
         ),
     )
 
 
-def _unmet(found: Sequence[Candidate], vary, deformation, limits: Limits) -> Finding:
-    limit = limits.force
+def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
+    limit = asked.limit_force_N
     best = min(found, key=lambda one: max(one.force / limit, one.utilisation or 0.0))
     ranges = " and ".join(
         f"{named(name)} between {low:g} and {high:g} mm"
-        for name, (low, high) in vary.items()
+        for name, (low, high) in asked.bounds.items()
     )
     at = ", ".join(
         f"{named(name)} {value:.4g} mm" for name, value in best.sizes.items()
@@ -193,30 +169,30 @@ def _unmet(found: Sequence[Candidate], vary, deformation, limits: Limits) -> Fin
     if best.utilisation is not None:
         stress = f" and {best.utilisation:.3g} of the allowed stress"
     words = (
-        f"no {ranges or 'material'} meets {limit:g} N at {deformation:g} mm with "
-        f"probability {limits.probability:g}: the best ({at or best.basis.material}) "
+        f"no {ranges or 'material'} meets {limit:g} N at "
+        f"{asked.deformation_mm:g} mm with probability "
+        f"{asked.probability:g}: the best ({at or best.basis.material}) "
         f"gives {best.force:.4g} N{stress}"
     )
     remedy = "Widen the bounds, free another size, or allow more force"
     return Finding("limit_force", words, remedy)
 
 
-def _findings(
-    draws: DesignDraws, vary, deformation, temperatures, limits: Limits, materials
-) -> list[Finding]:
+def _findings(draws: DesignDraws, asked: LimitAsked, materials) -> list[Finding]:
+    vary = asked.bounds
     findings = name_findings(vary, SIZES, "vary")
     if not vary and not materials:
         words = "nothing may change"
         remedy = "Free a size, e.g. wall_thickness_mm=0.5:0.8"
         findings.append(Finding("vary", words, remedy))
     for name, value, unit in (
-        ("limit_force", limits.force, "N"),
-        ("limit_stress", limits.stress, "MPa"),
+        ("limit_force", asked.limit_force_N, "N"),
+        ("limit_stress", asked.limit_stress_MPa, "MPa"),
     ):
         if value is not None and not 0.0 < value < np.inf:
             words = f"{value:g} is no limit"
             findings.append(Finding(name, words, f"Give it in {unit}, above zero"))
-    findings += probability_findings(draws, limits.probability)
+    findings += probability_findings(draws, asked.probability)
     if any(name not in SIZES for name in vary):
         return findings
     for name, (low, high) in vary.items():
@@ -226,8 +202,8 @@ def _findings(
     findings += unseen_findings(draws, vary)
     sizes = {name: np.asarray(ends, float) for name, ends in vary.items()}
     findings += size_findings(draws, sizes)
-    if deformation is None:
+    if np.isnan(asked.deformation_mm):
         return [*findings, no_deformation()]
     radius = float(np.min(sizes.get("radius_mm", draws.gear.geometry.radius)))
-    at = np.array([float(deformation)])
-    return findings + place_findings(draws, at, temperatures, radius)
+    place = np.array([asked.deformation_mm]), np.asarray(asked.temperature_C)
+    return findings + place_findings(draws, *place, radius)

@@ -1,4 +1,4 @@
-"""Designs as answers."""
+"""Designs as answers, and all that their result folders hold."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -14,16 +14,15 @@ from hdcal.design.answer import (
     GearByGear,
     GeneratorAnswer,
     InverseAnswer,
-    LimitAsked,
     SetPoint,
     SpringCurve,
     StressAtWindow,
-    WindowAsked,
     WindowForces,
     WindowKept,
 )
 from hdcal.design.candidate import Candidate
 from hdcal.design.design_draws import DesignDraws
+from hdcal.design.document import generator_document, inverse_document
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sentences import (
     generator_headline,
@@ -36,8 +35,10 @@ from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
+from hdcal.report.write import Report
 
 D = TypeVar("D", bound=DesignAnswer)
+_FILE = "design.json"
 
 
 def origin(basis: DesignDraws, interval: float, interval_kind: str) -> dict[str, Any]:
@@ -68,20 +69,11 @@ def _error(probability: float, draws: int) -> float:
 
 
 def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
-    """Return an elastic wave generator as an answer, ready for JSON.
-
-    Args:
-        found: from `wave_generator`.
-    """
-    levels = range(len(found.temperatures))
+    """Return an elastic wave generator as an answer, ready for JSON."""
+    levels = range(len(found.asked.temperature_C))
     told = GeneratorAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
-        asked=WindowAsked(
-            window_mm=found.window,
-            temperature_C=_numbers(found.temperatures),
-            probability=found.required,
-            setting_sd_mm=found.setting_sd,
-        ),
+        asked=found.asked,
         population=found.gear.words,
         spring=_spring(found),
         set_point=_set_point(found),
@@ -100,6 +92,20 @@ def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
         warnings=found.warnings,
     )
     return in_words(told, generator_headline(told), generator_words(told))
+
+
+def generator_report(
+    found: WaveGenerator, command: str = ""
+) -> Report[GeneratorAnswer]:
+    """Return all that `hdcal design --window` leaves behind."""
+
+    def figures():
+        from hdcal.design.figure import generator_figures
+
+        return generator_figures(found)
+
+    answer = generator_answer(found)
+    return Report(generator_document(answer, command), answer, _FILE, figures)
 
 
 def _numbers(values: np.ndarray) -> tuple[float, ...]:
@@ -122,12 +128,13 @@ def _spring(found: WaveGenerator) -> ChosenSpring:
 
 
 def _middle(found: WaveGenerator) -> float:
-    return 0.5 * sum(found.window)
+    return 0.5 * sum(found.asked.window_mm)
 
 
 def _reference(found: WaveGenerator) -> int:
     """Return which of the temperatures is nearest to the reference."""
-    off = np.abs(found.temperatures - found.basis.gear.reference_temperature)
+    levels = np.asarray(found.asked.temperature_C)
+    off = np.abs(levels - found.basis.gear.reference_temperature)
     return int(np.argmin(off))
 
 
@@ -136,21 +143,21 @@ def _set_point(found: WaveGenerator) -> SetPoint:
     level = _reference(found)
     return SetPoint(
         deformation_mm=_middle(found),
-        temperature_C=float(found.temperatures[level]),
+        temperature_C=found.asked.temperature_C[level],
         force_N=credible_interval(found.forces[1, level]),
     )
 
 
 def _forces(found: WaveGenerator, level: int) -> WindowForces:
     ends = map(credible_interval, found.forces[:, level])
-    return WindowForces(float(found.temperatures[level]), *ends)
+    return WindowForces(found.asked.temperature_C[level], *ends)
 
 
 def _kept(found: WaveGenerator, level: int) -> WindowKept:
     low, high = found.intervals(level)
     x = found.chosen.interference + found.error
     return WindowKept(
-        temperature_C=float(found.temperatures[level]),
+        temperature_C=found.asked.temperature_C[level],
         zero_backlash=float(np.mean(x >= low)),
         no_jam=float(np.mean(x <= high)),
         inside=float(np.mean((x >= low) & (x <= high))),
@@ -161,21 +168,23 @@ def _adjusted(found: WaveGenerator) -> GearByGear:
     """Return the range of set points when each gear is given its own."""
     low, high = found.intervals()
     own = 0.5 * (low + high)
-    ends = np.array([0.5 - found.required / 2.0, 0.5 + found.required / 2.0])
+    ends = np.array(
+        [0.5 - found.asked.probability / 2.0, 0.5 + found.asked.probability / 2.0]
+    )
     reach = np.quantile(own, ends)
     first, last = _numbers(reach)
     soft, firm = _numbers(found.chosen.rate * (reach - _middle(found)))
     return GearByGear(
         probability=found.chosen.adjusted,
-        share_of_gears=found.required,
+        share_of_gears=found.asked.probability,
         interference_mm=(first, last),
         preload_N=(soft, firm),
     )
 
 
 def _window_stress(found: WaveGenerator) -> StressAtWindow:
-    basis, at = found.basis, found.window[1]
-    rise = found.temperatures - basis.gear.reference_temperature
+    basis, at = found.basis, found.asked.window_mm[1]
+    rise = np.asarray(found.asked.temperature_C) - basis.gear.reference_temperature
     warm = np.max(1.0 - np.asarray(basis.values["alpha"])[:, None] * rise, axis=1)
     modulus = np.asarray(basis.values["E0"]) * warm
     draws = np.asarray(peak_stress(basis.gear.geometry, modulus, at))
@@ -199,21 +208,10 @@ def _stress(basis: DesignDraws, draws: np.ndarray) -> dict[str, Any]:
 
 
 def inverse_answer(found: InverseDesign) -> InverseAnswer:
-    """Return an inverse design as an answer, ready for JSON.
-
-    Args:
-        found: from `inverse_design`.
-    """
+    """Return an inverse design as an answer, ready for JSON."""
     told = InverseAnswer(
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
-        asked=LimitAsked(
-            deformation_mm=found.deformation,
-            temperature_C=_numbers(found.temperatures),
-            limit_force_N=found.limit_force,
-            limit_stress_MPa=found.limit_stress,
-            probability=found.required,
-            bounds=found.bounds,
-        ),
+        asked=found.asked,
         population=found.gear.words,
         design=_candidate(found.chosen),
         tested=_candidate(found.tested),
@@ -223,6 +221,18 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
         warnings=found.warnings,
     )
     return in_words(told, inverse_headline(told), inverse_words(told))
+
+
+def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAnswer]:
+    """Return all that `hdcal design --limit-force` leaves behind."""
+
+    def figures():
+        from hdcal.design.figure import inverse_figures
+
+        return inverse_figures(found)
+
+    answer = inverse_answer(found)
+    return Report(inverse_document(answer, command), answer, _FILE, figures)
 
 
 def _candidate(one: Candidate) -> CandidateAnswer:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.design.answer import WindowAsked
 from hdcal.design.checks import place_findings, probability_findings
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.next_gear import NextGear, next_gear
@@ -14,6 +15,7 @@ from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
 
 # Default range of the spring rate, relative to the gear's own stiffness.
 RATE_RANGE = (0.01, 100.0)
@@ -22,16 +24,13 @@ _ALONG = 9
 
 
 @dataclass(frozen=True)
-class WaveGenerator:
+class WaveGenerator(Shown):
     """The elastic wave generator that meets a window, and how it was judged.
 
     Attributes:
         basis: what the draws belong to.
         gear: whom the window is for.
-        window: lo and hi of the deformation [mm].
-        temperatures: at which it has to hold [°C].
-        required: probability that is asked for.
-        setting_sd: scatter of x as built [mm].
+        asked: window, temperatures and probability.
         springs: every rate that was looked at, softest first.
         chosen: the softest that meets the requirement.
         forces: F at lo, in the middle and at hi at each temperature [N]: [3, T, draw].
@@ -41,10 +40,7 @@ class WaveGenerator:
 
     basis: DesignDraws
     gear: NextGear
-    window: tuple[float, float]
-    temperatures: np.ndarray
-    required: float
-    setting_sd: float
+    asked: WindowAsked
     springs: tuple[Spring, ...]
     chosen: Spring
     forces: np.ndarray
@@ -58,14 +54,7 @@ class WaveGenerator:
             level: of the temperatures; by default at all of them.
         """
         forces = self.forces if level is None else self.forces[:, level : level + 1]
-        return set_points(self.chosen.rate, self.window, forces)
-
-    def _repr_html_(self) -> str:
-        from hdcal.design.document import generator_document
-        from hdcal.design.summary import generator_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(generator_document(generator_answer(self)))
+        return set_points(self.chosen.rate, self.asked.window_mm, forces)
 
 
 def wave_generator(
@@ -102,51 +91,49 @@ def wave_generator(
         InputError: bad input, or no spring rate meets the requirement.
     """
     draws = design_draws(source, seed=seed)
-    levels = with_reference(draws, temperatures)
+    levels = tuple(with_reference(draws, temperatures).tolist())
+    asked = WindowAsked(window, levels, probability, setting_sd)
     with Findings() as wrong:
-        wrong += _findings(draws, window, levels, probability, setting_sd, rates)
+        wrong += _findings(draws, asked, rates)
         gear = wrong.attempt(next_gear, draws, tolerances, seed)
     assert gear is not None
-    return _generator(draws, gear, window, levels, probability, setting_sd, rates, seed)
+    return _generator(draws, gear, asked, rates, seed)
 
 
 def _generator(
     draws: DesignDraws,
     gear: NextGear,
-    window: tuple[float, float],
-    temperatures: np.ndarray,
-    required: float,
-    setting_sd: float,
+    asked: WindowAsked,
     rates: tuple[float, float] | None,
     seed: int,
 ) -> WaveGenerator:
+    window, levels = asked.window_mm, np.asarray(asked.temperature_C)
     along = np.linspace(*window, _ALONG)
-    forces = gear.forces(along, temperatures)
+    forces = gear.forces(along, levels)
     _check_growing(forces)
     if rates is None:
         middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
         rates = (RATE_RANGE[0] * middle, RATE_RANGE[1] * middle)
-    error = setting_sd * np.random.default_rng([seed, 1]).normal(size=draws.size)
+    scatter = np.random.default_rng([seed, 1]).normal(size=draws.size)
+    error = asked.setting_sd_mm * scatter
     springs = judge_all(rates, window, forces, error)
-    chosen = softest(springs, window, forces, error, required)
+    chosen = softest(springs, window, forces, error, asked.probability)
     if chosen is None:
-        raise InputError([_unmet(springs, window, required)])
+        raise InputError([_unmet(springs, asked)])
     return WaveGenerator(
         draws,
         gear,
-        window,
-        temperatures,
-        required,
-        setting_sd,
+        asked,
         tuple(sorted({*springs, chosen}, key=lambda spring: spring.rate)),
         chosen,
         forces[[0, _ALONG // 2, -1]],
         error,
-        (*beyond_tested(draws, np.array(window), temperatures), *draws.misfits),
+        (*beyond_tested(draws, np.array(window), levels), *draws.misfits),
     )
 
 
-def _unmet(springs: list[Spring], window, required: float) -> Finding:
+def _unmet(springs: list[Spring], asked: WindowAsked) -> Finding:
+    window, required = asked.window_mm, asked.probability
     best = max(springs, key=lambda spring: spring.together)
     words = (
         f"no spring rate between {springs[0].rate:.4g} and {springs[-1].rate:.4g} N/mm "
@@ -172,21 +159,20 @@ def _check_growing(forces: np.ndarray) -> None:
         raise InputError([Finding("window", words, remedy)])
 
 
-def _findings(
-    draws: DesignDraws, window, temperatures, probability, setting_sd, rates
-) -> list[Finding]:
-    findings = []
-    low, high = window
+def _findings(draws: DesignDraws, asked: WindowAsked, rates) -> list[Finding]:
+    findings, setting_sd = [], asked.setting_sd_mm
+    low, high = asked.window_mm
     if not low < high:
         words = f"{low:g}:{high:g} is empty"
         findings.append(Finding("window", words, "Write LO:HI, e.g. 0.38:0.42"))
-    findings += probability_findings(draws, probability)
+    findings += probability_findings(draws, asked.probability)
     if not 0.0 <= setting_sd < np.inf:
         words = f"{setting_sd:g} is no standard deviation"
         findings.append(Finding("setting_sd", words, "Give it in mm"))
     if rates is not None and not 0.0 < rates[0] < rates[1] < np.inf:
         words = f"{rates[0]:g}:{rates[1]:g} is no range of spring rates"
         findings.append(Finding("rates", words, "Write LO:HI in N/mm"))
-    radius, ends = float(draws.gear.geometry.radius), np.asarray(window, float)
+    radius = float(draws.gear.geometry.radius)
+    place = np.asarray(asked.window_mm, float), np.asarray(asked.temperature_C)
     names = "window", "temperatures"
-    return findings + place_findings(draws, ends, temperatures, radius, names)
+    return findings + place_findings(draws, *place, radius, names)

@@ -22,14 +22,7 @@ def amplitude_of(
     library: dict[str, type[Effect]],
     rng: np.random.Generator,
 ) -> Amplitude:
-    """Return the size of an effect, given that it is the only one.
-
-    Args:
-        evidence: of the hypotheses.
-        name: of the effect.
-        library: the effects by name.
-        rng: source of randomness.
-    """
+    """Return the size of an effect, given that it is the only one."""
     declared = parameters(library[name])
     field = next(f for f, about in declared.items() if about.null is not None)
     if name == QUANTISATION:
@@ -44,7 +37,8 @@ def amplitude_of(
         size = _spread(evidence, name)
     else:
         field, size = _largest(evidence, name, library[name])
-    return Amplitude(name, field, declared[field].unit, size)
+    unit = declared[field].unit
+    return Amplitude(**vars(size), effect=name, parameter=field, unit=unit)
 
 
 def _piecewise_amplitude(

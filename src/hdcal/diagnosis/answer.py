@@ -5,11 +5,12 @@ from typing import Annotated, ClassVar, Literal
 
 from hdcal.diagnosis.verdict import (
     Budget,
+    Cell,
     Closure,
     CovariateShare,
     Gap,
     NextRun,
-    VerdictWord,
+    Which,
 )
 from hdcal.report.answer import (
     Answer,
@@ -22,14 +23,7 @@ from hdcal.report.answer import (
     Sentences,
     Words,
 )
-from hdcal.report.parameters import Interval
 from hdcal.report.posterior_answer import CalibratedGear
-
-_PAIR = "^[A-Za-z_][A-Za-z0-9_]*(\\+[A-Za-z_][A-Za-z0-9_]*)?$"
-Chances = Annotated[
-    dict[str, Probability],
-    Promise(required=["none", "unknown"], propertyNames={"pattern": _PAIR}),
-]
 
 
 def _if(condition: dict, then: dict) -> dict:
@@ -41,65 +35,14 @@ def _inside(part: str, rules: dict) -> dict:
 
 
 @dataclass(frozen=True)
-class CellAnswer:
-    """One cell of the rows and the mean residual in it, simultaneous 95 % band."""
-
-    covariate: Words
-    label: str
-    from_: Real
-    to: Real
-    unit: str
-    rows: Count
-    bias_N: Interval
-    z: Real
-    share: Real
-
-
-@dataclass(frozen=True)
 class WhereAnswer:
     """Where the gap lies: `cells` were declared beforehand, `regions` are off."""
 
     p_value: Probability
     statistics: dict[str, Real]
     shares: tuple[CovariateShare, ...]
-    regions: tuple[CellAnswer, ...]
-    cells: tuple[CellAnswer, ...]
-
-
-@dataclass(frozen=True)
-class AmplitudeAnswer(Interval):
-    """Size of the named effect, 90 % credible interval."""
-
-    effect: EffectName
-    parameter: Words
-    unit: str
-
-
-@dataclass(frozen=True)
-class NotTestable:
-    """An effect, and what the records lack to show it."""
-
-    effect: EffectName
-    needs: Annotated[tuple[Words, ...], Promise(minItems=1)]
-
-
-@dataclass(frozen=True)
-class WhichAnswer:
-    """Which unmodelled effect causes the gap; see `Which`."""
-
-    verdict: VerdictWord
-    effect: EffectName | None
-    second_effect: EffectName | None
-    set: Annotated[tuple[EffectName, ...], Promise(uniqueItems=True)]
-    probabilities: Chances
-    inclusion: dict[str, Probability]
-    log_evidence: dict[str, Real]
-    amplitude: AmplitudeAnswer | None
-    not_testable: tuple[NotTestable, ...]
-    not_excited: tuple[EffectName, ...]
-    inseparable: tuple[tuple[EffectName, EffectName], ...]
-    sensitivity: dict[str, Real]
-    stability: Probability | None
+    regions: tuple[Cell, ...]
+    cells: tuple[Cell, ...]
 
 
 @dataclass(frozen=True)
@@ -162,7 +105,7 @@ class VerdictAnswer(Answer):
     interval: float
     gap: Gap
     where: WhereAnswer
-    which: WhichAnswer
+    which: Which
     shrink: Closure
     next_test: tuple[NextRun, ...]
     next_test_reason: str

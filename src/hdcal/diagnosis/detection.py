@@ -80,14 +80,7 @@ def detect_gap(
     case: Case,
     rng: np.random.Generator,
 ) -> Detection:
-    """Test the base model; where it fails, test the hypotheses and fit a smooth gap.
-
-    Args:
-        evidence: of the hypotheses.
-        posterior: over them.
-        case: whose rows are tested.
-        rng: source of randomness.
-    """
+    """Test the base model; where it fails, test the hypotheses and fit a smooth gap."""
     prepared = evidence.prepared
     correlation = float(posterior.correlation @ prepared.rows.correlations)
     cells, directions = declared_directions(evidence, case)

@@ -92,7 +92,7 @@ def _diagnose_one(
     """Return the answer, or what is wrong with the case."""
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.library import choose_library
-    from hdcal.diagnosis.result_folder import write_verdict
+    from hdcal.diagnosis.summary import write_verdict
     from hdcal.physics.registry import EFFECTS
 
     effects = choose_library(library, EFFECTS)

@@ -39,12 +39,6 @@ def rank_runs(
 ) -> tuple[tuple[NextRun, ...], str]:
     """Rank runs by what they would tell about the cause for their effort, best first.
 
-    Args:
-        evidence: of the hypotheses.
-        posterior: over them.
-        library: the effects by name.
-        rng: source of randomness.
-
     Returns:
         The runs that are worth it, and why there are none.
     """

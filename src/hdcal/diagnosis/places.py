@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from hdcal.diagnosis.answer import CellAnswer, WhereAnswer
+from hdcal.diagnosis.answer import WhereAnswer
+from hdcal.diagnosis.verdict import Cell
 from hdcal.report.words import known, with_unit
 
 _PREPOSITIONS = {
@@ -16,7 +17,7 @@ _SIDES = {"time": ("after", "before")}
 def places(where: WhereAnswer) -> Iterator[tuple[str, float]]:
     """Yield the two worst places in words, each with the bias there [N]."""
     plain = [cell for cell in where.regions if "×" not in cell.covariate]
-    worst: dict[str, CellAnswer] = {}
+    worst: dict[str, Cell] = {}
     for cell in plain or where.regions:
         worst.setdefault(cell.covariate, cell)
     for covariate, cell in list(worst.items())[:2]:
@@ -29,7 +30,7 @@ def places(where: WhereAnswer) -> Iterator[tuple[str, float]]:
         yield _range(covariate, joined, where), max(biases, key=abs)
 
 
-def _range(covariate: str, joined: list[CellAnswer], where: WhereAnswer) -> str:
+def _range(covariate: str, joined: list[Cell], where: WhereAnswer) -> str:
     low, high = min(c.from_ for c in joined), max(c.to for c in joined)
     cells = [c for c in where.cells if c.covariate == covariate]
     starts = [c.from_ for c in cells if known(c.from_)]
@@ -51,7 +52,7 @@ def _round(value: float) -> str:
     return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 
-def _stretch(cell: CellAnswer, regions: Sequence[CellAnswer]) -> list[CellAnswer]:
+def _stretch(cell: Cell, regions: Sequence[Cell]) -> list[Cell]:
     """Return a region with those of its sign that join on to it."""
     joined, sign = [cell], cell.bias_N.median > 0.0
     waiting = [

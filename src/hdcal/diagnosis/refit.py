@@ -30,14 +30,6 @@ def refit(
 ) -> Refits:
     """Calibrate the corrected model by NUTS: the name, or each member of the set.
 
-    Args:
-        case: to calibrate.
-        which: what is named.
-        posterior: over hypotheses.
-        library: effects by name.
-        seed: of the sampling.
-        progress: called with (iterations done, iterations in all).
-
     Returns:
         Probability and posterior by hypothesis; `none` for the plain model and
         `unknown` for the plain model with a leftover gap.
@@ -80,7 +72,7 @@ def with_sampled_size(which: Which, fits: Refits) -> Which:
     draws = posterior.draws.get(f"{size.effect}.{size.parameter}")
     if draws is None or not posterior.usable:
         return which
-    return replace(which, amplitude=replace(size, size=interval(draws)))
+    return replace(which, amplitude=replace(size, **vars(interval(draws))))
 
 
 def failure_reasons(fits: Refits) -> tuple[str, ...]:

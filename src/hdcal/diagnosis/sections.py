@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from hdcal.diagnosis.answer import CellAnswer, VerdictAnswer
-from hdcal.diagnosis.verdict import Closure, Gap
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.verdict import Cell, Closure, Gap
 from hdcal.diagnosis.words import held_out, one_reading
 from hdcal.report.document import (
     Block,
@@ -77,7 +77,7 @@ def _size_rows(gap: Gap) -> list[tuple[str, str, str]]:
     ]
 
 
-def _regions(regions: Sequence[CellAnswer]) -> Iterator[Block]:
+def _regions(regions: Sequence[Cell]) -> Iterator[Block]:
     if not regions:
         yield Text("No range is off by more than noise alone would make it.")
         return
@@ -89,7 +89,7 @@ def _regions(regions: Sequence[CellAnswer]) -> Iterator[Block]:
         yield Text(f"{hidden} more are in verdict.json.", soft=True)
 
 
-def _region_row(cell: CellAnswer) -> list[str]:
+def _region_row(cell: Cell) -> list[str]:
     bias = cell.bias_N
     width = bias.hi - bias.lo if known(bias.hi) else None
     return [

@@ -1,22 +1,19 @@
-"""A verdict as its JSON answer."""
+"""A verdict as its JSON answer, and all that its result folder holds."""
 
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 
-from hdcal.diagnosis.answer import (
-    AmplitudeAnswer,
-    CellAnswer,
-    DiagnosedData,
-    NotTestable,
-    Refit,
-    VerdictAnswer,
-    WhereAnswer,
-    WhichAnswer,
-)
-from hdcal.diagnosis.verdict import Cell, Verdict, Where, Which, member_files
+from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
+from hdcal.diagnosis.document import verdict_document
+from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
-from hdcal.inference.posterior import versions
-from hdcal.report.parameters import Interval
+from hdcal.inference.posterior import FILE_NAME, Posterior, versions
+from hdcal.inference.residuals import residuals
+from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.prediction.engine.causes import ORIGIN
 from hdcal.report.posterior_answer import CalibratedGear
+from hdcal.report.write import Report, report_files, write_files, write_numbers
 
 INTERVAL = 0.9
 
@@ -24,14 +21,8 @@ INTERVAL = 0.9
 def verdict_answer(
     verdict: Verdict, *, seed: int = 0, quick: bool = False
 ) -> VerdictAnswer:
-    """Return a verdict as its JSON answer.
-
-    Args:
-        verdict: from `diagnose`.
-        seed: it was made with.
-        quick: whether nothing was sampled.
-    """
-    case, gear = verdict.case, verdict.case.gear
+    """Return a verdict as its JSON answer."""
+    case, gear, where = verdict.case, verdict.case.gear, verdict.where
     found = VerdictAnswer(
         status=verdict.status,
         reasons=verdict.reasons,
@@ -41,8 +32,10 @@ def verdict_answer(
         limits=(),
         interval=INTERVAL,
         gap=verdict.gap,
-        where=_where(verdict.where),
-        which=_which(verdict.which),
+        where=WhereAnswer(
+            where.p_value, where.statistics, where.shares, where.regions, where.cells
+        ),
+        which=verdict.which,
         shrink=verdict.shrink,
         next_test=verdict.next_test,
         next_test_reason=verdict.no_run,
@@ -61,7 +54,7 @@ def verdict_answer(
             name=case.name,
             rows=len(case.records.force),
             averaged_rows=verdict.averaged_rows,
-            rows_diagnosed=len(verdict.where.records.force),
+            rows_diagnosed=len(where.records.force),
             sha256=case.data_sha256,
             notes=case.notes,
         ),
@@ -76,43 +69,83 @@ def verdict_answer(
     )
 
 
-def _where(where: Where) -> WhereAnswer:
-    return WhereAnswer(
-        p_value=where.p_value,
-        statistics=where.statistics,
-        shares=where.shares,
-        regions=tuple(map(_cell, where.regions)),
-        cells=tuple(map(_cell, where.cells)),
-    )
+def verdict_report(
+    verdict: Verdict, command: str = "", *, seed: int = 0, quick: bool = False
+) -> Report[VerdictAnswer]:
+    """Return all that `hdcal diagnose` leaves behind for one case."""
+    refit = corrected(verdict)
+    found = verdict_answer(verdict, seed=seed, quick=quick)
 
+    @cache
+    def bands() -> Bands:
+        return default_bands(list(verdict.posteriors.values()))
 
-def _cell(cell: Cell) -> CellAnswer:
-    low, high = cell.bias_N - cell.half_width_N, cell.bias_N + cell.half_width_N
-    return CellAnswer(
-        covariate=cell.covariate,
-        label=cell.label,
-        from_=cell.start,
-        to=cell.stop,
-        unit=cell.unit,
-        rows=cell.rows,
-        bias_N=Interval(cell.bias_N, low, high),
-        z=cell.z,
-        share=cell.share,
-    )
+    def figures():
+        from hdcal.calibration.figure.bands import calibration_figure
+        from hdcal.diagnosis.figure.closure import shrink_figure
+        from hdcal.diagnosis.figure.where import where_figure
+        from hdcal.diagnosis.figure.which import which_figure
 
-
-def _which(which: Which) -> WhichAnswer:
-    size, lacking = which.amplitude, which.not_testable.items()
-    return WhichAnswer(
-        **{
-            **vars(which),
-            "amplitude": size
-            and AmplitudeAnswer(
-                **vars(size.size),
-                effect=size.effect,
-                parameter=size.parameter,
-                unit=size.unit,
-            ),
-            "not_testable": tuple(NotTestable(name, needs) for name, needs in lacking),
+        drawn = {
+            "where": where_figure(verdict),
+            "which": which_figure(verdict),
+            "shrink": shrink_figure(verdict),
         }
+        if refit is not None:
+            fit = refit[1]
+            drawn["bands"] = calibration_figure(fit, bands(), residuals(fit))
+        return drawn
+
+    return Report(
+        verdict_document(found, verdict.case, command, refit),
+        found,
+        "verdict.json",
+        figures,
+        tables=lambda: {} if refit is None else {"bands.csv": bands().columns()},
+        save=lambda folder: _save_models(verdict, folder),
     )
+
+
+def write_verdict(
+    verdict: Verdict, folder: Path, command: str = "", *, report: bool = True, **made
+) -> VerdictAnswer:
+    """Write what `hdcal diagnose` leaves behind for one case, and return the answer.
+
+    Args:
+        verdict: from `diagnose`.
+        folder: an empty one, from `whole_folder`.
+        command: how the result was made, for its provenance.
+        report: whether figures and report are wanted; they take most of the time.
+        made: seed and quick, as of `verdict_report`.
+    """
+    told = verdict_report(verdict, command, **made)
+    write_numbers(told, folder)
+    if report:
+        write_files(report_files(told.document, told.figures()), folder)
+    return told.answer
+
+
+def member_files(verdict: Verdict) -> dict[str, str]:
+    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
+    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
+    files = {name: f"posterior-{name}.nc" for name in ranked}
+    return files | dict.fromkeys(ranked[:1], FILE_NAME)
+
+
+def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
+    """Return the most probable corrected model with its name."""
+    weighed = verdict.posteriors
+    if not weighed:
+        return None
+    name = max(weighed, key=lambda name: weighed[name][0])
+    return name, weighed[name][1]
+
+
+def _save_models(verdict: Verdict, folder: Path) -> None:
+    """Save every calibrated model, each with the probabilities of all."""
+    chances = {name: share for name, (share, _) in verdict.posteriors.items()}
+    for name, file in member_files(verdict).items():
+        posterior = verdict.posteriors[name][1]
+        origin = {"hypothesis": name, "probabilities": chances}
+        settings = {**posterior.settings, ORIGIN: origin}
+        replace(posterior, settings=settings).save(folder / file)

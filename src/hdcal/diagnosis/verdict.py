@@ -1,17 +1,23 @@
 """The answer of a diagnosis, as typed values; views turn them into files and words."""
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
-from hdcal.inference.posterior import FILE_NAME, Posterior
-from hdcal.report.answer import EffectName, Probability, Real, Words
+from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
+from hdcal.report.answer import Count, EffectName, Probability, Promise, Real, Words
 from hdcal.report.parameters import Interval
 
 VerdictWord = Literal["none", "named", "ambiguous", "unknown"]
+_PAIR = "^[A-Za-z_][A-Za-z0-9_]*(\\+[A-Za-z_][A-Za-z0-9_]*)?$"
+Chances = Annotated[
+    dict[str, Probability],
+    Promise(required=["none", "unknown"], propertyNames={"pattern": _PAIR}),
+]
 
 
 @dataclass(frozen=True)
@@ -46,31 +52,30 @@ class Cell:
         covariate: deformation, temperature, time, angle, direction, run, specimen
             or a product such as `direction × deformation`.
         label: for people, such as "0.36 … 0.54 mm" or "unloading".
-        start: lower end in `unit`; NaN for labels.
-        stop: upper end; NaN for labels.
+        from_: lower end in `unit`; NaN for labels.
+        to: upper end; NaN for labels.
         unit: mm, °C, s, rad or "".
         rows: number of rows.
-        bias_N: mean reading minus calibrated model.
-        half_width_N: of the simultaneous 95 % band of a model without gap.
+        bias_N: mean reading minus calibrated model, with the simultaneous 95 % band of
+            noise around it.
         z: bias over its standard error under no gap.
         share: of the squared gap that lies in this cell [-].
     """
 
-    covariate: str
+    covariate: Words
     label: str
-    start: float
-    stop: float
+    from_: Real
+    to: Real
     unit: str
-    rows: int
-    bias_N: float
-    half_width_N: float
-    z: float
-    share: float
+    rows: Count
+    bias_N: Interval
+    z: Real
+    share: Real
 
     @property
     def hot(self) -> bool:
         """Whether the bias leaves the simultaneous band."""
-        return abs(self.bias_N) > self.half_width_N
+        return self.bias_N.lo > 0.0 or self.bias_N.hi < 0.0
 
 
 @dataclass(frozen=True)
@@ -110,13 +115,20 @@ class Where:
 
 
 @dataclass(frozen=True)
-class Amplitude:
+class Amplitude(Interval):
     """Size of the named effect, 90 % credible interval."""
 
-    effect: str
-    parameter: str
+    effect: EffectName
+    parameter: Words
     unit: str
-    size: Interval
+
+
+@dataclass(frozen=True)
+class NotTestable:
+    """An effect, and what the records lack to show it."""
+
+    effect: EffectName
+    needs: Annotated[tuple[Words, ...], Promise(minItems=1)]
 
 
 @dataclass(frozen=True)
@@ -132,7 +144,7 @@ class Which:
         inclusion: of each effect over singles and pairs.
         log_evidence: of each hypothesis, relative to none [nat].
         amplitude: of `effect`; None without one.
-        not_testable: effect → features that the records lack.
+        not_testable: effects that these records cannot show.
         not_excited: effects that this loading cannot show at a physical size.
         inseparable: pairs of effects that this loading can never tell apart.
         sensitivity: top inclusion for amplitude priors ⅓ and 3 times as wide.
@@ -140,18 +152,18 @@ class Which:
     """
 
     verdict: VerdictWord
-    effect: str | None
-    second_effect: str | None
-    set: tuple[str, ...]
-    probabilities: dict[str, float]
-    inclusion: dict[str, float]
-    log_evidence: dict[str, float]
+    effect: EffectName | None
+    second_effect: EffectName | None
+    set: Annotated[tuple[EffectName, ...], Promise(uniqueItems=True)]
+    probabilities: Chances
+    inclusion: dict[str, Probability]
+    log_evidence: dict[str, Real]
     amplitude: Amplitude | None
-    not_testable: dict[str, tuple[str, ...]]
-    not_excited: tuple[str, ...]
-    inseparable: tuple[tuple[str, str], ...]
-    sensitivity: dict[str, float]
-    stability: float | None
+    not_testable: tuple[NotTestable, ...]
+    not_excited: tuple[EffectName, ...]
+    inseparable: tuple[tuple[EffectName, EffectName], ...]
+    sensitivity: dict[str, Real]
+    stability: Probability | None
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -246,7 +258,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Shown):
     """Where, which, how far, and what to do next.
 
     Attributes:
@@ -284,10 +296,3 @@ class Verdict:
     def status(self) -> Literal["ok", "failed"]:
         """Return whether the result may be used."""
         return "failed" if self.reasons else "ok"
-
-
-def member_files(verdict: Verdict) -> dict[str, str]:
-    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
-    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
-    files = {name: f"posterior-{name}.nc" for name in ranked}
-    return files | dict.fromkeys(ranked[:1], FILE_NAME)

@@ -24,6 +24,11 @@ def interval(draws) -> Interval:
     return Interval(float(middle), float(low), float(high))
 
 
+def about(middle: float, half_width: float) -> Interval:
+    """Return the interval of a given half-width about its middle."""
+    return Interval(middle, middle - half_width, middle + half_width)
+
+
 def declared_directions(
     evidence: CaseEvidence, case: Case
 ) -> tuple[list[DeclaredCell], Directions]:
@@ -67,15 +72,7 @@ def describe_where(
     tested: ResidualTest,
     smooth: SmoothGap | None,
 ) -> Where:
-    """Put the outcome of the residual test into values for people.
-
-    Args:
-        evidence: for the order of the rows.
-        case: whose rows were tested.
-        cells: that were declared.
-        tested: outcome of the residual test.
-        smooth: the smooth gap, None when none is detected.
-    """
+    """Put the outcome of the residual test into values for people."""
     order = evidence.prepared.order
     residual, gap = np.empty(len(order)), np.zeros(len(order))
     residual[order] = tested.residual
@@ -94,8 +91,7 @@ def describe_where(
                 cell.stop,
                 cell.unit,
                 int(cell.rows.sum()),
-                float(tested.bias[index]),
-                float(tested.half_width[index]),
+                about(float(tested.bias[index]), float(tested.half_width[index])),
                 float(tested.z[index]),
                 float(np.sum(left**2 * cell.rows) / total),
             )

@@ -1,6 +1,6 @@
 """Which effect causes the gap: posterior over hypotheses, and how firm it is."""
 
-from itertools import combinations
+from itertools import combinations, starmap
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from hdcal.diagnosis.model_posterior import (
     model_posterior,
     verdict_word,
 )
-from hdcal.diagnosis.verdict import Which
+from hdcal.diagnosis.verdict import NotTestable, Which
 from hdcal.evidence.case_evidence import LEAST_SEEN, NONE, CaseEvidence
 from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.resampled_evidence import resampled_evidence
@@ -29,15 +29,7 @@ def identify_cause(
     library: dict[str, type[Effect]],
     rng: np.random.Generator,
 ) -> Which:
-    """Return the verdict on the cause.
-
-    Args:
-        evidence: of the hypotheses.
-        posterior: over them.
-        detected: whether there is a gap.
-        library: the effects by name.
-        rng: source of randomness.
-    """
+    """Return the verdict on the cause."""
     word = verdict_word(posterior, detected)
     ranked = sorted(posterior.inclusion, key=lambda n: -posterior.inclusion[n])
     named = word in ("named", "ambiguous") and bool(ranked)
@@ -52,7 +44,7 @@ def identify_cause(
         inclusion=posterior.inclusion,
         log_evidence=posterior.log_evidence,
         amplitude=amplitude_of(evidence, effect, library, rng) if effect else None,
-        not_testable=evidence.not_testable,
+        not_testable=tuple(starmap(NotTestable, evidence.not_testable.items())),
         not_excited=evidence.not_excited,
         inseparable=inseparable(evidence),
         sensitivity=sensitivity(evidence, effect) if effect else {},

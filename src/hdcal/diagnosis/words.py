@@ -3,9 +3,9 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from hdcal.diagnosis.answer import VerdictAnswer, WhichAnswer
+from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.places import places
-from hdcal.diagnosis.verdict import Closure
+from hdcal.diagnosis.verdict import Closure, Which
 from hdcal.report.words import (
     estimate,
     hypothesis,
@@ -84,7 +84,7 @@ def limits(found: VerdictAnswer) -> list[str]:
     return [*_blind(which), PROPORTIONAL, *([NO_PROOF] if _closes(found) else [])]
 
 
-def _blind(which: WhichAnswer) -> Iterator[str]:
+def _blind(which: Which) -> Iterator[str]:
     if which.not_testable:
         lacking = [
             f"{label(item.effect)} (needs {', '.join(item.needs)})"
@@ -98,7 +98,7 @@ def _blind(which: WhichAnswer) -> Iterator[str]:
         yield _alike(which)
 
 
-def _alike(which: WhichAnswer) -> str:
+def _alike(which: Which) -> str:
     """Name the pairs of one shape, first those that concern the answer."""
     matter = {which.effect, which.second_effect, *which.set}
     pairs = sorted(which.inseparable, key=lambda pair: not matter & {*pair})
@@ -191,7 +191,7 @@ def _unknown(found: VerdictAnswer) -> Iterator[str]:
     yield from _shrinks(found, "the best correction there is")
 
 
-def _with_chance(which: WhichAnswer, name: str) -> str:
+def _with_chance(which: Which, name: str) -> str:
     chance = which.inclusion.get(name, which.probabilities.get(name))
     return f"{hypothesis(name)} ({percent(chance)})"
 

@@ -18,6 +18,7 @@ from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import Problem, build_problem
+from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
 FILE_NAME = "posterior.nc"
@@ -25,7 +26,7 @@ _PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
 
 
 @dataclass(frozen=True, repr=False)
-class Posterior:
+class Posterior(Shown):
     """A calibration: draws in code units, priors, checks and provenance.
 
     Attributes:

@@ -1,7 +1,5 @@
 """A dynamic calibration in words: the only place of its sentences."""
 
-from collections.abc import Sequence
-
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.motion.answer import DynamicCalibrationAnswer
 from hdcal.motion.quantities import QUANTITIES, quantity_table
@@ -9,7 +7,6 @@ from hdcal.report.document import Document, Picture, Section, Sentences, notices
 from hdcal.report.parameters import Interval
 from hdcal.report.posterior_sections import (
     check_section,
-    failed_headline,
     parameter_section,
     prior_section,
 )
@@ -24,17 +21,8 @@ ASSUMPTIONS = (
 )
 
 
-def headline(frequency: Interval, reasons: Sequence[str]) -> str:
-    """Return the answer in one sentence.
-
-    Args:
-        frequency: natural frequency [Hz].
-        reasons: why the calibration must not be used, if so.
-    """
-    return failed_headline(reasons) if reasons else _frequency(frequency)
-
-
-def _frequency(found: Interval) -> str:
+def headline(found: Interval) -> str:
+    """Return the natural frequency [Hz] in one sentence."""
     middle, span = estimate(found)
     return f"The gear swings freely at {middle} Hz, 95 % credible interval {span} Hz."
 
@@ -52,13 +40,7 @@ def next_steps(posterior: DynamicPosterior) -> list[str]:
 def motion_document(
     posterior: DynamicPosterior, found: DynamicCalibrationAnswer, command: str = ""
 ) -> Document:
-    """Return the report; its pictures are motion, priors and sampler.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-        found: from `dynamic_answer`.
-        command: how the result was made.
-    """
+    """Return the report; its pictures are motion, priors and sampler."""
     return Document(
         name=posterior.case.gear.name,
         kind="dynamic calibration",
@@ -66,7 +48,7 @@ def motion_document(
         f"time ({found.data.name}): mass, damping and stiffness of m ÿ + c ẏ + k y = "
         f"F(t), theory “{found.gear.theory}”.",
         # Of a failed calibration the page shows it struck through.
-        headline=_frequency(found.natural_frequency_Hz),
+        headline=headline(found.natural_frequency_Hz),
         next_steps=next_steps(posterior),
         notices=[
             *notices(("Remarks", found.flat_directions), tone="neutral"),

@@ -12,6 +12,7 @@ from hdcal.report.canvas import (
     DARK,
     GREY,
     ORANGE,
+    beyond,
     heading,
     plain,
     style,
@@ -21,31 +22,24 @@ from hdcal.report.canvas import (
 
 
 def response_figure(response: Response) -> Figure:
-    """Draw the force, and below it the band of the deformation.
-
-    Args:
-        response: from `respond`.
-    """
+    """Draw the force, and below it the band of the deformation."""
     time, unit = _clock(response.time_s)
     with style():
         figure, above, below = _panels(unit)
         _draw_force(above, time, response.force_N)
         lo, hi = response.deformation_lo_mm, response.deformation_hi_mm
         tested = np.asarray(response.tested)
-        # Neighbouring stretches share a point, else a white slit opens between them.
-        beyond = (
-            ~tested | np.append(~tested[1:], False) | np.append(False, ~tested[:-1])
-        )
+        untested = beyond(tested)
         shade = {"color": BLUE, "linewidth": 0.0}
         below.fill_between(
             time, lo, hi, where=tested, alpha=0.4, label="95 % credible band", **shade
         )
-        if beyond.any():
+        if untested.any():
             below.fill_between(
                 time,
                 lo,
                 hi,
-                where=beyond,
+                where=untested,
                 facecolor=BLUE,
                 edgecolor=BLUE,
                 alpha=0.18,
@@ -63,12 +57,7 @@ def response_figure(response: Response) -> Figure:
 
 
 def motion_figure(posterior: Posterior, bands: MotionBands) -> Figure:
-    """Draw a calibrated record: force, deformation with bands, and what is left.
-
-    Args:
-        posterior: whose name and status are shown.
-        bands: from `motion_bands`.
-    """
+    """Draw a calibrated record: force, deformation with bands, and what is left."""
     time, unit = _clock(bands.time_s)
     shown = thinned(len(time))
     with style():

@@ -1,32 +1,62 @@
-"""A dynamic calibration as an answer: the numbers and words of its summary.json."""
+"""A dynamic calibration as an answer, and all that its result folder holds."""
+
+from functools import cache
 
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.posterior import FILE_NAME
 from hdcal.motion.answer import DynamicCalibrationAnswer
-from hdcal.motion.document import ASSUMPTIONS, headline, next_steps
+from hdcal.motion.bands import MotionBands, motion_bands
+from hdcal.motion.document import ASSUMPTIONS, headline, motion_document, next_steps
 from hdcal.report.parameters import credible_interval
 from hdcal.report.posterior_answer import posterior_entries
+from hdcal.report.write import Report
 
 
 def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
-    """Return a dynamic calibration as an answer, ready for JSON.
-
-    Args:
-        posterior: from `calibrate_dynamic`.
-    """
+    """Return a dynamic calibration as an answer, ready for JSON."""
     draws = posterior.draws
     ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
     damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
     free = credible_interval(frequency)
-    steps = next_steps(posterior)
+    entries = posterior_entries(posterior, headline(free), next_steps(posterior))
     return DynamicCalibrationAnswer(
-        **posterior_entries(posterior),
-        headline=headline(free, posterior.reasons),
-        next_step=steps[0] if steps else None,
+        **entries,
         damping_N_s_per_mm=credible_interval(draws["damping"]),
         damping_ratio=credible_interval(ratio),
         natural_frequency_Hz=free,
         damped_frequency_Hz=credible_interval(damped),
         assumptions=ASSUMPTIONS,
+    )
+
+
+def dynamic_report(
+    posterior: DynamicPosterior, command: str = ""
+) -> Report[DynamicCalibrationAnswer]:
+    """Return all that `hdcal calibrate --dynamic` leaves behind."""
+    found = dynamic_answer(posterior)
+
+    @cache
+    def bands() -> MotionBands:
+        return motion_bands(posterior)
+
+    def figures():
+        from hdcal.motion.figure import motion_figure
+        from hdcal.report.draws_figure import prior_figure, sampler_figure
+
+        return {
+            "motion": motion_figure(posterior, bands()),
+            "priors": prior_figure(posterior),
+            "sampler": sampler_figure(posterior),
+        }
+
+    return Report(
+        motion_document(posterior, found, command),
+        found,
+        "summary.json",
+        figures,
+        kept=["motion"],
+        tables=lambda: {"motion.csv": bands().columns()},
+        save=lambda folder: posterior.save(folder / FILE_NAME),
     )

@@ -4,6 +4,7 @@ import io
 import logging
 import math
 import warnings
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, Literal
 
@@ -112,6 +113,29 @@ def watermark(figure: Figure) -> None:
 def heading(axes: Axes, text: str) -> None:
     """Write a small heading above a panel, at its left edge."""
     axes.set_title(text, loc="left", fontweight="bold", color=DARK)
+
+
+def note(axes: Axes, text: str, at: tuple[Any, Any], shift, **look: Any) -> None:
+    """Write a small text beside a place, shifted by so many points."""
+    axes.annotate(
+        text, at, xytext=shift, textcoords="offset points", fontsize=8.5, **look
+    )
+
+
+def name_rows(axes: Axes, names: Sequence[str], *, size: float = 8.5) -> None:
+    """Name the rows of bars at 0, 1, 2, … instead of marking a scale."""
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", labelsize=size, length=0)
+    axes.grid(False, axis="y")
+
+
+def beyond(tested: np.ndarray) -> np.ndarray:
+    """Return the rows that are drawn as not tested, with those next to them.
+
+    Neighbouring stretches share a point, else a white slit opens between them.
+    """
+    before, after = np.append(False, ~tested[:-1]), np.append(~tested[1:], False)
+    return ~tested | after | before
 
 
 def thinned(size: int) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The part of a JSON answer that tells of a sampled posterior."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -85,12 +86,22 @@ class PosteriorAnswer(Answer):
     data: CalibratedData
 
 
-def posterior_entries(posterior: Posterior) -> dict[str, Any]:
-    """Return what a `PosteriorAnswer` holds, but for headline and next step."""
+def posterior_entries(
+    posterior: Posterior, headline: str, steps: Sequence[str]
+) -> dict[str, Any]:
+    """Return what a `PosteriorAnswer` holds.
+
+    Args:
+        posterior: that was sampled.
+        headline: of a calibration that passed its checks.
+        steps: what to do next, most urgent first.
+    """
     case, settings = posterior.case, posterior.settings
     return {
         "status": "ok" if posterior.usable else "failed",
         "reasons": posterior.reasons,
+        "headline": headline if posterior.usable else _failed(posterior),
+        "next_step": steps[0] if steps else None,
         "warnings": _warnings(posterior),
         "parameters": parameter_estimates(posterior),
         "stiffness_N_per_mm": credible_interval(posterior.draws["stiffness"]),
@@ -108,6 +119,11 @@ def posterior_entries(posterior: Posterior) -> dict[str, Any]:
             case.name, len(case.records.force), case.data_sha256, case.notes
         ),
     }
+
+
+def _failed(posterior: Posterior) -> str:
+    listed = "; ".join(posterior.reasons)
+    return f"This calibration failed its checks and must not be used: {listed}."
 
 
 def _warnings(posterior: Posterior) -> tuple[str, ...]:

@@ -31,12 +31,6 @@ _SAMPLER = Picture(
 )
 
 
-def failed_headline(reasons: Sequence[str]) -> str:
-    """Return that a calibration must not be used, and why."""
-    listed = "; ".join(reasons)
-    return f"This calibration failed its checks and must not be used: {listed}."
-
-
 def parameter_section(
     found: Mapping[str, ParameterEstimate], *, brief: bool = True
 ) -> Section:

@@ -10,11 +10,7 @@ _MOST_LISTED = 8
 
 
 def check_document(found: CheckAnswer) -> Document:
-    """Return the report of a check.
-
-    Args:
-        found: from `check_answer`.
-    """
+    """Return the report of a check."""
     return Document(
         name=found.case,
         kind="check",

@@ -16,11 +16,7 @@ from hdcal.physics.registry import EFFECTS
 
 
 def check_answer(case: Case) -> CheckAnswer:
-    """Return what was understood of a case, ready for JSON.
-
-    Args:
-        case: from `read_case`.
-    """
+    """Return what was understood of a case, ready for JSON."""
     gear, records = case.gear, case.records
     lacking = {
         name: tuple(sorted(effect.needs - records.known))

@@ -10,11 +10,7 @@ def headline(count: int) -> str:
 
 
 def effects_document(found: EffectsAnswer) -> Document:
-    """Return the library as a table.
-
-    Args:
-        found: from `effects_answer`.
-    """
+    """Return the library as a table."""
     rows = []
     for effect in found.effects:
         first = [effect.name, effect.stage, ", ".join(effect.needs) or "–"]

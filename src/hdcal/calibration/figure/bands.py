@@ -16,6 +16,7 @@ from hdcal.report.canvas import (
     DARK,
     GREY,
     MOST_POINTS,
+    beyond,
     heading,
     plain,
     style,
@@ -29,13 +30,7 @@ _MOST_COLUMNS = 3
 
 
 def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> Figure:
-    """Draw force over deformation, and below it the distance from the fit.
-
-    Args:
-        posterior: names, status.
-        bands: from `default_bands`.
-        left: residuals of the same posterior.
-    """
+    """Draw force over deformation, and below it the distance from the fit."""
     gear = posterior.case.gear
     levels = np.unique(bands.temperature_C)
     colours = temperature_colours(levels)
@@ -114,8 +109,7 @@ def _draw_curve(
     zero = bands.physics_median_N[rows] if baseline else np.zeros(len(rows))
     tested = np.asarray(bands.tested[rows], dtype=bool)
     dashes = (0, (4, 2)) if bands.direction[rows[0]] == "down" else "-"
-    # Neighbouring stretches share a point, else a white slit opens between them.
-    beyond = ~tested | np.append(~tested[1:], False) | np.append(False, ~tested[:-1])
+    untested = beyond(tested)
     bands_here = [("new_measurement", 0.16), ("physics", 0.38)]
     if np.isfinite(bands.with_gap_median_N).any():
         bands_here.insert(1, ("with_gap", 0.22))
@@ -125,15 +119,15 @@ def _draw_curve(
         high = getattr(bands, f"{name}_hi_N")[rows] - zero
         shade = {"color": colour, "linewidth": 0.0}
         axes.fill_between(x, low, high, where=tested, alpha=strength, **shade)
-        axes.fill_between(x, low, high, where=beyond, alpha=strength / 3, **shade)
+        axes.fill_between(x, low, high, where=untested, alpha=strength / 3, **shade)
         if name == "new_measurement":
             edge = {"facecolor": "none", "edgecolor": colour, "linewidth": 0.0}
             axes.fill_between(
-                x, low, high, where=beyond, hatch="////", alpha=0.45, **edge
+                x, low, high, where=untested, hatch="////", alpha=0.45, **edge
             )
     middle = bands.physics_median_N[rows] - zero
     axes.plot(x, np.where(tested, middle, np.nan), color=colour, linestyle=dashes)
-    axes.plot(x, np.where(beyond, middle, np.nan), color=colour, linestyle=":")
+    axes.plot(x, np.where(untested, middle, np.nan), color=colour, linestyle=":")
     if len(bands_here) == 3:
         gap = bands.with_gap_median_N[rows] - zero
         axes.plot(x, gap, color=colour, linewidth=1.0, linestyle="-.")

@@ -22,12 +22,7 @@ _MOST_GROUPS = 6
 
 
 def residual_figure(posterior: Posterior, left: Residuals) -> Figure:
-    """Draw standardised residuals over what they might depend on.
-
-    Args:
-        posterior: names, status.
-        left: residuals of the same posterior.
-    """
+    """Draw standardised residuals over what they might depend on."""
     order = np.arange(1, len(left.residual) + 1)
     panels = [
         ("over deformation", "deformation as read [mm]", left.deformation),

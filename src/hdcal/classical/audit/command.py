@@ -22,11 +22,8 @@ def audit(console: Console, out, force):
     from hdcal.classical.audit.audit import audit as check_claims
     from hdcal.classical.audit.document import audit_document
     from hdcal.classical.audit.summary import audit_answer
+    from hdcal.report.write import Report
 
     found = audit_answer(check_claims())
-    document = audit_document(found)
-    if out is not None:
-        from hdcal.report.write import write_report
-
-        write_report(out, document, {"audit.json": found}, force=force)
-    return console.answer(document, found, out)
+    told = Report(audit_document(found), found, "audit.json")
+    return console.report(told, out, force=force)

@@ -16,11 +16,7 @@ def headline(count: Mapping[str, int]) -> str:
 
 
 def audit_document(found: AuditAnswer) -> Document:
-    """Return the report of the audit.
-
-    Args:
-        found: from `audit_answer`.
-    """
+    """Return the report of the audit."""
     claims = [
         [str(c.point), c.claim, c.formula, c.data, c.verdict] for c in found.claims
     ]

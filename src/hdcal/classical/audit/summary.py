@@ -19,11 +19,7 @@ from hdcal.classical.fit.notation import model_name
 
 
 def audit_answer(claims: tuple[Claim, ...]) -> AuditAnswer:
-    """Return the audit as an answer, ready for JSON.
-
-    Args:
-        claims: from `audit`.
-    """
+    """Return the audit as an answer, ready for JSON."""
     words = [claim.verdict for claim in claims]
     count = {word: words.count(word) for word in get_args(Outcome)}
     return AuditAnswer(

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from hdcal.classical.fit.fit import LackOfFit
 from hdcal.report.answer import Answer, Real
 from hdcal.report.parameters import Interval
-
-KIND = "confidence interval (t), independent normal errors of one size"
 
 
 @dataclass(frozen=True)
@@ -19,17 +18,6 @@ class Coefficient:
     standard_error: Real
     lo: Real
     hi: Real
-
-
-@dataclass(frozen=True)
-class LackOfFitAnswer:
-    """The test of whether a curve is too simple."""
-
-    against: Literal["pure error", "next degree"]
-    F: Real
-    dof: tuple[int, int]
-    p_value: float
-    too_simple: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +54,7 @@ class FittedCurve:
     r2_adjusted: float | None
     aicc: float | None
     aicc_over_best: float | None
-    lack_of_fit: LackOfFitAnswer | None
+    lack_of_fit: LackOfFit | None
     held_out_rows_N: float | None
     held_out_runs_N: float | None
     condition_number: Real

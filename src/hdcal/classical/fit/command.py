@@ -43,9 +43,8 @@ def fit(console: Console, degrees, through_origin, at, run, out, force, **given)
     For who knows polyfit: the same coefficients, with standard errors, confidence
     intervals, and tests of whether the curve suits the data.
     """
-    from hdcal.classical.fit.document import fit_document
     from hdcal.classical.fit.fit import fit as fit_case
-    from hdcal.classical.fit.summary import fit_answer
+    from hdcal.classical.fit.summary import fit_report
     from hdcal.cli.sources import load_posterior
 
     with console.wrong as wrong:
@@ -56,12 +55,5 @@ def fit(console: Console, degrees, through_origin, at, run, out, force, **given)
         console.check_target(out, force)
     assert case is not None and fits is not None
     posterior = None if run is None else load_posterior(run)
-    found = fit_answer(case, fits, at=at, posterior=posterior)
-    document = fit_document(case, found, console.command)
-    if out is not None:
-        from hdcal.classical.fit.figure import fit_figure
-        from hdcal.report.write import write_report
-
-        figures = {"fit": fit_figure(case, fits)}
-        write_report(out, document, {"fit.json": found}, figures, force=force)
-    return console.answer(document, found, out)
+    told = fit_report(case, fits, console.command, at=at, posterior=posterior)
+    return console.report(told, out, force=force)

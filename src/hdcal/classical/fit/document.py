@@ -6,15 +6,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hdcal.classical.fit.answer import FitAnswer, FittedCurve, ForceAt
+from hdcal.classical.fit.fit import DOUBT
 from hdcal.classical.fit.notation import omega
 from hdcal.data.case import Case
 from hdcal.report.document import Document, Picture, Section, Table, Text, notices
 from hdcal.report.parameters import Interval
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import estimate, number
-
-# A smaller chance than this says that the curve is too simple.
-DOUBT = 0.05
 
 
 def headline(curves: Sequence[FittedCurve]) -> str:
@@ -49,13 +47,7 @@ def notes(case: Case) -> Iterator[str]:
 
 
 def fit_document(case: Case, found: FitAnswer, command: str = "") -> Document:
-    """Return the report of classical fits; its picture is called fit.
-
-    Args:
-        case: that was fitted.
-        found: from `fit_answer`.
-        command: how the result was made.
-    """
+    """Return the report of classical fits; its picture is called fit."""
     lacking = [
         one.model
         for one in found.fits

@@ -12,12 +12,7 @@ from hdcal.report.canvas import CYCLE, DARK, heading, style, thinned
 
 
 def fit_figure(case: Case, fits: Sequence[PolynomialFit]) -> Figure:
-    """Draw readings, curves with their confidence bands, and residuals.
-
-    Args:
-        case: that was fitted.
-        fits: from `fit`.
-    """
+    """Draw readings, curves with their confidence bands, and residuals."""
     x, y = np.asarray(case.records.deformation), np.asarray(case.records.force)
     rows = thinned(len(x))
     grid = np.linspace(min(0.0, x.min()), max(0.0, x.max()), 200)

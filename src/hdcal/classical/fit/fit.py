@@ -16,9 +16,12 @@ from scipy.stats import t as t_law
 
 from hdcal.data.case import Case
 from hdcal.errors import Finding, Findings
+from hdcal.report.answer import Real
 
 LEVEL = 0.95
 MOST_DEGREE = 9
+# A smaller chance than this says that the curve is too simple.
+DOUBT = 0.05
 # Beyond this condition number of the scaled columns no digit of a coefficient is left.
 _WORST_CONDITION = 1e14
 
@@ -32,12 +35,14 @@ class LackOfFit:
         F: ratio of the mean squares [-].
         dof: its degrees of freedom.
         p_value: chance of a ratio as large if the curve is right.
+        too_simple: that chance is small.
     """
 
     against: Literal["pure error", "next degree"]
-    F: float
+    F: Real
     dof: tuple[int, int]
     p_value: float
+    too_simple: bool
 
 
 @dataclass(frozen=True)
@@ -285,4 +290,4 @@ def _ratio(against, squares, below, extra: int, free: int) -> LackOfFit | None:
         return None
     ratio = max(squares - below, 0.0) / extra / (below / free)
     chance = float(f_law.sf(ratio, extra, free))
-    return LackOfFit(against, float(ratio), (extra, free), chance)
+    return LackOfFit(against, float(ratio), (extra, free), chance, chance < DOUBT)

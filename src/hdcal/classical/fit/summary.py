@@ -12,9 +12,8 @@ from hdcal.classical.fit.answer import (
     FittedCurve,
     FittedData,
     ForceAt,
-    LackOfFitAnswer,
 )
-from hdcal.classical.fit.document import DOUBT, headline, notes
+from hdcal.classical.fit.document import fit_document, headline, notes
 from hdcal.classical.fit.fit import LEVEL, PolynomialFit
 from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
@@ -22,6 +21,7 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
 from hdcal.report.parameters import credible_interval
+from hdcal.report.write import Report
 
 KIND = "confidence interval (t), independent normal errors of one size"
 
@@ -66,6 +66,28 @@ def fit_answer(
     )
 
 
+def fit_report(
+    case: Case,
+    fits: Sequence[PolynomialFit],
+    command: str = "",
+    *,
+    at: float | None = None,
+    posterior: Posterior | None = None,
+) -> Report[FitAnswer]:
+    """Return all that `hdcal fit` leaves behind.
+
+    Args and errors are those of `fit_answer`; `command` says how it was made.
+    """
+
+    def figures():
+        from hdcal.classical.fit.figure import fit_figure
+
+        return {"fit": fit_figure(case, fits)}
+
+    found = fit_answer(case, fits, at=at, posterior=posterior)
+    return Report(fit_document(case, found, command), found, "fit.json", figures)
+
+
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
     reach = case.gear.geometry.radius * (2 if case.gear.reading == "diametral" else 1)
     with Findings() as wrong:
@@ -102,7 +124,7 @@ def _curve(one: PolynomialFit, at: float | None, best: float | None) -> FittedCu
         r2_adjusted=one.r2_adjusted,
         aicc=one.aicc,
         aicc_over_best=None if one.aicc is None or best is None else one.aicc - best,
-        lack_of_fit=_lack_of_fit(one),
+        lack_of_fit=one.lack_of_fit,
         held_out_rows_N=one.held_out,
         held_out_runs_N=one.held_out_runs,
         condition_number=one.condition_number,
@@ -110,14 +132,6 @@ def _curve(one: PolynomialFit, at: float | None, best: float | None) -> FittedCu
         if at is None
         else ForceAt(**{f"{name}_N": value for name, value in one.at(at).items()}),
     )
-
-
-def _lack_of_fit(one: PolynomialFit) -> LackOfFitAnswer | None:
-    lack = one.lack_of_fit
-    if lack is None:
-        return None
-    too_simple = lack.p_value < DOUBT
-    return LackOfFitAnswer(lack.against, lack.F, lack.dof, lack.p_value, too_simple)
 
 
 def _highest_first(one: PolynomialFit) -> tuple[float, ...]:

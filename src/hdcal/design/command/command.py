@@ -42,8 +42,8 @@ def design(console: Console, run, gear, out, force, **given):
     """
     keep_compilations()
     from hdcal.design.inverse_design import inverse_design
-    from hdcal.design.result_folder import write_generator, write_inverse
     from hdcal.design.sources import open_source
+    from hdcal.design.summary import generator_report, inverse_report
     from hdcal.design.wave_generator import wave_generator
 
     with console.wrong as wrong:
@@ -55,9 +55,8 @@ def design(console: Console, run, gear, out, force, **given):
     spring = given["window"] is not None
     for name in OF_LIMIT if spring else OF_WINDOW:
         del given[name]
-    made = {"command": console.command, "force": force}
     if spring:
-        told = write_generator(wave_generator(source, **given), target, **made)
+        told = generator_report(wave_generator(source, **given), console.command)
     else:
-        told = write_inverse(inverse_design(source, **given), target, **made)
-    return console.answer(*told, target)
+        told = inverse_report(inverse_design(source, **given), console.command)
+    return console.report(told, target, force=force)

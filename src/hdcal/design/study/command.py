@@ -49,9 +49,9 @@ def study(console: Console, run, gear, article, out, force, **asked):
     if article:
         return _article(console, run)
     keep_compilations()
-    from hdcal.design.result_folder import write_study
     from hdcal.design.sources import open_source
     from hdcal.design.study.study import study as run_study
+    from hdcal.design.study.summary import study_report
 
     with console.wrong as wrong:
         if not (options.is_given("vary") or options.is_given("materials")):
@@ -61,9 +61,8 @@ def study(console: Console, run, gear, article, out, force, **asked):
         target = out or usual
         console.check_target(target, force)
     assert source is not None and target is not None
-    found = run_study(source, **asked)
-    told = write_study(found, target, command=console.command, force=force)
-    return console.answer(*told, target)
+    told = study_report(run_study(source, **asked), console.command)
+    return console.report(told, target, force=force)
 
 
 def _article(console: Console, run) -> int:

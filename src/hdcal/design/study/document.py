@@ -50,12 +50,7 @@ def _bands(found: StudyAnswer) -> str:
 
 
 def study_document(found: StudyAnswer, command: str = "") -> Document:
-    """Return the report of a study; its picture is called study.
-
-    Args:
-        found: from `study_answer`.
-        command: how the result was made.
-    """
+    """Return the report of a study; its picture is called study."""
     sections = [picture("study", "Force", _STUDY), *_designs(found)]
     return design_document(found, "study", [_bands(found)], sections, command)
 
@@ -99,11 +94,7 @@ def _row(found: StudyAnswer, shown: Sequence[str], row: int) -> list[str]:
 
 
 def article_document(found: ArticleAnswer) -> Document:
-    """Return the article's Tables 3 and 4 beside what holds together.
-
-    Args:
-        found: from `article_answer`.
-    """
+    """Return the article's Tables 3 and 4 beside what holds together."""
     sections = [
         Section(
             f"Table {which} of the article, forces in N",

@@ -18,9 +18,6 @@ def study_figure(found: Study) -> Figure:
 
     One size gives a line with its band, two give a map; of more, the first two at the
     middle of the others. Materials give a line, or a map, each.
-
-    Args:
-        found: from `study`.
     """
     sizes = [name for name in found.varied if name != "material"]
     rows = _middle_rows(found, sizes[2:])

@@ -19,6 +19,7 @@ from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import geometry_with
 from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
+from hdcal.notebook import Shown
 from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.forces import gear_forces
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
@@ -31,7 +32,7 @@ _BLOCK = 2_000_000
 
 
 @dataclass(frozen=True)
-class Study:
+class Study(Shown):
     """The force of every design; one entry of each column per design.
 
     Attributes:
@@ -53,13 +54,6 @@ class Study:
     basis: DesignDraws
     assumptions: tuple[str, ...]
     warnings: tuple[str, ...]
-
-    def _repr_html_(self) -> str:
-        from hdcal.design.study.document import study_document
-        from hdcal.design.study.summary import study_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(study_document(study_answer(self)))
 
 
 def study(

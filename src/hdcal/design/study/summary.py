@@ -4,17 +4,19 @@ from collections.abc import Sequence
 
 from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
 from hdcal.design.study.article_tables import ArticleRow
-from hdcal.design.study.document import ARTICLE_HEADLINE, study_headline, study_words
+from hdcal.design.study.document import (
+    ARTICLE_HEADLINE,
+    study_document,
+    study_headline,
+    study_words,
+)
 from hdcal.design.study.study import Study
 from hdcal.design.summary import in_words, origin
+from hdcal.report.write import Report
 
 
 def study_answer(found: Study) -> StudyAnswer:
-    """Return a study as an answer, ready for JSON, its table by column.
-
-    Args:
-        found: from `study`.
-    """
+    """Return a study as an answer, ready for JSON, its table by column."""
     told = StudyAnswer(
         **origin(found.basis, found.interval, found.interval_kind),
         varied=found.varied,
@@ -25,12 +27,26 @@ def study_answer(found: Study) -> StudyAnswer:
     return in_words(told, study_headline(told), study_words(told))
 
 
-def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:
-    """Return the article's tables as an answer, ready for JSON.
+def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
+    """Return all that `hdcal study` leaves behind."""
 
-    Args:
-        rows: from `article_rows`.
-    """
+    def figures():
+        from hdcal.design.study.figure import study_figure
+
+        return {"study": study_figure(found)}
+
+    answer = study_answer(found)
+    return Report(
+        study_document(answer, command),
+        answer,
+        "study.json",
+        figures,
+        tables=lambda: {"study.csv": found.columns},
+    )
+
+
+def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:
+    """Return the article's tables as an answer, ready for JSON."""
     return ArticleAnswer(
         reasons=(), headline=ARTICLE_HEADLINE, next_step=None, rows=tuple(rows)
     )

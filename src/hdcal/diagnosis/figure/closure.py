@@ -14,6 +14,8 @@ from hdcal.report.canvas import (
     GREY,
     ORANGE,
     heading,
+    name_rows,
+    note,
     plain,
     style,
     watermark,
@@ -47,14 +49,7 @@ def _draw_ladder(axes: Axes, shrink: Closure) -> None:
     colours = [_colour(rung.model) for rung in rungs]
     axes.barh(range(len(rungs)), sizes, 0.66, color=colours)
     for place, size in enumerate(sizes):
-        axes.annotate(
-            newton(float(size)),
-            (size, place),
-            (3, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8.5,
-        )
+        note(axes, newton(float(size)), (size, place), (3, 0), va="center")
         if place:
             line = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
             axes.plot([sizes[place - 1]] * 2, [place - 0.67, place - 0.33], **line)
@@ -65,10 +60,8 @@ def _draw_ladder(axes: Axes, shrink: Closure) -> None:
         axes.xaxis.set_major_formatter("{x:g}")
     else:
         axes.set_xlim(0.0, 1.25 * sizes.max() or 1.0)
-    axes.set_yticks(range(len(rungs)), [_rung(rung.model) for rung in rungs])
-    axes.tick_params(axis="y", labelsize=8, length=0)
+    name_rows(axes, [_rung(rung.model) for rung in rungs], size=8)
     axes.set_ylim(len(rungs) - 0.4, -0.6)
-    axes.grid(False, axis="y")
     axes.set_xlabel("measured − model, rms [N]")
 
 
@@ -101,15 +94,13 @@ def _draw_closed(axes: Axes, shrink: Closure) -> None:
         axes.plot(value, place, "o", color=colour, markersize=7)
     axes.axvline(0.0, color=DARK, linewidth=0.8)
     axes.axvline(1.0, color=GREEN, linewidth=0.8, linestyle="--")
-    axes.set_yticks(range(len(rows)), [row[0] for row in reversed(rows)])
-    axes.tick_params(axis="y", labelsize=8, length=0)
+    name_rows(axes, [row[0] for row in reversed(rows)], size=8)
     values = [end for _, value, span, _ in rows for end in (value, *(span or ()))]
     low = min(0.0, max(-1.0, min(values)))
     axes.set_xlim(low - 0.06, 1.08)
     axes.set_ylim(-0.6, len(rows) - 0.4)
     ticks = [tick for tick in (-1.0, -0.5, 0.0, 0.5, 1.0) if tick >= low - 0.06]
     axes.set_xticks(ticks, [f"{100 * tick:.0f} %" for tick in ticks])
-    axes.grid(False, axis="y")
 
 
 def _rows(shrink: Closure) -> list[tuple]:

@@ -16,6 +16,7 @@ from hdcal.report.canvas import (
     ORANGE,
     RED,
     heading,
+    name_rows,
     plain,
     style,
     thinned,
@@ -53,7 +54,7 @@ def _by_covariate(cells: tuple[Cell, ...]) -> tuple[dict, dict]:
     scales: dict[str, list[Cell]] = {"deformation": []}
     labels: dict[str, list[Cell]] = {}
     for cell in cells:
-        placed = np.isfinite([cell.start, cell.stop]).all()
+        placed = np.isfinite([cell.from_, cell.to]).all()
         kind = scales if placed and "×" not in cell.covariate else labels
         kind.setdefault(cell.covariate, []).append(cell)
     return scales, labels
@@ -99,10 +100,10 @@ def _draw_scale(axes: Axes, verdict: Verdict, name: str, cells: list[Cell]) -> N
         axes.plot(values[rows], residual[rows], "o", rasterized=len(rows) > 300, **dots)
     if name == "deformation" and values is not None:
         _draw_gap(axes, values, verdict.where.gap_N)
-    ends = [end for cell in cells for end in (cell.start, cell.stop)]
+    ends = [end for cell in cells for end in (cell.from_, cell.to)]
     thin = 0.02 * (max(ends) - min(ends) or 1.0) if ends else 0.0
     for cell in cells:
-        start, stop = cell.start, cell.stop
+        start, stop = cell.from_, cell.to
         if stop - start < thin:
             start, stop = start - thin, stop + thin
         _draw_cell(axes, cell, start, stop)
@@ -115,14 +116,18 @@ def _draw_scale(axes: Axes, verdict: Verdict, name: str, cells: list[Cell]) -> N
 def _draw_cell(axes: Axes, cell: Cell, start: float, stop: float) -> None:
     if cell.hot:
         axes.axvspan(start, stop, color=ORANGE, alpha=0.16, linewidth=0.0, zorder=0)
-    width = cell.half_width_N
+    width = _half_width(cell)
     axes.fill_between(
         [start, stop], -width, width, color=BLUE, alpha=0.16, linewidth=0.0, zorder=1
     )
     colour = RED if cell.hot else BLUE
-    bias = [cell.bias_N, cell.bias_N]
+    bias = [cell.bias_N.median] * 2
     line = {"linewidth": 2.2, "solid_capstyle": "butt"}
     axes.plot([start, stop], bias, color=colour, zorder=4, **line)
+
+
+def _half_width(cell: Cell) -> float:
+    return cell.bias_N.hi - cell.bias_N.median
 
 
 def _draw_gap(axes: Axes, deformation: np.ndarray, gap: np.ndarray) -> None:
@@ -143,15 +148,14 @@ def _draw_labels(axes: Axes, covariate: str, cells: list[Cell]) -> None:
             axes.axhspan(
                 place - 0.5, place + 0.5, color=ORANGE, alpha=0.16, linewidth=0.0
             )
-        width, colour = cell.half_width_N, RED if cell.hot else BLUE
+        width, colour = _half_width(cell), RED if cell.hot else BLUE
         axes.barh(place, 2.0 * width, 0.62, left=-width, color=BLUE, alpha=0.16)
-        axes.plot([cell.bias_N] * 2, [place - 0.31, place + 0.31], color=colour, lw=2.2)
+        bias = [cell.bias_N.median] * 2
+        axes.plot(bias, [place - 0.31, place + 0.31], color=colour, lw=2.2)
     axes.use_sticky_edges = False
     axes.axvline(0.0, color=DARK, linewidth=0.8)
-    axes.set_yticks(range(len(shown)), [plain(cell.label, 34) for cell in shown])
-    axes.tick_params(axis="y", labelsize=8, length=0)
+    name_rows(axes, [plain(cell.label, 34) for cell in shown], size=8)
     axes.set_ylim(-0.6, len(shown) - 0.4)
-    axes.grid(False, axis="y")
     more = f" (worst {len(shown)} of {len(cells)})" if len(shown) < len(cells) else ""
     heading(axes, f"By {plain(covariate, 40)}{more}")
     axes.set_xlabel("measured − model [N]")

@@ -53,24 +53,14 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
         drive = read_drive(console, force, columns, asked["amplitude"])
     keep_compilations()
     from hdcal.inference.dynamic_posterior import load_any
-    from hdcal.motion.figure import response_figure
-    from hdcal.motion.respond.document import response_document
     from hdcal.motion.respond.respond import respond as ask
-    from hdcal.motion.respond.summary import response_answer, with_columns
+    from hdcal.motion.respond.summary import response_report, with_columns
     from hdcal.report.write import write_report
 
     if asked["mass"] is not None:
         asked["mass"] *= 1e-3  # 1 kg = 1e-3 N·s²/mm
     given = {name: value for name, value in asked.items() if value is not None}
     response = ask(load_any(run), drive, **given)
-    found = response_answer(response)
-    document = response_document(response, found, console.command)
-    write_report(
-        out,
-        document,
-        {"response.json": found},
-        {"response": response_figure(response)},
-        tables={"response.csv": response.columns()},
-        force=replace,
-    )
-    return console.answer(document, with_columns(found, response), out)
+    report = response_report(response, console.command)
+    write_report(report, out, force=replace)
+    return console.answer(report.document, with_columns(report.answer, response), out)

@@ -103,13 +103,7 @@ def remarks(
 def response_document(
     response: "Response", found: ResponseAnswer, command: str = ""
 ) -> Document:
-    """Return the report; its picture is called response.
-
-    Args:
-        response: from `respond`.
-        found: from `response_answer`.
-        command: how the result was made.
-    """
+    """Return the report; its picture is called response."""
     posterior = response.posterior
     provenance = [
         *gear_rows(posterior.case, posterior.theory),

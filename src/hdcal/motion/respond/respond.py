@@ -19,6 +19,7 @@ from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
 from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
 from hdcal.motion.respond.request import Drive, Request, make_request
+from hdcal.notebook import Shown
 from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.report.parameters import INTERVAL, credible_interval
@@ -29,7 +30,7 @@ _MOST_SWINGS = 20_000
 
 
 @dataclass(frozen=True)
-class Response:
+class Response(Shown):
     """The motion under a force; one entry per time.
 
     Attributes:
@@ -71,13 +72,6 @@ class Response:
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns in the order of response.csv."""
         return {name: getattr(self, name) for name in COLUMNS}
-
-    def _repr_html_(self) -> str:
-        from hdcal.motion.respond.document import response_document
-        from hdcal.motion.respond.summary import response_answer
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(response_document(self, response_answer(self)))
 
 
 def respond(

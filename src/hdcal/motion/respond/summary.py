@@ -1,4 +1,4 @@
-"""A response as an answer: the numbers and words of response.json."""
+"""A response as an answer, and all that its result folder holds."""
 
 import numpy as np
 
@@ -8,17 +8,14 @@ from hdcal.motion.respond.answer import (
     ResponseAnswer,
     ResponseWithColumns,
 )
-from hdcal.motion.respond.document import headline, next_steps
+from hdcal.motion.respond.document import headline, next_steps, response_document
 from hdcal.motion.respond.respond import Response
 from hdcal.report.parameters import INTERVAL
+from hdcal.report.write import Report
 
 
 def response_answer(response: Response) -> ResponseAnswer:
-    """Return a response without its rows as an answer, ready for JSON.
-
-    Args:
-        response: from `respond`.
-    """
+    """Return a response without its rows as an answer, ready for JSON."""
     posterior = response.posterior
     moving = isinstance(posterior, DynamicPosterior)
     estimates = {n: QuantityEstimate(**one) for n, one in response.estimates.items()}
@@ -42,6 +39,24 @@ def response_answer(response: Response) -> ResponseAnswer:
         remarks=response.remarks,
         draws=response.draws,
         points=len(response.time_s),
+    )
+
+
+def response_report(response: Response, command: str = "") -> Report[ResponseAnswer]:
+    """Return all that `hdcal respond` leaves behind."""
+
+    def figures():
+        from hdcal.motion.figure import response_figure
+
+        return {"response": response_figure(response)}
+
+    found = response_answer(response)
+    return Report(
+        response_document(response, found, command),
+        found,
+        "response.json",
+        figures,
+        tables=lambda: {"response.csv": response.columns()},
     )
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.errors import Finding, InputError
+from hdcal.notebook import Shown
 from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
@@ -32,7 +33,7 @@ _MOST_TEMPERATURES = 6
 
 
 @dataclass(frozen=True)
-class Bands:
+class Bands(Shown):
     """Equal-tailed bands of the force as read [N]; one entry per row.
 
     Attributes:

@@ -2,7 +2,12 @@
 
 from hdcal.data.records import Records
 from hdcal.prediction.bands.bands import Bands
+from hdcal.report.document import Document, Section, Table, Tag, Text
+from hdcal.report.parameters import Interval
 from hdcal.report.words import estimate, number
+
+# Rows of a table; all are in the columns.
+_MOST_ROWS = 40
 
 
 def headline(bands: Bands, interval: float) -> str:
@@ -41,3 +46,41 @@ def untested_rows(bands: Bands, records: Records) -> str:
         f"{untested} of {size} rows lie outside what was tested: {low:g} … {high:g} "
         f"mm, {cold:g} … {warm:g} °C, {seen}"
     )
+
+
+def bands_document(bands: Bands) -> Document:
+    """Return bands as a table for a notebook."""
+    size = len(bands.tested)
+    numbers = ("deformation [mm]", "temperature [°C]", "mean [N]", "band of the mean")
+    numbers += ("band of a new reading",)
+    rows = [_row(bands, row) for row in range(min(size, _MOST_ROWS))]
+    columns = [*numbers[:2], "direction", *numbers[2:], "tested"]
+    more = [Text(f"The first {_MOST_ROWS} of {size}.")] * (size > _MOST_ROWS)
+    unusable = () if bands.usable.all() else ("the calibration failed its checks",)
+    return Document(
+        name="Bands",
+        kind="bands",
+        subtitle="force as read",
+        headline=f"The force at {size} places, with its bands.",
+        sections=[
+            Section("Bands", [Table(columns, rows, frozenset(numbers)), *more], True)
+        ],
+        failed=unusable,
+    )
+
+
+def _row(bands: Bands, row: int) -> list[str | Tag]:
+    def ends(band: str) -> Interval:
+        parts = (
+            getattr(bands, f"{band}_{end}_N")[row] for end in ("median", "lo", "hi")
+        )
+        return Interval(*map(float, parts))
+
+    return [
+        f"{bands.deformation_mm[row]:g}",
+        f"{bands.temperature_C[row]:g}",
+        str(bands.direction[row]),
+        *estimate(ends("physics")),
+        estimate(ends("new_measurement"))[1],
+        "yes" if bands.tested[row] else Tag("extrapolated", "caution"),
+    ]

@@ -60,21 +60,13 @@ def margin(console: Console, run, out, force, **asked):
     """
     keep_compilations()
     from hdcal.prediction.engine.causes import read_models
-    from hdcal.prediction.margin.document import margin_report
     from hdcal.prediction.margin.margin import margin as bounds_of
-    from hdcal.prediction.margin.summary import margin_answer
+    from hdcal.prediction.margin.summary import margin_report
 
     with console.wrong as wrong:
         models = wrong.attempt(read_models, run) or []
         console.check_target(out, force)
     found = bounds_of(models, **asked)
     posterior = max(models, key=lambda model: model[0])[1]
-    answer = margin_answer(found, posterior, seed=asked["seed"])
-    document = margin_report(answer, posterior, console.command)
-    if out is not None:
-        from hdcal.prediction.margin.figure import margin_figures
-        from hdcal.report.write import write_report
-
-        figures = margin_figures(found, answer.gear.name)
-        write_report(out, document, {"margin.json": answer}, figures, force=force)
-    return console.answer(document, answer, out)
+    told = margin_report(found, posterior, console.command, seed=asked["seed"])
+    return console.report(told, out, force=force)

@@ -3,8 +3,6 @@
 from dataclasses import replace
 
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
-from hdcal.prediction.engine.population import Population
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
@@ -30,25 +28,6 @@ from hdcal.report.parameters import Interval
 from hdcal.report.provenance import gear_rows
 from hdcal.report.words import estimate, hypothesis, number
 
-LOAD = (
-    "The load on the gear: without the gauge's zero, its errors and its noise. "
-    "A leftover discrepancy counts as the gear's."
-)
-LOAD_OF_MOUNTINGS = (
-    "Mountings differ by the gauge's zero, which is no load: here they are alike."
-)
-TOLERANCES_OF_GEARS = (
-    "The tolerances come on top of how much the tested gears differ, which already "
-    "holds their own."
-)
-TOLERANCES_ALONE = (
-    "With tolerances the forces are those of gears that differ from the tested ones in "
-    "these sizes and in nothing else."
-)
-NORMAL_TAILS = (
-    "Such rare cases rest on the normal tails of noise and scatter, which no test of "
-    "this size has seen."
-)
 CALIBRATION_SHARE = (
     "“Calibration” is stiffness, zeros, effects and leftover together: the data tie "
     "them to each other, so that they have no shares of their own; of K and E0 only "
@@ -80,16 +59,10 @@ def margin_document(found: Margin) -> Document:
     )
 
 
-def margin_report(
+def whole_document(
     found: MarginAnswer, posterior: Posterior, command: str = ""
 ) -> Document:
-    """Return the report of a margin, with whose it is and how it was made.
-
-    Args:
-        found: from `margin_answer`.
-        posterior: of the likeliest model.
-        command: how the result was made.
-    """
+    """Return the report of a margin, with whose it is and how it was made."""
     tolerances = ", ".join(
         f"{name} ± {size:g}" for name, size in found.tolerances_mm.items()
     )
@@ -203,90 +176,3 @@ def _sensitivities(found: Margin) -> Section:
     table = Table(["input", "at", "", *numbers[1:]], rows, frozenset(numbers))
     note = Text(CALIBRATION_SHARE, soft=True)
     return Section("What the bound hangs on", [shown, note, table])
-
-
-def population_words(population: Population, problem: Problem) -> str:
-    """Return in one sentence whose forces the numbers are about."""
-    if population == "readings":
-        gears = "the tested gears on average" if problem.specimens else "this one gear"
-        place = "mountings on average" if problem.runs else "mounting"
-        return (
-            f"Single readings of {gears} in the tested {place}. Another gear or "
-            "another mounting may need a force outside these bounds."
-        )
-    runs = f", each in a new mounting ({problem.runs} were tested)"
-    if population == "mountings":
-        gears = "the tested gears on average" if problem.specimens else "this one gear"
-        return (
-            f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
-            "Another gear may need a force outside these bounds."
-        )
-    place = runs if problem.runs else ", in the tested mounting"
-    return f"New gears of this kind ({problem.specimens} were tested){place}."
-
-
-def untested_deformation(
-    at: float, tested: tuple[float, float], *, leftover: float, fitted: bool
-) -> str:
-    """Say that a deformation was not tested.
-
-    Args:
-        at: asked for [mm as read].
-        tested: ends of the tested range [mm as read].
-        leftover: sd by which the bounds are widened there [N].
-        fitted: whether that is from a fitted discrepancy.
-    """
-    low, high = tested
-    source = "the fitted leftover discrepancy" if fitted else "the prior only"
-    return (
-        f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside the "
-        f"tested {low:g} … {high:g} mm. Widened by a leftover discrepancy of "
-        f"{leftover:.2g} N (sd), from {source}."
-    )
-
-
-def untested_direction(*, down: bool) -> str:
-    """Say that a direction of the movement was not tested."""
-    word = "unloading" if down else "loading"
-    return f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
-
-
-def untested_temperature(
-    asked: tuple[float, float],
-    tested: tuple[float, float],
-    *,
-    measured: bool,
-    by_data: bool,
-) -> str:
-    """Say that temperatures were not tested.
-
-    Args:
-        asked: coldest and warmest [°C].
-        tested: coldest and warmest of the data [°C].
-        measured: whether the data hold a temperature at all.
-        by_data: whether they tell the loss of modulus per kelvin.
-    """
-    cold, warm = tested
-    seen = f"{cold:g} °C" if cold == warm else f"{cold:g} … {warm:g} °C"
-    assumed = "" if measured else " (assumed, it was not measured)"
-    source = "the data" if by_data else "its prior (the material), not from the data"
-    return (
-        f"Extrapolated: {asked[0]:g} … {asked[1]:g} °C lies outside the tested "
-        f"{seen}{assumed}. Young's modulus carries it, linearly; its loss per kelvin "
-        f"is from {source}."
-    )
-
-
-def few_tested(what: str, count: int) -> str:
-    """Say that the scatter between members rests on the prior.
-
-    Args:
-        what: gears or mountings.
-        count: how many were tested.
-    """
-    return f"How much {what} differ rests on the prior: {count} were too few to tell."
-
-
-def draws_used(used: int, total: int) -> str:
-    """Say that not all draws were used."""
-    return f"{used} of {total} draws were used."

@@ -16,6 +16,8 @@ from hdcal.report.canvas import (
     ORANGE,
     RED,
     heading,
+    name_rows,
+    note,
     plain,
     style,
 )
@@ -29,23 +31,13 @@ _DRIVEN_WORDS = {
 
 
 def margin_figures(found: Margin, name: str) -> dict[str, Figure]:
-    """Return the figures of a margin by name; without shares there is no tornado.
-
-    Args:
-        found: from `margin`.
-        name: of the gear.
-    """
+    """Return the figures of a margin by name; without shares there is no tornado."""
     drawn = {"margin": margin_figure(found, name)}
     return drawn | ({"tornado": tornado_figure(found)} if found.shares else {})
 
 
 def margin_figure(found: Margin, name: str) -> Figure:
-    """Draw the force needed with its bounds, over temperature where there are several.
-
-    Args:
-        found: from `margin`.
-        name: of the gear.
-    """
+    """Draw the force needed with its bounds, over temperature if there are several."""
     several = len(found.levels) > 1
     with style():
         height = 6.0 if several else 2.9
@@ -82,34 +74,18 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
     axes.plot(ends, [2, 2], color=DARK, linewidth=1.2)
     for end, mark in zip(ends, "<>", strict=True):
         axes.plot(end, 2, mark, color=DARK, markersize=7)
-        axes.annotate(
-            f"{end:.1f} N",
-            (end, 2),
-            (0, -15),
-            textcoords="offset points",
-            ha="center",
-            fontsize=8.5,
-        )
+        note(axes, f"{end:.1f} N", (end, 2), (0, -15), ha="center")
     words = [row[0] for row in rows] + [f"{bound_name(found)} bounds,\none-sided each"]
-    axes.set_yticks(range(3), words)
-    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    name_rows(axes, words)
     axes.set_ylim(2.75, -0.6)
-    axes.grid(False, axis="y")
     axes.set_xlabel("force [N]")
     axes.margins(x=0.1)
     if found.limit_force_N is not None:
         axes.axvline(found.limit_force_N, color=RED, linewidth=1.4)
-        axes.annotate(
-            f"capacity {found.limit_force_N:g} N",
-            (found.limit_force_N, 0.5),
-            xytext=(-4, 0),
-            textcoords="offset points",
-            color=RED,
-            ha="right",
-            va="center",
-            fontsize=8.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-        )
+        words, at = f"capacity {found.limit_force_N:g} N", (found.limit_force_N, 0.5)
+        behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        place = {"ha": "right", "va": "center", "bbox": behind}
+        note(axes, words, at, (-4, 0), color=RED, **place)
 
 
 def _draw_window(axes: Axes, found: Margin) -> None:
@@ -177,21 +153,12 @@ def _draw_shares(axes: Axes, found: Margin) -> None:
         total, first = (min(max(s, 0.0), 1.0) for s in (share.total, share.first))
         axes.barh(place, total, 0.66, color=colour, alpha=0.35)
         axes.barh(place, first, 0.66, color=colour)
-        axes.annotate(
-            f"{100.0 * total:.0f} %",
-            (total, place),
-            (3, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=8.5,
-        )
-    axes.set_yticks(range(len(ranked)), [input_label(share.name) for share in ranked])
-    axes.tick_params(axis="y", labelsize=8.5, length=0)
+        note(axes, f"{100.0 * total:.0f} %", (total, place), (3, 0), va="center")
+    name_rows(axes, [input_label(share.name) for share in ranked])
     axes.set_ylim(len(ranked) - 0.4, -0.6)
     axes.set_xlim(0.0, 1.18)
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
     axes.set_xlabel("share of the variance (Sobol)")
-    axes.grid(False, axis="y")
     seen = dict.fromkeys(share.driven_by for share in ranked)
     handles = [Patch(color=_DRIVEN[d], linewidth=0) for d in seen]
     handles.append(Patch(color=GREY, alpha=0.35, linewidth=0))
@@ -206,19 +173,10 @@ def _draw_gradients(axes: Axes, found: Margin) -> None:
     colours = [RED if value > 0.0 else BLUE for value in values]
     axes.barh(range(len(ranked)), values, 0.66, color=colours, alpha=0.75)
     for place, value in enumerate(values):
-        axes.annotate(
-            f"{value:+.2f} N",
-            (value, place),
-            (3 if value > 0.0 else -3, 0),
-            textcoords="offset points",
-            va="center",
-            ha="left" if value > 0.0 else "right",
-            fontsize=8.5,
-        )
+        shift, side = ((3, 0), "left") if value > 0.0 else ((-3, 0), "right")
+        note(axes, f"{value:+.2f} N", (value, place), shift, va="center", ha=side)
     axes.axvline(0.0, color=DARK, linewidth=0.8)
-    axes.set_yticks(range(len(ranked)), [input_label(slope.name) for slope in ranked])
-    axes.tick_params(axis="y", labelsize=8.5, length=0)
+    name_rows(axes, [input_label(slope.name) for slope in ranked])
     axes.set_ylim(len(ranked) - 0.4, -0.6)
     axes.margins(x=0.4)
     axes.set_xlabel("change [N]")
-    axes.grid(False, axis="y")

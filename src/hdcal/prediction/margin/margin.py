@@ -23,9 +23,12 @@ from hdcal.prediction.margin.bounds import (
 )
 from hdcal.prediction.margin.checks import check_margin
 from hdcal.prediction.margin.deformation_reached import deformation_reached
-from hdcal.prediction.margin.document import population_words
 from hdcal.prediction.margin.gradients import gradients
-from hdcal.prediction.margin.remarks import extrapolations, remarks
+from hdcal.prediction.margin.remarks import (
+    extrapolations,
+    population_words,
+    remarks,
+)
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.variance_shares import variance_shares

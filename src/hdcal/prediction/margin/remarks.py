@@ -1,16 +1,37 @@
-"""What a margin rests on: what is extrapolated, assumed or left out."""
+"""What a margin rests on in sentences: whose, extrapolated, assumed or left out."""
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
+from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
+from hdcal.prediction.engine.population import Population
 from hdcal.prediction.engine.population_force import PopulationForce, leftover_sd
-from hdcal.prediction.margin import document as say
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import Exceedance
 
+_LOAD = (
+    "The load on the gear: without the gauge's zero, its errors and its noise. "
+    "A leftover discrepancy counts as the gear's."
+)
+_LOAD_OF_MOUNTINGS = (
+    "Mountings differ by the gauge's zero, which is no load: here they are alike."
+)
+_TOLERANCES_OF_GEARS = (
+    "The tolerances come on top of how much the tested gears differ, which already "
+    "holds their own."
+)
+_TOLERANCES_ALONE = (
+    "With tolerances the forces are those of gears that differ from the tested ones in "
+    "these sizes and in nothing else."
+)
+_NORMAL_TAILS = (
+    "Such rare cases rest on the normal tails of noise and scatter, which no test of "
+    "this size has seen."
+)
 # A content beyond this only the normal law tells.
 _TAIL = 0.9999
 
@@ -34,24 +55,37 @@ def _main(forces: Sequence[PopulationForce]) -> PopulationForce:
 def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator[str]:
     cause, where = force.cause, force.conditions
     records = cause.posterior.case.records
-    at, low, high = where.deformation, where.low, where.high
+    at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
     if max(low - at, at - high) > NEAR_MM:
         sd = np.asarray(leftover_sd(cause.values, where))
-        yield say.untested_deformation(
-            float(at),
-            (float(low), float(high)),
-            leftover=float(np.sqrt(np.mean(sd**2))),
-            fitted=cause.problem.discrepancy is not None,
+        leftover = float(np.sqrt(np.mean(sd**2)))
+        fitted = cause.problem.discrepancy is not None
+        source = "the fitted leftover discrepancy" if fitted else "the prior only"
+        yield (
+            f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
+            f"the tested {low:g} … {high:g} mm. Widened by a leftover discrepancy of "
+            f"{leftover:.2g} N (sd), from {source}."
         )
     if (-1.0 if where.down else 1.0) not in np.asarray(records.sense):
-        yield say.untested_direction(down=where.down)
+        word = "unloading" if where.down else "loading"
+        yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
     if not temperature_is_tested(records, temperature).all():
-        yield say.untested_temperature(
-            (np.min(temperature), np.max(temperature)),
-            (np.min(records.temperature), np.max(records.temperature)),
-            measured="temperature" in records.known,
-            by_data=cause.driver("alpha") == "data",
-        )
+        yield _untested_temperature(cause, temperature)
+
+
+def _untested_temperature(cause: Cause, temperature: np.ndarray) -> str:
+    records = cause.posterior.case.records
+    cold, warm = np.min(records.temperature), np.max(records.temperature)
+    seen = f"{cold:g} °C" if cold == warm else f"{cold:g} … {warm:g} °C"
+    known = "temperature" in records.known
+    assumed = "" if known else " (assumed, it was not measured)"
+    by_data = cause.driver("alpha") == "data"
+    source = "the data" if by_data else "its prior (the material), not from the data"
+    return (
+        f"Extrapolated: {np.min(temperature):g} … {np.max(temperature):g} °C lies "
+        f"outside the tested {seen}{assumed}. Young's modulus carries it, linearly; "
+        f"its loss per kelvin is from {source}."
+    )
 
 
 def remarks(
@@ -71,26 +105,49 @@ def remarks(
     used = sum(force.cause.size for force in forces)
     rare = risk is not None and risk.probability < 1.0 / used
     if rare or max(criteria.content, criteria.required) > _TAIL:
-        said.append(say.NORMAL_TAILS)
+        said.append(_NORMAL_TAILS)
     total = sum(len(force.cause.posterior.draws["K"]) for force in forces)
     if used < total:
-        said.append(say.draws_used(used, total))
+        said.append(f"{used} of {total} draws were used.")
     return tuple(dict.fromkeys(said))
 
 
 def _of_population(force: PopulationForce) -> Iterator[str]:
     whose, problem = force.whose, force.cause.problem
     if whose.quantity == "load":
-        yield say.LOAD
+        yield _LOAD
         if whose.population == "mountings":
-            yield say.LOAD_OF_MOUNTINGS
+            yield _LOAD_OF_MOUNTINGS
     for name, what, count in (
         ("specimen_sd", "gears", whose.tested_gears(problem)),
         ("run_offset_sd", "mountings", whose.tested_mountings(problem)),
     ):
         found = force.cause.posterior.diagnoses.get(name)
         if count and found is not None and found.driven_by == "prior":
-            yield say.few_tested(what, count)
+            yield (
+                f"How much {what} differ rests on the prior: {count} were too few to "
+                "tell."
+            )
     if force.tolerances:
         gears = whose.population == "specimens"
-        yield say.TOLERANCES_OF_GEARS if gears else say.TOLERANCES_ALONE
+        yield _TOLERANCES_OF_GEARS if gears else _TOLERANCES_ALONE
+
+
+def population_words(population: Population, problem: Problem) -> str:
+    """Return in one sentence whose forces the numbers are about."""
+    if population == "readings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        place = "mountings on average" if problem.runs else "mounting"
+        return (
+            f"Single readings of {gears} in the tested {place}. Another gear or "
+            "another mounting may need a force outside these bounds."
+        )
+    runs = f", each in a new mounting ({problem.runs} were tested)"
+    if population == "mountings":
+        gears = "the tested gears on average" if problem.specimens else "this one gear"
+        return (
+            f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
+            "Another gear may need a force outside these bounds."
+        )
+    place = runs if problem.runs else ", in the tested mounting"
+    return f"New gears of this kind ({problem.specimens} were tested){place}."

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from hdcal.notebook import Shown
 from hdcal.prediction.engine.conditions import Direction
 from hdcal.prediction.engine.forces import Quantity
 from hdcal.prediction.engine.population import Population
@@ -94,7 +95,7 @@ class ModelBound:
 
 
 @dataclass(frozen=True)
-class Margin:
+class Margin(Shown):
     """The force needed at a deformation, and the margin of a capacity.
 
     Attributes:
@@ -138,9 +139,3 @@ class Margin:
     shares: tuple[VarianceShare, ...]
     extrapolated: Sentences
     remarks: Sentences
-
-    def _repr_html_(self) -> str:
-        from hdcal.prediction.margin.document import margin_document
-        from hdcal.report.html import notebook_html
-
-        return notebook_html(margin_document(self))

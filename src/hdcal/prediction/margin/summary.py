@@ -1,11 +1,12 @@
-"""A margin as an answer."""
+"""A margin as an answer, and all that its result folder holds."""
 
 from hdcal.inference.posterior import Posterior, versions
 from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
-from hdcal.prediction.margin.document import CALIBRATION_SHARE
+from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
 from hdcal.report.posterior_answer import CalibratedGear
+from hdcal.report.write import Report
 
 KINDS = {
     "force_N": "mean of the population, equal-tailed credible interval",
@@ -21,13 +22,7 @@ KINDS = {
 def margin_answer(
     found: Margin, posterior: Posterior, *, seed: int = 0
 ) -> MarginAnswer:
-    """Return a margin as an answer, ready for JSON.
-
-    Args:
-        found: from `margin`.
-        posterior: of the likeliest model.
-        seed: it was made with.
-    """
+    """Return a margin as an answer, ready for JSON."""
     gear, case = posterior.case.gear, posterior.case
     return MarginAnswer(
         reasons=(),
@@ -42,3 +37,18 @@ def margin_answer(
         gear=CalibratedGear(gear.name, gear.material, posterior.theory),
         data=DataUsed(case.name, len(case.records.force), case.data_sha256),
     )
+
+
+def margin_report(
+    found: Margin, posterior: Posterior, command: str = "", *, seed: int = 0
+) -> Report[MarginAnswer]:
+    """Return all that `hdcal margin` leaves behind."""
+
+    def figures():
+        from hdcal.prediction.margin.figure import margin_figures
+
+        return margin_figures(found, posterior.case.gear.name)
+
+    answer = margin_answer(found, posterior, seed=seed)
+    document = whole_document(answer, posterior, command)
+    return Report(document, answer, "margin.json", figures)

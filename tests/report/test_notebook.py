@@ -1,0 +1,58 @@
+"""Every public result shows what matters most of it in a notebook's cell."""
+
+import inspect
+
+import pytest
+from moving import still_posterior
+from posteriors import single
+from verdicts import named
+
+import hdcal
+from hdcal.data.gear import read_gear
+from hdcal.data.resources import datasets_folder
+from hdcal.notebook import TELLERS, Shown
+
+GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
+# Classes of the public face that are input, a part of a result, or a tool.
+NO_RESULTS = {"Case", "Claim", "Effect", "Finding", "Gear", "Geometry", "HdcalError"}
+NO_RESULTS |= {"InputError", "Noise", "NotUsable", "PolynomialFit", "Prior", "Profile"}
+NO_RESULTS |= {"Records", "Residuals", "Rows", "Tracker"}
+
+
+def test_every_public_result_is_shown():
+    public = {name: getattr(hdcal, name) for name in hdcal.__all__}
+    results = {n for n, c in public.items() if inspect.isclass(c)} - NO_RESULTS
+    assert results == set(TELLERS)
+    assert all(issubclass(public[name], Shown) for name in results)
+
+
+@pytest.fixture(scope="module")
+def results():
+    gear, posterior = read_gear(GEAR), single()
+    return {
+        "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
+        "InverseDesign": (
+            hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
+            "keeps 90 N",
+        ),
+        "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
+        "Posterior": (posterior, "Stiffness at the reference temperature"),
+        "Response": (
+            hdcal.respond(still_posterior(), "step", points=21, draws=20),
+            "The deformation reaches",
+        ),
+        "Study": (hdcal.study(gear, {"radius_mm": [38, 40]}), "2 designs"),
+        "Verdict": (named(), "Most likely cause"),
+        "WaveGenerator": (
+            hdcal.wave_generator(gear, (0.2, 0.6), probability=0.5),
+            "keeps the gear within",
+        ),
+    }
+
+
+@pytest.mark.parametrize("name", sorted(set(TELLERS) - {"DynamicPosterior"}))
+def test_a_result_is_shown(name: str, results):
+    found, words = results[name]
+    assert type(found).__name__ == name
+    shown = found._repr_html_()
+    assert words in shown and "<html" not in shown and "<script" not in shown
