@@ -19,6 +19,8 @@ _COMPILED_PLAINLY = (
 
 def pytest_configure(config: pytest.Config) -> None:
     """Name one cache for this process, its workers and every command they start."""
+    # To trace a model makes many objects and little garbage.
+    gc.set_threshold(100_000, 10, 10)
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
     # As commands do: two processes on two cores, each with two threads, only wait.
