@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 from rigs import cycles, make_case, make_gear, make_records, program, ramp, simulate
-from short import SHORT
+from short import SHORT, TOO_SHORT
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.calibration.summary import summarise
@@ -220,7 +220,7 @@ def test_a_diametral_reading_halves_the_radial_displacement():
 def test_a_gap_beside_an_effect_is_integrated_too():
     """Rows are kept for the effect; drawn members must not count in the likelihood."""
     case = make_case(with_force(cycles(96)))
-    found = calibrate(case, effects=["coulomb_friction"], with_gap=True, **SHORT)
+    found = calibrate(case, effects=["coulomb_friction"], with_gap=True, **TOO_SHORT)
     assert {"gap_weights", "coulomb_friction.force"} <= set(found.draws)
     problem = found.problem
     one = {name: values[0] for name, values in found.draws.items()}

@@ -25,7 +25,7 @@ from hdcal.report.answer import json_schema
 from hdcal.report.plain import as_json
 
 # One shape and one length for all: the sampler is compiled once.
-SETTINGS = {"chains": 4, "warmup": 400, "draws": 500}
+SETTINGS = {"chains": 4, "warmup": 200, "draws": 250}
 SOUGHT = ("mass", "damping", "stiffness")
 
 
