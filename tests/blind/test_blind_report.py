@@ -3,6 +3,7 @@
 import json
 import re
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -66,12 +67,23 @@ SETS = {
 }
 
 
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Callable[[str], Path]:
+    """Write the report of a set; each is drawn once."""
+
+    @cache
+    def write(name: str) -> Path:
+        target = tmp_path_factory.mktemp(name)
+        write_result(target, made(*SETS[name]))
+        return target
+
+    return write
+
+
 @pytest.fixture(scope="module", params=SETS)
-def folder(request, tmp_path_factory) -> Path:
+def folder(request, written) -> Path:
     """A written report, one kind after the other."""
-    target = tmp_path_factory.mktemp(request.param)
-    write_result(target, made(*SETS[request.param]))
-    return target
+    return written(request.param)
 
 
 @pytest.fixture(scope="module")
@@ -120,29 +132,29 @@ def fields_of(value) -> dict:
     return {name.rstrip("_"): field for name, field in vars(value).items()}
 
 
-def test_the_json_holds_the_scores_and_no_nan(tmp_path: Path):
-    found = made(40)
-    write_result(tmp_path, found)
-    text = (tmp_path / "scores.json").read_text("utf-8")
+def test_the_json_holds_the_scores_and_no_nan(written):
+    found = made(*SETS["many"])
+    text = (written("many") / "scores.json").read_text("utf-8")
     assert "NaN" not in text and "Infinity" not in text
     # Tuples become lists, nothing else changes.
     assert json.loads(text) == json.loads(json.dumps(found, default=fields_of))
 
 
-def test_names_from_outside_stay_names(tmp_path: Path):
-    write_result(tmp_path, made(120, NAUGHTY))
-    page = (tmp_path / "report.html").read_text("utf-8")
+def test_names_from_outside_stay_names(written):
+    folder = written("naughty")
+    page = (folder / "report.html").read_text("utf-8")
     assert "<script" not in page
     assert "&lt;script&gt;alert" in page
     assert "\x1b" not in page and "\N{RIGHT-TO-LEFT OVERRIDE}" not in page
-    for svg in tmp_path.glob("*.svg"):
+    figures = list(folder.glob("*.svg"))
+    assert figures
+    for svg in figures:
         assert "<script" not in svg.read_text("utf-8")
 
 
-def test_met_and_missed_are_said_in_words(tmp_path: Path):
-    found = made(400)
-    write_result(tmp_path, found)
-    page = (tmp_path / "report.html").read_text("utf-8")
+def test_met_and_missed_are_said_in_words(written):
+    found = made(*SETS["many"])
+    page = (written("many") / "report.html").read_text("utf-8")
     tags = Counter(re.findall(r'<span class="tag [^"]*">(\w+)', page))
     assert tags["met"] == found.summary.met > 0
     assert tags["missed"] == found.summary.missed > 0
@@ -150,12 +162,12 @@ def test_met_and_missed_are_said_in_words(tmp_path: Path):
     assert all(row.what in page for row in found.bar if "'" not in row.what)
 
 
-def test_the_same_scores_give_the_same_files(tmp_path: Path):
-    for name in ("one", "two"):
-        (tmp_path / name).mkdir()
-        write_result(tmp_path / name, made(30))
-    for entry in (tmp_path / "one").iterdir():
-        assert entry.read_bytes() == (tmp_path / "two" / entry.name).read_bytes()
+def test_the_same_scores_give_the_same_files(written, tmp_path: Path):
+    write_result(tmp_path, made(*SETS["many"]))
+    entries = list(written("many").iterdir())
+    assert entries
+    for entry in entries:
+        assert entry.read_bytes() == (tmp_path / entry.name).read_bytes()
 
 
 ROW = BarResult(

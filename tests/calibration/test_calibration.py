@@ -6,6 +6,7 @@ import jax
 import numpy as np
 import pytest
 from rigs import cycles, make_case, make_gear, make_records, program, ramp, simulate
+from short import SHORT, TOO_SHORT
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.calibration.summary import summarise
@@ -17,8 +18,6 @@ from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
-
-SHORT = {"warmup": 300, "draws": 300}
 
 
 def with_force(records, sd=0.5):
@@ -140,8 +139,8 @@ def assert_recovered(name):
     }
     data = simulate(problem, case, truth, jax.random.key(11))
     # Rounding seen as noise shares one variance with sigma: a ridge with a long tail.
-    draws = 2000 if name == "quantisation" else 500
-    found = calibrate(data, effects=[name], warmup=draws, draws=draws)
+    longer = {"warmup": 2000, "draws": 2000} if name == "quantisation" else {}
+    found = calibrate(data, effects=[name], **(SHORT | longer))
     assert found.usable, found.reasons
     for parameter in (n for n in truth if "." in n):
         low, high = np.quantile(found.draws[parameter], [0.005, 0.995])
@@ -221,7 +220,7 @@ def test_a_diametral_reading_halves_the_radial_displacement():
 def test_a_gap_beside_an_effect_is_integrated_too():
     """Rows are kept for the effect; drawn members must not count in the likelihood."""
     case = make_case(with_force(cycles(96)))
-    found = calibrate(case, effects=["coulomb_friction"], with_gap=True, **SHORT)
+    found = calibrate(case, effects=["coulomb_friction"], with_gap=True, **TOO_SHORT)
     assert {"gap_weights", "coulomb_friction.force"} <= set(found.draws)
     problem = found.problem
     one = {name: values[0] for name, values in found.draws.items()}

@@ -9,6 +9,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 from commands import XB1, Done, Hdcal
+from short import TOO_SHORT, options
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.report.answer import json_schema
@@ -20,7 +21,7 @@ MARK = "FAILED — do not use"
 def failed(hdcal: Hdcal, tmp_path_factory: pytest.TempPathFactory) -> tuple[Done, Path]:
     """A run far too short to have converged."""
     folder = tmp_path_factory.mktemp("failed") / "result"
-    hurry = ["--warmup", "1", "--draws", "20"]
+    hurry = options(TOO_SHORT)
     return hdcal("calibrate", XB1, *hurry, "--out", folder), folder
 
 
@@ -57,8 +58,8 @@ def test_no_band_is_marked_usable(failed: tuple[Done, Path]):
         assert {row["usable"] for row in csv.DictReader(stream)} == {"false"}
 
 
-def test_nothing_is_predicted_from_it(failed: tuple[Done, Path], hdcal: Hdcal):
-    done = hdcal("predict", failed[1], "--deformation", "0.1", "--json")
+def test_nothing_is_predicted_from_it(failed: tuple[Done, Path], here: Hdcal):
+    done = here("predict", failed[1], "--deformation", "0.1", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["status"] == "failed"
     assert "must not be used" in done.stderr

@@ -10,7 +10,8 @@ import jsonschema
 import numpy as np
 import pytest
 import xarray as xr
-from commands import SHORT, XB1, Done, Hdcal
+from commands import XB1, Done, Hdcal
+from short import SHORT, options
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.report.answer import json_schema
@@ -155,16 +156,16 @@ def test_the_report_asks_nothing_of_the_network(calibrated: Calibrated):
 
 
 def test_an_older_result_is_replaced_only_when_told_to(
-    calibrated: Calibrated, hdcal: Hdcal, here: Hdcal
+    calibrated: Calibrated, here: Hdcal
 ):
     _, folder = calibrated
     before = (folder / "summary.json").read_bytes()
-    again = ["calibrate", XB1, *SHORT, "--out", folder]
+    again = ["calibrate", XB1, *options(SHORT), "--out", folder]
     done = here(*again)
     assert done.returncode == 2
     assert "exists already" in done.stderr and "--force" in done.stderr
     assert (folder / "summary.json").read_bytes() == before
-    done = hdcal(*again, "--force")
+    done = here(*again, "--force")
     assert done.returncode == 0, done.stderr
     assert "What to do next" in done.stdout and "\x1b" not in done.stdout
     assert (folder / "summary.json").read_bytes() != before
@@ -183,15 +184,15 @@ def test_predict_prints_a_table(calibrated: Calibrated, hdcal: Hdcal):
 
 
 def test_predict_writes_a_file_or_json(
-    calibrated: Calibrated, hdcal: Hdcal, here: Hdcal, tmp_path: Path
+    calibrated: Calibrated, here: Hdcal, tmp_path: Path
 ):
     out = tmp_path / "bands.csv"
     asked = ["predict", calibrated[1], "--deformation", "0.1,0.2", "--out", out]
-    assert hdcal(*asked).stdout == ""
+    assert here(*asked).stdout == ""
     assert len(read_bands(out.read_text())) == 2
     refused = here(*asked)
     assert refused.returncode == 2 and "exists already" in refused.stderr
-    done = hdcal(*asked, "--force", "--json", "--direction", "down")
+    done = here(*asked, "--force", "--json", "--direction", "down")
     said = json.loads(done.stdout)
     assert said["status"] == "ok" and list(said["columns"]) == COLUMNS
     assert said["columns"]["direction"] == ["down", "down"]

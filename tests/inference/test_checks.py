@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from rigs import cycles, make_case, make_gear, make_records, ramp
+from short import SHORT, TOO_SHORT
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
@@ -37,7 +38,7 @@ def case_of(records, gear=None, **change):
 
 @pytest.fixture(scope="module")
 def good():
-    return calibrate(case_of(ramp(40)), seed=1)
+    return calibrate(case_of(ramp(40)), seed=1, **SHORT)
 
 
 def outcome(posterior, start):
@@ -115,7 +116,7 @@ def test_trajectories_that_are_cut_off_fail():
 
 
 def test_too_short_a_run_fails_closed():
-    posterior = calibrate(case_of(ramp(40)), warmup=5, draws=20)
+    posterior = calibrate(case_of(ramp(40)), **TOO_SHORT)
     assert not posterior.usable
     assert posterior.reasons
     with pytest.raises(NotUsable):
@@ -126,7 +127,7 @@ def test_a_force_in_the_wrong_unit_conflicts_with_the_prior(good):
     records = ramp(40)
     kilo = case_of(records, force=9.80665 * honest_force(records))
     assert outcome(good, "prior and data") == ["passed"]
-    assert outcome(calibrate(kilo), "prior and data") == ["warning"]
+    assert outcome(calibrate(kilo, **SHORT), "prior and data") == ["warning"]
 
 
 def test_a_median_far_in_the_tail_is_a_conflict():
@@ -137,18 +138,20 @@ def test_a_median_far_in_the_tail_is_a_conflict():
 
 def test_a_prior_that_cuts_the_answer_off_is_a_bound(good):
     gear = make_gear(K=Prior("uniform", (1.0, 2.3)))
-    posterior = calibrate(case_of(ramp(40), gear))
+    posterior = calibrate(case_of(ramp(40), gear), **SHORT)
     assert outcome(good, "no parameter at a bound") == ["passed"]
     assert outcome(posterior, "no parameter at a bound") == ["warning"]
     assert "K at 2.3" in next(c.words for c in posterior.checks if "bound" in c.name)
 
 
 def test_an_effect_that_is_absent_is_pressed_against_zero():
-    absent = calibrate(case_of(cycles(96)), effects=["coulomb_friction"])
+    absent = calibrate(case_of(cycles(96)), effects=["coulomb_friction"], **SHORT)
     assert outcome(absent, "no parameter at a bound") == ["warning"]
     records = cycles(96)
     force = honest_force(records) + 2.0 * np.asarray(records.sense)
-    present = calibrate(case_of(records, force=force), effects=["coulomb_friction"])
+    present = calibrate(
+        case_of(records, force=force), effects=["coulomb_friction"], **SHORT
+    )
     assert outcome(present, "no parameter at a bound") == ["passed"]
 
 
@@ -182,7 +185,8 @@ def test_a_parameter_without_its_covariate_is_dead(good):
     words = [c.words for c in good.checks if c.outcome == "note"]
     assert "alpha: these data say nothing, the prior is the answer" in words
     assert good.diagnoses["alpha"].driven_by == "prior"
-    warm = calibrate(case_of(cycles(960), force=honest_force(cycles(960), sd=0.1)))
+    records = cycles(960)
+    warm = calibrate(case_of(records, force=honest_force(records, sd=0.1)), **SHORT)
     assert not any("alpha" in c.words for c in warm.checks if c.outcome == "note")
     assert warm.diagnoses["alpha"].driven_by == "data"
 
@@ -197,7 +201,7 @@ def test_a_known_modulus_is_no_flat_direction():
     gear = make_gear(
         E0=Prior("fixed", (207e3,)), deformation_offset=Prior("fixed", (0.0,))
     )
-    posterior = calibrate(case_of(ramp(40), gear))
+    posterior = calibrate(case_of(ramp(40), gear), **SHORT)
     assert not any("told apart by" in c.words for c in posterior.checks)
 
 

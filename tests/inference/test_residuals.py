@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rigs import cycles
 from scipy import stats
+from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.reading import read_case
@@ -75,7 +76,7 @@ def test_what_the_priors_allow_is_absorbed_and_no_more():
 
 
 def test_the_article_s_data_bend_upwards():
-    left = residuals(calibrate(read_case(datasets_folder() / "xb1-100-80")))
+    left = residuals(calibrate(read_case(datasets_folder() / "xb1-100-80"), **SHORT))
     assert [shape.name for shape in left.structure] == ["curvature"]
     assert "convex" in left.structure[0].words
     assert left.structure[0].p_value < 1e-3
@@ -83,9 +84,9 @@ def test_the_article_s_data_bend_upwards():
 
 def test_thermal_demo_needs_its_effect():
     case = read_case(datasets_folder() / "thermal-demo")
-    without = calibrate(case)
+    without = calibrate(case, **SHORT)
     assert [s.name for s in residuals(without).structure] == ["temperature"]
-    effect = calibrate(case, effects=["thermal_zero_drift"])
+    effect = calibrate(case, effects=["thermal_zero_drift"], **SHORT)
     assert residuals(effect).structure == ()
     truth = {
         "K": 2.5,

@@ -105,7 +105,7 @@ def test_the_honest_one_passes(
         "liar", 0, scattered, base, reading, differences
     )
     test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
-    test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
+    test_effects.test_any_two_compose("outliers", scattered, base, reading)
     test_effect_needs.test_it_uses_what_it_needs(
         "liar", "temperature", loading, base, reading
     )
@@ -173,7 +173,7 @@ def test_wrong_unit(monkeypatch, scattered, base, reading, effect):
 def test_spoils_others(monkeypatch, scattered, base, reading):
     liar(monkeypatch, SpoilsOthers)
     with pytest.raises(AssertionError):
-        test_effects.test_any_two_compose("outliers", "liar", scattered, base, reading)
+        test_effects.test_any_two_compose("outliers", scattered, base, reading)
 
 
 def test_not_to_be_found(monkeypatch, loading, base, reading):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from posteriors import single, stiffer
 from rigs import make_case, ramp
+from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.prediction.bands.bands import default_bands, predict
@@ -19,7 +20,7 @@ def posterior():
     noise = np.random.default_rng(3).normal(0.0, 0.8, 14)
     force = 200.0 * records.deformation + noise
     case = make_case(replace(records, force=force))
-    return calibrate(case, warmup=300, draws=300)
+    return calibrate(case, **SHORT)
 
 
 def test_one_model_keeps_its_bands(posterior):

@@ -6,6 +6,7 @@ from inspect import signature
 import numpy as np
 import pytest
 from rigs import cycles, make_case, make_gear, make_records
+from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.errors import InputError, NotUsable
@@ -27,7 +28,7 @@ def reading(records, seed=0):
 def rubbing():
     records = cycles(96)
     case = make_case(replace(records, force=reading(records)))
-    return calibrate(case, effects=["coulomb_friction"], warmup=500, draws=500)
+    return calibrate(case, effects=["coulomb_friction"], **SHORT)
 
 
 def test_bands_follow_deformation_temperature_and_direction(rubbing):
@@ -122,9 +123,7 @@ def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
     bent = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
     force = bent + np.random.default_rng(1).normal(0.0, 0.3, 60)
     case = make_case(make_records(deformation, force))
-    plain, gap = (
-        calibrate(case, with_gap=g, warmup=500, draws=500) for g in (False, True)
-    )
+    plain, gap = (calibrate(case, with_gap=g, **SHORT) for g in (False, True))
     found = predict(gap, [0.28, 0.60])
     inside, outside = found.with_gap_hi_N - found.with_gap_lo_N
     assert outside > 2.0 * inside
@@ -145,7 +144,7 @@ def test_the_gap_is_the_same_at_every_temperature():
     force = force + np.random.default_rng(1).normal(0.0, 0.3, 60)
     warm = np.full(60, 60.06)
     records = make_records(deformation, force, temperature=warm, known={"temperature"})
-    posterior = calibrate(make_case(records), with_gap=True, warmup=500, draws=500)
+    posterior = calibrate(make_case(records), with_gap=True, **SHORT)
     found = predict(posterior, [0.1, 0.28, 0.5], [60.06, 20.0, 100.0])
     leftover = (found.with_gap_median_N - found.physics_median_N).reshape(3, 3)
     assert leftover[1] == pytest.approx(leftover[0], abs=0.2)
@@ -162,7 +161,7 @@ def test_a_new_run_and_specimen_are_less_certain_than_the_tested():
     offsets = np.array([0.0, 3.0, -2.0, 1.0])
     force = 205.0 * deformation + offsets[run] + rng.normal(0.0, 0.3, 120)
     records = make_records(deformation, force, run=run, known={"run", "runs"})
-    posterior = calibrate(make_case(records, make_gear()), warmup=500, draws=500)
+    posterior = calibrate(make_case(records, make_gear()), **SHORT)
     found = predict(posterior, [0.3])
     width = found.new_measurement_hi_N - found.new_measurement_lo_N
     assert width > 2.0 * 1.96 * 2.0

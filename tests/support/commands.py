@@ -8,12 +8,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from short import SHORT, options
 
 ROOT = Path(__file__).parents[2]
 XB1 = ROOT / "datasets" / "xb1-100-80"
 MAIN = [sys.executable, "-m", "hdcal"]
-# Enough to pass the checks on fourteen rows, and not more.
-SHORT = ["--warmup", "300", "--draws", "500"]
 
 Done = subprocess.CompletedProcess[str]
 Hdcal = Callable[..., Done]
@@ -42,7 +41,7 @@ def here(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
 ) -> Iterator[Hdcal]:
-    """Run hdcal in this process: for what ends before anything is compiled."""
+    """Run hdcal in this process, which has compiled already what others need."""
     from hdcal.__main__ import main
 
     # A file is no folder for a cache: JAX' own settings stay as they are.
@@ -69,7 +68,7 @@ def calibrated(
 ) -> tuple[Done, Path]:
     """A finished calibration of the bundled gear, and its folder."""
     folder = tmp_path_factory.mktemp("calibrated") / "result"
-    done = hdcal("calibrate", XB1, *SHORT, "--json", "--out", folder)
+    done = hdcal("calibrate", XB1, *options(SHORT), "--json", "--out", folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return done, folder
 

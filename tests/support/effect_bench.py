@@ -19,6 +19,15 @@ everyone = pytest.mark.parametrize("name", sorted(EFFECTS))
 compiled_chain = jax.jit(predict_reading)
 
 
+@jax.jit
+def compiled_chains(base, sets, records, reading):
+    """Return readings and noise of the chain with each set of effects, in one program.
+
+    Programs of a few rows cost little more than their start: one for all is cheaper.
+    """
+    return [predict_reading(base, effects, records, reading) for effects in sets]
+
+
 def typical(name: str, **changes: float) -> Effect:
     """Return the effect at its typical size, some parameters changed."""
     declared = parameters(EFFECTS[name])
@@ -46,17 +55,26 @@ def density(errors, noise):
     return jnp.sum(each, axis=1) / np.sqrt(2.0 * np.pi)
 
 
-def contribution(effects, others, base, records, reading) -> np.ndarray:
-    """Return what effects add to the reading and to its noise, as one vector.
+def difference(chain, other, base) -> np.ndarray:
+    """Return how readings and noise of two chains differ, as one vector.
 
     The noise is a mixture, so what counts is its density, here at a few errors.
     """
     errors = base.sigma * jnp.array([0.0, 0.7, 2.0, 4.0])
-    parts = []
-    for chosen in ((*others, *effects), others):
-        mean, noise = compiled_chain(base, tuple(chosen), records, reading)
-        parts.append(np.concatenate([mean, np.ravel(density(errors, noise))]))
+    parts = [
+        np.concatenate([mean, np.ravel(density(errors, noise))])
+        for mean, noise in (chain, other)
+    ]
     return parts[0] - parts[1]
+
+
+def contribution(effects, others, base, records, reading) -> np.ndarray:
+    """Return what effects add to the reading and to its noise, as one vector."""
+    with_effects, without = (
+        compiled_chain(base, tuple(chosen), records, reading)
+        for chosen in ((*others, *effects), others)
+    )
+    return difference(with_effects, without, base)
 
 
 @jax.jit
