@@ -17,7 +17,7 @@ from hdcal.physics.effect import Effect, Noise, parameter
 class Liar(Effect):
     """An honest thermal zero, to be spoiled."""
 
-    name: ClassVar[str] = "liar"
+    name: ClassVar[str] = "broken"
     stage: ClassVar[str] = "sensor"
     family: ClassVar[str] = "lies"
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
@@ -85,48 +85,48 @@ class NotToBeFound(Liar):
         return signal + self.size
 
 
-def liar(monkeypatch, effect):
-    monkeypatch.setitem(EFFECTS, "liar", effect)
+def broken(monkeypatch, effect):
+    monkeypatch.setitem(EFFECTS, "broken", effect)
 
 
 def test_the_honest_one_passes(
     monkeypatch, scattered, loading, base, reading, differences
 ):
-    liar(monkeypatch, Liar)
-    test_effects.test_null_changes_nothing("liar", 0, scattered, base, reading)
+    broken(monkeypatch, Liar)
+    test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
     test_effects.test_at_its_typical_size_it_does_something(
-        "liar", loading, base, reading
+        "broken", loading, base, reading
     )
     for size in (test_effects.null, test_effects.typical):
         test_effects.test_gradients_are_finite(
-            "liar", size, False, scattered, base, reading
+            "broken", size, False, scattered, base, reading
         )
     test_effects.test_gradients_are_right(
-        "liar", 0, scattered, base, reading, differences
+        "broken", 0, scattered, base, reading, differences
     )
-    test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
+    test_effects.test_symmetry_is_as_declared("broken", scattered, base, reading)
     test_effects.test_any_two_compose("outliers", scattered, base, reading)
     test_effect_needs.test_it_uses_what_it_needs(
-        "liar", "temperature", loading, base, reading
+        "broken", "temperature", loading, base, reading
     )
     for covariate in test_effect_needs.LICENCES:
         test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "liar", covariate, loading, base, reading
+            "broken", covariate, loading, base, reading
         )
-    test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
+    test_effect_units.test_units_do_not_matter("broken", scattered, base, reading)
 
 
 def test_not_null_at_null(monkeypatch, scattered, base, reading):
-    liar(monkeypatch, NotNullAtNull)
+    broken(monkeypatch, NotNullAtNull)
     with pytest.raises(AssertionError):
-        test_effects.test_null_changes_nothing("liar", 0, scattered, base, reading)
+        test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
 
 
 def test_no_slope_at_null(monkeypatch, scattered, base, reading):
-    liar(monkeypatch, KinkAtNull)
+    broken(monkeypatch, KinkAtNull)
     with pytest.raises(AssertionError):
         test_effects.test_gradients_are_finite(
-            "liar", test_effects.null, True, scattered, base, reading
+            "broken", test_effects.null, True, scattered, base, reading
         )
 
 
@@ -134,53 +134,53 @@ def test_wrong_slope(monkeypatch, scattered, base, reading, differences):
     class OffTheStep(WrongSlope):
         size: float = parameter("N/K", "an amplitude", typical=0.10501, null=0.0)
 
-    liar(monkeypatch, OffTheStep)
+    broken(monkeypatch, OffTheStep)
     with pytest.raises(AssertionError):
         test_effects.test_gradients_are_right(
-            "liar", 0, scattered, base, reading, differences
+            "broken", 0, scattered, base, reading, differences
         )
 
 
 def test_wrong_symmetry(monkeypatch, scattered, base, reading):
-    liar(monkeypatch, NotEven)
+    broken(monkeypatch, NotEven)
     with pytest.raises(AssertionError):
-        test_effects.test_symmetry_is_as_declared("liar", scattered, base, reading)
+        test_effects.test_symmetry_is_as_declared("broken", scattered, base, reading)
 
 
 def test_undeclared_covariate(monkeypatch, loading, base, reading):
-    liar(monkeypatch, LooksAtTime)
+    broken(monkeypatch, LooksAtTime)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "liar", "time", loading, base, reading
+            "broken", "time", loading, base, reading
         )
 
 
 def test_needless_need(monkeypatch, loading, base, reading):
-    liar(monkeypatch, NeedsNothing)
+    broken(monkeypatch, NeedsNothing)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_uses_what_it_needs(
-            "liar", "temperature", loading, base, reading
+            "broken", "temperature", loading, base, reading
         )
 
 
 @pytest.mark.parametrize("effect", [OtherUnit, HardCoded])
 def test_wrong_unit(monkeypatch, scattered, base, reading, effect):
-    liar(monkeypatch, effect)
+    broken(monkeypatch, effect)
     with pytest.raises(AssertionError):
-        test_effect_units.test_units_do_not_matter("liar", scattered, base, reading)
+        test_effect_units.test_units_do_not_matter("broken", scattered, base, reading)
 
 
 def test_spoils_others(monkeypatch, scattered, base, reading):
-    liar(monkeypatch, SpoilsOthers)
+    broken(monkeypatch, SpoilsOthers)
     with pytest.raises(AssertionError):
         test_effects.test_any_two_compose("outliers", scattered, base, reading)
 
 
 def test_not_to_be_found(monkeypatch, loading, base, reading):
-    liar(monkeypatch, NotToBeFound)
+    broken(monkeypatch, NotToBeFound)
     with pytest.raises(AssertionError):
         test_effect_recovery.test_recovered_from_its_own_data(
-            "liar", loading, base, reading
+            "broken", loading, base, reading
         )
 
 
@@ -193,6 +193,6 @@ def test_not_to_be_found(monkeypatch, loading, base, reading):
     ],
 )
 def test_undocumented(monkeypatch, promise):
-    liar(monkeypatch, Liar)
+    broken(monkeypatch, Liar)
     with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
-        promise("liar")
+        promise("broken")

@@ -106,10 +106,7 @@ def scores_document(
             _confused(found),
             _reliability(found),
             _detection(found),
-            Section(
-                "How near the sizes come",
-                [_grid("size of the gap", found.by_r, _SIZES)],
-            ),
+            _sizes(found),
             *(
                 Section(f"By {name}", [_grid(name, lines, _FIRST)])
                 for name, lines in groups.items()
@@ -118,6 +115,11 @@ def scores_document(
             Section("How it was reckoned", [Facts(notes)]),
         ],
     )
+
+
+def _sizes(found: Scores) -> Section:
+    table = _grid("size of the gap", found.by_r, _SIZES)
+    return Section("How near the sizes come", [table])
 
 
 def _promised(found: Scores, brief: bool) -> Section:

@@ -217,9 +217,11 @@ def read_named(
 
 
 def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
-    from hdcal.data.toml_file import nearest
+    from hdcal.data.toml_file import did_you_mean
 
-    return Finding(option, f"unknown key '{name[:60]}'", nearest(name, list(known)))
+    return Finding(
+        option, f"unknown key '{name[:60]}'", did_you_mean(name, list(known))
+    )
 
 
 def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:

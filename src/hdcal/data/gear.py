@@ -21,7 +21,7 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.data.records import Geometry
-from hdcal.data.toml_file import TomlFile, nearest, read_toml
+from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 
@@ -45,7 +45,7 @@ def read_gear(path: Path | str, theory: str | None = None) -> Gear:
         model = wrong.attempt(check_schema, toml)
         wrong += size_findings(toml)
         if theory is not None and theory not in get_args(Theory):
-            remedy = nearest(theory, list(get_args(Theory)))
+            remedy = did_you_mean(theory, list(get_args(Theory)))
             wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
         facts = wrong.attempt(_material, toml, path.parent)
         given = wrong.attempt(_given_priors, toml)
@@ -140,7 +140,9 @@ def _given_priors(toml: TomlFile) -> tuple[dict[str, Prior], dict[str, Prior]]:
             elif isinstance(entry, dict) and "family" not in entry:
                 tables.setdefault(name, {}).update(entry)
             else:
-                remedy = nearest(name, list(units)) + "; or a table [priors.EFFECT]"
+                remedy = (
+                    did_you_mean(name, list(units)) + "; or a table [priors.EFFECT]"
+                )
                 wrong.append(toml.finding("unknown key", remedy, key))
         effects = wrong.attempt(read_effect_priors, tables, "priors", toml)
     assert effects is not None

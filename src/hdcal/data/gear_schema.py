@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hdcal.data.case import Theory
-from hdcal.data.toml_file import TomlFile, nearest
+from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.errors import Finding, InputError
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
@@ -66,11 +66,15 @@ def _translate(error: dict, toml: TomlFile) -> Finding:
     if kind == "extra_forbidden":
         *table, name = error["loc"]
         model: Any = GearFile.model_fields[table[0]].annotation if table else GearFile
-        return toml.finding("unknown key", nearest(name, list(model.model_fields)), key)
+        return toml.finding(
+            "unknown key", did_you_mean(name, list(model.model_fields)), key
+        )
     if kind == "missing":
         return toml.finding("is missing", f"Add it: {_example(key)}", key)
     if kind == "literal_error":
-        remedy = nearest(str(value), re.findall(r"'(\w+)'", error["ctx"]["expected"]))
+        remedy = did_you_mean(
+            str(value), re.findall(r"'(\w+)'", error["ctx"]["expected"])
+        )
         return toml.finding(f"unknown choice {value!r:.60}", remedy, key)
     if kind in ("greater_than", "greater_than_equal") and "temperature" in key:
         return toml.finding("is below absolute zero", "Write it in °C", key)

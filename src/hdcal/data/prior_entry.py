@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 
 from hdcal.data.prior import FAMILIES, Prior
-from hdcal.data.toml_file import TomlFile, nearest
+from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.units import UnitError, to_code
 from hdcal.errors import Findings, InputError
 
@@ -47,7 +47,9 @@ def read_prior(
     family = entry.get("family")
     if not isinstance(family, str) or family not in FAMILIES:
         words = "names no family" if family is None else f"unknown family '{family}'"
-        raise toml.error(words, nearest(str(family), list(FAMILIES)), f"{key}.family")
+        raise toml.error(
+            words, did_you_mean(str(family), list(FAMILIES)), f"{key}.family"
+        )
     with Findings() as wrong:
         numbers = wrong.attempt(_numbers, entry, family, key, toml)
         conversion = wrong.attempt(_conversion, entry, key, toml, unit)
@@ -74,7 +76,7 @@ def _numbers(entry: dict, family: str, key: str, toml: TomlFile) -> list[float]:
     findings = [
         toml.finding(
             f"is no part of a {family} prior",
-            nearest(str(extra), [*wanted, *_WORDS], "It takes"),
+            did_you_mean(str(extra), [*wanted, *_WORDS], "It takes"),
             f"{key}.{extra}",
         )
         for extra in entry

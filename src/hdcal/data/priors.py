@@ -7,7 +7,7 @@ from pathlib import Path
 from hdcal.data.prior import Prior as Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
-from hdcal.data.toml_file import TomlFile, nearest, read_toml
+from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
@@ -65,7 +65,7 @@ def read_priors(
             if key in ("name", "description"):
                 continue
             if key not in units:
-                remedy = nearest(key, list(units))
+                remedy = did_you_mean(key, list(units))
                 wrong.append(toml.finding("unknown parameter", remedy, key))
             elif prior := wrong.attempt(read_prior, entry, key, toml, units[key]):
                 found[key] = prior
@@ -139,6 +139,6 @@ def material_priors(name: str) -> dict[str, Prior]:
         InputError: no such material.
     """
     if name not in material_names():
-        remedy = nearest(name, material_names())
+        remedy = did_you_mean(name, material_names())
         raise InputError([Finding(f"{name}.toml", "unknown material", remedy)])
     return _shipped(name).copy()

@@ -104,7 +104,7 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
     return TomlFile(file, table, text)
 
 
-def nearest(name: str, known: list[str], what: str = "Known are") -> str:
+def did_you_mean(name: str, known: list[str], what: str = "Known are") -> str:
     """A remedy that names the likeliest meaning of an unknown name, and the rest."""
     by_lower = {item.lower(): item for item in known}
     near = get_close_matches(name.lower(), by_lower, 1, 0.5)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from hdcal.data.toml_file import nearest
+from hdcal.data.toml_file import did_you_mean
 from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding
 from hdcal.prediction.engine.conditions import temperature_findings
@@ -21,7 +21,7 @@ def name_findings(
     """Return a finding for each name that is not known, with the nearest one."""
     listed = list(known)
     return [
-        Finding(where, f"unknown key '{name[:60]}'", nearest(name, listed))
+        Finding(where, f"unknown key '{name[:60]}'", did_you_mean(name, listed))
         for name in names
         if name not in listed
     ]

@@ -21,7 +21,7 @@ from hdcal.data.priors import (
     read_priors,
 )
 from hdcal.data.records import Geometry, Records
-from hdcal.data.toml_file import nearest
+from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import Values
 from hdcal.inference.distributions import frozen, scaled
@@ -222,7 +222,7 @@ def read_material(name: str) -> dict[str, Prior]:
     if not name.endswith(".toml"):
         if name not in material_names():
             words = f"unknown material '{name[:60]}'"
-            remedy = nearest(name, material_names(), "Shipped are")
+            remedy = did_you_mean(name, material_names(), "Shipped are")
             raise InputError([Finding("materials", words, remedy)])
         return material_priors(name)
     facts = read_priors(Path(name), MATERIAL_UNITS, name)

@@ -23,9 +23,9 @@ def open_source(
         Both None where they cannot be told.
     """
     if (run is None) == (gear is None):
-        words = "is missing" if run is None else "and --gear are given both"
-        remedy = "Name a folder of hdcal calibrate, or --gear GEAR.toml for priors only"
-        wrong.append(Finding("RUN", words, remedy))
+        words = "is missing" if run is None else "and `gear` are given both"
+        remedy = "Name a folder of hdcal calibrate, or `gear` GEAR.toml for priors only"
+        wrong.append(Finding("run", words, remedy))
         return None, None
     if gear is not None:
         return wrong.attempt(read_gear, gear), f"{Path(gear).stem}-{kind}"

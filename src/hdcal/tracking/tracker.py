@@ -91,8 +91,7 @@ class Tracker:
             force: as read [N].
             temperature: of the specimen [°C]; by default the reference one.
             time: since the reset of the rig [s]; only some effects look at it.
-            run: label of the mounting; another one than before widens the zero of the
-                force.
+            run: label of the mounting; another one widens the zero of the force.
 
         Returns:
             The answer as plain data: a line of `hdcal track`.
@@ -105,20 +104,16 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
-        middle, half, score = self._core.step(columns, force)
-        if isinstance(self._core, FirstRows) and self._core.complete:
-            self._core = self._core.merged(self._forget)
+        middle, half, score = self._step(columns, force)
         self.rows += 1
         share, alarm = self._alarm.step(score)
+        band = [middle - half, middle + half]
         found = {
             "schema": SCHEMA,
             "status": "ok",
             "row": self.rows,
             "stiffness_N_per_mm": self._stiffness(),
-            "force_N": {
-                "predicted": middle,
-                "predictive_95": [middle - half, middle + half],
-            },
+            "force_N": {"predicted": middle, "predictive_95": band},
             "innovation": score,
             "alarm": alarm,
             "alarm_score": share,
@@ -130,6 +125,12 @@ class Tracker:
         if isinstance(self._core, Particles):
             found |= _degeneracy(self._core, found["stiffness_N_per_mm"])
         return found
+
+    def _step(self, columns, force: float) -> tuple[float, float, float]:
+        step = self._core.step(columns, force)
+        if isinstance(self._core, FirstRows) and self._core.complete:
+            self._core = self._core.merged(self._forget)
+        return step
 
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""

@@ -12,7 +12,7 @@ from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
 from hdcal.blind.virtual_rig.outside import CHOSEN, LISTED, UNSEEN
 from hdcal.blind.virtual_rig.sensing import NOISES
 from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
-from hdcal.data.toml_file import nearest
+from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, InputError
 
 SIZES = (0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
@@ -64,7 +64,7 @@ def draw_plans(mix: str, count: int, rng: np.random.Generator) -> list[Plan]:
         InputError: no mix has this name.
     """
     if mix not in MIXES:
-        words, remedy = f"no mix is called '{mix[:60]}'", nearest(mix, list(MIXES))
+        words, remedy = f"no mix is called '{mix[:60]}'", did_you_mean(mix, list(MIXES))
         raise InputError([Finding("mix", words, remedy)])
     if mix != "all":
         return list(islice(_endless(mix, rng), count))
