@@ -14,8 +14,8 @@ from hdcal import EFFECTS
 from hdcal.physics.effect import Effect, Noise, parameter
 
 
-class Liar(Effect):
-    """An honest thermal zero, to be spoiled."""
+class ThermalZero(Effect):
+    """A thermal zero that is right, to be spoiled."""
 
     name: ClassVar[str] = "broken"
     stage: ClassVar[str] = "sensor"
@@ -29,49 +29,49 @@ class Liar(Effect):
         return signal + self.size * rows.temperature_rise
 
 
-class NotNullAtNull(Liar):
+class NotNullAtNull(ThermalZero):
     def apply(self, signal, rows):
         return signal + (self.size + 1e-9) * rows.temperature_rise
 
 
-class KinkAtNull(Liar):
+class KinkAtNull(ThermalZero):
     def apply(self, signal, rows):
         return signal + jnp.sqrt(self.size**2) * rows.temperature_rise
 
 
-class WrongSlope(Liar):
+class WrongSlope(ThermalZero):
     def apply(self, signal, rows):
         # A step: its derivative is zero wherever it exists.
         return signal + jnp.round(100.0 * self.size) / 100.0 * rows.temperature_rise
 
 
-class NotEven(Liar):
+class NotEven(ThermalZero):
     def apply(self, signal, rows):
         return signal + self.size * rows.temperature_rise * rows.deformation
 
 
-class LooksAtTime(Liar):
+class LooksAtTime(ThermalZero):
     def apply(self, signal, rows):
         drift = 1e-3 * rows.records.time
         return signal + self.size * (rows.temperature_rise + drift)
 
 
-class NeedsNothing(Liar):
+class NeedsNothing(ThermalZero):
     def apply(self, signal, rows):
         return signal + 10.0 * self.size
 
 
-class OtherUnit(Liar):
+class OtherUnit(ThermalZero):
     def apply(self, signal, rows):
         return signal + self.size * rows.temperature_rise * rows.stiffness / 200.0
 
 
-class HardCoded(Liar):
+class HardCoded(ThermalZero):
     def apply(self, signal, rows):
         return signal + 0.1 * jnp.tanh(10.0 * self.size) * rows.temperature_rise
 
 
-class SpoilsOthers(Liar):
+class SpoilsOthers(ThermalZero):
     stage: ClassVar[str] = "noise"
 
     def apply(self, signal, rows):
@@ -80,19 +80,19 @@ class SpoilsOthers(Liar):
         return Noise(jnp.zeros(1), sd)
 
 
-class NotToBeFound(Liar):
+class NotToBeFound(ThermalZero):
     def apply(self, signal, rows):
         return signal + self.size
 
 
-def broken(monkeypatch, effect):
+def register(monkeypatch, effect):
     monkeypatch.setitem(EFFECTS, "broken", effect)
 
 
 def test_the_honest_one_passes(
     monkeypatch, scattered, loading, base, reading, differences
 ):
-    broken(monkeypatch, Liar)
+    register(monkeypatch, ThermalZero)
     test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
     test_effects.test_at_its_typical_size_it_does_something(
         "broken", loading, base, reading
@@ -117,13 +117,13 @@ def test_the_honest_one_passes(
 
 
 def test_not_null_at_null(monkeypatch, scattered, base, reading):
-    broken(monkeypatch, NotNullAtNull)
+    register(monkeypatch, NotNullAtNull)
     with pytest.raises(AssertionError):
         test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
 
 
 def test_no_slope_at_null(monkeypatch, scattered, base, reading):
-    broken(monkeypatch, KinkAtNull)
+    register(monkeypatch, KinkAtNull)
     with pytest.raises(AssertionError):
         test_effects.test_gradients_are_finite(
             "broken", test_effects.null, True, scattered, base, reading
@@ -134,7 +134,7 @@ def test_wrong_slope(monkeypatch, scattered, base, reading, differences):
     class OffTheStep(WrongSlope):
         size: float = parameter("N/K", "an amplitude", typical=0.10501, null=0.0)
 
-    broken(monkeypatch, OffTheStep)
+    register(monkeypatch, OffTheStep)
     with pytest.raises(AssertionError):
         test_effects.test_gradients_are_right(
             "broken", 0, scattered, base, reading, differences
@@ -142,13 +142,13 @@ def test_wrong_slope(monkeypatch, scattered, base, reading, differences):
 
 
 def test_wrong_symmetry(monkeypatch, scattered, base, reading):
-    broken(monkeypatch, NotEven)
+    register(monkeypatch, NotEven)
     with pytest.raises(AssertionError):
         test_effects.test_symmetry_is_as_declared("broken", scattered, base, reading)
 
 
 def test_undeclared_covariate(monkeypatch, loading, base, reading):
-    broken(monkeypatch, LooksAtTime)
+    register(monkeypatch, LooksAtTime)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_looks_at_nothing_undeclared(
             "broken", "time", loading, base, reading
@@ -156,7 +156,7 @@ def test_undeclared_covariate(monkeypatch, loading, base, reading):
 
 
 def test_needless_need(monkeypatch, loading, base, reading):
-    broken(monkeypatch, NeedsNothing)
+    register(monkeypatch, NeedsNothing)
     with pytest.raises(AssertionError):
         test_effect_needs.test_it_uses_what_it_needs(
             "broken", "temperature", loading, base, reading
@@ -165,19 +165,19 @@ def test_needless_need(monkeypatch, loading, base, reading):
 
 @pytest.mark.parametrize("effect", [OtherUnit, HardCoded])
 def test_wrong_unit(monkeypatch, scattered, base, reading, effect):
-    broken(monkeypatch, effect)
+    register(monkeypatch, effect)
     with pytest.raises(AssertionError):
         test_effect_units.test_units_do_not_matter("broken", scattered, base, reading)
 
 
 def test_spoils_others(monkeypatch, scattered, base, reading):
-    broken(monkeypatch, SpoilsOthers)
+    register(monkeypatch, SpoilsOthers)
     with pytest.raises(AssertionError):
         test_effects.test_any_two_compose("outliers", scattered, base, reading)
 
 
 def test_not_to_be_found(monkeypatch, loading, base, reading):
-    broken(monkeypatch, NotToBeFound)
+    register(monkeypatch, NotToBeFound)
     with pytest.raises(AssertionError):
         test_effect_recovery.test_recovered_from_its_own_data(
             "broken", loading, base, reading
@@ -193,6 +193,6 @@ def test_not_to_be_found(monkeypatch, loading, base, reading):
     ],
 )
 def test_undocumented(monkeypatch, promise):
-    broken(monkeypatch, Liar)
+    register(monkeypatch, ThermalZero)
     with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
         promise("broken")
