@@ -31,8 +31,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
     os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
     # Most of a test run is compilation of programs that run for less than a second:
-    # compiled plainly they take half the time. What is computed is the same; at level 0
-    # it is not: slopes that are 0/0 in a branch not taken are NaN.
+    # compiled plainly they take half the time. `make demo` runs as users do.
     os.environ.setdefault("XLA_FLAGS", _COMPILED_PLAINLY)
 
 

@@ -121,7 +121,7 @@ def _internal(error: Exception, console: Console) -> int:
 
 
 def _hear_termination() -> None:
-    """Let a polite kill clean up as an interruption does."""
+    """Clean up on SIGTERM as on an interruption."""
 
     def stop(*_) -> None:
         raise KeyboardInterrupt

@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax import monitoring
+from compiling import compilations
 from moving import moving_case
 from rigs import make_case, ramp
 
@@ -18,25 +18,16 @@ from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem
 from hdcal.motion.bands import motion_bands
 
-COMPILED = "/jax/core/compile/backend_compile_duration"
-
 
 def mappings() -> int:
     return Path("/proc/self/maps").read_bytes().count(b"\n")
 
 
-@pytest.fixture
-def compilations():
-    """Names of what JAX compiled since."""
-    found = []
-
-    def note(event: str, seconds: float, **about) -> None:
-        if event == COMPILED:
-            found.append(about.get("fun_name"))
-
-    monitoring.register_event_duration_secs_listener(note)
-    yield found
-    monitoring.unregister_event_duration_listener(note)
+@pytest.fixture(name="compilations")
+def noted():
+    """Names of what JAX compiles meanwhile."""
+    with compilations() as found:
+        yield found
 
 
 def bent(rows: int):
@@ -52,6 +43,10 @@ def calibrate_bent(case):
     return residuals(calibrate(case, **settings))
 
 
+def calibrate_with_gap(case):
+    return residuals(calibrate(case, with_gap=True, **FEW))
+
+
 def calibrate_moving(case):
     return motion_bands(calibrate_dynamic(case, **FEW))
 
@@ -60,6 +55,7 @@ FEW = {"chains": 2, "warmup": 20, "draws": 20}
 # Two numbers of rows of one bucket.
 KINDS = {
     "at rest": (bent, calibrate_bent, (33, 47)),
+    "with a gap": (bent, calibrate_with_gap, (33, 47)),
     "moving": (lambda rows: moving_case(0, rows=rows), calibrate_moving, (200, 250)),
 }
 

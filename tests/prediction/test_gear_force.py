@@ -9,8 +9,9 @@ import pytest
 from designs import bent, known
 from posteriors import single
 
+from hdcal.design.answer import LimitAsked
 from hdcal.design.design_draws import design_draws
-from hdcal.design.force_limit import Limits, Target
+from hdcal.design.force_limit import Target
 from hdcal.design.next_gear import next_gear
 from hdcal.design.study.study import force_quantiles, general_quantiles, is_linear
 from hdcal.errors import InputError
@@ -83,13 +84,17 @@ def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
     assert is_linear(draws) == (make is known)
 
 
+def limit(deformation, temperatures, probability) -> LimitAsked:
+    """Return a limit of 60 N."""
+    return LimitAsked(deformation, temperatures, 60.0, None, probability, {})
+
+
 @pytest.mark.parametrize("theory", ["ring", "cup"])
 @pytest.mark.parametrize("make", [known, bent])
 def test_derivatives_are_those_of_finite_differences(make, theory):
     draws = make(500, theory)
     gear = next_gear(draws, {"wall_thickness_mm": 0.02, "radius_mm": 0.05})
-    levels, limits = np.array([-20.0, 80.0]), Limits(60.0, None, 0.95)
-    target = Target.of(draws, gear, 0.3, levels, limits)
+    target = Target.of(draws, gear, limit(0.3, (-20.0, 80.0), 0.95))
     place = {
         "wall_thickness_mm": 0.66,
         "radius_mm": 41.0,
@@ -115,8 +120,7 @@ def test_derivatives_are_those_of_finite_differences(make, theory):
 
 def test_a_wrong_derivative_would_be_seen():
     draws = bent(500)
-    limits = Limits(60.0, None, 0.95)
-    target = Target.of(draws, next_gear(draws), 0.4, np.array([20.0]), limits)
+    target = Target.of(draws, next_gear(draws), limit(0.4, (20.0,), 0.95))
     slope = jax.grad(lambda x: target.force({"deformation_mm": x}))
     # That of the straight line alone.
     straight = target.force({}) / 0.4
@@ -126,8 +130,7 @@ def test_a_wrong_derivative_would_be_seen():
 def test_no_fewer_draws_keep_the_limit_than_were_asked_for():
     draws = known(2000)
     for probability in (0.5, 0.9, 0.99, 0.995):
-        limits = Limits(60.0, None, probability)
-        target = Target.of(draws, next_gear(draws), 0.4, np.array([20.0]), limits)
+        target = Target.of(draws, next_gear(draws), limit(0.4, (20.0,), probability))
         share = np.mean(np.asarray(target.forces({})) <= float(target.force({})))
         assert probability <= share < probability + 2.0 / draws.size
 

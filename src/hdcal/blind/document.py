@@ -5,7 +5,7 @@ from typing import Any
 
 from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring.estimates import Estimate
-from hdcal.blind.scoring.file_order import FileOrder, TestedFileOrder
+from hdcal.blind.scoring.file_order import FileOrder, NeighbourTests
 from hdcal.blind.scoring.reliability import Reliabilities
 from hdcal.blind.scoring.scores import Scores
 from hdcal.blind.words import (
@@ -271,7 +271,7 @@ def _calibration(found: Reliabilities) -> list[tuple[str, str]]:
 def _order(found: FileOrder) -> list[tuple[str, str]]:
     p_value = shown(found.p_value, "p")
     rows = [("p-value, that answers do not depend on order", p_value)]
-    if isinstance(found, TestedFileOrder):
+    if isinstance(found, NeighbourTests):
         for entry, words in (
             (found.same_as_neighbour, "same answer as the next file"),
             (found.truth_of_neighbour, "answer is the truth of a neighbour"),

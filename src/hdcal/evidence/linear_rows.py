@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.linalg import cho_solve
 
 # AR(1) coefficients of the noise within a run that are integrated over; more would
 # explain slow physics as noise.
@@ -64,10 +65,9 @@ def log_det_projection(rows: LinearRows, correlation: float) -> float:
     The base coefficients have prior precision `rows.precision`/σ²; zero columns change
     nothing.
     """
-    base = whiten(rows, rows.base, correlation)
-    factor = np.linalg.cholesky(base.T @ base + np.diag(rows.precision))
+    factor = _root(rows, whiten(rows, rows.base, correlation))
     prior = np.sum(np.log(rows.precision))
-    return float(prior - 2.0 * np.sum(np.log(np.diag(factor))))
+    return float(prior - 2.0 * np.sum(np.log(np.abs(np.diag(factor)))))
 
 
 def remove_base(
@@ -79,8 +79,8 @@ def remove_base(
     temperature.
     """
     base = rows.base
-    gram = base.T @ base + np.diag(rows.precision)
-    return curves - (curves @ base) @ np.linalg.solve(gram, base.T)
+    root = _root(rows, base)
+    return curves - (curves @ base) @ cho_solve((root, False), base.T)
 
 
 def project(
@@ -92,8 +92,17 @@ def project(
     back: what this costs is kept in as many further entries as the base has columns.
     """
     base = whiten(rows, rows.base, correlation)
-    gram = base.T @ base + np.diag(rows.precision)
     white = whiten(rows, curves.T, correlation).T
-    fitted = np.linalg.solve(gram, base.T @ white.T).T
+    fitted = cho_solve((_root(rows, base), False), base.T @ white.T).T
     held = np.sqrt(rows.precision) * fitted
     return np.concatenate([white - fitted @ base.T, held], axis=1)
+
+
+def _root(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:
+    """Return the upper triangular R with R'R = X'X + S⁻¹, shape (p, p).
+
+    Readings without noise leave next to nothing of the priors: the sum itself would
+    be singular by rounding.
+    """
+    stacked = np.vstack([base, np.diag(np.sqrt(rows.precision))])
+    return np.asarray(np.linalg.qr(stacked, mode="r"))

@@ -9,7 +9,7 @@ from hdcal.blind.scoring.estimates import Estimate, OfEffect, share
 from hdcal.blind.scoring.scored_case import Cases, ScoredCase
 
 METHOD = (
-    "Fraction detected = 5 % + 95 % logistic(s (log r - m)), 5 % being the gate's own "
+    "Fraction detected = 5 % + 95 % logistic(s (log r - m)), 5 % being the test's own "
     "level. Posterior on a grid, flat in m and log s: unlike a fitted maximum it stays "
     "finite where detected and undetected sizes do not overlap. r90: where the "
     "fraction is 90 %; median and 95 % interval, null beyond the sizes that were tried."

@@ -45,7 +45,7 @@ class FileOrder:
 
 
 @dataclass(frozen=True)
-class TestedFileOrder(FileOrder):
+class NeighbourTests(FileOrder):
     """The same with both comparisons, and with the first one of the truth alone."""
 
     same_as_neighbour: PermutationTest
@@ -72,7 +72,7 @@ def order_dependence(cases: Cases) -> FileOrder:
     next_truth = _tested(lambda a: _agree(a, true) + _agree(true, a), stated, truth)
     itself = _tested(lambda a: _agree(a, a), true, np.zeros_like(true))
     p_value = min(1.0, 2.0 * min(same.p_value, next_truth.p_value))
-    return TestedFileOrder(len(found), p_value, *halves, same, next_truth, itself)
+    return NeighbourTests(len(found), p_value, *halves, same, next_truth, itself)
 
 
 def _codes(names: list[str]) -> np.ndarray:

@@ -12,7 +12,7 @@ from hdcal.blind.scoring.detection import METHOD, DetectionCurve, detection
 from hdcal.blind.scoring.estimates import Estimate
 from hdcal.blind.scoring.file_order import (
     FileOrder,
-    TestedFileOrder,
+    NeighbourTests,
     order_dependence,
 )
 from hdcal.blind.scoring.groups import groups
@@ -90,7 +90,7 @@ class Scores:
     by_family: list[tables.Row]
     pairs: tables.Row
     rivals: list[tables.Row]
-    order: TestedFileOrder | FileOrder
+    order: NeighbourTests | FileOrder
     notes: dict[str, str] = field(default_factory=lambda: NOTES)
 
 

@@ -109,7 +109,7 @@ def respond(
     Raises:
         NotUsable: the posterior failed its checks, or a motion could not be
             integrated.
-        InputError: what was asked makes no sense.
+        InputError: a setting is out of range.
     """
     posterior.require_usable()
     with Findings() as wrong:

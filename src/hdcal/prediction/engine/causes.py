@@ -134,7 +134,7 @@ def read_models(run: Path | str) -> list[tuple[float, Posterior]]:
     refits = found.get("refits", [])
     if not refits:
         words = "holds no calibrated model"
-        remedy = "Diagnose again without `quick`, or calibrate"
+        remedy = "Diagnose again with sampling, or calibrate"
         raise InputError([Finding(str(run), words, remedy)])
     loaded, findings = [], []
     for refit in refits:
