@@ -12,9 +12,7 @@ import pytest
 pytest_plugins = ["commands"]
 
 _OWN = pytest.StashKey[str]()
-_COMPILED_PLAINLY = (
-    "--xla_backend_optimization_level=1 --xla_cpu_use_fusion_emitters=false"
-)
+_COMPILED_PLAINLY = "--xla_cpu_use_fusion_emitters=false"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -31,7 +29,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
     os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
     # Most of a test run is compilation of programs that run for less than a second:
-    # compiled plainly they take half the time. `make demo` runs as users do.
+    # compiled plainly they take less time. `make demo` runs as users do.
     os.environ.setdefault("XLA_FLAGS", _COMPILED_PLAINLY)
 
 
