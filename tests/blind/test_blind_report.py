@@ -14,12 +14,13 @@ from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 
 from hdcal.blind.figure import bar_figure, confusion_figure
 from hdcal.blind.label import CaseAnswer, Label
-from hdcal.blind.result_folder import write_result
 from hdcal.blind.scoring.bar import BarResult
 from hdcal.blind.scoring.scores import Scores, score
+from hdcal.blind.summary import scores_report
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.folder import OUTPUTS
+from hdcal.report.write import write_report
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}
 FAMILIES = {name: effect.family for name, effect in EFFECTS.items()}
@@ -74,7 +75,7 @@ def written(tmp_path_factory) -> Callable[[str], Path]:
     @cache
     def write(name: str) -> Path:
         target = tmp_path_factory.mktemp(name)
-        write_result(target, made(*SETS[name]))
+        write_report(scores_report(made(*SETS[name])), target, force=True)
         return target
 
     return write
@@ -163,7 +164,7 @@ def test_met_and_missed_are_said_in_words(written):
 
 
 def test_the_same_scores_give_the_same_files(written, tmp_path: Path):
-    write_result(tmp_path, made(*SETS["many"]))
+    write_report(scores_report(made(*SETS["many"])), tmp_path, force=True)
     entries = list(written("many").iterdir())
     assert entries
     for entry in entries:

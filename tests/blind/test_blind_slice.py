@@ -22,7 +22,7 @@ def scores(tmp_path_factory) -> Scores:
     write_set(folder, drawn, GEAR_TOML, key, mix="prior", seed=SEED)
     for name in ("hdcal", "bic", "r2", "none"):
         answer_set(folder, by=name)
-    return open_set(folder, key).scores
+    return open_set(folder, key).report.answer
 
 
 def guess(label) -> float:

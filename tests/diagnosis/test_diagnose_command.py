@@ -36,7 +36,8 @@ def pretend(case, *, library, quick=False, seed=0, progress=None):
         raise InputError([Finding(case.name, "is refused", "Take another")])
     verdict = KINDS.get(case.name, KINDS["named"])()
     named = replace(verdict.case, name=case.name)
-    return replace(verdict, case=named, library=tuple(library))
+    made = {"seed": seed, "quick": quick}
+    return replace(verdict, case=named, library=tuple(library), **made)
 
 
 def choose(spec, registry):

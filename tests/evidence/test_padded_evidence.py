@@ -1,11 +1,10 @@
 """Padding changes no evidence, and sizes of one bucket share every executable."""
 
 from dataclasses import replace
-from typing import ClassVar
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
+from centred import Centred
 from compiling import compilations
 from diagnosis_cases import judged, simulated
 from rigs import cycles
@@ -17,7 +16,6 @@ from hdcal.evidence import closed_form, noise_evidence
 from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.inference import padding
 from hdcal.inference.padding import bucket_size
-from hdcal.physics.effect import Effect, Stage, parameter
 from hdcal.physics.registry import EFFECTS
 
 # One of each kind: linear or not in its amplitude, with memory, with shapes, with
@@ -91,20 +89,6 @@ def test_sizes_of_one_bucket_share_every_executable():
         assert found == []
         judged(larger, library=LIBRARY)
         assert found
-
-
-class Centred(Effect):
-    """A force about the mean deformation: it looks at rows to come."""
-
-    name: ClassVar[str] = "centred"
-    stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "drift"
-
-    size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
-
-    def apply(self, signal, rows):
-        """Return the force and its share."""
-        return signal + self.size * (rows.deformation - jnp.mean(rows.deformation))
 
 
 def test_an_effect_that_looks_ahead_is_refused():

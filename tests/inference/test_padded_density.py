@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from centred import Centred
 from moving import moving_case
 from rigs import draw_truth, make_case, make_gear, program
 
@@ -21,7 +22,6 @@ from hdcal.inference.dynamic_problem import (
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
-from hdcal.physics.effect import Effect, Stage, parameter
 from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.
@@ -126,20 +126,6 @@ def test_a_row_of_padding_that_counts_is_seen():
     values = values_of(problem)
     found, slow = (float(EXPAND(p, values)[0]) for p in (more, bare(problem, case)))
     assert abs(found - slow) > 1e-6 * abs(slow)
-
-
-class Centred(Effect):
-    """A force about the mean deformation: it looks at rows to come."""
-
-    name: ClassVar[str] = "centred"
-    stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "drift"
-
-    size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
-
-    def apply(self, signal, rows):
-        """Return the force and its share."""
-        return signal + self.size * (rows.deformation - jnp.mean(rows.deformation))
 
 
 class Cumulative(Centred):

@@ -1,6 +1,7 @@
 """Every public result shows what matters most of it in a notebook's cell."""
 
 import inspect
+from dataclasses import replace
 
 import pytest
 from moving import still_posterior
@@ -10,6 +11,7 @@ from verdicts import named
 import hdcal
 from hdcal.data.gear import read_gear
 from hdcal.data.resources import datasets_folder
+from hdcal.diagnosis.summary import verdict_answer
 from hdcal.notebook import TELLERS, Shown
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
@@ -56,3 +58,11 @@ def test_a_result_is_shown(name: str, results):
     assert type(found).__name__ == name
     shown = found._repr_html_()
     assert words in shown and "<html" not in shown and "<script" not in shown
+
+
+def test_a_quick_verdict_says_that_nothing_was_sampled(results):
+    quick = replace(results["Verdict"][0], quick=True, seed=3)
+    words = "quick: no margins were sampled"
+    assert words in quick._repr_html_()
+    assert words not in results["Verdict"][0]._repr_html_()
+    assert (verdict_answer(quick).seed, verdict_answer(quick).quick) == (3, True)

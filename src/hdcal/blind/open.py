@@ -9,13 +9,13 @@ from typing import Any
 from hdcal.blind.answer import Opening, ScoredAnswers
 from hdcal.blind.answer_files import AnswerFiles, frozen_names
 from hdcal.blind.closures import closures
-from hdcal.blind.label import CaseAnswer
-from hdcal.blind.result_folder import write_result
 from hdcal.blind.scoring.scores import JUDGED, Scores, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
+from hdcal.blind.summary import scores_report
 from hdcal.report.folder import check_target, write_whole
 from hdcal.report.plain import as_json
+from hdcal.report.write import Report, write_report
 
 OPENED_SCHEMA = "hdcal.blind-opened/1"
 RESULT = "result"
@@ -28,16 +28,12 @@ class OpenedSet:
     Attributes:
         folder: where the result is.
         opening: whose answers were scored.
-        scores: of them.
-        secret: the labels.
-        answers: of each diagnoser, in the order of the labels.
+        report: of their scores.
     """
 
     folder: Path
     opening: Opening
-    scores: Scores
-    secret: Sealed
-    answers: dict[str, list[CaseAnswer]]
+    report: Report[Scores]
 
 
 def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet:
@@ -81,7 +77,9 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet
         {label.case for label in secret.labels if label.mix == "prior"} or None,
         judged,
     )
-    opened = OpenedSet(found.folder / RESULT, opening, scores, secret, answers)
+    others = {"opening.json": opening, "labels.json": secret.plain()}
+    report = scores_report(scores, secret.labels, answers, others)
+    opened = OpenedSet(found.folder / RESULT, opening, report)
     _write(found, opened, hashes if before is None else None)
     return opened
 
@@ -139,6 +137,4 @@ def _write(found: BlindSet, opened: OpenedSet, hashes: dict[str, str] | None) ->
         }
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(record)))
-    others = {"opening.json": opened.opening, "labels.json": opened.secret.plain()}
-    labels = opened.secret.labels
-    write_result(opened.folder, opened.scores, labels, opened.answers, others)
+    write_report(opened.report, opened.folder, force=True)

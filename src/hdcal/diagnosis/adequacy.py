@@ -40,6 +40,8 @@ def move_inadequate_to_unknown(
 ) -> ModelPosterior:
     """Move probability to unknown from hypotheses that leave more than noise.
 
+    `correlation` is the AR(1) coefficient of the noise.
+
     Source:
         T. Sellke, M. J. Bayarri and J. O. Berger, The American Statistician 55 (2001):
         a p-value speaks for its hypothesis with odds of at least −e p ln p.

@@ -79,6 +79,8 @@ def diagnose(
         reasons=failure_reasons(fits),
         averaged_rows=group,
         no_run=no_run,
+        seed=seed,
+        quick=quick,
     )
 
 

@@ -99,8 +99,7 @@ def _diagnose_one(
     settings = {"quick": quick, "seed": seed}
     try:
         verdict = diagnose(case, library=effects, progress=progress, **settings)
-        written = {"command": command, "report": report, **settings}
-        return write_verdict(verdict, folder, **written)
+        return write_verdict(verdict, folder, command, report=report)
     except InputError as error:
         return error.findings
     except (HdcalError, OSError):

@@ -18,9 +18,7 @@ from hdcal.report.write import Report, report_files, write_files, write_numbers
 INTERVAL = 0.9
 
 
-def verdict_answer(
-    verdict: Verdict, *, seed: int = 0, quick: bool = False
-) -> VerdictAnswer:
+def verdict_answer(verdict: Verdict) -> VerdictAnswer:
     """Return a verdict as its JSON answer."""
     case, gear, where = verdict.case, verdict.case.gear, verdict.where
     found = VerdictAnswer(
@@ -46,8 +44,8 @@ def verdict_answer(
         ),
         library=verdict.library,
         notes=verdict.notes,
-        seed=seed,
-        quick=quick,
+        seed=verdict.seed,
+        quick=verdict.quick,
         versions=versions(),
         gear=CalibratedGear(gear.name, gear.material, gear.theory),
         data=DiagnosedData(
@@ -69,12 +67,10 @@ def verdict_answer(
     )
 
 
-def verdict_report(
-    verdict: Verdict, command: str = "", *, seed: int = 0, quick: bool = False
-) -> Report[VerdictAnswer]:
+def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]:
     """Return all that `hdcal diagnose` leaves behind for one case."""
     refit = corrected(verdict)
-    found = verdict_answer(verdict, seed=seed, quick=quick)
+    found = verdict_answer(verdict)
 
     @cache
     def bands() -> Bands:
@@ -107,7 +103,7 @@ def verdict_report(
 
 
 def write_verdict(
-    verdict: Verdict, folder: Path, command: str = "", *, report: bool = True, **made
+    verdict: Verdict, folder: Path, command: str = "", *, report: bool = True
 ) -> VerdictAnswer:
     """Write what `hdcal diagnose` leaves behind for one case, and return the answer.
 
@@ -116,9 +112,8 @@ def write_verdict(
         folder: an empty one, from `whole_folder`.
         command: how the result was made, for its provenance.
         report: whether figures and report are wanted; they take most of the time.
-        made: seed and quick, as of `verdict_report`.
     """
-    told = verdict_report(verdict, command, **made)
+    told = verdict_report(verdict, command)
     write_numbers(told, folder)
     if report:
         write_files(report_files(told.document, told.figures()), folder)

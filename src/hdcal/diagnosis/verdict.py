@@ -276,6 +276,8 @@ class Verdict(Shown):
         reasons: why the result must not be used; empty when it may.
         averaged_rows: rows in each mean that was diagnosed; 1 is single rows.
         no_run: why `next_test` is empty.
+        seed: of the simulations and the sampler.
+        quick: nothing was sampled.
     """
 
     case: Case
@@ -291,6 +293,8 @@ class Verdict(Shown):
     reasons: tuple[str, ...] = ()
     averaged_rows: int = 1
     no_run: str = ""
+    seed: int = 0
+    quick: bool = False
 
     @property
     def status(self) -> Literal["ok", "failed"]:

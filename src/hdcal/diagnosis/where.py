@@ -72,7 +72,10 @@ def describe_where(
     tested: ResidualTest,
     smooth: SmoothGap | None,
 ) -> Where:
-    """Put the outcome of the residual test into values for people."""
+    """Put the outcome of the residual test into values for people.
+
+    Without a detected gap there is no `smooth` part of it.
+    """
     order = evidence.prepared.order
     residual, gap = np.empty(len(order)), np.zeros(len(order))
     residual[order] = tested.residual

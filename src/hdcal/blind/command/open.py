@@ -23,7 +23,6 @@ from hdcal.cli.options import json_option
 def open_(console: Console, folder, key, by) -> None:
     """Open DIR, score its frozen answers, and write DIR/result."""
     from hdcal.blind.answer import ScoresAnswer
-    from hdcal.blind.document import scores_document
     from hdcal.blind.open import open_set
     from hdcal.report.terminal import terminal_lines
 
@@ -35,10 +34,10 @@ def open_(console: Console, folder, key, by) -> None:
             words = "were frozen after the set was opened"
             console.words(f"NOT BLIND: the answers of '{name}' {words}")
     console.words(f"verified and scored: {opened.folder}")
-    document = scores_document(opened.scores, opened.secret.labels, opened.answers)
+    document = opened.report.document
     if console.json:
         words = {"headline": document.headline, "next_step": None}
-        found = {**vars(opened.opening), "scores": opened.scores}
+        found = {**vars(opened.opening), "scores": opened.report.answer}
         console.data(ScoresAnswer(status="ok", reasons=(), **words, **found))
     else:
         console.table(*terminal_lines(document, str(opened.folder)))

@@ -1,4 +1,4 @@
-"""What the scores of a blind check leave behind: numbers, pictures and the report."""
+"""The scores of a blind check, and all that its result folder holds."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,27 +14,22 @@ from hdcal.blind.figure import (
 from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.scoring.scores import Scores
 from hdcal.report.plain import as_json
-from hdcal.report.write import Report, write_report
+from hdcal.report.write import Report
 
 
-def write_result(
-    target: Path | str,
+def scores_report(
     scores: Scores,
     labels: Sequence[Label] = (),
     answers: Mapping[str, Sequence[CaseAnswer]] | None = None,
     others: Mapping[str, Any] | None = None,
-) -> None:
-    """Write scores.json, the pictures and report.html; an older result is replaced.
+) -> Report[Scores]:
+    """Return all that `hdcal blind open` leaves behind.
 
     Args:
-        target: the folder to make.
         scores: of the answers.
         labels: the truth, where what was said of measured data is to be shown.
         answers: by diagnoser, in the order of the labels.
         others: content of other JSON files, by name.
-
-    Raises:
-        InputError: as `write_report`.
     """
 
     def figures():
@@ -50,5 +45,4 @@ def write_result(
             (folder / name).write_text(as_json(content), "utf-8")
 
     document = scores_document(scores, labels, answers)
-    report = Report(document, scores, "scores.json", figures, save=save)
-    write_report(report, target, force=True)
+    return Report(document, scores, "scores.json", figures, save=save)
