@@ -12,7 +12,9 @@ import pytest
 pytest_plugins = ["commands"]
 
 _OWN = pytest.StashKey[str]()
-_COMPILED_PLAINLY = "--xla_cpu_use_fusion_emitters=false"
+_COMPILED_PLAINLY = (
+    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
+)
 
 
 def pytest_configure(config: pytest.Config) -> None:

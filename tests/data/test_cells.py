@@ -26,6 +26,7 @@ def table_of(cell: str) -> CsvTable:
 @example("1.5,")
 @example("- 1")
 @example("1e")
+@example("+1E 2")
 @example("Infinity")
 def test_one_cell(cell):
     fast = table_of(cell).numbers([1])

@@ -7,10 +7,9 @@ import numpy as np
 from rigs import cycles, make_case, make_records
 
 from hdcal.data.case import Case
+from hdcal.diagnosis.budget import Budget, BudgetPart
 from hdcal.diagnosis.verdict import (
     Amplitude,
-    Budget,
-    BudgetPart,
     Cell,
     Closure,
     CovariateShare,

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import compress
@@ -18,6 +19,8 @@ _NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
 # same posterior everywhere. From 3.1 on pandas does so unasked, and warns if asked.
 _OLD = tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1)
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _OLD else {}
+# Pandas takes "+1E 2" for 100.
+_TORN = re.compile(rb"\+[0-9.,]+[eE]\s")
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class CsvTable:
 
     def numbers(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
         """Those of some columns that hold plain numbers throughout, by position."""
+        if _TORN.search(self.body):
+            return {}
         try:
             read = self._read(columns, "float64")
         except ValueError:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
+from hdcal.diagnosis.budget import Budget
 from hdcal.diagnosis.verdict import (
-    Budget,
     Cell,
     Closure,
     CovariateShare,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.verdict import Budget, BudgetPart
+from hdcal.diagnosis.budget import Budget, BudgetPart
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of

@@ -7,6 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
+from hdcal.diagnosis.budget import Budget
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.report.answer import Count, EffectName, Probability, Promise, Real, Words
@@ -219,42 +220,6 @@ class NextRun:
     separates: tuple[EffectName, ...]
     information_nats: Real
     cost: str
-
-
-@dataclass(frozen=True)
-class BudgetPart:
-    """One physical reason why K is not 1.
-
-    Attributes:
-        name: for people.
-        factor: posterior of the factor, 90 % interval [-].
-        prior: the same before the data.
-        driven_by: prior or data.
-        split_by: the extra run or measurement that would tell it from the others.
-    """
-
-    name: Words
-    factor: Interval
-    prior: Interval
-    driven_by: Literal["prior", "data"]
-    split_by: str
-
-
-@dataclass(frozen=True)
-class Budget:
-    """K as a product of physical factors; one curve gives only the product.
-
-    Attributes:
-        K: at the prior's mean modulus, beside the named effects.
-        formula: theory whose K this is.
-        parts: whose product it is.
-        note: in words.
-    """
-
-    K: Interval
-    formula: Literal["ring", "cup", "article"]
-    parts: tuple[BudgetPart, ...]
-    note: str
 
 
 @dataclass(frozen=True)

@@ -205,8 +205,9 @@ def _grid(
 def _least_squares(problem: NoiseProblem, noise_sd: float) -> np.ndarray:
     """Return coefficients and log noise sd, where the search starts."""
     columns, reading = np.asarray(problem.columns), np.asarray(problem.reading)
-    pull = np.diag(problem.precision * noise_sd**2)
-    solved = np.linalg.solve(columns.T @ columns + pull, columns.T @ reading)
+    pull = np.diag(np.sqrt(problem.precision) * noise_sd)
+    stacked = np.vstack([columns, pull]), np.append(reading, np.zeros(len(pull)))
+    solved = np.linalg.lstsq(*stacked, rcond=None)[0]
     squares = np.sum((reading - columns @ solved) ** 2) / problem.count
     return np.append(solved, 0.5 * np.log(squares))
 

@@ -62,16 +62,20 @@ def _products(evidence: CaseEvidence, weight: np.ndarray):
         whiten(rows, columns, correlation)
         for columns in (rows.base, (rows.reading - offsets).T, slopes.T)
     )
-    weighted_base = weight[:, :, None] * base
-    xx = np.einsum("snp,nq->spq", weighted_base, base, optimize=True)
-    xe = np.einsum("snp,ng->spg", weighted_base, left, optimize=True)
-    xu = np.einsum("snp,ng->spg", weighted_base, slope, optimize=True)
-    gram = xx + np.diag(rows.precision)
-    fitted_e, fitted_u = np.linalg.solve(gram, xe), np.linalg.solve(gram, xu)
+    # Orthonormal columns rather than X'X + S⁻¹, which readings without noise leave
+    # singular by rounding.
+    root = np.sqrt(weight)[:, :, None]
+    prior = np.diag(np.sqrt(rows.precision))
+    stacked = np.concatenate(
+        [root * base, np.broadcast_to(prior, (len(weight), *prior.shape))], axis=1
+    )
+    seen = root * np.linalg.qr(stacked).Q[:, : len(base)]
+    xe = np.einsum("snp,ng->spg", seen, left, optimize=True)
+    xu = np.einsum("snp,ng->spg", seen, slope, optimize=True)
     return (
-        weight @ left**2 - np.sum(xe * fitted_e, axis=1),
-        weight @ (left * slope) - np.sum(xu * fitted_e, axis=1),
-        weight @ slope**2 - np.sum(xu * fitted_u, axis=1),
+        weight @ left**2 - np.sum(xe**2, axis=1),
+        weight @ (left * slope) - np.sum(xe * xu, axis=1),
+        weight @ slope**2 - np.sum(xu**2, axis=1),
     )
 
 

@@ -45,6 +45,7 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
+@jax.jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
