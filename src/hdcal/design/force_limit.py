@@ -75,7 +75,10 @@ class Target(eqx.Module):
         along = jnp.broadcast_to(at, self.temperatures.shape)
         factors = place.get("modulus", 1.0), place.get("K", 1.0)
         each = self.gears.forces(self.drawn(place), along, self.temperatures, *factors)
-        return jnp.max(each, axis=0)
+        # The derivative of a maximum compares values, which a compiler may compute
+        # twice with another rounding; that of a choice does not.
+        worst = jnp.argmax(each, axis=0)
+        return jnp.take_along_axis(each, worst[None], axis=0)[0]
 
     def stresses(self, place: Mapping[str, Scalar]) -> Float[Array, " draw"]:
         """Return the largest hoop bending stress over the temperatures [MPa]."""
