@@ -15,6 +15,7 @@ OUTPUTS = frozenset(
         "posterior.nc",
         "summary.json",
         "verdict.json",
+        "refused.json",
         "bands.csv",
         "report.html",
         "calibration.svg",
