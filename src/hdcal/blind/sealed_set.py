@@ -24,11 +24,14 @@ from hdcal.blind.seal import (
     new_salt,
     seal,
 )
+from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import versions
 from hdcal.report.folder import check_target, whole_folder
 from hdcal.report.plain import as_json, printable
 
+# Of one file of a set.
+_LARGEST = 1 << 30
 SET, SEALED, GEAR, CASES = "set.json", "sealed.bin", "gear.toml", "cases"
 GET_AGAIN = "Get the set again from whoever made it; this copy proves nothing"
 
@@ -242,6 +245,8 @@ def _encoded(text: str | bytes) -> bytes:
 
 
 def _bytes(path: Path, remedy: str) -> bytes:
+    if (why := why_not_readable(path, _LARGEST)) is not None:
+        raise refusal(path, why[0], remedy)
     try:
         return path.read_bytes()
     except FileNotFoundError:
