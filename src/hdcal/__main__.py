@@ -19,7 +19,7 @@ from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
-from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.errors import Finding, HdcalError, InputError, NotUsable
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
@@ -89,6 +89,12 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _run(arguments: list[str], console: Console) -> int:
+    try:
+        os.getcwd()
+    except OSError:
+        words = "the working directory is gone"
+        console.findings([Finding("command line", words, "Change to one that exists")])
+        return BAD_INPUT
     try:
         code = hdcal.main(arguments, "hdcal", standalone_mode=False, obj=console)
         return code if isinstance(code, int) else DONE

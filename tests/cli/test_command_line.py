@@ -202,6 +202,24 @@ def test_output_that_cannot_be_written_is_one_line(asked):
     assert done.stderr == "hdcal: the system refused: No space left on device\n"
 
 
+def test_a_working_directory_that_is_gone_is_said_at_once(tmp_path: Path):
+    (tmp_path / "gone").mkdir()
+    command = ["sh", "-c", 'rmdir "$PWD"; exec "$@"', "sh", *MAIN, "check", "x.csv"]
+    done = subprocess.run(
+        command, cwd=tmp_path / "gone", capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr == (
+        "hdcal: command line: the working directory is gone. Change to one that exists.\n"
+    )
+
+
+@pytest.mark.parametrize("name", ["a" * 4096, "a\nb", "a" * 300 + ".csv"])
+def test_a_name_that_no_system_takes_is_a_finding(here: Hdcal, name: str):
+    done = here("check", name)
+    assert done.returncode == 2 and "internal" not in done.stderr
+
+
 def test_closed_streams_are_no_error():
     script = (
         "import os, sys; os.close(1); os.close(2); os.execv(sys.argv[1], sys.argv[1:])"
