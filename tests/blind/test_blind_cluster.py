@@ -158,10 +158,10 @@ def until(happened: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
-def test_the_real_diagnosis_answers_there(local, hdcal: Hdcal, tmp_path: Path):
+def test_the_real_diagnosis_answers_there(local, here: Hdcal, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 1)
     asked = ["blind", "answer", folder, "--scheduler", local.scheduler_address]
-    done = hdcal(*asked, "--json")
+    done = here(*asked, "--json")
     assert done.returncode == 0, done.stderr
     assert len(done.stderr.splitlines()) == 2
     (answer,) = json.loads(done.stdout)["answers"]
