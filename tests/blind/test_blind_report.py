@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import DESK, PAPER, PHONE, Seen, look, print_pages
+from hdcal.report.folder import OUTPUTS
 
 from hdcal.blind.figure import bar_figure, confusion_figure
 from hdcal.blind.label import CaseAnswer, Label
@@ -19,7 +20,6 @@ from hdcal.blind.scoring.scores import Scores, score
 from hdcal.blind.summary import scores_report
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.folder import OUTPUTS
 from hdcal.report.write import write_report
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}

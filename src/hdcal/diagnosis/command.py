@@ -51,7 +51,6 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
     from hdcal.diagnosis.overview import document_and_answer
     from hdcal.physics.registry import EFFECTS
-    from hdcal.report.folder import whole_folder
 
     with console.wrong as wrong:
         wrong.attempt(choose_library, settings["library"], EFFECTS)
@@ -61,15 +60,15 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
         if out is None and found:
             # Of many cases the folder is no single one's.
             out = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
     keep_compilations()
     tell_notes(console, found)
     if settings["report"] is None:
         settings["report"] = len(found) <= MANY
         if not settings["report"]:
             console.words(f"more than {MANY} cases: no reports without --report")
-    assert out is not None
-    with whole_folder(out, force=force) as folder:
+    assert console.folder is not None
+    with console.folder.filled() as folder:
         answers = diagnose_all(found, folder, command=console.command, **settings)
     opened = "report.html" if settings["report"] else "verdict.json"
     return console.answer(
