@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.report.plain import as_json, printable
-from hdcal.report.saving.disk import sync_folder, write_file
+from hdcal.report.saving.disk import sync, write_file
 
 STAMP, SCHEMA = "hdcal-result.json", "hdcal.result/1"
 # What file managers leave behind on their own.
@@ -41,19 +41,18 @@ def seal(folder: Path) -> None:
     Raises:
         OSError: the disk refused.
     """
-    files, folders = [], []
-    for path in _below(folder):
-        if _is_folder(path):
-            folders.append(path)
-            continue
-        size, sha256 = _read(path, sync=True)
-        name = path.relative_to(folder).as_posix()
-        files.append({"file": name, "bytes": size, "sha256": sha256})
+    below = list(_below(folder))
+    files = []
+    for path in below:
+        if not _is_folder(path):
+            size, sha256 = _read(path)
+            name = path.relative_to(folder).as_posix()
+            files.append({"file": name, "bytes": size, "sha256": sha256})
     version = metadata.version("hdcal")
     stamp = {"schema": SCHEMA, "version": version, "files": files}
     write_file(folder / STAMP, as_json(stamp).encode())
-    for inner in [*folders, folder]:
-        sync_folder(inner)
+    for path in [*below, folder / STAMP, folder]:
+        sync(path)
 
 
 def older_result(folder: Path) -> list[str]:
@@ -125,17 +124,10 @@ def _stamped(folder: Path) -> dict[str, Any] | None:
     return known | {STAMP: None}
 
 
-def _read(path: Path, *, sync: bool = False) -> tuple[int, str]:
-    """Return size and SHA-256 of a file.
-
-    Args:
-        path: the file.
-        sync: wait until the disk holds it.
-    """
+def _read(path: Path) -> tuple[int, str]:
+    """Return size and SHA-256 of a file."""
     with open(path, "rb") as stream:
         sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-        if sync:
-            os.fsync(stream.fileno())
         return os.fstat(stream.fileno()).st_size, sha256
 
 

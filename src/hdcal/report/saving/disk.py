@@ -1,4 +1,4 @@
-"""Steps on a disk: synced writes, and renames that replace nothing."""
+"""Steps on a disk: writes, syncs, and renames that replace nothing."""
 
 import ctypes
 import errno
@@ -8,12 +8,12 @@ from pathlib import Path
 
 _NO_REPLACE, _EXCHANGE = 1, 2
 _FROM_HERE = -100  # AT_FDCWD: relative names are below the working directory
-# The errors of a kernel or a file system that does not know such a rename.
+# The errors of a system that does not know such a rename, or such a sync.
 _UNKNOWN = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP}
 
 
 def write_file(path: Path, data: bytes, mode: int = 0o666) -> None:
-    """Write a new file and wait until the disk holds it.
+    """Write a new file.
 
     Args:
         path: must not exist.
@@ -23,24 +23,22 @@ def write_file(path: Path, data: bytes, mode: int = 0o666) -> None:
     Raises:
         OSError: it exists, or the disk refused.
     """
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
-    descriptor = os.open(path, flags, mode)
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
     try:
         left = memoryview(data)
         while left:
             left = left[os.write(descriptor, left) :]
-        os.fsync(descriptor)
     finally:
         os.close(descriptor)
 
 
-def sync_folder(folder: Path) -> None:
-    """Wait until the disk holds the names in a folder.
+def sync(path: Path) -> None:
+    """Wait until the disk holds a file's content, or the names in a folder.
 
     Raises:
         OSError: the disk refused.
     """
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     except OSError as error:

@@ -15,7 +15,7 @@ from hdcal.report.saving.disk import (
     exchange,
     rename_beside,
     rename_new,
-    sync_folder,
+    sync,
     write_file,
 )
 from hdcal.report.saving.leftovers import BUILDING, SWAPPING, finish, remove_result
@@ -106,7 +106,7 @@ class Target(ABC):
     def _confirm(self) -> None:
         """Wait until the disk holds the new name."""
         try:
-            sync_folder(self.path.parent)
+            sync(self.path.parent)
         except OSError as error:
             words = "is written, but may not outlast a loss of power"
             reason = error.strerror or error
@@ -190,6 +190,7 @@ class TargetFile(Target):
         with self._building() as building:
             file = building / self.path.name
             write_file(file, data, mode)
+            sync(file)
             self._publish(file)
 
     def check(self) -> None:
