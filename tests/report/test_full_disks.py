@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -12,9 +13,10 @@ from pathlib import Path
 
 import full_disks
 import pytest
-from commands import XB1, Hdcal
+from commands import MAIN, XB1, Hdcal
 from posteriors import single
 from results import write_result
+from short import SHORT, options
 
 from hdcal.calibration.summary import calibration_report
 from hdcal.errors import InputError, NotWritable
@@ -211,3 +213,18 @@ def test_a_real_disk_may_be_full_at_any_byte(own_mounts, whole: Path, tmp_path: 
     assert set(said) == {"full at once", "full", "written"}
     assert sum(words != "written" for words in said) >= 20
     assert all(same for words, same in outcomes if words != "written")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [256, 1024, 2048])
+def test_a_calibration_on_a_small_disk_fails_in_one_line(
+    own_mounts, size: int, tmp_path: Path
+):
+    # Its posterior.nc alone takes more; HDF5 crashed when it wrote to such a disk.
+    mount = f"mount -t tmpfs -o size={size}k none {tmp_path}"
+    asked = ["calibrate", str(XB1), "--out", str(tmp_path / "run"), *options(SHORT)]
+    command = shlex.join([*MAIN, *asked])
+    script = f"{mount} && {{ {command} 2>&1; echo $?; ls -A {tmp_path}; }}"
+    *_, said, code = own_mounts("sh", "-c", script).splitlines()
+    assert "cannot be written (No space left on device)" in said
+    assert code == "1"
