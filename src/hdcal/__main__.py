@@ -15,17 +15,19 @@ from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
-from hdcal.cli.console import Console, usage_error
+from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
-from hdcal.errors import HdcalError, InputError, NotUsable
+from hdcal.errors import Finding, HdcalError, InputError, NotUsable
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+# 128 + SIGPIPE, as shells say it of a tool whose reader went away.
+NOBODY_READS = 141
 
 
 def _show_version(context: click.Context, _, wanted: bool) -> None:
@@ -81,11 +83,18 @@ def main(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     console = Console(json="--json" in given)
     console.prepare()
-    _hear_termination()
-    sys.exit(_run(given, console))
+    _hear_interruptions()
+    code = _run(given, console)
+    sys.exit(NOBODY_READS if code == DONE and console.unread else code)
 
 
 def _run(arguments: list[str], console: Console) -> int:
+    try:
+        os.getcwd()
+    except OSError:
+        words = "the working directory is gone"
+        console.findings([Finding("command line", words, "Change to one that exists")])
+        return BAD_INPUT
     try:
         code = hdcal.main(arguments, "hdcal", standalone_mode=False, obj=console)
         return code if isinstance(code, int) else DONE
@@ -101,32 +110,44 @@ def _run(arguments: list[str], console: Console) -> int:
     except HdcalError as error:
         console.failure("error", str(error))
         return NOT_TO_BE_USED
+    except SystemExit:
+        # So click ends when nobody reads its help.
+        console.unread = True
+        return DONE
     except (KeyboardInterrupt, click.Abort):
         console.words("interrupted: nothing was written")
         return INTERRUPTED
+    except OSError as error:
+        # A full disk behind standard output: what is left for it would fail again.
+        discard_output()
+        return _failed(error, f"the system refused: {error.strerror or error}", console)
     except Exception as error:
-        return _internal(error, console)
+        what = " ".join(str(error).split())[:200] or "no further words"
+        words = f"internal error ({type(error).__name__}: {what}); please report it, "
+        return _failed(error, words + "with what HDCAL_DEBUG=1 prints", console)
 
 
-def _internal(error: Exception, console: Console) -> int:
+def _failed(error: Exception, words: str, console: Console) -> int:
     if os.environ.get("HDCAL_DEBUG") == "1":
         raise error
-    what = " ".join(str(error).split())[:200] or "no further words"
-    console.failure(
-        "error",
-        f"internal error ({type(error).__name__}: {what}); please report it, with "
-        "what HDCAL_DEBUG=1 prints",
-    )
+    console.failure("error", words)
     return NOT_TO_BE_USED
 
 
-def _hear_termination() -> None:
-    """Clean up on SIGTERM as on an interruption."""
+def _hear_interruptions() -> None:
+    """Clean up on SIGINT and on SIGTERM, and do not let a second one disturb that."""
+    heard = [signal.SIGTERM]
+    # What runs in the background of a script, or under nohup, ignores the keyboard.
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        heard.append(signal.SIGINT)
 
     def stop(*_) -> None:
+        for each in heard:
+            signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, stop)
+    for each in heard:
+        signal.signal(each, stop)
 
 
 if __name__ == "__main__":

@@ -181,12 +181,52 @@ def test_a_text_from_a_file_cannot_steer_the_terminal(here: Hdcal, case: Path):
     assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
 
 
-def test_a_reader_that_goes_away_is_no_error():
+@pytest.mark.parametrize("asked", ["effects", "--help"])
+def test_a_reader_that_goes_away_is_no_error(asked):
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run([*MAIN, "effects"], stdout=write, stderr=subprocess.PIPE)
+    command = [*MAIN, asked]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE)
     os.close(write)
-    assert (done.returncode, done.stderr) == (0, b"")
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has such a device")
+@pytest.mark.parametrize("asked", ["effects", "--help"])
+def test_output_that_cannot_be_written_is_one_line(asked):
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [*MAIN, asked], stdout=full, stderr=subprocess.PIPE, text=True
+        )
+    assert done.returncode == 1
+    assert done.stderr == "hdcal: the system refused: No space left on device\n"
+
+
+def test_a_working_directory_that_is_gone_is_said_at_once(tmp_path: Path):
+    (tmp_path / "gone").mkdir()
+    command = ["sh", "-c", 'rmdir "$PWD"; exec "$@"', "sh", *MAIN, "check", "x.csv"]
+    done = subprocess.run(
+        command, cwd=tmp_path / "gone", capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr == (
+        "hdcal: command line: the working directory is gone. Change to one that exists.\n"
+    )
+
+
+@pytest.mark.parametrize("name", ["a" * 4096, "a\nb", "a" * 300 + ".csv"])
+def test_a_name_that_no_system_takes_is_a_finding(here: Hdcal, name: str):
+    done = here("check", name)
+    assert done.returncode == 2 and "internal" not in done.stderr
+
+
+def test_closed_streams_are_no_error():
+    script = (
+        "import os, sys; os.close(1); os.close(2); os.execv(sys.argv[1], sys.argv[1:])"
+    )
+    command = [sys.executable, "-c", script, *MAIN]
+    assert subprocess.run([*command, "effects"]).returncode == 0
+    assert subprocess.run([*command, "effects", "none"]).returncode == 2
 
 
 def test_a_defect_of_hdcal_is_one_line():

@@ -13,7 +13,7 @@ from commands import XB1, Hdcal
 from verdicts import KINDS
 
 from hdcal.cli.processes import run_all
-from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.errors import Finding, InputError
 from hdcal.report.answer import json_schema
 from hdcal.report.saving.contents import STAMP
@@ -148,20 +148,45 @@ def test_everything_wrong_with_any_case_is_said_at_once(
     assert set(tmp_path.rglob("*")) == before
 
 
-def test_two_cases_of_one_name_are_refused(diagnose, cases, tmp_path: Path):
-    done = diagnose(cases["none"], cases["named"], cases["none"])
+def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path):
+    """Three are refused: by the reader, by the diagnosis, and for its name."""
+    (cases["unknown"] / "data.csv").write_text("deformation_mm\n1\n")
+    (tmp_path / "none").mkdir()
+    for file in ("data.csv", "gear.toml"):
+        (tmp_path / "none" / file).write_bytes((XB1 / file).read_bytes())
+    asked = [*(cases[n] for n in ("none", "unknown", "refused", "named")), "none"]
+    done = diagnose(*asked, "--no-report", "--out", "all", "--json")
     assert done.returncode == 2
-    assert "a second case is called 'none'" in done.stderr
+    assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
+    said = json.loads(done.stdout)
+    jsonschema.validate(said, json_schema(VerdictsAnswer))
+    assert list(said["cases"]) == ["none", "named"]
+    assert list(said["refused"]) == [str(cases["unknown"]), "none", "refused"]
+    assert "3 refused" in said["headline"] and said["status"] == "ok"
+    written = json.loads((tmp_path / "all" / "refused.json").read_text("utf-8"))
+    jsonschema.validate(written, json_schema(RefusedAnswer))
+    assert written["cases"] == said["refused"]
+    assert said["refused"]["refused"][0]["problem"] == "is refused"
+    for words in ("a second case is called 'none'", "is refused", "column"):
+        assert words in done.stderr
+    # Such a result may be replaced like any other.
+    assert diagnose(*asked, "--no-report", "--out", "all", "--force").returncode == 2
+
+
+def test_where_every_case_is_refused_nothing_is_written(
+    diagnose, cases, tmp_path: Path
+):
+    (cases["none"] / "data.csv").write_text("deformation_mm\n1\n")
+    done = diagnose(cases["none"], cases["refused"])
+    assert done.returncode == 2 and "is refused" in done.stderr
+    assert "none/data.csv" in done.stderr
     assert names(tmp_path) == {"cases"}
 
 
-@pytest.mark.parametrize(("name", "code"), [("refused", 2), ("defect", 1)])
-def test_one_case_that_breaks_leaves_nothing(
-    diagnose, cases, tmp_path: Path, name: str, code: int
-):
-    done = diagnose(cases["none"], cases[name], "--no-report")
-    assert done.returncode == code
-    assert name in done.stderr and "Traceback" not in done.stderr
+def test_a_defect_leaves_nothing(diagnose, cases, tmp_path: Path):
+    done = diagnose(cases["none"], cases["defect"], "--no-report")
+    assert done.returncode == 1
+    assert "defect" in done.stderr and "Traceback" not in done.stderr
     assert names(tmp_path) == {"cases"}
 
 

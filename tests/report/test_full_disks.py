@@ -135,6 +135,31 @@ def test_a_folder_that_cannot_be_synced_is_whole_and_told(
     assert {path.name for path in place.iterdir()} == {"run"}
 
 
+@pytest.mark.parametrize("renames", [True, False])
+def test_a_name_that_is_refused_leaves_what_was_there(renames: bool, place: Path):
+    """What fails last: the rename, after everything is written."""
+    write_again({"summary.json": b"old"}, place / "run")
+    before = content(place)
+
+    def refused(*_) -> bool:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    for target in ("run", "new"):
+        with pytest.MonkeyPatch.context() as patch:
+            if renames:
+                patch.setattr("hdcal.report.saving.disk._rename", refused)
+            else:
+                patch.setattr("hdcal.report.saving.disk._rename", lambda *_: False)
+                patch.setattr(os, "rename", refused)
+            with pytest.raises(NotWritable, match="nothing of it was left"):
+                write_again({"summary.json": b"new"}, place / target)
+        # What could not be renamed back either comes back at the next start.
+        with reserve_folder(place / "another"):
+            pass
+        assert content(place) == before
+        assert {path.name for path in place.iterdir()} == {"run"}
+
+
 @pytest.mark.parametrize("number", [*ERRORS, errno.EACCES])
 def test_before_any_work_it_is_bad_input(number: int, tmp_path: Path):
     with pytest.MonkeyPatch.context() as patch:

@@ -13,6 +13,7 @@ from hdcal.blind.scoring.scores import JUDGED, Scores, score
 from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
 from hdcal.blind.summary import scores_report
+from hdcal.data.regular_file import why_not_readable
 from hdcal.report.plain import as_json
 from hdcal.report.saving.reserve import reserve_folder, write_whole
 from hdcal.report.saving.target import TargetFolder
@@ -20,6 +21,7 @@ from hdcal.report.write import Report, write_report
 
 OPENED_SCHEMA = "hdcal.blind-opened/1"
 RESULT = "result"
+_LARGEST_KEY = 1 << 10
 
 
 @dataclass(frozen=True)
@@ -115,6 +117,8 @@ def _unsealed(found: BlindSet, key: Path) -> Sealed:
 
 
 def _read_key(path: Path) -> bytes:
+    if (why := why_not_readable(path, _LARGEST_KEY)) is not None:
+        raise refusal(path, why[0], "Name the key file of this set")
     try:
         return path.read_bytes().strip()
     except OSError as error:

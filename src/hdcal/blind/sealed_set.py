@@ -24,6 +24,7 @@ from hdcal.blind.seal import (
     new_salt,
     seal,
 )
+from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import versions
 from hdcal.report.plain import as_json, printable
@@ -31,6 +32,8 @@ from hdcal.report.saving.disk import write_file
 from hdcal.report.saving.reserve import reserve_file, reserve_folder
 from hdcal.report.saving.target import KeptBeside
 
+# Of one file of a set.
+_LARGEST = 1 << 30
 SET, SEALED, GEAR, CASES = "set.json", "sealed.bin", "gear.toml", "cases"
 GET_AGAIN = "Get the set again from whoever made it; this copy proves nothing"
 
@@ -246,6 +249,8 @@ def _encoded(text: str | bytes) -> bytes:
 
 
 def _bytes(path: Path, remedy: str) -> bytes:
+    if (why := why_not_readable(path, _LARGEST)) is not None:
+        raise refusal(path, why[0], remedy)
     try:
         return path.read_bytes()
     except FileNotFoundError:

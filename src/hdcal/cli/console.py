@@ -39,9 +39,16 @@ class Console:
         self.wrong = Findings()
         # Where the result goes; `reserve_folder` sets it.
         self.folder: TargetFolder | None = None
+        # Whether what reads the output went away.
+        self.unread = False
 
     def prepare(self) -> None:
         """Quiet the libraries, and let any text be printed on any terminal."""
+        # Closed ones are None.
+        sys.stdout, sys.stderr = (
+            stream or open(os.devnull, "w")  # noqa: SIM115, as long as the process
+            for stream in (sys.stdout, sys.stderr)
+        )
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="backslashreplace")
@@ -174,7 +181,12 @@ class Console:
         try:
             print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
         except BrokenPipeError:
+            self.unread = True
             discard_output()
+        except OSError:
+            # Where words cannot go, nobody can be told.
+            if not to_error:
+                raise
 
 
 def discard_output() -> None:

@@ -4,8 +4,10 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing.connection import wait
 from typing import Any
 
 from hdcal.cli.compilation_cache import keep_compilations
@@ -69,7 +71,16 @@ def completed(
 
 def _begin() -> None:
     """Prepare a process that works for another, which alone hears the keyboard."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Console(json=False).prepare()
     sys.stdout = open(os.devnull, "w")  # noqa: SIM115, lives as long as the process
     keep_compilations()
+
+
+def _end_with_parent() -> None:
+    """End this process once the one that it works for is gone, however it went."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

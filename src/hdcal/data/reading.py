@@ -1,5 +1,6 @@
 """Read one case: a table of measurements and the gear it was taken on."""
 
+import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -36,13 +37,14 @@ def read_case(
         InputError: holds everything that is wrong with either file.
     """
     data = Path(data)
-    folder = data.is_dir()
+    # As `is_dir`, but a path that no system takes is no folder.
+    folder = os.path.isdir(data)
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
     with Findings() as wrong:
         measured = wrong.attempt(read_measurements, csv_path, columns)
         found = None
-        if gear is None and not gear_path.exists():
+        if gear is None and not os.path.exists(gear_path):
             wrong.append(_no_gear(data))
         else:
             found = wrong.attempt(read_gear, gear_path, theory)

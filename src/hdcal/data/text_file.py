@@ -5,6 +5,7 @@ import hashlib
 from pathlib import Path
 
 from hdcal.data.findings import FileFindings
+from hdcal.data.regular_file import why_not_readable
 
 CHUNK = 1 << 18
 LONGEST_LINE = 1 << 20
@@ -27,8 +28,8 @@ def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
     Raises:
         InputError: missing, unreadable, a folder, binary, or a line over 1 MiB.
     """
-    if path.is_dir():
-        findings.refuse("is a folder", "Name the file inside it")
+    if (why := why_not_readable(path, LARGEST_FILE)) is not None:
+        findings.refuse(*why)
     try:
         raw = _stream(path, findings)
     except FileNotFoundError:

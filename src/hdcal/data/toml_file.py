@@ -8,6 +8,7 @@ from functools import cached_property
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 
 LARGEST = 1 << 20
@@ -73,13 +74,13 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
     Raises:
         InputError: missing, unreadable, too large, or not TOML.
     """
+    if isinstance(source, Path) and (why := why_not_readable(source, LARGEST)):
+        raise _refusal(file, *why)
     try:
         with source.open("rb") as stream:
             raw = stream.read(LARGEST + 1)
     except FileNotFoundError:
         raise _refusal(file, "does not exist", "Check the name") from None
-    except IsADirectoryError:
-        raise _refusal(file, "is a folder", "Name the file inside it") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         words = f"cannot be read ({reason})"

@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.toml_file import did_you_mean
 from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding
-from hdcal.prediction.engine.conditions import temperature_findings
+from hdcal.prediction.engine.conditions import level_findings, temperature_findings
 from hdcal.prediction.engine.sizes import SIZES, matters
 
 _LARGEST = 1e5
@@ -92,11 +92,9 @@ def place_findings(
     elif deformation.max() >= least_radius:
         words = f"{deformation.max():g} mm on a radius of {least_radius:g} mm"
         findings.append(Finding(where, words, "Give it in mm"))
-    if not np.isfinite(temperature).all():
-        findings.append(Finding(warmth, "is not finite", "Give numbers in °C"))
-        return findings
-    return findings + temperature_findings(
-        draws.gear, draws.values, temperature, warmth
+    return findings + (
+        level_findings(temperature, warmth)
+        or temperature_findings(draws.gear, draws.values, temperature, warmth)
     )
 
 

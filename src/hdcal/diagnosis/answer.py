@@ -1,6 +1,6 @@
 """The JSON answer of a diagnosis, verdict.json: what each number in it is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from hdcal.diagnosis.budget import Budget
@@ -12,6 +12,7 @@ from hdcal.diagnosis.verdict import (
     NextRun,
     Which,
 )
+from hdcal.errors import Finding
 from hdcal.report.answer import (
     Answer,
     Count,
@@ -126,3 +127,12 @@ class VerdictsAnswer(Answer):
 
     schema: Literal["hdcal.verdicts/1"] = "hdcal.verdicts/1"
     cases: dict[str, VerdictAnswer]
+    refused: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RefusedAnswer(Answer):
+    """What is wrong with the cases of one call that have no answer; refused.json."""
+
+    schema: Literal["hdcal.refused/1"] = "hdcal.refused/1"
+    cases: dict[str, tuple[Finding, ...]]

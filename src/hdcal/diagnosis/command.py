@@ -49,28 +49,31 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     one_thread_for_algebra()
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
-    from hdcal.diagnosis.overview import document_and_answer
+    from hdcal.diagnosis.overview import document_and_answer, write_refused
     from hdcal.physics.registry import EFFECTS
 
     with console.wrong as wrong:
         wrong.attempt(choose_library, settings["library"], EFFECTS)
-        found = []
+        asked = None
         if columns is not None:
-            found = wrong.attempt(read_cases, cases, gear, columns, theory) or []
-        if out is None and found:
-            # Of many cases the folder is no single one's.
-            out = f"{found[0].name}-diagnosis" if len(found) == 1 else "diagnosis"
+            asked = wrong.attempt(read_cases, cases, gear, columns, theory)
+        if out is None and asked is not None:
+            out = asked.folder
         console.reserve_folder(out, force)
+        if wrong and asked is not None:
+            wrong.extend(asked.findings)
+    assert asked is not None and console.folder is not None
     keep_compilations()
-    tell_notes(console, found)
+    tell_notes(console, asked)
     if settings["report"] is None:
-        settings["report"] = len(found) <= MANY
+        settings["report"] = len(asked.found) <= MANY
         if not settings["report"]:
             console.words(f"more than {MANY} cases: no reports without --report")
-    assert console.folder is not None
     with console.folder.filled() as folder:
-        answers = diagnose_all(found, folder, command=console.command, **settings)
-    opened = "report.html" if settings["report"] else "verdict.json"
-    return console.answer(
-        *document_and_answer(answers), out, opened if len(answers) == 1 else ""
-    )
+        made = diagnose_all(asked, folder, command=console.command, **settings)
+        if asked.many:
+            write_refused(made[1].refused, folder)
+    page = "report.html" if settings["report"] else "verdict.json"
+    opened = "" if asked.many else page
+    code = console.answer(*document_and_answer(*made), out, opened)
+    return 2 if made[1].refused else code

@@ -1,6 +1,7 @@
 """Many cases: read all of them before any work, then diagnose one after the other."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -13,26 +14,61 @@ from hdcal.data.reading import read_case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, Findings, HdcalError, InputError
 
+Refused = Mapping[str, tuple[Finding, ...]]
 
-def read_cases(paths: Sequence[str], gear, columns, theory) -> list[Case]:
-    """Read every case.
+
+@dataclass(frozen=True)
+class AskedCases:
+    """The cases of one call.
+
+    Attributes:
+        found: those that could be read, with names of their own.
+        refused: what is wrong with the others, by what the user called them.
+    """
+
+    found: Sequence[Case]
+    refused: Refused
+
+    @property
+    def many(self) -> bool:
+        """Return whether each case gets a folder of its own."""
+        return len(self.found) + len(self.refused) > 1
+
+    @property
+    def folder(self) -> str:
+        """Return the name of the result folder: of many cases it is no single one's."""
+        return "diagnosis" if self.many else f"{self.found[0].name}-diagnosis"
+
+    @property
+    def findings(self) -> list[Finding]:
+        """Return all that is wrong with any case, once."""
+        # One gear file may be behind many cases; its faults are said once.
+        return list(dict.fromkeys(f for each in self.refused.values() for f in each))
+
+
+def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
+    """Read every case; one that cannot be used does not stop the others.
 
     Raises:
-        InputError: holds everything that is wrong with any of them.
+        InputError: holds everything that is wrong where no case can be used.
     """
     found: dict[str, Case] = {}
-    with Findings() as wrong:
-        for path in paths:
-            case = wrong.attempt(_read, path, gear, columns, theory)
-            if case is None:
-                continue
+    refused: dict[str, tuple[Finding, ...]] = {}
+    for path in paths:
+        wrong = Findings()
+        case = wrong.attempt(_read, path, gear, columns, theory)
+        if case is not None and case.name.casefold() in found:
+            words = f"a second case is called '{case.name}', as is its result"
+            wrong.append(Finding(path, words, "Rename one, or run it by itself"))
+        if wrong:
+            refused[path] = (*refused.get(path, ()), *wrong)
+        elif case is not None:
             # Some file systems know no capitals.
-            name = case.name.casefold()
-            if name in found:
-                words = f"a second case is called '{case.name}', as is its result"
-                wrong.append(Finding(path, words, "Rename one, or run it by itself"))
-            found[name] = case
-    return list(found.values())
+            found[case.name.casefold()] = case
+    asked = AskedCases(list(found.values()), refused)
+    if not found:
+        raise InputError(asked.findings)
+    return asked
 
 
 def _read(path: str, gear, columns, theory) -> Case:
@@ -41,34 +77,36 @@ def _read(path: str, gear, columns, theory) -> Case:
     return case
 
 
-def tell_notes(console: Console, cases: Sequence[Case]) -> None:
+def tell_notes(console: Console, asked: AskedCases) -> None:
     """Print what was noted while the cases were read."""
-    for case in cases:
+    for case in asked.found:
         for note in case.notes:
-            console.words(note if len(cases) == 1 else f"{case.name}: {note}")
+            console.words(f"{case.name}: {note}" if asked.many else note)
 
 
 def diagnose_all(
-    cases: Sequence[Case], folder: Path, *, jobs: int, command: str, **settings
-) -> dict[str, VerdictAnswer]:
+    asked: AskedCases, folder: Path, *, jobs: int, command: str, **settings
+) -> tuple[dict[str, VerdictAnswer], AskedCases]:
     """Diagnose every case and write its result.
 
     Args:
-        cases: with names of their own.
+        asked: the cases.
         folder: to write into; each of many cases gets a folder inside it.
         jobs: processes.
         command: how the results are made.
         settings: library, quick, report, seed.
 
     Returns:
-        Answers by name, in the order of the cases.
+        Answers by name, in the order of the cases; and the cases, those refused
+        among them that a diagnosis found something wrong with.
 
     Raises:
-        InputError: holds everything that a diagnosis found wrong with its case.
+        InputError: holds everything that is wrong where no case can be used.
     """
     work = partial(_diagnose_one, command=command, **settings)
+    cases = asked.found
     with progress_bar("diagnosing") as progress:
-        if len(cases) == 1:
+        if not asked.many:
             outcomes = [work(cases[0], folder, progress=progress)]
         else:
             places = [folder / case.name for case in cases]
@@ -76,14 +114,19 @@ def diagnose_all(
                 place.mkdir()
             tasks = list(zip(cases, places, strict=True))
             outcomes = run_all(work, tasks, jobs, progress)
-    found = {}
-    with Findings() as wrong:
-        for case, outcome in zip(cases, outcomes, strict=True):
-            if isinstance(outcome, VerdictAnswer):
-                found[case.name] = outcome
-            else:
-                wrong += outcome
-    return found
+    found: dict[str, VerdictAnswer] = {}
+    refused = dict(asked.refused)
+    for case, outcome in zip(cases, outcomes, strict=True):
+        if isinstance(outcome, VerdictAnswer):
+            found[case.name] = outcome
+        else:
+            refused[case.name] = outcome
+            if asked.many:
+                (folder / case.name).rmdir()
+    left = AskedCases([case for case in cases if case.name in found], refused)
+    if not found:
+        raise InputError(left.findings)
+    return found, left
 
 
 def _diagnose_one(

@@ -17,6 +17,7 @@ from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
@@ -157,6 +158,7 @@ class Posterior(Shown):
             model = json.loads(tree.attrs["model"])
             if model["settings"].get("kind", "static") != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
+            check_draws(tree, model["priors"])
             case = posterior_file.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
@@ -175,7 +177,7 @@ class Posterior(Shown):
                 checks=tuple(Check(**check) for check in model["checks"]),
                 settings=model["settings"],
             )
-        except (KeyError, ValueError, TypeError) as error:
+        except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error
 
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -11,6 +12,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.errors import Finding, InputError
+from hdcal.inference.posterior_limits import check_container
 
 FORMAT = "hdcal.posterior/1"
 # The attribute that holds the digest of everything else.
@@ -108,9 +110,10 @@ def open_tree(path) -> xr.DataTree:
     """Open a posterior file and read it whole.
 
     Raises:
-        InputError: it is missing or not a posterior file.
+        InputError: it is missing, not a posterior file, or declares what none holds.
     """
     try:
+        check_container(Path(path))
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             loaded = tree.load()
     except FileNotFoundError as error:
@@ -123,6 +126,8 @@ def open_tree(path) -> xr.DataTree:
                 )
             ]
         ) from error
+    except InputError:
+        raise
     except Exception as error:
         raise InputError([not_a_posterior(path)]) from error
     return loaded

@@ -67,6 +67,7 @@ def track(console: Console, known, gear, **settings):
         console.words(f"interrupted after {tracker.rows} rows")
         return 130
     except BrokenPipeError:
+        console.unread = True
         discard_output()
     words = f"{tracker.rows} rows, {tracker.alarms} alarms"
     console.words(words + (f", {bad} rows that were no reading" if bad else ""))

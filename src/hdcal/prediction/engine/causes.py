@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from hdcal.data.prior import Prior
+from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.density import POSITIVE, Values
 from hdcal.inference.distributions import distribution
@@ -17,6 +18,7 @@ from hdcal.inference.problem import Problem
 
 VERDICT = "verdict.json"
 SCHEMA = "hdcal.verdict/1"
+_LARGEST_VERDICT = 64 << 20
 # What a posterior of a diagnosis knows of the diagnosis: its own hypothesis, and the
 # probabilities of all that were calibrated.
 ORIGIN = "diagnosis"
@@ -149,6 +151,8 @@ def read_models(run: Path | str) -> list[tuple[float, Posterior]]:
 
 def _read_verdict(path: Path) -> dict:
     """Return a verdict of this version with whole entries for its models."""
+    if (why := why_not_readable(path, _LARGEST_VERDICT)) is not None:
+        raise InputError([Finding(str(path), *why)])
     words, remedy = "is not a verdict that hdcal wrote", "Diagnose again"
     try:
         found = json.loads(path.read_text("utf-8"))

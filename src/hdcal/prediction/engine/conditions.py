@@ -18,6 +18,8 @@ SENSE = {"up": 1.0, "down": -1.0}
 # How far beyond the data still counts as tested: thermometers are no better [K], and
 # a deformation is compared with itself as it was written [mm].
 NEAR_K, NEAR_MM = 1.0, 1e-9
+# Temperatures of one answer; each is a row of it.
+MOST_LEVELS = 1_000
 _ABSOLUTE_ZERO = -273.15
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
@@ -85,6 +87,21 @@ def temperature_is_tested(records: Records, temperature) -> np.ndarray:
 def _within(values, measured, slack: float) -> np.ndarray:
     low, high = np.min(measured), np.max(measured)
     return (values >= low - slack) & (values <= high + slack)
+
+
+def level_findings(temperature: np.ndarray, name: str) -> list[Finding]:
+    """Return what is wrong with the temperatures at all of which something holds.
+
+    Args:
+        temperature: those asked for [°C].
+        name: of the parameter.
+    """
+    if temperature.size == 0 or not np.isfinite(temperature).all():
+        return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
+    if temperature.size > MOST_LEVELS:
+        words = f"{temperature.size} temperatures are too many"
+        return [Finding(name, words, f"Give at most {MOST_LEVELS}")]
+    return []
 
 
 def temperature_findings(

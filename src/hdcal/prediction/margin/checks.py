@@ -6,7 +6,11 @@ import numpy as np
 
 from hdcal.errors import Finding, InputError
 from hdcal.prediction.engine.causes import Cause, likeliest
-from hdcal.prediction.engine.conditions import DIRECTIONS, temperature_findings
+from hdcal.prediction.engine.conditions import (
+    DIRECTIONS,
+    level_findings,
+    temperature_findings,
+)
 from hdcal.prediction.engine.forces import QUANTITIES
 from hdcal.prediction.engine.population import check_population
 from hdcal.prediction.engine.population_force import MOST_DRAWS
@@ -74,10 +78,9 @@ def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
 
 
 def _check_temperature(cause: Cause, temperature) -> list[Finding]:
-    if temperature.size == 0 or not np.isfinite(temperature).all():
-        remedy = "Give it like -20:80, in °C"
-        return [Finding("temperature", "is an empty window", remedy)]
-    return temperature_findings(cause.posterior.case.gear, cause.values, temperature)
+    return level_findings(temperature, "temperature") or temperature_findings(
+        cause.posterior.case.gear, cause.values, temperature
+    )
 
 
 def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:

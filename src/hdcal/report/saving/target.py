@@ -95,10 +95,10 @@ class Target(ABC):
             if isinstance(error, Foreign):
                 problem = str(error)
             beside = rename_beside(building, self.path)
+            self._confirm()
             problem += f", and was kept; the result lies beside it, in '{beside.name}'"
             raise self._kept(problem) from None
-        finally:
-            self._confirm()
+        self._confirm()
         if older is not None:
             problem = "was edited as the result took its place"
             raise self._kept(f"{problem}; what was there lies in '{older.name}'")

@@ -1,0 +1,154 @@
+"""Posterior files from strangers: refused by what they declare, before it is read."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import xarray as xr
+
+from hdcal.data.regular_file import why_not_readable
+from hdcal.errors import Finding, InputError
+
+LARGEST_FILE = 1 << 32
+# What a file may unpack to: this many times its size, but at least so many bytes.
+_MOST_UNPACKED, _LEAST_LIMIT = 16, 64 << 20
+_LARGEST_CHUNK = 64 << 20
+_MOST_OBJECTS, _MOST_ATTRIBUTES, _MOST_TEXTS = 2_000, 500, 20_000
+_MOST_LETTERS = 64 << 20
+# How NetCDF names what HDF5 itself needs; they hold references.
+_OF_DIMENSIONS = frozenset({"DIMENSION_LIST", "REFERENCE_LIST"})
+# Parameters of every model; others depend on what was measured.
+_EVERYWHERE = frozenset({"K", "E0", "alpha", "deformation_offset"})
+
+
+def check_container(path: Path) -> None:
+    """Refuse a file whose declared content is no posterior's or does not fit.
+
+    Only declarations are read, and texts as long as they stay short.
+
+    Raises:
+        InputError: links, loops, other types, or more data than a file of its size
+            can hold.
+        OSError: it is missing or no HDF5 file.
+    """
+    if (why := why_not_readable(path, LARGEST_FILE)) is not None:
+        raise InputError([Finding(str(path), *why)])
+    limit = max(_MOST_UNPACKED * path.stat().st_size, _LEAST_LIMIT)
+    with h5py.File(path, "r") as file:
+        try:
+            size = sum(_declared(each) for each in _objects(file))
+        except (KeyError, TypeError, ValueError, RuntimeError) as error:
+            raise _refusal(path, str(error) or "holds what no posterior does") from None
+    if size > limit:
+        words = f"declares {size >> 20} MiB of data, more than its size can hold"
+        raise _refusal(path, words)
+
+
+def _objects(file: h5py.File) -> Iterator[h5py.Group | h5py.Dataset]:
+    """Yield every group and dataset once.
+
+    Raises:
+        ValueError: a link leads elsewhere or back, or there are too many objects.
+    """
+    waiting: list[h5py.Group] = [file]
+    seen = {h5py.h5o.get_info(file.id).addr}
+    while waiting:
+        group = waiting.pop()
+        yield group
+        for name in group:
+            if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                raise ValueError("holds a link to another place")
+            found = group[name]
+            if not isinstance(found, h5py.Group | h5py.Dataset):
+                raise ValueError("holds what is neither group nor data")
+            address = h5py.h5o.get_info(found.id).addr
+            if address in seen:
+                raise ValueError("holds a loop of links")
+            seen.add(address)
+            if len(seen) > _MOST_OBJECTS:
+                raise ValueError(f"holds more than {_MOST_OBJECTS} objects")
+            if isinstance(found, h5py.Group):
+                waiting.append(found)
+            else:
+                yield found
+
+
+def _declared(found: h5py.Group | h5py.Dataset) -> int:
+    """Return how many bytes an object unpacks to.
+
+    Raises:
+        ValueError: a type or a chunk that no posterior has.
+    """
+    if len(found.attrs) > _MOST_ATTRIBUTES:
+        raise ValueError(f"holds more than {_MOST_ATTRIBUTES} attributes in one place")
+    size = 0
+    for name in found.attrs:
+        held = found.attrs.get_id(name)
+        if name not in _OF_DIMENSIONS:
+            _check_type(held.dtype)
+        count = int(np.prod(held.shape, dtype=object))
+        if count > _MOST_TEXTS:
+            raise ValueError(f"holds more than {_MOST_TEXTS} values in an attribute")
+        size += count * held.dtype.itemsize
+    if isinstance(found, h5py.Group):
+        return size
+    _check_type(found.dtype)
+    if found.is_virtual or found.external:
+        raise ValueError("keeps its data in another file")
+    chunk = np.prod(found.chunks or (0,), dtype=object) * found.dtype.itemsize
+    if chunk > _LARGEST_CHUNK:
+        raise ValueError("is cut into chunks of an absurd size")
+    count = int(np.prod(found.shape, dtype=object))
+    if found.dtype.kind == "O":
+        return size + _letters(found, count)
+    return size + count * found.dtype.itemsize
+
+
+def _check_type(dtype: np.dtype) -> None:
+    text = h5py.check_string_dtype(dtype) is not None
+    if dtype.kind not in "biuf" and not text:
+        raise ValueError("holds data of a type that no posterior has")
+
+
+def _letters(found: h5py.Dataset, count: int) -> int:
+    """Return the length of all texts; many may be one and the same long one."""
+    if count > _MOST_TEXTS:
+        raise ValueError(f"holds more than {_MOST_TEXTS} texts")
+    letters = 0
+    for index in np.ndindex(found.shape):
+        letters += len(found[index])
+        if letters > _MOST_LETTERS:
+            raise ValueError("holds texts of an absurd length")
+    return letters
+
+
+def check_draws(tree: xr.DataTree, sites: Iterable[str]) -> None:
+    """Check that draws and rows are whole, whoever wrote them.
+
+    Args:
+        tree: as it was read.
+        sites: parameters that the model has a prior of; those that every model has
+            and those of effects have to be there.
+
+    Raises:
+        KeyError, ValueError: they are not.
+    """
+    for name, group in (("posterior", ("chain", "draw")), ("constant_data", ())):
+        for variable in tree[name].to_dataset().data_vars.values():
+            if variable.dims[: len(group)] != group:
+                raise ValueError(f"{variable.name} has other axes")
+            if variable.dtype.kind not in "biuf" or not np.isfinite(variable).all():
+                raise ValueError(f"{variable.name} is not finite")
+    needed = {name for name in sites if name in _EVERYWHERE or "." in name}
+    missing = needed - set(tree["posterior"].data_vars)
+    if missing:
+        raise KeyError(*missing)
+    sizes = tree["posterior"].sizes
+    if sizes["chain"] < 1 or sizes["draw"] < 1:
+        raise ValueError("there are no draws")
+
+
+def _refusal(path: Path, words: str) -> InputError:
+    remedy = "Take a file that hdcal wrote, or calibrate again"
+    return InputError([Finding(str(path), words, remedy)])

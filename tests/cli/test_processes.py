@@ -1,0 +1,66 @@
+"""Processes of one command end with it, whatever ends it."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+WORK = (
+    "import time; from hdcal.cli.processes import run_all\n"
+    "if __name__ == '__main__': run_all(time.sleep, [(100,), (100,)], 2)"
+)
+SLOW = """
+import pathlib, time
+import hdcal.data.reading as reading
+from hdcal.__main__ import main
+
+def slow(*_, **__):
+    try:
+        print("begun", flush=True)
+        time.sleep(100)
+    finally:
+        time.sleep(1)
+        pathlib.Path("cleaned-up").touch()
+
+reading.read_case = slow
+main(["check", "case"])
+"""
+
+
+def test_workers_do_not_outlive_a_killed_command(tmp_path: Path):
+    script = tmp_path / "work.py"
+    script.write_text(WORK)
+    with subprocess.Popen([sys.executable, script]) as command:
+        parent = psutil.Process(command.pid)
+        # Two workers, and Python's own process that looks after shared things.
+        limit = time.monotonic() + 60
+        while len(parent.children()) < 3 and time.monotonic() < limit:
+            time.sleep(0.05)
+        workers = parent.children()
+        time.sleep(1)  # so that they have begun
+        command.kill()
+    _, alive = psutil.wait_procs(workers, timeout=20)
+    assert len(workers) == 3 and not alive
+
+
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_interruption_does_not_disturb_the_first(by, tmp_path: Path):
+    with subprocess.Popen(
+        [sys.executable, "-c", SLOW],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    ) as command:
+        assert command.stdout is not None and command.stderr is not None
+        assert command.stdout.readline() == b"begun\n"
+        for _ in range(3):
+            command.send_signal(by)
+            time.sleep(0.2)
+        said = command.stderr.read()
+        assert command.wait(30) == 130
+    assert said.strip() == b"hdcal: interrupted: nothing was written"
+    assert (tmp_path / "cleaned-up").exists()

@@ -1,0 +1,181 @@
+"""A posterior file from a stranger is refused by what it declares, unread."""
+
+import os
+import shutil
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from posteriors import batch
+
+from hdcal.errors import InputError
+from hdcal.inference import posterior_file
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_file import open_tree
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("honest") / "posterior.nc"
+    batch(3, 20).save(path)
+    return path
+
+
+def bomb(file: h5py.File) -> None:
+    """Nine gigabytes of zeros in some kilobytes."""
+    size, chunk = 9 << 27, 1 << 20
+    held = file.create_dataset(
+        "posterior/many", (size,), "f8", chunks=(chunk,), compression="gzip"
+    )
+    held[:chunk] = 0.0
+
+
+def unwritten(file: h5py.File) -> None:
+    file.create_dataset("posterior/many", (1 << 40,), "f8")
+
+
+def loop(file: h5py.File) -> None:
+    file["posterior/again"] = file["/"]
+
+
+def twice(file: h5py.File) -> None:
+    file["posterior/again"] = file["posterior/K"]
+
+
+def soft_link(file: h5py.File) -> None:
+    file["posterior/again"] = h5py.SoftLink("/posterior")
+
+
+def external_link(file: h5py.File) -> None:
+    file["posterior/again"] = h5py.ExternalLink("other.nc", "/")
+
+
+def external_data(file: h5py.File) -> None:
+    file.create_dataset("posterior/x", (4,), "f8", external=[("/etc/passwd", 0, 32)])
+
+
+def virtual_data(file: h5py.File) -> None:
+    layout = h5py.VirtualLayout((4,), "f8")
+    layout[:] = h5py.VirtualSource("other.nc", "x", (4,))
+    file.create_virtual_dataset("posterior/x", layout)
+
+
+def lists(file: h5py.File) -> None:
+    file.create_dataset("posterior/x", (4,), h5py.vlen_dtype("f8"))
+
+
+def records(file: h5py.File) -> None:
+    file.create_dataset("posterior/x", (4,), [("a", "f8"), ("b", "i4")])
+
+
+def references(file: h5py.File) -> None:
+    file["posterior"].attrs["x"] = file["posterior/K"].ref
+
+
+def named_type(file: h5py.File) -> None:
+    file["posterior/x"] = np.dtype("f8")
+
+
+def absurd_chunk(file: h5py.File) -> None:
+    file.create_dataset("posterior/x", (4,), "f8", maxshape=(None,), chunks=(1 << 28,))
+
+
+def one_long_text(file: h5py.File) -> None:
+    """The same megabyte, named ten thousand times."""
+    text = file.create_dataset("posterior/x", (10_000,), h5py.string_dtype())
+    text[:] = ["x" * 20_000] * 10_000
+
+
+def many_objects(file: h5py.File) -> None:
+    for index in range(2_500):
+        file.create_group(f"posterior/g{index}")
+
+
+HOSTILE = [
+    bomb,
+    unwritten,
+    loop,
+    twice,
+    soft_link,
+    external_link,
+    external_data,
+    virtual_data,
+    lists,
+    records,
+    references,
+    named_type,
+    absurd_chunk,
+    one_long_text,
+    many_objects,
+]
+
+
+@pytest.mark.parametrize("spoil", HOSTILE)
+def test_what_no_posterior_declares_is_refused_unread(file, tmp_path, spoil):
+    copy = Path(shutil.copy(file, tmp_path / "posterior.nc"))
+    with h5py.File(copy, "a") as opened:
+        spoil(opened)
+    begun = time.process_time()
+    with pytest.raises(InputError, match="Take a file that hdcal wrote"):
+        open_tree(copy)
+    # To read what they declare would take minutes, or for ever.
+    assert time.process_time() - begun < 5.0
+
+
+def test_a_pipe_and_a_device_are_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("/dev/zero")
+    for name in ("pipe", "link"):
+        with pytest.raises(InputError, match="may never end"):
+            open_tree(tmp_path / name)
+
+
+def nothing_drawn(tree) -> None:
+    tree["posterior"] = tree["posterior"].isel(draw=slice(0, 0))
+
+
+def not_finite(tree) -> None:
+    tree["posterior/K"].values[0, 3] = np.nan
+
+
+def without_a_parameter(tree) -> None:
+    del tree["posterior"]["K"]
+
+
+def texts_for_numbers(tree) -> None:
+    draws = tree["posterior"].to_dataset()
+    draws["K"] = draws["K"].astype(str)
+    tree["posterior"] = draws
+
+
+def other_axes(tree) -> None:
+    draws = tree["posterior"].to_dataset()
+    draws["K"] = draws["K"].transpose()
+    tree["posterior"] = draws
+
+
+def rows_not_finite(tree) -> None:
+    tree["constant_data/deformation"].values[0] = np.inf
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        nothing_drawn,
+        not_finite,
+        without_a_parameter,
+        texts_for_numbers,
+        other_axes,
+        rows_not_finite,
+    ],
+)
+def test_a_broken_content_is_refused_though_its_digest_is_right(file, tmp_path, spoil):
+    tree = open_tree(file)
+    spoil(tree)
+    del tree.attrs[posterior_file.DIGEST]
+    tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
+    tree.to_netcdf(tmp_path / "posterior.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match="is not a posterior that hdcal wrote"):
+        Posterior.load(tmp_path)
