@@ -162,10 +162,11 @@ def attack(way: str, renames: bool, again: bool, base: Path) -> dict[str, Any]:
     former = None if before is None else OLD
     # With two renames there is a moment without the target, until the next start.
     early = {former, NEW} if renames else {former, NEW, None}
-    number, kills, wrong = 0, 0, []
+    number, calls, kills, wrong = 0, 0, 0, []
     ended = False
     while not ended:
-        number, second = number + 1, 0
+        # Of the first kills a seventh, where each is followed by many others.
+        number, calls, second = number + (7 if again else 1), calls + 1, 0
         restarted = False
         while not restarted:
             second += 1
@@ -180,7 +181,7 @@ def attack(way: str, renames: bool, again: bool, base: Path) -> dict[str, Any]:
             found += look(folder, read, {former, NEW}, final=True)
             wrong += [f"{way}, call {number}/{second}: {words}" for words in found]
             shutil.rmtree(folder)
-    return {"calls": number - 1, "kills": kills, "wrong": wrong}
+    return {"calls": calls - 1, "kills": kills, "wrong": wrong}
 
 
 if __name__ == "__main__":
