@@ -39,7 +39,7 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
 
 
 _EPILOG = (
-    "Exit codes: 0 done, 1 the result must not be used, 2 bad input, 130 interrupted."
+    "Exit codes: 0 done, 1 no result that may be used, 2 bad input, 130 interrupted."
 )
 
 

@@ -51,6 +51,10 @@ class InputError(HdcalError):
         super().__init__("\n".join(str(finding) for finding in self.findings))
 
 
+class NotWritable(HdcalError):
+    """The disk refused a result while it was written; nothing of it is left there."""
+
+
 class NotUsable(HdcalError):
     """A result exists but failed its checks, so nothing may be derived from it."""
 
@@ -62,7 +66,7 @@ class Findings(list[Finding]):
 
         with Findings() as wrong:
             case = wrong.attempt(read_case, path)
-            wrong.attempt(check_target, out)
+            wrong.attempt(choose_effects, names)
     """
 
     def attempt(

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import DESK, PAPER, PHONE, Seen, look, print_pages
+from results import write_result
 
 from hdcal.blind.figure import bar_figure, confusion_figure
 from hdcal.blind.label import CaseAnswer, Label
@@ -19,8 +21,7 @@ from hdcal.blind.scoring.scores import Scores, score
 from hdcal.blind.summary import scores_report
 from hdcal.blind.words import bar_row, span, with_span
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.folder import OUTPUTS
-from hdcal.report.write import write_report
+from hdcal.report.saving.contents import STAMP
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}
 FAMILIES = {name: effect.family for name, effect in EFFECTS.items()}
@@ -75,7 +76,7 @@ def written(tmp_path_factory) -> Callable[[str], Path]:
     @cache
     def write(name: str) -> Path:
         target = tmp_path_factory.mktemp(name)
-        write_report(scores_report(made(*SETS[name])), target, force=True)
+        write_result(scores_report(made(*SETS[name])), target, force=True)
         return target
 
     return write
@@ -120,12 +121,16 @@ def test_it_can_be_printed(folder: Path, tmp_path: Path):
     assert 2 <= print_pages(folder / "report.html", tmp_path) <= 15
 
 
-def test_everything_is_written_and_may_be_replaced(folder: Path):
+def test_everything_is_written_and_may_be_replaced(folder: Path, tmp_path: Path):
+    folder = shutil.copytree(folder, tmp_path / "copy")
     names = {entry.name for entry in folder.iterdir()}
     pictures = {"bar", "confusion", "reliability", "detection"}
     kinds = {f"{name}.{kind}" for name in pictures for kind in ("svg", "png")}
-    assert names == {"scores.json", "report.html"} | kinds
-    assert names <= OUTPUTS
+    assert names == {"scores.json", "report.html", STAMP} | kinds
+    stamped = json.loads((folder / STAMP).read_text("utf-8"))["files"]
+    assert {one["file"] for one in stamped} == names - {STAMP}
+    write_result(scores_report(made(*SETS["few"])), folder, force=True)
+    assert {entry.name for entry in folder.iterdir()} == names
 
 
 def fields_of(value) -> dict:
@@ -164,7 +169,7 @@ def test_met_and_missed_are_said_in_words(written):
 
 
 def test_the_same_scores_give_the_same_files(written, tmp_path: Path):
-    write_report(scores_report(made(*SETS["few"])), tmp_path, force=True)
+    write_result(scores_report(made(*SETS["few"])), tmp_path, force=True)
     entries = list(written("few").iterdir())
     assert entries
     for entry in entries:

@@ -52,6 +52,7 @@ def test_the_folder_holds_what_it_should(calibrated: Calibrated):
         "calibration.png",
         "report.html",
         "summary.json",
+        "hdcal-result.json",
     }
     assert [path.name for path in folder.parent.iterdir()] == ["result"]
     assert (folder / "calibration.png").read_bytes().startswith(b"\x89PNG")

@@ -17,7 +17,8 @@ def test_the_audit_as_words_json_and_page(here: Hdcal, tmp_path: Path):
     page = (out / "report.html").read_text("utf-8")
     assert all(claim["verdict"] in page for claim in found["claims"])
     assert "http://" not in page and "https://" not in page
-    assert {entry.name for entry in out.iterdir()} == {"audit.json", "report.html"}
+    names = {"audit.json", "report.html", "hdcal-result.json"}
+    assert {entry.name for entry in out.iterdir()} == names
     assert here("audit", "--out", out, "--force").returncode == 0
 
 

@@ -26,7 +26,8 @@ def test_a_folder_holds_report_figure_and_numbers(here: Hdcal, tmp_path: Path):
     arguments = ["fit", XB1, "--degree", "2", "--through-origin", "--out", out]
     assert here(*arguments).returncode == 0
     names = {entry.name for entry in out.iterdir()}
-    assert names == {"fit.json", "fit.svg", "fit.png", "report.html"}
+    files = {"fit.json", "fit.svg", "fit.png", "report.html"}
+    assert names == files | {"hdcal-result.json"}
     page = (out / "report.html").read_text("utf-8")
     assert "a ω + b ω²" in page and "c + a ω" not in page
     assert here(*arguments).returncode == 2

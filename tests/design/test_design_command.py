@@ -11,6 +11,7 @@ import jsonschema
 import pytest
 from browser import PHONE, look
 from commands import XB1, Done, Hdcal
+from results import write_result
 
 from hdcal.data.gear import read_gear
 from hdcal.design.answer import GeneratorAnswer, InverseAnswer
@@ -23,7 +24,7 @@ from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.report.answer import Answer, json_schema
-from hdcal.report.write import write_report
+from hdcal.report.saving.contents import STAMP
 
 WALL = "wall_thickness_mm=0.5:0.8"
 FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
@@ -52,13 +53,13 @@ def folders(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pa
     posterior = replace(posterior, case=replace(posterior.case, gear=gear))
     sizes = {"wall_thickness_mm": (0.5, 0.8), "radius_mm": (38.0, 45.0)}
     spring = wave_generator(posterior, (0.38, 0.42))
-    write_report(generator_report(spring), base / "generator")
+    write_result(generator_report(spring), base / "generator")
     among = ["40CrNiMoA", "Ti-6Al-4V"]
     made = inverse_design(posterior, sizes, 70.0, materials=among)
-    write_report(inverse_report(made), base / "inv")
+    write_result(inverse_report(made), base / "inv")
     vary = {"wall_thickness_mm": [0.6, 0.7], "radius_mm": [38, 40, 42]}
     tabulated = study(posterior, vary, materials=among)
-    write_report(study_report(tabulated), base / "study")
+    write_result(study_report(tabulated), base / "study")
     return {name: base / name for name in ("generator", "inv", "study")}
 
 
@@ -69,7 +70,7 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     said = valid(done.stdout, GeneratorAnswer)
     folder = tmp_path / "xb1-100-80-design"
     files = {path.name for path in folder.iterdir()}
-    assert files == {"design.json", "report.html", *FIGURES}
+    assert files == {"design.json", "report.html", STAMP, *FIGURES}
     assert json.loads((folder / "design.json").read_text("utf-8")) == said
     assert (said["schema"], said["kind"]) == ("hdcal.design/1", "wave_generator")
     assert said["spring"]["probability"] >= 0.99
@@ -107,7 +108,8 @@ def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
     assert done.returncode == 0, done.stderr
     folder = tmp_path / "xb1-100-80-study"
     names = {path.name for path in folder.iterdir()}
-    assert names == {"study.csv", "study.json", "study.svg", "study.png", "report.html"}
+    files = {"study.csv", "study.json", "study.svg", "study.png", "report.html"}
+    assert names == files | {STAMP}
     with (folder / "study.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 15
@@ -239,7 +241,7 @@ def test_the_longest_table_is_cut_and_says_so(folders: dict[str, Path]):
     gear = read_gear(XB1 / "gear.toml")
     many = study(gear, {"wall_thickness_mm": [0.6 + 1e-4 * i for i in range(201)]})
     told = study_report(many)
-    write_report(told, folders["study"].parent / "many")
+    write_result(told, folders["study"].parent / "many")
     page = (folders["study"].parent / "many" / "report.html").read_text("utf-8")
     assert page.count("<td>40CrNiMoA</td>") == 200
     assert "The first 40 of 201" in page and "The first 200 of 201" in page

@@ -16,6 +16,7 @@ from hdcal.cli.processes import run_all
 from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.errors import Finding, InputError
 from hdcal.report.answer import json_schema
+from hdcal.report.saving.contents import STAMP
 
 SCHEMA = json_schema(VerdictAnswer)
 
@@ -78,7 +79,7 @@ def names(folder: Path) -> set[str]:
 def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
     done = diagnose(cases["named"], "--out", "run", "--json", "--seed", "3")
     assert done.returncode == 0, done.stderr
-    assert names(tmp_path / "run") == FILES
+    assert names(tmp_path / "run") == FILES | {STAMP}
     found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
     jsonschema.validate(found, SCHEMA)
     assert json.loads(done.stdout) == found
@@ -89,7 +90,7 @@ def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
 
 def test_the_folder_is_named_after_the_case(diagnose, cases, tmp_path: Path):
     assert diagnose(cases["none"], "--no-report").returncode == 0
-    assert names(tmp_path / "none-diagnosis") == {"verdict.json"}
+    assert names(tmp_path / "none-diagnosis") == {"verdict.json", STAMP}
 
 
 def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
@@ -98,8 +99,9 @@ def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
     asked = [cases["named"], cases["none"], "a.csv", "--json", "--out", "all"]
     done = diagnose(*asked, "--report")
     assert done.returncode == 0, done.stderr
-    assert names(tmp_path / "all") == {"named", "none", "a"}
-    assert all(names(folder) == FILES for folder in (tmp_path / "all").iterdir())
+    assert names(tmp_path / "all") == {"named", "none", "a", STAMP}
+    for name in ("named", "none", "a"):
+        assert names(tmp_path / "all" / name) == FILES
     asked.append("--no-report")
     said = json.loads(done.stdout)["cases"]
     assert list(said) == ["named", "none", "a"]
@@ -110,7 +112,7 @@ def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
     assert diagnose(*asked, "--force").returncode == 0
     (tmp_path / "all" / "named" / "notes.txt").write_text("mine")
     refused = diagnose(*asked, "--force")
-    assert refused.returncode == 2 and "'named'" in refused.stderr
+    assert refused.returncode == 2 and "'named/notes.txt'" in refused.stderr
 
 
 def test_a_failed_case_is_written_and_told_by_the_exit_code(
@@ -155,7 +157,7 @@ def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path
     asked = [*(cases[n] for n in ("none", "unknown", "refused", "named")), "none"]
     done = diagnose(*asked, "--no-report", "--out", "all", "--json")
     assert done.returncode == 2
-    assert names(tmp_path / "all") == {"none", "named", "refused.json"}
+    assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
     said = json.loads(done.stdout)
     jsonschema.validate(said, json_schema(VerdictsAnswer))
     assert list(said["cases"]) == ["none", "named"]

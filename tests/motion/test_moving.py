@@ -236,7 +236,8 @@ def test_the_command_writes_what_the_library_found(
     assert summary["schema"] == "hdcal.dynamic-calibration/1"
     assert summary["status"] == ["ok", "failed"][code]
     names = {"motion.csv", "motion.png", "motion.svg", "posterior.nc", "report.html"}
-    assert {file.name for file in out.iterdir()} == names | {"summary.json"}
+    names |= {"summary.json", "hdcal-result.json"}
+    assert {file.name for file in out.iterdir()} == names
     page = (out / "report.html").read_text("utf-8")
     marked = "FAILED — do not use" in page
     assert marked == (code == 1)

@@ -36,7 +36,8 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     assert printed["status"] == "ok"
     out = Path("run-response")
     names = {"response.csv", "response.json", "response.png", "response.svg"}
-    assert {file.name for file in out.iterdir()} == names | {"report.html"}
+    names |= {"report.html", "hdcal-result.json"}
+    assert {file.name for file in out.iterdir()} == names
     columns = printed.pop("columns")
     assert printed == json.loads((out / "response.json").read_text("utf-8"))
     jsonschema.validate(printed, json_schema(ResponseAnswer))

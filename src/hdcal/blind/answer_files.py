@@ -8,8 +8,10 @@ from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import Entry, is_name, is_stamped, stamped
 from hdcal.blind.sealed_set import BlindSet, read_json, refusal
 from hdcal.errors import InputError
-from hdcal.report.folder import write_whole
 from hdcal.report.plain import as_json, as_plain
+from hdcal.report.saving.leftovers import sweep
+from hdcal.report.saving.reserve import reserve_file, write_whole
+from hdcal.report.saving.target import TargetFile
 
 ANSWER_SCHEMA, ANSWERS_SCHEMA = "hdcal.blind-answer/1", "hdcal.blind-answers/1"
 _PREFIX = "answers-"
@@ -40,16 +42,20 @@ class AnswerFiles:
         """Return the file of one answer."""
         return self.folder / f"{case}.json"
 
-    def check_free(self) -> None:
-        """Refuse to answer what is frozen.
+    def reserve(self) -> TargetFile:
+        """Reserve the file of the frozen answers: nobody else answers meanwhile.
 
         Raises:
-            InputError: it is.
+            InputError: they are frozen already, or somebody else is answering.
         """
         if self.file.exists():
             words = "exists already: these answers are frozen"
             remedy = f"Move it and {self.folder.name} away to answer anew"
             raise refusal(self.file, words, remedy)
+        target = reserve_file(self.file)
+        if self.folder.is_dir():
+            sweep(self.folder, target.lock)
+        return target
 
     def kept(self, fingerprint: Mapping[str, Any]) -> set[str]:
         """Return which cases are answered already.
@@ -101,9 +107,19 @@ class AnswerFiles:
         write_whole(self.path(entry.case), as_json(stamped(data)))
 
     def freeze(
-        self, fingerprint: Mapping[str, Any], families: Mapping[str, str], library: str
+        self,
+        target: TargetFile,
+        fingerprint: Mapping[str, Any],
+        families: Mapping[str, str],
+        library: str,
     ) -> dict[str, Any]:
         """Write all answers into one file, and return what it holds.
+
+        Args:
+            target: from `reserve`.
+            fingerprint: by which all answers were made.
+            families: of the effects.
+            library: as it was asked for.
 
         Raises:
             InputError: an answer is missing or does not fit the others.
@@ -122,7 +138,7 @@ class AnswerFiles:
                 "answers": answers,
             }
         )
-        write_whole(self.file, as_json(data))
+        target.write(as_json(data).encode())
         return data
 
     def frozen(self) -> tuple[dict[str, Any], list[CaseAnswer]]:

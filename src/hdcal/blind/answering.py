@@ -21,7 +21,7 @@ from hdcal.blind.sealed_set import CASES, SET, BlindSet, read_set, refusal
 from hdcal.cli.processes import completed
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.library import choose_library
-from hdcal.errors import Finding, HdcalError, InputError
+from hdcal.errors import Finding, HdcalError, InputError, NotWritable
 from hdcal.inference.sample import Progress
 
 # Name of the case, and its answer or else what is wrong.
@@ -82,19 +82,19 @@ def answer_set(
     _check_libraries(found)
     entries = {entry.case: entry for entry in found.manifest.cases}
     answers, made_by = AnswerFiles(found, by), fingerprint(library)
-    answers.check_free()
-    kept = answers.kept(made_by)
-    made = diagnosers[by], library, digest(canonical(made_by))
-    tasks = [CaseTask(entries[case], *made) for case in entries if case not in kept]
-    # Closed whatever happens: no process works on for an answer that is not kept.
-    with closing(_outcomes(found, tasks, jobs, scheduler)) as outcomes:
-        for done, (case, answer, findings) in enumerate(outcomes, len(kept) + 1):
-            if answer is None:
-                raise InputError(findings)
-            answers.write(entries[case], answer, made_by)
-            if progress is not None:
-                progress(done, len(entries))
-    return answers.freeze(made_by, families(), library or "")
+    with answers.reserve() as target:
+        kept = answers.kept(made_by)
+        made = diagnosers[by], library, digest(canonical(made_by))
+        tasks = [CaseTask(entries[case], *made) for case in entries if case not in kept]
+        # Closed whatever happens: no process works for an answer that is not kept.
+        with closing(_outcomes(found, tasks, jobs, scheduler)) as outcomes:
+            for done, (case, answer, findings) in enumerate(outcomes, len(kept) + 1):
+                if answer is None:
+                    raise InputError(findings)
+                answers.write(entries[case], answer, made_by)
+                if progress is not None:
+                    progress(done, len(entries))
+        return answers.freeze(target, made_by, families(), library or "")
 
 
 def _check_libraries(found: BlindSet) -> None:
@@ -170,9 +170,9 @@ def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
         here = (replace(one, file=Path(one.file).name) for one in error.findings)
         return name, None, tuple(here)
     except OSError as error:
-        words = f"cannot be answered ({error.strerror or error})"
+        words = f"{name}: cannot be answered ({error.strerror or error})"
         remedy = "Check space and permissions where temporary files go"
-        return name, None, (Finding(f"{CASES}/{name}.csv", words, remedy),)
+        raise NotWritable(f"{words}. {remedy}.") from error
     except HdcalError:
         raise
     except Exception as error:

@@ -14,8 +14,9 @@ from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, 
 from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
 from hdcal.blind.summary import scores_report
 from hdcal.data.regular_file import why_not_readable
-from hdcal.report.folder import check_target, write_whole
 from hdcal.report.plain import as_json
+from hdcal.report.saving.reserve import reserve_folder, write_whole
+from hdcal.report.saving.target import TargetFolder
 from hdcal.report.write import Report, write_report
 
 OPENED_SCHEMA = "hdcal.blind-opened/1"
@@ -50,6 +51,13 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet
         InputError: answers are not frozen, or anything is not what was promised.
     """
     found = read_set(folder)
+    with reserve_folder(found.folder / RESULT, force=True) as target:
+        return _open(found, key, by, target)
+
+
+def _open(
+    found: BlindSet, key: Path, by: Sequence[str], target: TargetFolder
+) -> OpenedSet:
     # Whoever is not scored today was blind all the same, and is recorded as such.
     everyone = frozen_names(found) if not by else _present(found, by)
     frozen = {name: AnswerFiles(found, name).frozen() for name in everyone}
@@ -81,9 +89,11 @@ def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet
     )
     others = {"opening.json": opening, "labels.json": secret.plain()}
     report = scores_report(scores, secret.labels, answers, others)
-    opened = OpenedSet(found.folder / RESULT, opening, report)
-    _write(found, opened, hashes if before is None else None)
-    return opened
+    if before is None:
+        # Before any label reaches the disk: what is answered later is not blind.
+        write_whole(found.opened, as_json(stamped(_record(found, hashes))))
+    write_report(report, target)
+    return OpenedSet(found.folder / RESULT, opening, report)
 
 
 def _present(found: BlindSet, by: Sequence[str]) -> list[str]:
@@ -129,16 +139,10 @@ def _read_opened(found: BlindSet) -> dict[str, Any] | None:
     return data
 
 
-def _write(found: BlindSet, opened: OpenedSet, hashes: dict[str, str] | None) -> None:
-    """Write the record of a first opening, then the result."""
-    check_target(opened.folder, force=True)
-    if hashes is not None:
-        record = {
-            "schema": OPENED_SCHEMA,
-            "set_commitment": found.manifest.commitment,
-            "answers": hashes,
-            "time": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-        # Before any label reaches the disk: what is answered later is not blind.
-        write_whole(found.opened, as_json(stamped(record)))
-    write_report(opened.report, opened.folder, force=True)
+def _record(found: BlindSet, hashes: dict[str, str]) -> dict[str, Any]:
+    return {
+        "schema": OPENED_SCHEMA,
+        "set_commitment": found.manifest.commitment,
+        "answers": hashes,
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

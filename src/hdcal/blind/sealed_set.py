@@ -27,8 +27,10 @@ from hdcal.blind.seal import (
 from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import versions
-from hdcal.report.folder import check_target, whole_folder
 from hdcal.report.plain import as_json, printable
+from hdcal.report.saving.disk import write_file
+from hdcal.report.saving.reserve import reserve_file, reserve_folder
+from hdcal.report.saving.target import KeptBeside
 
 # Of one file of a set.
 _LARGEST = 1 << 30
@@ -144,24 +146,6 @@ def read_json(path: Path, schema: str, remedy: str) -> dict[str, Any]:
     return data
 
 
-def check_free(target: Path | str, key: Path, *, force: bool = False) -> None:
-    """Refuse a set or a key that could not be written.
-
-    Raises:
-        InputError: the target or the key exists, or the key would lie in the set.
-    """
-    check_target(target, force=force, ours=_of_plain_set(target))
-    if key.resolve().is_relative_to(Path(os.path.realpath(target))):
-        words = "would lie inside the set, which it opens"
-        raise refusal(key, words, "Name a place outside with `key`")
-    if os.path.lexists(key):
-        words = "exists already, and may be the only key to another set"
-        raise refusal(key, words, "Name another file with `key`, or move it away")
-    if not key.parent.is_dir():
-        words = "its parent folder does not exist"
-        raise refusal(key, words, "Make that first")
-
-
 def write_set(
     target: Path | str,
     drawn: Iterable[tuple[str | bytes, Label]],
@@ -176,67 +160,87 @@ def write_set(
 
     Args:
         target: the folder to make.
-        drawn: table and label of each case.
+        drawn: table and label of each case; first asked when both may be written.
         gear: text of the gear file of all of them.
-        key: the file to make; no other is ever replaced.
+        key: the file to make, readable to its owner only; no other is ever replaced.
         mix: name of the mix, sealed with the labels.
         seed: of the mix, sealed too; salts follow from it. None for a measurement.
         force: whether an older set without answers may be replaced.
 
     Raises:
-        InputError: the target or the key exists, or the disk refused.
+        InputError: the target or the key exists, or the key would lie in the set.
+        NotWritable: the disk refused.
     """
-    check_free(target, key, force=force)
+    _check_key(key, target)
     secret = new_key()
-    labels, salts, entries = [], [], []
-    ours = _of_plain_set(target)
-    with _key_file(key, secret), whole_folder(target, force=force, ours=ours) as into:
-        (into / CASES).mkdir()
-        for table, label in drawn:
-            check_names([label.case])
-            data = _encoded(table)
-            salt = new_salt() if seed is None else drawn_salt(seed, label.case)
-            with open(into / CASES / f"{label.case}.csv", "xb") as stream:
-                stream.write(data)
-            promise = commit(label, salt, digest(data))
-            library = library_of(label)
-            entries.append(Entry(label.case, digest(data), promise, library))
-            labels.append(label)
-            salts.append(salt)
-        check_names([entry.case for entry in entries])
-        token = seal(Sealed(mix, seed or 0, tuple(labels), tuple(salts)), secret)
-        (into / SEALED).write_bytes(token)
-        (into / GEAR).write_bytes(_encoded(gear))
-        hashes = digest(_encoded(gear)), digest(token)
-        manifest = Manifest(tuple(entries), *hashes, versions())
-        (into / SET).write_text(as_json(manifest.plain()), "utf-8")
+    with (
+        reserve_folder(target, force=force, unstamped=_plain_set) as folder,
+        reserve_file(key) as file,
+        _removed_on_failure(key, secret),
+        folder.filled() as into,
+    ):
+        manifest = _fill(into, drawn, _encoded(gear), secret, mix, seed)
+        # No set is ever seen without its key.
+        file.write(secret + b"\n", 0o600)
     return manifest
 
 
-def _of_plain_set(target: Path | str) -> Callable[[Path], bool]:
-    """Return what tells the parts of an intact set; of any other nothing is ours."""
+def _fill(
+    into: Path,
+    drawn: Iterable[tuple[str | bytes, Label]],
+    gear: bytes,
+    secret: bytes,
+    mix: str,
+    seed: int | None,
+) -> Manifest:
+    labels, salts, entries = [], [], []
+    (into / CASES).mkdir()
+    for table, label in drawn:
+        check_names([label.case])
+        data = _encoded(table)
+        salt = new_salt() if seed is None else drawn_salt(seed, label.case)
+        write_file(into / CASES / f"{label.case}.csv", data)
+        promise = commit(label, salt, digest(data))
+        entries.append(Entry(label.case, digest(data), promise, library_of(label)))
+        labels.append(label)
+        salts.append(salt)
+    check_names([entry.case for entry in entries])
+    token = seal(Sealed(mix, seed or 0, tuple(labels), tuple(salts)), secret)
+    write_file(into / SEALED, token)
+    write_file(into / GEAR, gear)
+    manifest = Manifest(tuple(entries), digest(gear), digest(token), versions())
+    write_file(into / SET, as_json(manifest.plain()).encode())
+    return manifest
+
+
+def _check_key(key: Path, target: Path | str) -> None:
+    if key.resolve().is_relative_to(Path(os.path.realpath(target))):
+        words = "would lie inside the set, which it opens"
+        raise refusal(key, words, "Name a place outside with `key`")
+    if os.path.lexists(key):
+        words = "exists already, and may be the only key to another set"
+        raise refusal(key, words, "Name another file with `key`, or move it away")
+
+
+def _plain_set(folder: Path) -> list[str]:
+    """Return the files of an intact set without a stamp; of any other none."""
     try:
-        read_set(target)
+        cases = read_set(folder).manifest.cases
     except InputError:
-        return lambda _: False
-    return lambda entry: entry.name in (SET, SEALED, GEAR, CASES)
+        return []
+    return [SET, SEALED, GEAR, *(f"{CASES}/{entry.case}.csv" for entry in cases)]
 
 
 @contextmanager
-def _key_file(path: Path, key: bytes) -> Iterator[None]:
-    """Keep a key, readable to its owner only, if all goes well."""
-    flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+def _removed_on_failure(path: Path, secret: bytes) -> Iterator[None]:
+    """Remove a key where there is no set that it opens."""
     try:
-        descriptor = os.open(path, flags, 0o600)
-    except OSError as error:
-        words = f"cannot be written ({error.strerror or error})"
-        raise refusal(path, words, "Name another file with `key`") from error
-    try:
-        with open(descriptor, "wb") as stream:
-            stream.write(key + b"\n")
         yield
+    except KeptBeside:
+        raise
     except BaseException:
-        path.unlink(missing_ok=True)
+        if path.is_file() and path.read_bytes().strip() == secret:
+            path.unlink()
         raise
 
 

@@ -1,7 +1,6 @@
 """The scores of a blind check, and all that its result folder holds."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from hdcal.blind.document import scores_document
@@ -40,9 +39,12 @@ def scores_report(
             "detection": detection_figure(scores.detection),
         }
 
-    def save(folder: Path) -> None:
-        for name, content in (others or {}).items():
-            (folder / name).write_text(as_json(content), "utf-8")
-
     document = scores_document(scores, labels, answers)
-    return Report(document, scores, "scores.json", figures, save=save)
+    texts = [(name, as_json(content)) for name, content in (others or {}).items()]
+    return Report(
+        document,
+        scores,
+        "scores.json",
+        figures,
+        others=lambda: [(name, text.encode()) for name, text in texts],
+    )

@@ -56,7 +56,7 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
         # Said now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
     assert case is not None and out is not None
     keep_compilations()
     if dynamic:
@@ -70,4 +70,4 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
         console.words(note)
     with progress_bar() as progress:
         posterior: Any = sample(case, progress=progress, **settings)
-    return console.report(report(posterior, console.command), out, force=force)
+    return console.report(report(posterior, console.command))

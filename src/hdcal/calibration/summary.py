@@ -84,7 +84,7 @@ def calibration_report(
         figures,
         kept=["calibration"],
         tables=lambda: {"bands.csv": bands().columns()},
-        save=lambda folder: posterior.save(folder / FILE_NAME),
+        others=lambda: [(FILE_NAME, posterior.to_netcdf())],
     )
 
 

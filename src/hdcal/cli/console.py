@@ -9,7 +9,8 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -19,7 +20,10 @@ from hdcal.report.plain import as_json, printable
 if TYPE_CHECKING:
     from hdcal.report.answer import Answer
     from hdcal.report.document import Document
+    from hdcal.report.saving.target import Target, TargetFolder
     from hdcal.report.write import Report
+
+T = TypeVar("T", bound="Target")
 
 
 class Console:
@@ -33,6 +37,8 @@ class Console:
         self.json = json
         # What the options' texts held that could not be read.
         self.wrong = Findings()
+        # Where the result goes; `reserve_folder` sets it.
+        self.folder: TargetFolder | None = None
         # Whether what reads the output went away.
         self.unread = False
 
@@ -60,10 +66,10 @@ class Console:
         """Return the command line as it was given, for a result's provenance."""
         return shlex.join(["hdcal", *sys.argv[1:]])
 
-    def check_target(
+    def reserve_folder(
         self, out: str | None, force: bool, replace: str = "force"
     ) -> None:
-        """Note where a result could not be written, before any work is done.
+        """Reserve the result folder, or note why there can be none, before any work.
 
         Args:
             out: the folder to make, or None.
@@ -71,9 +77,21 @@ class Console:
             replace: the parameter that says so.
         """
         if out is not None:
-            from hdcal.report.folder import check_target
+            from hdcal.report.saving.reserve import reserve_folder
 
-            self.wrong.attempt(check_target, out, force=force, replace=replace)
+            names = {"force": force, "replace": replace}
+            self.folder = self.hold(partial(reserve_folder, out, **names))
+
+    def hold(self, reserve: Callable[[], T]) -> T | None:
+        """Return the place of a result, held until the command ends, or None.
+
+        Args:
+            reserve: the place; what it refuses is noted.
+        """
+        place = self.wrong.attempt(reserve)
+        if place is not None:
+            click.get_current_context().with_resource(place)
+        return place
 
     def answer(
         self,
@@ -97,20 +115,17 @@ class Console:
             self.data(answer)
         return 0 if answer.status == "ok" else 1
 
-    def report(
-        self, report: "Report[Answer]", folder: str | None, *, force: bool
-    ) -> int:
-        """Write a result folder if one is wanted, show the answer, return its code.
+    def report(self, report: "Report[Answer]") -> int:
+        """Write the reserved folder if there is one, show the answer, return its code.
 
         Args:
             report: what to write and show.
-            folder: to make, or None.
-            force: replace an older result.
         """
         from hdcal.report.write import write_report
 
-        if folder is not None:
-            write_report(report, folder, force=force)
+        if self.folder is not None:
+            write_report(report, self.folder)
+        folder = None if self.folder is None else self.folder.name
         return self.answer(report.document, report.answer, folder)
 
     def result(self, text: str) -> None:

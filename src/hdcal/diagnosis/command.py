@@ -51,7 +51,6 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
     from hdcal.diagnosis.overview import document_and_answer, write_refused
     from hdcal.physics.registry import EFFECTS
-    from hdcal.report.folder import whole_folder
 
     with console.wrong as wrong:
         wrong.attempt(choose_library, settings["library"], EFFECTS)
@@ -60,17 +59,17 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
             asked = wrong.attempt(read_cases, cases, gear, columns, theory)
         if out is None and asked is not None:
             out = asked.folder
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
         if wrong and asked is not None:
             wrong.extend(asked.findings)
-    assert asked is not None and out is not None
+    assert asked is not None and console.folder is not None
     keep_compilations()
     tell_notes(console, asked)
     if settings["report"] is None:
         settings["report"] = len(asked.found) <= MANY
         if not settings["report"]:
             console.words(f"more than {MANY} cases: no reports without --report")
-    with whole_folder(out, force=force) as folder:
+    with console.folder.filled() as folder:
         made = diagnose_all(asked, folder, command=console.command, **settings)
         if asked.many:
             write_refused(made[1].refused, folder)

@@ -9,6 +9,7 @@ from hdcal.diagnosis.many_cases import AskedCases, Refused
 from hdcal.diagnosis.words import count_words, verdict_word
 from hdcal.report.document import Document, Section, Table
 from hdcal.report.plain import as_json
+from hdcal.report.saving.disk import write_file
 from hdcal.report.words import hypothesis, known, newton, percent
 
 _MEND = "Mend what is listed as refused."
@@ -42,7 +43,7 @@ def write_refused(refused: Refused, folder: Path) -> None:
         next_step=_MEND,
         cases=dict(refused),
     )
-    (folder / "refused.json").write_text(as_json(answer), "utf-8")
+    write_file(folder / "refused.json", as_json(answer).encode())
 
 
 def verdicts_answer(

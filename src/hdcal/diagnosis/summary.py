@@ -1,5 +1,6 @@
 """A verdict as its JSON answer, and all that its result folder holds."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -98,7 +99,7 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
         "verdict.json",
         figures,
         tables=lambda: {} if refit is None else {"bands.csv": bands().columns()},
-        save=lambda folder: _save_models(verdict, folder),
+        others=lambda: _models(verdict),
     )
 
 
@@ -109,7 +110,7 @@ def write_verdict(
 
     Args:
         verdict: from `diagnose`.
-        folder: an empty one, from `whole_folder`.
+        folder: an empty one, from `TargetFolder.filled`.
         command: how the result was made, for its provenance.
         report: whether figures and report are wanted; they take most of the time.
     """
@@ -136,11 +137,11 @@ def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
     return name, weighed[name][1]
 
 
-def _save_models(verdict: Verdict, folder: Path) -> None:
-    """Save every calibrated model, each with the probabilities of all."""
+def _models(verdict: Verdict) -> Iterator[tuple[str, bytes]]:
+    """Yield the file of every calibrated model, each with the probabilities of all."""
     chances = {name: share for name, (share, _) in verdict.posteriors.items()}
     for name, file in member_files(verdict).items():
         posterior = verdict.posteriors[name][1]
         origin = {"hypothesis": name, "probabilities": chances}
         settings = {**posterior.settings, ORIGIN: origin}
-        replace(posterior, settings=settings).save(folder / file)
+        yield file, replace(posterior, settings=settings).to_netcdf()

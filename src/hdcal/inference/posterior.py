@@ -106,6 +106,13 @@ class Posterior(Shown):
 
     def save(self, path: Path | str) -> None:
         """Write the posterior as a NetCDF file that ArviZ opens."""
+        Path(path).write_bytes(self.to_netcdf())
+
+    def to_netcdf(self) -> bytes:
+        """Return the content of a NetCDF file that ArviZ opens.
+
+        Made in memory: HDF5 crashes where a disk that is full refuses its writes.
+        """
         tree = self.tree.copy()
         tree.attrs = {
             "hdcal_format": posterior_file.FORMAT,
@@ -126,7 +133,7 @@ class Posterior(Shown):
             ),
         }
         tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
-        tree.to_netcdf(path, engine="h5netcdf")
+        return bytes(tree.to_netcdf(engine="h5netcdf"))
 
     @classmethod
     def load(

@@ -58,5 +58,5 @@ def dynamic_report(
         figures,
         kept=["motion"],
         tables=lambda: {"motion.csv": bands().columns()},
-        save=lambda folder: posterior.save(folder / FILE_NAME),
+        others=lambda: [(FILE_NAME, posterior.to_netcdf())],
     )

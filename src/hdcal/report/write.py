@@ -1,6 +1,6 @@
 """A report's files: the page, the JSON answer, the figures and the tables."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
@@ -9,9 +9,10 @@ import numpy as np
 
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
-from hdcal.report.folder import whole_folder
 from hdcal.report.html import html_page
 from hdcal.report.plain import as_json
+from hdcal.report.saving.disk import write_file
+from hdcal.report.saving.target import TargetFolder
 
 if TYPE_CHECKING:
     from hdcal.report.canvas import Figure
@@ -33,7 +34,7 @@ class Report(Generic[A]):
         kept: figures that become files of their own too, as SVG and PNG; by default
             all of them.
         tables: makes the columns of the CSV files, by the names of the files.
-        save: writes what else belongs into the folder.
+        others: makes the content of other files, each with its name.
     """
 
     document: Document
@@ -42,40 +43,40 @@ class Report(Generic[A]):
     figures: Callable[[], Mapping[str, "Figure"]] = dict
     kept: Collection[str] | None = None
     tables: Callable[[], Tables] = dict
-    save: Callable[[Path], None] | None = None
+    others: Callable[[], Iterable[tuple[str, bytes]]] = tuple
 
 
-def write_report(report: Report, target: Path | str, *, force: bool = False) -> None:
+def write_report(report: Report, target: TargetFolder) -> None:
     """Write a result folder, whole or not at all.
 
     Args:
         report: what to write.
-        target: the folder to make.
-        force: replace an older result.
+        target: where.
 
     Raises:
-        InputError: the folder exists or cannot be written.
+        KeptBeside: the target appeared or was edited meanwhile.
+        NotWritable: the disk refused.
     """
-    # Drawn before the folder is begun: an older result stays as long as possible.
+    # Drawn before the folder is begun: what fails there touches no disk.
     files = report_files(report.document, report.figures(), report.kept)
-    with whole_folder(target, force=force) as folder:
+    with target.filled() as folder:
         write_numbers(report, folder)
         write_files(files, folder)
 
 
 def write_numbers(report: Report, folder: Path) -> None:
     """Write all of a report but page and figures into a folder that is there."""
-    (folder / report.file).write_text(as_json(report.answer), "utf-8")
+    write_file(folder / report.file, as_json(report.answer).encode())
     for name, columns in report.tables().items():
-        (folder / name).write_text(columns_csv(columns), "utf-8", newline="")
-    if report.save is not None:
-        report.save(folder)
+        write_file(folder / name, columns_csv(columns).encode())
+    for name, content in report.others():
+        write_file(folder / name, content)
 
 
 def write_files(files: Mapping[str, bytes], folder: Path) -> None:
     """Write files by their names into a folder that is there."""
     for name, content in files.items():
-        (folder / name).write_bytes(content)
+        write_file(folder / name, content)
 
 
 def report_files(

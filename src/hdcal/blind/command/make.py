@@ -44,10 +44,9 @@ def make(console: Console, source, out, key, force, **given) -> None:
     one_thread_for_algebra()
     check_forms(real=source is not None)
     from hdcal.blind.answer import SetAnswer
-    from hdcal.blind.sealed_set import check_free, write_set
+    from hdcal.blind.sealed_set import write_set
 
     key = Path(os.path.realpath(out) + ".key" if key is None else key)
-    check_free(out, key, force=force)
     content = _drawn(**given) if source is None else _measured(source, **given)
     manifest = write_set(out, key=key, force=force, **content)
     console.result(f"commitment {manifest.commitment}")

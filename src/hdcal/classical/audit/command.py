@@ -18,7 +18,7 @@ def audit(console: Console, out, force):
     article itself prints is given.
     """
     with console.wrong:
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
     from hdcal.classical.audit.audit import audit as check_claims
     from hdcal.classical.audit.document import audit_document
     from hdcal.classical.audit.summary import audit_answer
@@ -26,4 +26,4 @@ def audit(console: Console, out, force):
 
     found = audit_answer(check_claims())
     told = Report(audit_document(found), found, "audit.json")
-    return console.report(told, out, force=force)
+    return console.report(told)

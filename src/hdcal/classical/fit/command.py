@@ -52,8 +52,8 @@ def fit(console: Console, degrees, through_origin, at, run, out, force, **given)
         fits = None
         if case is not None and degrees is not None:
             fits = wrong.attempt(fit_case, case, degrees, through_origin=through_origin)
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
     assert case is not None and fits is not None
     posterior = None if run is None else load_posterior(run)
     told = fit_report(case, fits, console.command, at=at, posterior=posterior)
-    return console.report(told, out, force=force)
+    return console.report(told)

@@ -50,7 +50,7 @@ def design(console: Console, run, gear, out, force, **given):
         wrong += question_findings()
         source, usual = open_source(wrong, run, gear, "design")
         target = out or usual
-        console.check_target(target, force)
+        console.reserve_folder(target, force)
     assert source is not None and target is not None
     spring = given["window"] is not None
     for name in OF_LIMIT if spring else OF_WINDOW:
@@ -59,4 +59,4 @@ def design(console: Console, run, gear, out, force, **given):
         told = generator_report(wave_generator(source, **given), console.command)
     else:
         told = inverse_report(inverse_design(source, **given), console.command)
-    return console.report(told, target, force=force)
+    return console.report(told)

@@ -59,10 +59,10 @@ def study(console: Console, run, gear, article, out, force, **asked):
             wrong.append(Finding("vary", "nothing is varied", remedy))
         source, usual = open_source(wrong, run, gear, "study")
         target = out or usual
-        console.check_target(target, force)
+        console.reserve_folder(target, force)
     assert source is not None and target is not None
     told = study_report(run_study(source, **asked), console.command)
-    return console.report(told, target, force=force)
+    return console.report(told)
 
 
 def _article(console: Console, run) -> int:

@@ -49,7 +49,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     """
     out = out if out is not None else f"{Path(run).resolve().name}-response"
     with console.wrong:
-        console.check_target(out, replace, "replace")
+        console.reserve_folder(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
     keep_compilations()
     from hdcal.inference.dynamic_posterior import load_any
@@ -62,5 +62,6 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     given = {name: value for name, value in asked.items() if value is not None}
     response = ask(load_any(run), drive, **given)
     report = response_report(response, console.command)
-    write_report(report, out, force=replace)
+    assert console.folder is not None
+    write_report(report, console.folder)
     return console.answer(report.document, with_columns(report.answer, response), out)

@@ -1,11 +1,16 @@
 """`hdcal predict`: bands on the force from a result folder."""
 
+from functools import partial
+
 import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import GRID, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
+
+# By these columns --force knows an older table.
+_BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
 
 
 @command(short_help="Bands on the force from a result folder.")
@@ -33,11 +38,13 @@ from hdcal.cli.options import direction_option, force_option, json_option
 def predict(console: Console, run, deformation, temperature, direction, out, force):
     """Predict the force with its bands from RUN, a folder of `hdcal calibrate`."""
     from hdcal.cli.sources import load_posterior
-    from hdcal.report.folder import check_file, write_whole
+    from hdcal.report.saving.reserve import reserve_file
 
-    with console.wrong as wrong:
+    file = None
+    with console.wrong:
         if out is not None:
-            wrong.attempt(check_file, out, force=force)
+            asked = {"force": force, "beginning": _BEGINNING}
+            file = console.hold(partial(reserve_file, out, **asked))
     posterior = load_posterior(run)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows
@@ -48,8 +55,8 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     if untested := untested_rows(bands, posterior.case.records):
         console.words(untested)
     table = columns_csv(bands.columns())
-    if out is not None:
-        write_whole(out, table, force=force)
+    if file is not None:
+        file.write(table.encode())
         console.words(f"the table: {out}")
     elif not console.json:
         console.result(table.rstrip("\n"))

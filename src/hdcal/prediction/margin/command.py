@@ -65,8 +65,8 @@ def margin(console: Console, run, out, force, **asked):
 
     with console.wrong as wrong:
         models = wrong.attempt(read_models, run) or []
-        console.check_target(out, force)
+        console.reserve_folder(out, force)
     found = bounds_of(models, **asked)
     posterior = max(models, key=lambda model: model[0])[1]
     told = margin_report(found, posterior, console.command, seed=asked["seed"])
-    return console.report(told, out, force=force)
+    return console.report(told)

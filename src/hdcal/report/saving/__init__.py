@@ -1,0 +1,1 @@
+"""Results on disk: each appears whole or not at all, and replaces nothing of others."""

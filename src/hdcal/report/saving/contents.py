@@ -1,0 +1,161 @@
+"""The stamp in a result folder: which files hdcal wrote there, and what they held."""
+
+import hashlib
+import json
+import os
+import re
+import stat
+from collections.abc import Callable, Collection, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from hdcal.report.plain import as_json, printable
+from hdcal.report.saving.disk import sync, write_file
+
+STAMP, SCHEMA = "hdcal-result.json", "hdcal.result/1"
+# What file managers leave behind on their own.
+_LITTER = frozenset({".DS_Store", "Thumbs.db", "desktop.ini"})
+# Results of before there was a stamp: an answer with its schema, and these files.
+_ANSWER = re.compile(
+    r"(summary|verdict|scores|response|fit|audit|design|study|margin)\.json"
+)
+_UNSTAMPED = re.compile(
+    rf"{_ANSWER.pattern}|(opening|labels)\.json|report\.html|posterior(-\w+)?\.nc"
+    r"|(bands|response|motion|study)\.csv"
+    r"|(calibration|where|which|shrink|bands|bar|confusion|reliability|detection"
+    r"|response|motion|fit|design|profile|study|margin|tornado)\.(svg|png)"
+)
+
+# Returns what is hdcal's in a folder without a stamp: names of files below it.
+Unstamped = Callable[[Path], Collection[str]]
+
+
+class Foreign(Exception):
+    """Not a result of hdcal, or not only that; the text says why, as 'it …'."""
+
+
+def seal(folder: Path) -> None:
+    """Write the stamp into a finished folder and wait until the disk holds all of it.
+
+    Raises:
+        OSError: the disk refused.
+    """
+    below = list(_below(folder))
+    files = []
+    for path in below:
+        if not _is_folder(path):
+            size, sha256 = _read(path)
+            name = path.relative_to(folder).as_posix()
+            files.append({"file": name, "bytes": size, "sha256": sha256})
+    version = metadata.version("hdcal")
+    stamp = {"schema": SCHEMA, "version": version, "files": files}
+    write_file(folder / STAMP, as_json(stamp).encode())
+    for path in [*below, folder / STAMP, folder]:
+        sync(path)
+
+
+def older_result(folder: Path) -> list[str]:
+    """Return what an hdcal without stamps wrote, of one case or of many.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    places = [folder, *filter(_is_folder, folder.iterdir())]
+    return [
+        path.relative_to(folder).as_posix()
+        for place in places
+        if any(map(_is_answer, place.iterdir()))
+        for path in place.iterdir()
+        if _UNSTAMPED.fullmatch(path.name)
+    ]
+
+
+def result_entries(folder: Path, unstamped: Unstamped = older_result) -> list[Path]:
+    """Return all below a result folder, in an order in which it can be removed.
+
+    What tells that it is a result comes last, for a removal that is cut short.
+
+    Args:
+        folder: to look at.
+        unstamped: tells what is hdcal's where there is no stamp.
+
+    Raises:
+        Foreign: it holds what hdcal did not write, or what was edited since.
+        OSError: it cannot be read.
+    """
+    if not _is_folder(folder):
+        raise Foreign("is no folder")
+    known = _stamped(folder)
+    if known is None:
+        known = dict.fromkeys(unstamped(folder))
+    folders = {parent.as_posix() for name in known for parent in Path(name).parents}
+    found = list(_below(folder))
+    for path in found:
+        place = path.relative_to(folder)
+        name = place.as_posix()
+        if _is_folder(path) and name in folders:
+            continue
+        if name not in known and not (path.name in _LITTER and _is_file(path)):
+            # Of a folder that is not hdcal's the folder is named, not what it holds.
+            above = (one.as_posix() for one in reversed(place.parents))
+            first = next((one for one in above if one not in {".", *folders}), name)
+            words = f"holds '{printable(first)}', which hdcal did not write with it"
+            raise Foreign(words)
+        if not _is_file(path) or known.get(name) not in (None, _read(path)):
+            words = f"holds '{printable(name)}', which was edited since hdcal wrote it"
+            raise Foreign(words)
+    return found
+
+
+def _stamped(folder: Path) -> dict[str, Any] | None:
+    """Return size and SHA-256 of each file by its name; None without a stamp."""
+    path = folder / STAMP
+    if not os.path.lexists(path):
+        return None
+    try:
+        data = json.loads(path.read_text("utf-8")) if _is_file(path) else {}
+        if data["schema"] != SCHEMA:
+            raise ValueError
+        known = {one["file"]: (one["bytes"], one["sha256"]) for one in data["files"]}
+    except (KeyError, TypeError, ValueError, RecursionError):
+        words = f"holds '{STAMP}', which was edited since hdcal wrote it"
+        raise Foreign(words) from None
+    return known | {STAMP: None}
+
+
+def _read(path: Path) -> tuple[int, str]:
+    """Return size and SHA-256 of a file."""
+    with open(path, "rb") as stream:
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+        return os.fstat(stream.fileno()).st_size, sha256
+
+
+def _below(folder: Path) -> Iterator[Path]:
+    """Yield all below a folder: content before its folder, what tells of it last."""
+
+    def place(path: Path) -> tuple[bool, bool, str]:
+        return path.name == STAMP, bool(_ANSWER.fullmatch(path.name)), path.name
+
+    for path in sorted(folder.iterdir(), key=place):
+        if _is_folder(path):
+            yield from _below(path)
+        yield path
+
+
+def _is_answer(path: Path) -> bool:
+    if not _ANSWER.fullmatch(path.name) or not _is_file(path):
+        return False
+    try:
+        data = json.loads(path.read_text("utf-8"))
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(data, dict) and str(data.get("schema")).startswith("hdcal.")
+
+
+def _is_file(path: Path) -> bool:
+    return stat.S_ISREG(path.lstat().st_mode)
+
+
+def _is_folder(path: Path) -> bool:
+    return stat.S_ISDIR(path.lstat().st_mode)

@@ -1,0 +1,362 @@
+"""Nothing is replaced or removed but what hdcal wrote, and nobody else writes."""
+
+import errno
+import os
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from hdcal.errors import InputError
+from hdcal.report.saving import target as target_module
+from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving.reserve import reserve_file, reserve_folder
+from hdcal.report.saving.target import KeptBeside
+
+NEW = {STAMP, "summary.json"}
+
+
+def content(folder: Path) -> dict[str, bytes | None]:
+    """Return everything below a folder; None for a folder."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        if path.is_file()
+        else None
+        for path in folder.rglob("*")
+    }
+
+
+def write(target: Path, text: str, force: bool = False) -> None:
+    """Write a result with a folder inside."""
+    with reserve_folder(target, force=force) as place, place.filled() as building:
+        (building / "summary.json").write_text(text)
+        (building / "inner").mkdir()
+        (building / "inner" / "verdict.json").write_text(text)
+
+
+def edited(file: str) -> Callable[[Path], object]:
+    """Return what changes a file without changing its size."""
+    return lambda run: (run / file).write_text("mine")
+
+
+FOREIGN: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a file": (lambda run: (run / "thesis.txt").touch(), "'thesis.txt', which hdcal"),
+    "a file below": (lambda run: (run / "inner" / "a").touch(), "'inner/a', which"),
+    "an empty folder": (lambda run: (run / "mine").mkdir(), "'mine', which"),
+    "a folder": (
+        lambda run: (run / "mine" / "deep").mkdir(parents=True),
+        "'mine', which",
+    ),
+    "a link": (lambda run: (run / "link").symlink_to(run.parent), "'link', which"),
+    "a name that steers": (lambda run: (run / "a\x1b[31m").touch(), "'a\ufffd[31m'"),
+    "an edited file": (edited("summary.json"), "'summary.json', which was edited"),
+    "an edited one below": (
+        edited("inner/verdict.json"),
+        "'inner/verdict.json', which was edited",
+    ),
+    "an edited stamp": (edited(STAMP), f"'{STAMP}', which was edited"),
+    "a file that is now a link": (
+        lambda run: (
+            (run / "summary.json").rename(run.parent / "moved"),
+            (run / "summary.json").symlink_to(run.parent / "moved"),
+        ),
+        "'summary.json', which was edited",
+    ),
+    "a folder that is now a link": (
+        lambda run: (
+            (run / "inner").rename(run.parent / "moved"),
+            (run / "inner").symlink_to(run.parent / "moved"),
+        ),
+        "'inner', which",
+    ),
+    "litter that is a folder": (
+        lambda run: (run / ".DS_Store").mkdir(),
+        "'.DS_Store', which",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_what_hdcal_did_not_write_is_refused_at_once(kind: str, tmp_path: Path):
+    change, words = FOREIGN[kind]
+    write(tmp_path / "run", "text")
+    change(tmp_path / "run")
+    before = content(tmp_path)
+    with pytest.raises(InputError, match=re.escape(words)):
+        reserve_folder(tmp_path / "run", force=True)
+    assert content(tmp_path) == before
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_what_comes_meanwhile_stays_and_the_result_goes_beside(
+    kind: str, tmp_path: Path
+):
+    change, words = FOREIGN[kind]
+    write(tmp_path / "run", "text")
+    with (
+        pytest.raises(KeptBeside, match=re.escape(words)) as raised,
+        reserve_folder(tmp_path / "run", force=True) as place,
+        place.filled() as building,
+    ):
+        (building / "summary.json").write_text("new")
+        change(tmp_path / "run")
+        before = content(tmp_path / "run")
+    assert "in 'run-2'" in str(raised.value)
+    assert content(tmp_path / "run") == before
+    assert content(tmp_path / "run-2").keys() == NEW
+    assert {path.name for path in tmp_path.iterdir()} - {"moved"} == {"run", "run-2"}
+
+
+@pytest.mark.parametrize("kind", [kind for kind in FOREIGN if "litter" not in kind])
+def test_what_comes_in_the_last_moment_stays_too(
+    kind: str, tmp_path: Path, monkeypatch
+):
+    change, _ = FOREIGN[kind]
+    write(tmp_path / "run", "text")
+    exchange = target_module.exchange
+
+    def late(one: Path, other: Path) -> bool:
+        change(other)
+        late_content.update(content(other))
+        return exchange(one, other)
+
+    late_content: dict = {}
+    monkeypatch.setattr(target_module, "exchange", late)
+    with (
+        pytest.raises(KeptBeside, match="what was there lies in 'run-2'"),
+        reserve_folder(tmp_path / "run", force=True) as place,
+        place.filled() as building,
+    ):
+        (building / "summary.json").write_text("new")
+    assert content(tmp_path / "run").keys() == NEW
+    assert content(tmp_path / "run-2") == late_content
+    assert {path.name for path in tmp_path.iterdir()} - {"moved"} == {"run", "run-2"}
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("kind", ["empty folder", "folder", "file"])
+def test_a_target_that_appears_is_kept(
+    known: bool, kind: str, tmp_path: Path, monkeypatch
+):
+    if not known:
+        monkeypatch.setattr("hdcal.report.saving.disk._rename", lambda *_: False)
+    (tmp_path / "run-2").touch()
+    with (
+        pytest.raises(KeptBeside, match=r"appeared .* in 'run-3'"),
+        reserve_folder(tmp_path / "run", force=True) as place,
+        place.filled() as building,
+    ):
+        (building / "summary.json").write_text("new")
+        if kind == "file":
+            (tmp_path / "run").write_text("mine")
+        else:
+            (tmp_path / "run").mkdir()
+        if kind == "folder":
+            (tmp_path / "run" / "mine").touch()
+        before = content(tmp_path)
+    after = content(tmp_path)
+    assert {key: after[key] for key in before if not key.startswith(".")}.items() >= {
+        key: value for key, value in before.items() if not key.startswith(".")
+    }.items()
+    assert content(tmp_path / "run-3").keys() == NEW
+    assert {path.name for path in tmp_path.iterdir()} == {"run", "run-2", "run-3"}
+
+
+def test_a_file_that_appears_or_is_edited_is_kept(tmp_path: Path):
+    target = tmp_path / "a.csv"
+    with (
+        pytest.raises(KeptBeside, match=r"appeared .* in 'a-2\.csv'"),
+        reserve_file(target, force=True, beginning="bands") as place,
+    ):
+        target.write_text("mine")
+        place.write(b"bands")
+    target.write_text("bands")
+    with (
+        pytest.raises(KeptBeside, match=r"is no table .* in 'a-3\.csv'"),
+        reserve_file(target, force=True, beginning="bands") as place,
+    ):
+        target.write_text("mine")
+        place.write(b"bands")
+    there = {"a.csv": b"mine", "a-2.csv": b"bands", "a-3.csv": b"bands"}
+    assert content(tmp_path) == there
+
+
+def test_a_target_that_goes_away_is_made(tmp_path: Path):
+    write(tmp_path / "run", "text")
+    with (
+        reserve_folder(tmp_path / "run", force=True) as place,
+        place.filled() as building,
+    ):
+        (building / "summary.json").write_text("new")
+        (tmp_path / "run").rename(tmp_path / "kept")
+    assert content(tmp_path / "run").keys() == NEW
+    assert content(tmp_path / "kept").keys() == NEW | {"inner", "inner/verdict.json"}
+
+
+def test_a_place_where_a_disk_is_mounted_is_refused(tmp_path: Path, monkeypatch):
+    (tmp_path / "run").mkdir()
+    monkeypatch.setattr(os.path, "ismount", lambda path: path == tmp_path / "run")
+    with pytest.raises(InputError, match="mounted"):
+        reserve_folder(tmp_path / "run", force=True)
+
+
+WRITER = """
+import sys, time
+from hdcal.report.saving.reserve import reserve_folder
+with reserve_folder(sys.argv[1]) as place, place.filled() as building:
+    (building / "summary.json").write_text("slow")
+    print("at work", flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def writer(tmp_path: Path) -> Iterator[subprocess.Popen]:
+    """Another process that has begun to write tmp_path/run."""
+    command = [sys.executable, "-c", WRITER, str(tmp_path / "run")]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(command, text=True, **pipes) as process:
+        assert process.stdout is not None and process.stdout.readline()
+        yield process
+        process.kill()
+
+
+def test_a_second_run_is_told_at_once_who_is_at_work(writer, tmp_path: Path):
+    (tmp_path / "link").symlink_to(tmp_path / "run")
+    for name in ("run", "link", "./run"):
+        with pytest.raises(InputError) as raised:
+            reserve_folder(f"{tmp_path}/{name}", force=True)
+        who = f"process {writer.pid} on {platform.node()}"
+        assert f"is being written by {who}" in str(raised.value)
+    with reserve_folder(tmp_path / "other") as place, place.filled():
+        pass
+    writer.communicate("")
+    assert writer.returncode == 0
+    assert {path.name for path in tmp_path.iterdir()} == {"link", "run", "other"}
+    assert content(tmp_path / "run").keys() == NEW
+
+
+def test_the_lock_of_a_killed_run_is_recognised(writer, tmp_path: Path):
+    writer.kill()
+    writer.wait()
+    assert sum(path.name.startswith(".hdcal-") for path in tmp_path.iterdir()) == 2
+    with reserve_folder(tmp_path / "other") as place:
+        assert [path.name for path in tmp_path.iterdir()] == [place.lock.path.name]
+    assert not any(tmp_path.iterdir())
+
+
+def test_what_others_named_alike_is_left_alone(tmp_path: Path):
+    for name in (".hdcal-notes", ".hdcal-0123456789ab-x", ".hdcal-0123456789ab"):
+        (tmp_path / name).mkdir()
+    before = content(tmp_path)
+    write(tmp_path / "run", "text")
+    assert before.keys() <= content(tmp_path).keys()
+
+
+def test_where_there_are_no_locks_results_are_written_all_the_same(
+    tmp_path: Path, monkeypatch
+):
+    def refuse(*_) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    # Of another process, dead or alive: nobody can know.
+    leftover = tmp_path / ".hdcal-0123456789ab-0123456789ab" / "building"
+    leftover.mkdir(parents=True)
+    write(tmp_path / "run", "old")
+    write(tmp_path / "run", "new", force=True)
+    assert (tmp_path / "run" / "summary.json").read_text() == "new"
+    assert leftover.exists()
+
+
+def unstamped(folder: Path, answer: str, schema: str, *files: str) -> Path:
+    """Write what an hdcal without stamps wrote."""
+    folder.mkdir(parents=True)
+    (folder / answer).write_text(f'{{\n  "schema": "{schema}",\n  "status": "ok"\n}}')
+    for file in files:
+        (folder / file).write_text(file)
+    return folder
+
+
+# What v0.1.0 wrote, by command.
+OLD = {
+    "calibrate": (
+        *("summary.json", "hdcal.calibration/1", "posterior.nc", "bands.csv"),
+        *("report.html", "calibration.svg", "calibration.png"),
+    ),
+    "dynamic": (
+        *("summary.json", "hdcal.dynamic-calibration/1", "posterior.nc"),
+        *("motion.csv", "motion.svg", "motion.png", "report.html"),
+    ),
+    "diagnose": (
+        *("verdict.json", "hdcal.verdict/1", "posterior.nc", "posterior-none.nc"),
+        *("posterior-contact_onset.nc", "bands.csv", "report.html", "bands.svg"),
+        *("bands.png", "where.svg", "where.png", "which.svg", "which.png"),
+        *("shrink.svg", "shrink.png", ".DS_Store"),
+    ),
+    "respond": (
+        *("response.json", "hdcal.response/1", "response.csv", "response.svg"),
+        *("response.png", "report.html"),
+    ),
+    "audit": ("audit.json", "hdcal.audit/1", "report.html"),
+    "fit": ("fit.json", "hdcal.fit/1", "fit.svg", "fit.png", "report.html"),
+    "design": (
+        *("design.json", "hdcal.design/1", "design.svg", "design.png"),
+        *("profile.svg", "profile.png", "report.html"),
+    ),
+    "study": (
+        *("study.json", "hdcal.study/1", "study.csv", "study.svg", "study.png"),
+        "report.html",
+    ),
+    "margin": (
+        *("margin.json", "hdcal.margin/1", "margin.svg", "margin.png"),
+        *("tornado.svg", "tornado.png", "report.html"),
+    ),
+    "blind": (
+        *("scores.json", "hdcal.blind-scores/1", "opening.json", "labels.json"),
+        *("bar.svg", "bar.png", "confusion.svg", "confusion.png", "detection.svg"),
+        *("detection.png", "reliability.svg", "reliability.png", "report.html"),
+    ),
+}
+
+
+@pytest.mark.parametrize("command", OLD)
+def test_a_result_of_an_older_hdcal_is_recognised(command: str, tmp_path: Path):
+    run = unstamped(tmp_path / "run", *OLD[command])
+    (run / "thesis.txt").touch()
+    with pytest.raises(InputError, match=r"'thesis\.txt', which hdcal did not write"):
+        reserve_folder(run, force=True)
+    (run / "thesis.txt").unlink()
+    write(run, "new", force=True)
+    assert content(run).keys() == NEW | {"inner", "inner/verdict.json"}
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_many_cases_of_an_older_hdcal_are_recognised(tmp_path: Path):
+    for case in ("a", "b"):
+        unstamped(tmp_path / "run" / case, *OLD["diagnose"])
+    (tmp_path / "run" / "b" / "notes.txt").touch()
+    with pytest.raises(InputError, match=r"'b/notes\.txt', which hdcal did not write"):
+        reserve_folder(tmp_path / "run", force=True)
+    (tmp_path / "run" / "b" / "notes.txt").unlink()
+    write(tmp_path / "run", "new", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "schema"),
+    [("summary.json", "mine/1"), ("data.json", "hdcal.calibration/1")],
+)
+def test_names_alone_make_no_result(answer: str, schema: str, tmp_path: Path):
+    run = unstamped(tmp_path / "run", answer, schema, "report.html", "bands.csv")
+    before = content(tmp_path)
+    with pytest.raises(InputError, match=r"'bands\.csv', which hdcal did not write"):
+        reserve_folder(run, force=True)
+    (run / answer).write_text("[" * 100_000)
+    with pytest.raises(InputError, match=r"'bands\.csv', which hdcal did not write"):
+        reserve_folder(run, force=True)
+    assert content(tmp_path).keys() == before.keys()
