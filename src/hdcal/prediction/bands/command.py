@@ -21,7 +21,7 @@ from hdcal.cli.options import direction_option, force_option, json_option
     type=NUMBERS,
     help="Temperatures [°C]: 20,60 [default: the reference one].",
 )
-@direction_option
+@direction_option("Of the movement: deformation rising or falling.")
 @click.option(
     "--out",
     metavar="FILE.csv",
