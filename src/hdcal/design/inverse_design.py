@@ -94,10 +94,8 @@ def inverse_design(
         source: a calibration; or a gear, for what its priors say.
         vary: lowest and highest value of each free size [mm]: wall_thickness_mm,
             radius_mm, length_mm, load_height_mm.
-        limit_force: that must not be exceeded [N]: its size, along the sense of
-            loading, or with the sign of the force.
-        deformation: radial, of the gear, of either sign [mm]; by default its nominal
-            one.
+        limit_force: not to be exceeded [N]: its size, or with the force's sign.
+        deformation: radial, with its sign [mm]; by default the gear's nominal one.
         temperatures: at all of which the limits hold [°C]; by default the reference.
         probability: with which the next gear keeps each limit.
         materials: names or .toml files to choose among; by default the gear's own.
@@ -121,10 +119,8 @@ def inverse_design(
     limits = abs(limit_force), limit_stress, probability
     asked = LimitAsked(at, levels, *limits, dict(vary))
     with Findings() as wrong:
-        wrong += capacity_findings(
-            "limit_force", limit_force, asked.sense, f"{at:g} mm"
-        )
-        wrong += _findings(draws, asked, materials)
+        place = "limit_force", limit_force, asked.sense, f"{at:g} mm"
+        wrong += [*capacity_findings(*place), *_findings(draws, asked, materials)]
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
         gear = wrong.attempt(next_gear, draws, tolerances, seed)

@@ -38,8 +38,8 @@ def window_options(command: Callable) -> Callable:
         click.option(
             "--window",
             type=ENDS,
-            help="Deformation to keep [mm]: backlash beyond its end nearer to zero, jam "
-            "beyond the other. Asks for a spring.",
+            help="Deformation to keep [mm]: backlash beyond its end nearer to zero, "
+            "jam beyond the other. Asks for a spring.",
         ),
     ):
         command = add(command)

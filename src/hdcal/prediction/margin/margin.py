@@ -11,9 +11,9 @@ from hdcal.prediction.engine.conditions import (
     is_tested,
 )
 from hdcal.prediction.engine.forces import Quantity
-from hdcal.prediction.engine.loading_sense import loading_sense
+from hdcal.prediction.engine.loading_sense import LoadingSense, loading_sense
 from hdcal.prediction.engine.population import Population, widest
-from hdcal.prediction.engine.population_force import population_force
+from hdcal.prediction.engine.population_force import PopulationForce, population_force
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
@@ -99,14 +99,7 @@ def _margin(
     check_margin(causes, request, warm, criteria, sense)
     criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
-    about = {
-        "quantity": request.quantity,
-        "direction": request.direction,
-        "sense": sense,
-        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
-        "seed": request.seed,
-    }
-    forces = [population_force(c, request.deformation, whose, **about) for c in causes]
+    forces = _forces(causes, request, whose, sense)
     draws = population_draws(forces, warm, criteria)
     levels = _levels(draws, main, request, warm, criteria)
     check_sign(levels, request, criteria, sense)
@@ -141,6 +134,23 @@ def _margin(
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )
+
+
+def _forces(
+    causes: Sequence[Cause],
+    request: MarginRequest,
+    whose: Population,
+    sense: LoadingSense,
+) -> list[PopulationForce]:
+    """Return the forces that each cause expects."""
+    about = {
+        "quantity": request.quantity,
+        "direction": request.direction,
+        "sense": sense,
+        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
+        "seed": request.seed,
+    }
+    return [population_force(c, request.deformation, whose, **about) for c in causes]
 
 
 def _levels(
