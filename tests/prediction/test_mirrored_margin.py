@@ -4,7 +4,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
-from mirrored import WORDS, check_same, mirrored, turned
+from mirrored import check_same, mirrored, turned
 from posteriors import (
     batch,
     plain_draws,
@@ -156,7 +156,7 @@ def test_the_answer_is_mirrored(name: str):
     assert found.worst.lower_bound_N < found.worst.upper_bound_N
     assert 0.0 < found.worst.exceedance.probability < 1.0
     check_same(asdict(other), asdict(turned_margin(found)))
-    for words in WORDS:
+    for words in ("extrapolated", "remarks"):
         assert len(getattr(found, words)) == len(getattr(other, words))
     if "given_force" in asked:
         assert other.reached.lower_bound_mm < other.reached.upper_bound_mm < 0.0
@@ -259,6 +259,8 @@ def test_a_capacity_is_refused_where_the_zero_is_larger_than_the_load(sense: int
     with pytest.raises(InputError, match="Ask for the quantity load") as refused:
         hdcal.margin(posterior, sense * 0.4, limit_force=70.0, **QUICK)
     assert [finding.file for finding in refused.value.findings] == ["limit_force"]
+    bare = hdcal.margin(posterior, sense * 0.4, **QUICK)
+    assert any("no capacity can be compared" in words for words in bare.remarks)
     load = hdcal.margin(
         posterior, sense * 0.4, limit_force=70.0, quantity="load", **QUICK
     )

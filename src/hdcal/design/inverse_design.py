@@ -119,8 +119,7 @@ def inverse_design(
     limits = abs(limit_force), limit_stress, probability
     asked = LimitAsked(at, levels, *limits, dict(vary))
     with Findings() as wrong:
-        place = "limit_force", limit_force, asked.sense, f"{at:g} mm"
-        wrong += [*capacity_findings(*place), *_findings(draws, asked, materials)]
+        wrong += _findings(draws, asked, materials, limit_force)
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
         gear = wrong.attempt(next_gear, draws, tolerances, seed)
@@ -181,9 +180,12 @@ def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
     return Finding("limit_force", words, remedy)
 
 
-def _findings(draws: DesignDraws, asked: LimitAsked, materials) -> list[Finding]:
-    vary = asked.bounds
+def _findings(
+    draws: DesignDraws, asked: LimitAsked, materials, limit_force: float
+) -> list[Finding]:
+    vary, place = asked.bounds, f"{asked.deformation_mm:g} mm"
     findings = name_findings(vary, SIZES, "vary")
+    findings += capacity_findings("limit_force", limit_force, asked.sense, place)
     if not vary and not materials:
         words = "nothing may change"
         remedy = "Free a size, e.g. wall_thickness_mm=0.5:0.8"

@@ -33,6 +33,10 @@ _EITHER_SIGN = (
     "The force may have either sign here: 95 % of members lie between {low:.3g} and "
     "{high:.3g} N. Capacities and probabilities count the {sign} ones only."
 )
+_AGAINST = (
+    "The gauge's zero turns the sign of the force here, {low:.3g} … {high:.3g} N: no "
+    "capacity can be compared with it. The load has the sign of the loading."
+)
 _NORMAL_TAILS = (
     "Such rare cases rest on the normal tails of noise and scatter, which no test of "
     "this size has seen."
@@ -125,7 +129,9 @@ def remarks(
 def _signs(levels: Sequence[Level], sense: LoadingSense) -> Iterator[str]:
     spans = [level.member_N for level in levels]
     low, high = min(span.lo for span in spans), max(span.hi for span in spans)
-    if low < 0.0 < high:
+    if max(sense * low, sense * high) < 0.0:
+        yield _AGAINST.format(low=low, high=high)
+    elif low < 0.0 < high:
         sign = "positive" if sense > 0 else "negative"
         yield _EITHER_SIGN.format(low=low, high=high, sign=sign)
 
