@@ -252,9 +252,24 @@ def test_the_lock_of_a_killed_run_is_recognised(writer, tmp_path: Path):
 def test_what_others_named_alike_is_left_alone(tmp_path: Path):
     for name in (".hdcal-notes", ".hdcal-0123456789ab-x", ".hdcal-0123456789ab"):
         (tmp_path / name).mkdir()
+    # Whoever can write here cannot have others' files removed.
+    (tmp_path / "project" / "building").mkdir(parents=True)
+    (tmp_path / "project" / "building" / "mine").touch()
+    (tmp_path / ".hdcal-0123456789ab-0123456789ab").symlink_to(tmp_path / "project")
     before = content(tmp_path)
     write(tmp_path / "run", "text")
     assert before.keys() <= content(tmp_path).keys()
+
+
+def test_a_folder_of_others_is_not_searched(tmp_path: Path, monkeypatch):
+    write(tmp_path / "run", "text")
+    (tmp_path / "run" / "home" / "deep").mkdir(parents=True)
+    searched = []
+    iterdir = Path.iterdir
+    monkeypatch.setattr(Path, "iterdir", lambda p: (searched.append(p), iterdir(p))[1])
+    with pytest.raises(InputError, match="'home', which hdcal did not write"):
+        reserve_folder(tmp_path / "run", force=True)
+    assert searched == [tmp_path / "run"]
 
 
 def test_where_there_are_no_locks_results_are_written_all_the_same(
