@@ -40,9 +40,12 @@ def local_cluster(**settings) -> distributed.LocalCluster:
     return distributed.LocalCluster(**settings)
 
 
-@pytest.fixture
-def local(tmp_path: Path) -> Iterator:
-    """A scheduler here, and two workers in processes and a folder of their own."""
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
+    """A scheduler here, and two workers in processes and a folder of their own.
+
+    One for all tests: who kills a worker gets a new one by its nanny.
+    """
     import dask
 
     quiet = {"distributed.scheduler.allowed-failures": 1}
@@ -55,7 +58,7 @@ def local(tmp_path: Path) -> Iterator:
             # Without one it would take a port that others may have taken.
             dashboard_address=":0",
             silence_logs=50,
-            local_directory=str(tmp_path / "workers"),
+            local_directory=str(tmp_path_factory.mktemp("workers")),
         ) as found,
     ):
         yield found
@@ -155,10 +158,10 @@ def until(happened: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
-def test_the_real_diagnosis_answers_there(local, hdcal: Hdcal, tmp_path: Path):
+def test_the_real_diagnosis_answers_there(local, here: Hdcal, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 1)
     asked = ["blind", "answer", folder, "--scheduler", local.scheduler_address]
-    done = hdcal(*asked, "--json")
+    done = here(*asked, "--json")
     assert done.returncode == 0, done.stderr
     assert len(done.stderr.splitlines()) == 2
     (answer,) = json.loads(done.stdout)["answers"]

@@ -614,9 +614,9 @@ def test_a_set_asks_for_effects_that_exist(fresh: Path, tmp_path: Path):
         answer_set(tmp_path / "future")
 
 
-def test_the_real_diagnosis_answers(hdcal: Hdcal, tmp_path: Path):
+def test_the_real_diagnosis_answers(here: Hdcal, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 1)
-    done = hdcal("blind", "answer", folder, "--json")
+    done = here("blind", "answer", folder, "--json")
     assert done.returncode == 0, done.stderr
     (said,) = json.loads(done.stdout)["answers"]
     answer = CaseAnswer.from_plain(said)

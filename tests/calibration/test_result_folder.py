@@ -173,9 +173,9 @@ def test_an_older_result_is_replaced_only_when_told_to(
     assert [path.name for path in folder.parent.iterdir()] == ["result"]
 
 
-def test_predict_prints_a_table(calibrated: Calibrated, hdcal: Hdcal):
+def test_predict_prints_a_table(calibrated: Calibrated, here: Hdcal):
     asked = ["--deformation", "0:0.6:4", "--temperature", "20,60"]
-    done = hdcal("predict", calibrated[1], *asked)
+    done = here("predict", calibrated[1], *asked)
     assert done.returncode == 0, done.stderr
     rows = read_bands(done.stdout)
     found = [(float(r["deformation_mm"]), float(r["temperature_C"])) for r in rows]

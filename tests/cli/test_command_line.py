@@ -209,9 +209,8 @@ def test_a_working_directory_that_is_gone_is_said_at_once(tmp_path: Path):
         command, cwd=tmp_path / "gone", capture_output=True, text=True
     )
     assert done.returncode == 2
-    assert done.stderr == (
-        "hdcal: command line: the working directory is gone. Change to one that exists.\n"
-    )
+    words = "command line: the working directory is gone. Change to one that exists."
+    assert done.stderr == f"hdcal: {words}\n"
 
 
 @pytest.mark.parametrize("name", ["a" * 4096, "a\nb", "a" * 300 + ".csv"])

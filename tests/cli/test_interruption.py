@@ -9,13 +9,15 @@ from pathlib import Path
 
 import pytest
 from commands import MAIN, XB1
+from short import SHORT, options
 
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_run_leaves_nothing(by: signal.Signals, tmp_path: Path):
     # On a terminal the progress bar tells when sampling has begun.
     ours, theirs = pty.openpty()
-    command = [*MAIN, "calibrate", str(XB1), "--draws", "1000000"]
+    endless = options(SHORT | {"draws": 1_000_000})
+    command = [*MAIN, "calibrate", str(XB1), *endless]
     with subprocess.Popen(
         command, cwd=tmp_path, stderr=theirs, stdout=subprocess.PIPE
     ) as process:

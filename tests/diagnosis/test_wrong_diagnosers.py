@@ -89,8 +89,8 @@ def predictive(count: int):
     found = [drawn(seed) for seed in range(1000, 1000 + count)]
     names = (NONE, *NAMES)
     truth = np.array([names.index(name) for name, _ in found])
-    table = np.array([[shares(case)[n] for n in names] for _, case in found])
-    return truth, table
+    each = [shares(case) for _, case in found]
+    return truth, np.array([[share[name] for name in names] for share in each])
 
 
 def sharpened(table, power: float):

@@ -10,6 +10,7 @@ import pytest
 from compiling import compilations
 from moving import moving_case
 from rigs import make_case, ramp
+from short import TOO_SHORT
 
 from hdcal import calibrate, calibrate_dynamic, residuals
 from hdcal.data.priors import effect_priors
@@ -39,23 +40,22 @@ def bent(rows: int):
 
 
 def calibrate_bent(case):
-    settings = {"effects": ["progressive_stiffening"], "with_gap": True, **FEW}
+    settings = {"effects": ["progressive_stiffening"], "with_gap": True, **TOO_SHORT}
     return residuals(calibrate(case, **settings))
 
 
 def calibrate_with_gap(case):
-    return residuals(calibrate(case, with_gap=True, **FEW))
+    return residuals(calibrate(case, with_gap=True, **TOO_SHORT))
 
 
 def calibrate_moving(case):
-    return motion_bands(calibrate_dynamic(case, **FEW))
+    return motion_bands(calibrate_dynamic(case, **TOO_SHORT))
 
 
-FEW = {"chains": 2, "warmup": 20, "draws": 20}
 # Two numbers of rows of one bucket.
 KINDS = {
-    "at rest": (bent, calibrate_bent, (33, 47)),
-    "with a gap": (bent, calibrate_with_gap, (33, 47)),
+    "at rest": (bent, calibrate_bent, (49, 60)),
+    "with a gap": (bent, calibrate_with_gap, (49, 60)),
     "moving": (lambda rows: moving_case(0, rows=rows), calibrate_moving, (200, 250)),
 }
 

@@ -2,12 +2,16 @@
 
 import numpy as np
 from rigs import make_case, make_gear
+from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.calibration.summary import K_by_theory
 from hdcal.data.priors import Prior
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
+
+# Medians and widths to a few parts in a hundred take more draws than the checks.
+LONGER = SHORT | {"draws": 4000}
 
 
 def width(values):
@@ -20,7 +24,7 @@ def test_a_wider_modulus_prior_widens_K_only():
     wide_gear = make_gear(E0=Prior("normal", (207e3, 30e3)), resolution=0.98)
     narrow_gear = make_gear(E0=Prior("normal", (207e3, 3e3)), resolution=0.98)
     narrow, wide = (
-        calibrate(make_case(case.records, gear), draws=4000).draws
+        calibrate(make_case(case.records, gear), **LONGER).draws
         for gear in (narrow_gear, wide_gear)
     )
     product = [width(d["K"] * d["E0"]) for d in (narrow, wide)]
@@ -30,8 +34,8 @@ def test_a_wider_modulus_prior_widens_K_only():
 
 def test_every_theory_reads_one_posterior():
     case = read_case(datasets_folder() / "xb1-100-80")
-    by_ring = calibrate(case)
-    by_article = calibrate(case, theory="article")
+    by_ring = calibrate(case, **LONGER)
+    by_article = calibrate(case, theory="article", **LONGER)
     for first, second in zip(
         K_by_theory(by_ring).values(), K_by_theory(by_article).values(), strict=True
     ):

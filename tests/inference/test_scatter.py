@@ -1,4 +1,4 @@
-"""Effects of scatter name what the model's own members carry, and add nothing."""
+"""Runs and gears are members of the model; effects of scatter name them, no more."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import equinox as eqx
 import numpy as np
 import pytest
 from rigs import make_case, make_gear, make_records
+from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate, check_effect_priors
 from hdcal.calibration.summary import summarise
@@ -21,12 +22,16 @@ SCATTER = [name for name, each in EFFECTS.items() if issubclass(each, Scatter)]
 scatter = pytest.mark.parametrize("name", SCATTER)
 
 
+# Of each gear in comparison to the first, and of each run [N].
+STIFFER, OFFSETS = np.array([1.0, 1.08, 0.93]), np.array([0.0, 3.0, -2.0])
+
+
 def case_with(labels: int):
     """Return a case of so many runs, each on a gear of its own."""
-    label = np.repeat(np.arange(labels), 12)
-    deformation = np.tile(np.linspace(0.02, 0.54, 12), labels)
-    noise = np.random.default_rng(labels).normal(0.0, 0.4, 12 * labels)
-    force = 205.0 * deformation + np.array([0.0, 2.0, -1.0])[label] + noise
+    label = np.repeat(np.arange(labels), 40)
+    deformation = np.tile(np.linspace(0.02, 0.54, 40), labels)
+    noise = np.random.default_rng(labels).normal(0.0, 0.3, 40 * labels)
+    force = 205.0 * STIFFER[label] * deformation + OFFSETS[label] + noise
     known = {"run", "specimen"} | ({"runs", "specimens"} if labels > 2 else set())
     records = make_records(deformation, force, run=label, specimen=label, known=known)
     return make_case(records)
@@ -74,10 +79,22 @@ def test_a_prior_under_the_effects_name_is_refused(name):
         check_effect_priors(replace(case_with(3), gear=gear))
 
 
-def test_a_calibration_keeps_the_name_and_no_more(tmp_path):
-    settings = {"warmup": 100, "draws": 50, "chains": 2}
-    bare = calibrate(case_with(3), **settings)
-    found = calibrate(case_with(3), effects=["run_offset"], **settings)
+@pytest.fixture(scope="module")
+def bare():
+    """Return a calibration without effects."""
+    return calibrate(case_with(3), **SHORT)
+
+
+def test_gears_have_a_stiffness_and_runs_an_offset_each(bare):
+    stiffer = bare.draws["specimen_deviation"].mean(axis=0)
+    assert stiffer == pytest.approx(STIFFER / STIFFER.mean() - 1.0, abs=0.01)
+    offsets = bare.draws["run_offset"]
+    assert offsets.mean(axis=0) == pytest.approx(OFFSETS - OFFSETS.mean(), abs=0.3)
+    assert offsets.sum(axis=1) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_calibration_keeps_the_name_and_no_more(bare, tmp_path):
+    found = calibrate(case_with(3), effects=["run_offset"], **SHORT)
     assert found.effects == (EFFECTS["run_offset"],)
     assert found.priors.keys() == bare.priors.keys()
     for name, values in bare.draws.items():

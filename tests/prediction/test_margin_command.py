@@ -88,6 +88,7 @@ FALSE = {
     "basis": {"basis": "C-basis"},
     "population": {"population": "readings"},
     "quantity": {"quantity": "torque"},
+    "loading_sense": {"loading_sense": 0},
     "seed": {"seed": -1},
     "status": {"status": "failed"},
     "reasons": {"reasons": ["it is not ok"]},

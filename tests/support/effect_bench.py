@@ -20,12 +20,27 @@ compiled_chain = jax.jit(predict_reading)
 
 
 @jax.jit
-def compiled_chains(base, sets, records, reading):
-    """Return readings and noise of the chain with each set of effects, in one program.
+def _applied(effect, signal, rows):
+    return effect.apply(signal, rows)
 
-    Programs of a few rows cost little more than their start: one for all is cheaper.
+
+@dataclasses.dataclass(frozen=True)
+class Compiled:
+    """An effect whose contribution is a program of its own.
+
+    The chain around it runs as it stands: so many chains share a few programs.
     """
-    return [predict_reading(base, effects, records, reading) for effects in sets]
+
+    effect: Effect
+
+    @property
+    def stage(self) -> str:
+        """The stage of the effect."""
+        return self.effect.stage
+
+    def apply(self, signal, rows):
+        """Return the signal as the effect leaves it."""
+        return _applied(self.effect, signal, rows)
 
 
 def typical(name: str, **changes: float) -> Effect:

@@ -110,15 +110,16 @@ def force_option(command: Callable) -> Callable:
     return click.option("--force", is_flag=True, help=words)(command)
 
 
-def direction_option(command: Callable) -> Callable:
-    """Add --direction."""
+def direction_option(help: str) -> Callable[[Callable], Callable]:
+    """Add --direction.
+
+    Args:
+        help: what up and down are.
+    """
+    ways = click.Choice(["up", "down"])
     return click.option(
-        "--direction",
-        type=click.Choice(["up", "down"]),
-        default="up",
-        show_default=True,
-        help="Loading or unloading.",
-    )(command)
+        "--direction", type=ways, default="up", show_default=True, help=help
+    )
 
 
 def start_options(command: Callable) -> Callable:

@@ -4,6 +4,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from hdcal.prediction.engine.loading_sense import (
+    LoadingSense,
+    ends_along,
+    sense_of,
+)
 from hdcal.prediction.margin.result import Chance, Fraction, Size
 from hdcal.report.answer import Answer, Count, Sentences, Words
 from hdcal.report.parameters import Interval
@@ -41,7 +46,7 @@ class DesignAnswer(Answer):
 
 @dataclass(frozen=True, kw_only=True)
 class StressAnswer:
-    """Hoop bending stress, the yield strength where it is known, and their ratio."""
+    """Size of the hoop bending stress, yield strength if known, and their ratio."""
 
     stress_MPa: Interval
     yield_MPa: Interval | None
@@ -50,7 +55,7 @@ class StressAnswer:
 
 @dataclass(frozen=True, kw_only=True)
 class StressAtWindow(StressAnswer):
-    """The same at the upper end of a window."""
+    """The same at the end of a window that is the farther one from zero."""
 
     deformation_mm: float
 
@@ -60,7 +65,7 @@ class WindowAsked:
     """What a wave generator was asked for.
 
     Attributes:
-        window_mm: lo and hi of the deformation.
+        window_mm: lo and hi of the deformation, of one sign.
         temperature_C: at all of which it has to hold.
         probability: with which it has to hold.
         setting_sd_mm: scatter of the set point as built.
@@ -70,6 +75,16 @@ class WindowAsked:
     temperature_C: Numbers
     probability: Fraction
     setting_sd_mm: Size
+
+    @property
+    def sense(self) -> LoadingSense:
+        """Sense of loading: forces and set points have its sign."""
+        return sense_of(sum(self.window_mm))
+
+    @property
+    def sizes_mm(self) -> Ends:
+        """Least deformation (less: backlash) and largest (more: jam) in size."""
+        return ends_along(*self.window_mm, self.sense)
 
 
 @dataclass(frozen=True)
@@ -160,7 +175,7 @@ class LimitAsked:
     Attributes:
         deformation_mm: radial, of the gear.
         temperature_C: at all of which the limits hold.
-        limit_force_N: that must not be exceeded.
+        limit_force_N: that must not be exceeded, its size.
         limit_stress_MPa: hoop bending; None for the yield strength, if one is known.
         probability: share of the draws that have to keep each limit.
         bounds: of each free size [mm] by edge name.
@@ -172,6 +187,11 @@ class LimitAsked:
     limit_stress_MPa: float | None
     probability: Fraction
     bounds: Mapping[str, Ends]
+
+    @property
+    def sense(self) -> LoadingSense:
+        """Sense of loading: forces have its sign, limits are along it."""
+        return sense_of(self.deformation_mm)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,8 @@ from hdcal.prediction.engine.sizes import SIZES
 class Candidate:
     """One material with the best sizes that were found for it.
 
+    Forces are along the sense of loading.
+
     Attributes:
         basis: draws, of this material.
         sizes: [mm] by edge name.
@@ -116,6 +118,8 @@ def spreads(
     target: Target, sizes: Mapping[str, np.ndarray], shares: np.ndarray
 ) -> np.ndarray:
     """Return quantiles of the force, and the force kept, for many sizes [N].
+
+    All of them are along the sense of loading.
 
     Args:
         target: tells the population.

@@ -80,17 +80,18 @@ def place_findings(
 
     Args:
         draws: of the tested gear.
-        deformation: radial [mm].
+        deformation: radial, of either sense of loading [mm].
         temperature: [°C].
         least_radius: that deformations have to stay below [mm].
         names: of the two parameters.
     """
     findings, (where, warmth) = [], names
-    if not np.isfinite(deformation).all() or not (deformation > 0.0).all():
-        words = "a deformation that is not positive"
-        findings.append(Finding(where, words, "Give it in mm, above zero"))
-    elif deformation.max() >= least_radius:
-        words = f"{deformation.max():g} mm on a radius of {least_radius:g} mm"
+    farthest = deformation[np.argmax(np.abs(deformation))]
+    if not np.isfinite(deformation).all() or (deformation == 0.0).any():
+        words = "a deformation that is zero or not finite"
+        findings.append(Finding(where, words, "Give it in mm, above or below zero"))
+    elif abs(farthest) >= least_radius:
+        words = f"{farthest:g} mm on a radius of {least_radius:g} mm"
         findings.append(Finding(where, words, "Give it in mm"))
     return findings + (
         level_findings(temperature, warmth)

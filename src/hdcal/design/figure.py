@@ -67,9 +67,10 @@ def generator_figure(found: WaveGenerator) -> Figure:
 
 
 def _balance(axes: Axes, found: WaveGenerator) -> None:
-    low, high = found.asked.window_mm
+    (low, high), sense = found.asked.sizes_mm, found.asked.sense
     wide = high - low
     along = np.linspace(max(low - 1.5 * wide, 0.02 * low), high + 1.5 * wide, _FINE)
+    along = np.sort(sense * along)
     levels = np.asarray(found.asked.temperature_C)
     levels = levels[:: max(len(levels) - 1, 1)]  # the coldest and the warmest
     forces = found.gear.forces(along, levels)
@@ -82,12 +83,14 @@ def _balance(axes: Axes, found: WaveGenerator) -> None:
     spring = found.chosen
     axes.plot(
         along,
-        spring.rate * (spring.interference - along),
+        spring.rate * (sense * spring.interference - along),
         color=DARK,
         linestyle="--",
         label=f"spring of {spring.rate:.4g} N/mm",
     )
-    axes.axvspan(low, high, color=GREEN, alpha=0.12, linewidth=0, label="window")
+    axes.axvspan(
+        *found.asked.window_mm, color=GREEN, alpha=0.12, linewidth=0, label="window"
+    )
     room = 0.1 * (bands.max() - bands.min())
     axes.set_ylim(bands.min() - room, bands.max() + 4.0 * room)
     axes.set_xlim(along[0], along[-1])
@@ -130,8 +133,8 @@ def inverse_figure(found: InverseDesign) -> Figure:
 
 
 def _spreads(found: InverseDesign, sizes: dict) -> np.ndarray:
-    """Return lower end, median, upper end and the kept force at sizes [N]."""
-    return spreads(found.target, sizes, np.array(_TAILS))
+    """Return both ends, median and the kept force at sizes, with their sign [N]."""
+    return found.asked.sense * spreads(found.target, sizes, np.array(_TAILS))
 
 
 def _along_one(axes: Axes, found: InverseDesign) -> None:
@@ -142,10 +145,10 @@ def _along_one(axes: Axes, found: InverseDesign) -> None:
     axes.plot(along, table[1], color=BLUE, label="median and 95 % band")
     words = f"not exceeded with probability {found.asked.probability:g}"
     axes.plot(along, table[3], color=PURPLE, linestyle="--", label=words)
-    axes.axhline(found.asked.limit_force_N, color=RED, linewidth=0.9, label="limit")
-    axes.plot(
-        found.chosen.sizes[name], found.chosen.force, "o", color=DARK, label="chosen"
-    )
+    sense = found.asked.sense
+    limit, force = sense * found.asked.limit_force_N, sense * found.chosen.force
+    axes.axhline(limit, color=RED, linewidth=0.9, label="limit")
+    axes.plot(found.chosen.sizes[name], force, "o", color=DARK, label="chosen")
     axes.set_xlabel(f"{named(name)} [mm]")
     axes.set_ylabel("force [N]")
     axes.legend(loc="best")
@@ -164,7 +167,8 @@ def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
     figure.colorbar(
         drawn, ax=axes, label=f"force kept with {found.asked.probability:g} [N]"
     )
-    axes.contour(x, y, table, [found.asked.limit_force_N], colors=RED, linewidths=1.6)
+    limit = found.asked.sense * found.asked.limit_force_N
+    axes.contour(x, y, table, [limit], colors=RED, linewidths=1.6)
     geometry = found.basis.gear.geometry
     own = [float(getattr(geometry, n.removesuffix("_mm"))) for n in (first, second)]
     mark = {"markersize": 8, "markeredgecolor": "white", "linestyle": ""}

@@ -1,4 +1,7 @@
-"""The force and stress that a gear exceeds rarely, differentiable in all its sizes."""
+"""The force and stress that a gear exceeds rarely, differentiable in all its sizes.
+
+Both are sizes, along the sense of loading.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -29,7 +32,8 @@ class Target(eqx.Module):
     Attributes:
         gears: one for each draw.
         drawing: the tested gear's sizes, of the material in use [mm].
-        deformation: radial [mm].
+        deformation: radial, with its sign [mm].
+        sense: of loading.
         temperatures: [°C], shape (t,).
         limit_force: that must not be exceeded [N].
         limit_stress: that must not be exceeded [MPa], shape (draw,); infinite where
@@ -40,6 +44,7 @@ class Target(eqx.Module):
     gears: SampledGears
     drawing: Geometry
     deformation: Scalar
+    sense: Scalar
     temperatures: Float[Array, " t"]
     limit_force: float
     limit_stress: Float[Array, " draw"]
@@ -57,6 +62,7 @@ class Target(eqx.Module):
             gears=replace(gear.gears, values=dict(draws.values)),
             drawing=draws.drawing,
             deformation=asked.deformation_mm,
+            sense=float(asked.sense),
             temperatures=np.asarray(asked.temperature_C),
             limit_force=asked.limit_force_N,
             limit_stress=strength,
@@ -70,11 +76,15 @@ class Target(eqx.Module):
         return geometry_with(self.drawing, sizes)
 
     def forces(self, place: Mapping[str, Scalar]) -> Float[Array, " draw"]:
-        """Return the largest force over the temperatures of each draw [N]."""
+        """Return the largest force over the temperatures of each draw [N].
+
+        It is along the sense of loading.
+        """
         at = jnp.asarray(place.get("deformation_mm", self.deformation))
         along = jnp.broadcast_to(at, self.temperatures.shape)
         factors = place.get("modulus", 1.0), place.get("K", 1.0)
-        each = self.gears.forces(self.drawn(place), along, self.temperatures, *factors)
+        where = self.drawn(place), along, self.temperatures
+        each = self.sense * self.gears.forces(*where, *factors)
         # The derivative of a maximum compares values, which a compiler may compute
         # twice with another rounding; that of a choice does not.
         worst = jnp.argmax(each, axis=0)
@@ -88,7 +98,7 @@ class Target(eqx.Module):
         modulus = values["E0"] * warm * place.get("modulus", 1.0)
         at = place.get("deformation_mm", self.deformation)
         made = self.gears.made(self.drawn(place))
-        return jnp.asarray(peak_stress(made, modulus, at))
+        return jnp.asarray(peak_stress(made, modulus, self.sense * at))
 
     def force(self, place: Mapping[str, Scalar]) -> Scalar:
         """Return the force that is kept with the target's probability [N]."""

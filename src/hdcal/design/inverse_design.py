@@ -4,9 +4,10 @@ Of all sizes inside their bounds with
 
     F ≤ limit and stress ≤ strength, each with the required probability,
 
-the ones nearest to the tested gear are chosen: least Σ (ln x/x₀)², since K was found
-there. Solved by sequential quadratic programming on the logarithms of the sizes, with
-exact derivatives of the model.
+both in size, along the sense of loading (`hdcal.prediction.engine.loading_sense`), the
+ones nearest to the tested gear are chosen: least Σ (ln x/x₀)², since K was found there.
+Solved by sequential quadratic programming on the logarithms of the sizes, with exact
+derivatives of the model.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,6 +39,7 @@ from hdcal.design.sizes import (
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
+from hdcal.prediction.engine.loading_sense import capacity_findings
 from hdcal.prediction.engine.sizes import SIZES
 
 
@@ -92,8 +94,8 @@ def inverse_design(
         source: a calibration; or a gear, for what its priors say.
         vary: lowest and highest value of each free size [mm]: wall_thickness_mm,
             radius_mm, length_mm, load_height_mm.
-        limit_force: that must not be exceeded [N].
-        deformation: radial, of the gear [mm]; by default its nominal one.
+        limit_force: not to be exceeded [N]: its size, or with the force's sign.
+        deformation: radial, with its sign [mm]; by default the gear's nominal one.
         temperatures: at all of which the limits hold [°C]; by default the reference.
         probability: with which the next gear keeps each limit.
         materials: names or .toml files to choose among; by default the gear's own.
@@ -114,10 +116,10 @@ def inverse_design(
     # Without any number the finding about it is told with the others.
     at = np.nan if at is None else at
     levels = tuple(with_reference(draws, temperatures).tolist())
-    limits = limit_force, limit_stress, probability
+    limits = abs(limit_force), limit_stress, probability
     asked = LimitAsked(at, levels, *limits, dict(vary))
     with Findings() as wrong:
-        wrong += _findings(draws, asked, materials)
+        wrong += _findings(draws, asked, materials, limit_force)
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
         gear = wrong.attempt(next_gear, draws, tolerances, seed)
@@ -172,15 +174,18 @@ def _unmet(found: Sequence[Candidate], asked: LimitAsked) -> Finding:
         f"no {ranges or 'material'} meets {limit:g} N at "
         f"{asked.deformation_mm:g} mm with probability "
         f"{asked.probability:g}: the best ({at or best.basis.material}) "
-        f"gives {best.force:.4g} N{stress}"
+        f"gives {asked.sense * best.force:.4g} N{stress}"
     )
     remedy = "Widen the bounds, free another size, or allow more force"
     return Finding("limit_force", words, remedy)
 
 
-def _findings(draws: DesignDraws, asked: LimitAsked, materials) -> list[Finding]:
-    vary = asked.bounds
+def _findings(
+    draws: DesignDraws, asked: LimitAsked, materials, limit_force: float
+) -> list[Finding]:
+    vary, place = asked.bounds, f"{asked.deformation_mm:g} mm"
     findings = name_findings(vary, SIZES, "vary")
+    findings += capacity_findings("limit_force", limit_force, asked.sense, place)
     if not vary and not materials:
         words = "nothing may change"
         remedy = "Free a size, e.g. wall_thickness_mm=0.5:0.8"
@@ -191,7 +196,7 @@ def _findings(draws: DesignDraws, asked: LimitAsked, materials) -> list[Finding]
     ):
         if value is not None and not 0.0 < value < np.inf:
             words = f"{value:g} is no limit"
-            findings.append(Finding(name, words, f"Give it in {unit}, above zero"))
+            findings.append(Finding(name, words, f"Give it in {unit}"))
     findings += probability_findings(draws, asked.probability)
     if any(name not in SIZES for name in vary):
         return findings

@@ -14,6 +14,7 @@ from hdcal.design.answer import (
 )
 from hdcal.design.design_draws import DesignDraws
 from hdcal.prediction.engine.conditions import NEAR_K, NEAR_MM
+from hdcal.prediction.engine.loading_sense import ends_along, interval_along
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.report.words import estimate, number, percent
 
@@ -32,8 +33,7 @@ def next_step(found: DesignAnswer) -> str | None:
     if isinstance(found, GeneratorAnswer):
         return (
             f"Set the free end of a spring of {number(found.spring.rate_N_per_mm)} "
-            f"N/mm {number(found.spring.interference_mm)} mm beyond the undeformed "
-            "gear."
+            f"N/mm {_free_end(found)}."
         )
     if isinstance(found, InverseAnswer):
         return "Make one such gear and test it: K is carried over to its sizes."
@@ -54,9 +54,11 @@ def generator_words(found: GeneratorAnswer) -> Iterator[str]:
     """Yield what the wave generator has to be."""
     asked, spring, aim = found.asked, found.spring, found.set_point
     low, high = asked.window_mm
-    middle, span = estimate(aim.force_N)
+    force, pull = aim.force_N, "press" if asked.sense > 0 else "pull"
+    size = interval_along(force.median, force.lo, force.hi, asked.sense)
+    middle, span = estimate(size)
     yield (
-        f"To hold the gear at {aim.deformation_mm:.4g} mm each side has to press "
+        f"To hold the gear at {aim.deformation_mm:.4g} mm each side has to {pull} "
         f"with {middle} N ({percent(found.interval)} {_kind(found)} {span} N) at "
         f"{aim.temperature_C:g} °C."
     )
@@ -66,8 +68,7 @@ def generator_words(found: GeneratorAnswer) -> Iterator[str]:
     yield (
         f"With one set point for every gear, {softest}"
         f"{number(spring.rate_N_per_mm)} N/mm, {number(spring.rate_over_gear)} "
-        f"times the gear's own stiffness. Its free end stands "
-        f"{number(spring.interference_mm)} mm beyond the undeformed gear."
+        f"times the gear's own stiffness. Its free end stands {_free_end(found)}."
     )
     yield (
         f"It keeps {low:g} … {high:g} mm at {_warmth(asked.temperature_C)} with "
@@ -75,12 +76,22 @@ def generator_words(found: GeneratorAnswer) -> Iterator[str]:
         f"backlash {_share(spring.zero_backlash)}, no jam {_share(spring.no_jam)}."
     )
     yield _adjusting(found)
-    yield _stress(found.stress, f"At {high:g} mm")
+    yield _stress(found.stress, f"At {found.stress.deformation_mm:g} mm")
+
+
+def _free_end(found: GeneratorAnswer) -> str:
+    """Return where the free end of the spring is to stand."""
+    side = "beyond" if found.asked.sense > 0 else "inside"
+    far = found.asked.sense * found.spring.interference_mm
+    return f"{number(far)} mm {side} the undeformed gear"
 
 
 def _adjusting(found: GeneratorAnswer) -> str:
     own = found.adjusted
-    (x, y), (force, more) = own.interference_mm, own.preload_N
+    (x, y), (force, more) = (
+        ends_along(*ends, found.asked.sense)
+        for ends in (own.interference_mm, own.preload_N)
+    )
     share = percent(own.share_of_gears)
     return (
         f"Adjusted gear by gear with that spring, the set point has to reach from "

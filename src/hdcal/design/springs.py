@@ -9,6 +9,8 @@ with force F and radial deformation ω of one side. F grows with ω; so does ω 
 and ω ≥ lo just when x ≥ lo + F(lo)/c, ω ≤ hi just when x ≤ hi + F(hi)/c. A gear is
 inside the window at all temperatures just when x lies in one interval, which makes
 every probability here a count of intervals: no equation has to be solved.
+Deformations, forces and set points are along the sense of loading
+(`hdcal.prediction.engine.loading_sense`): a gear that is pulled has the same balance.
 """
 
 from dataclasses import dataclass

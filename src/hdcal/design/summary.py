@@ -33,6 +33,7 @@ from hdcal.design.sentences import (
 )
 from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import peak_stress
+from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report
@@ -108,18 +109,19 @@ def generator_report(
     return Report(generator_document(answer, command), answer, _FILE, figures)
 
 
-def _numbers(values: np.ndarray) -> tuple[float, ...]:
-    return tuple(values.tolist())
+def _signed(ends: np.ndarray, found: WaveGenerator) -> tuple[float, float]:
+    low, high = ends.tolist()
+    return ends_along(low, high, found.asked.sense)
 
 
 def _spring(found: WaveGenerator) -> ChosenSpring:
-    spring = found.chosen
-    own = np.median(found.forces[1, _reference(found)]) / _middle(found)
+    spring, sense = found.chosen, found.asked.sense
+    own = sense * np.median(found.forces[1, _reference(found)]) / _middle(found)
     return ChosenSpring(
         rate_N_per_mm=spring.rate,
         softest_considered=spring.rate == found.springs[0].rate,
         rate_over_gear=spring.rate / float(own),
-        interference_mm=spring.interference,
+        interference_mm=sense * spring.interference,
         probability=spring.together,
         standard_error=_error(spring.together, found.basis.size),
         zero_backlash=spring.no_backlash,
@@ -144,12 +146,13 @@ def _set_point(found: WaveGenerator) -> SetPoint:
     return SetPoint(
         deformation_mm=_middle(found),
         temperature_C=found.asked.temperature_C[level],
-        force_N=credible_interval(found.forces[1, level]),
+        force_N=credible_interval(found.asked.sense * found.forces[1, level]),
     )
 
 
 def _forces(found: WaveGenerator, level: int) -> WindowForces:
-    ends = map(credible_interval, found.forces[:, level])
+    sense = found.asked.sense
+    ends = map(credible_interval, sense * found.forces[::sense, level])
     return WindowForces(found.asked.temperature_C[level], *ends)
 
 
@@ -172,23 +175,23 @@ def _adjusted(found: WaveGenerator) -> GearByGear:
         [0.5 - found.asked.probability / 2.0, 0.5 + found.asked.probability / 2.0]
     )
     reach = np.quantile(own, ends)
-    first, last = _numbers(reach)
-    soft, firm = _numbers(found.chosen.rate * (reach - _middle(found)))
+    load = found.chosen.rate * (reach - found.asked.sense * _middle(found))
     return GearByGear(
         probability=found.chosen.adjusted,
         share_of_gears=found.asked.probability,
-        interference_mm=(first, last),
-        preload_N=(soft, firm),
+        interference_mm=_signed(reach, found),
+        preload_N=_signed(load, found),
     )
 
 
 def _window_stress(found: WaveGenerator) -> StressAtWindow:
-    basis, at = found.basis, found.asked.window_mm[1]
+    basis, at = found.basis, found.asked.sizes_mm[1]
     rise = np.asarray(found.asked.temperature_C) - basis.gear.reference_temperature
     warm = np.max(1.0 - np.asarray(basis.values["alpha"])[:, None] * rise, axis=1)
     modulus = np.asarray(basis.values["E0"]) * warm
     draws = np.asarray(peak_stress(basis.gear.geometry, modulus, at))
-    return StressAtWindow(deformation_mm=at, **_stress(basis, draws))
+    where = found.asked.sense * at
+    return StressAtWindow(deformation_mm=where, **_stress(basis, draws))
 
 
 def _stress(basis: DesignDraws, draws: np.ndarray) -> dict[str, Any]:
@@ -213,9 +216,11 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
         **origin(found.basis, INTERVAL, found.gear.interval_kind(found.basis)),
         asked=found.asked,
         population=found.gear.words,
-        design=_candidate(found.chosen),
-        tested=_candidate(found.tested),
-        candidates=tuple(map(_candidate, found.candidates)),
+        design=_candidate(found.chosen, found.asked.sense),
+        tested=_candidate(found.tested, found.asked.sense),
+        candidates=tuple(
+            _candidate(one, found.asked.sense) for one in found.candidates
+        ),
         elasticities=found.elasticities,
         assumptions=tuple(found.chosen.basis.assumptions),
         warnings=found.warnings,
@@ -235,14 +240,14 @@ def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAns
     return Report(inverse_document(answer, command), answer, _FILE, figures)
 
 
-def _candidate(one: Candidate) -> CandidateAnswer:
-    span = credible_interval(one.forces)
+def _candidate(one: Candidate, sense: LoadingSense) -> CandidateAnswer:
+    span = credible_interval(sense * one.forces)
     return CandidateAnswer(
         material=one.basis.material,
         sizes_mm={name.removesuffix("_mm"): v for name, v in one.sizes.items()},
         met=one.met,
         change=one.change,
-        force_N=CandidateForce(**vars(span), kept=one.force),
+        force_N=CandidateForce(**vars(span), kept=sense * one.force),
         probability=one.kept,
         standard_error=_error(one.kept, len(one.forces)),
         **_stress(one.basis, one.stresses),

@@ -27,13 +27,16 @@ _ALONG = 9
 class WaveGenerator(Shown):
     """The elastic wave generator that meets a window, and how it was judged.
 
+    Springs, forces and set points are along the sense of loading.
+
     Attributes:
         basis: what the draws belong to.
         gear: whom the window is for.
         asked: window, temperatures and probability.
         springs: every rate that was looked at, softest first.
         chosen: the softest that meets the requirement.
-        forces: F at lo, in the middle and at hi at each temperature [N]: [3, T, draw].
+        forces: F at the least deformation, in the middle and at the largest, at each
+            temperature [N]: [3, T, draw].
         error: of each draw's set point as built [mm], shape (draw,).
         warnings: what is extrapolated, in words.
     """
@@ -54,7 +57,7 @@ class WaveGenerator(Shown):
             level: of the temperatures; by default at all of them.
         """
         forces = self.forces if level is None else self.forces[:, level : level + 1]
-        return set_points(self.chosen.rate, self.asked.window_mm, forces)
+        return set_points(self.chosen.rate, self.asked.sizes_mm, forces)
 
 
 def wave_generator(
@@ -72,8 +75,9 @@ def wave_generator(
 
     Args:
         source: a calibration; or a gear, for what its priors say.
-        window: least deformation (below: backlash) and largest (above: teeth jam),
-            radial, of the gear [mm].
+        window: lowest and highest deformation, radial, of the gear [mm]. In the one
+            nearer to zero teeth begin to have backlash, in the other they jam. A
+            generator that pulls has both below zero.
         temperatures: at all of which a gear has to stay inside [°C]; by default the
             reference one.
         probability: with which the next gear has to stay inside.
@@ -107,9 +111,9 @@ def _generator(
     rates: tuple[float, float] | None,
     seed: int,
 ) -> WaveGenerator:
-    window, levels = asked.window_mm, np.asarray(asked.temperature_C)
+    window, levels = asked.sizes_mm, np.asarray(asked.temperature_C)
     along = np.linspace(*window, _ALONG)
-    forces = gear.forces(along, levels)
+    forces = asked.sense * gear.forces(asked.sense * along, levels)
     _check_growing(forces)
     if rates is None:
         middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
@@ -128,7 +132,7 @@ def _generator(
         chosen,
         forces[[0, _ALONG // 2, -1]],
         error,
-        (*beyond_tested(draws, np.array(window), levels), *draws.misfits),
+        (*beyond_tested(draws, np.array(asked.window_mm), levels), *draws.misfits),
     )
 
 
@@ -165,6 +169,10 @@ def _findings(draws: DesignDraws, asked: WindowAsked, rates) -> list[Finding]:
     if not low < high:
         words = f"{low:g}:{high:g} is empty"
         findings.append(Finding("window", words, "Write LO:HI, e.g. 0.38:0.42"))
+    elif low < 0.0 < high:
+        words = f"{low:g}:{high:g} holds zero, where no spring presses nor pulls"
+        remedy = "Give both ends one sign, e.g. 0.38:0.42"
+        findings.append(Finding("window", words, remedy))
     findings += probability_findings(draws, asked.probability)
     if not 0.0 <= setting_sd < np.inf:
         words = f"{setting_sd:g} is no standard deviation"

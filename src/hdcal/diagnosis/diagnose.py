@@ -51,14 +51,12 @@ def diagnose(
         The verdict; it may be none, ambiguous or unknown.
 
     Raises:
-        InputError: an effect has no prior or does not bear padded rows, the gear file
-            names an unknown one, or the force does not grow with the deformation.
+        InputError: an effect, a prior or the data cannot be used, see `_check`.
     """
     _check(case, library)
     rng = np.random.default_rng(seed)
     averaged, group = average_rows(case)
-    # Means say nothing of the noise of single rows.
-    library = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
+    library = _testable(library, group)
     evidence, posterior = _evidence_and_posterior(averaged, library)
     found = detect_gap(evidence, posterior, averaged, rng)
     which = identify_cause(evidence, found.posterior, found.detected, library, rng)
@@ -84,8 +82,21 @@ def diagnose(
     )
 
 
+def _testable(
+    library: Mapping[str, type[Effect]], group: int
+) -> dict[str, type[Effect]]:
+    """Return the effects that means of `group` rows can show."""
+    # They say nothing of the noise of single rows.
+    return {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
+
+
 def _check(case: Case, library: Mapping[str, type[Effect]]) -> None:
-    """Refuse priors of unknown effects, and forces that fall with the deformation."""
+    """Refuse priors of unknown effects, and forces that fall with the deformation.
+
+    Raises:
+        InputError: an effect has no prior or does not bear padded rows, the gear file
+            names an unknown one, or the force does not grow with the deformation.
+    """
     check_effect_priors(case, {**EFFECTS, **library})
     deformation = case.records.deformation - np.mean(case.records.deformation)
     if deformation @ np.asarray(case.records.force) > 0.0:

@@ -6,6 +6,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import xarray as xr
+from h5py import h5o  # pyright: ignore[reportAttributeAccessIssue]
 
 from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
@@ -52,7 +53,7 @@ def _objects(file: h5py.File) -> Iterator[h5py.Group | h5py.Dataset]:
         ValueError: a link leads elsewhere or back, or there are too many objects.
     """
     waiting: list[h5py.Group] = [file]
-    seen = {h5py.h5o.get_info(file.id).addr}
+    seen = {h5o.get_info(file.id).addr}
     while waiting:
         group = waiting.pop()
         yield group
@@ -62,7 +63,7 @@ def _objects(file: h5py.File) -> Iterator[h5py.Group | h5py.Dataset]:
             found = group[name]
             if not isinstance(found, h5py.Group | h5py.Dataset):
                 raise ValueError("holds what is neither group nor data")
-            address = h5py.h5o.get_info(found.id).addr
+            address = h5o.get_info(found.id).addr
             if address in seen:
                 raise ValueError("holds a loop of links")
             seen.add(address)

@@ -72,8 +72,8 @@ class ChangeAlarm:
         """Take the next standardised innovation.
 
         Returns:
-            The larger sum as a share of the threshold, negative if that of too small
-            forces, and whether it calls.
+            The larger sum as a share of the threshold, negative if that of readings
+            below what was expected (with their sign), and whether it calls.
         """
         self._above = max(0.0, self._above + innovation - ALLOWANCE)
         self._below = max(0.0, self._below - innovation - ALLOWANCE)

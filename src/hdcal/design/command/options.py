@@ -38,8 +38,8 @@ def window_options(command: Callable) -> Callable:
         click.option(
             "--window",
             type=ENDS,
-            help="Deformation to keep [mm]: backlash below, jam above. Asks for a "
-            "spring.",
+            help="Deformation to keep [mm]: backlash beyond its end nearer to zero, "
+            "jam beyond the other. Asks for a spring.",
         ),
     ):
         command = add(command)
@@ -69,7 +69,7 @@ def limit_options(command: Callable) -> Callable:
         click.option(
             "--limit-force",
             type=FORCE,
-            help="Force not to be exceeded. Asks for sizes.",
+            help="Size of the force not to be exceeded. Asks for sizes.",
         ),
     ):
         command = add(command)

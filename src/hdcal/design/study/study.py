@@ -37,8 +37,8 @@ class Study(Shown):
 
     Attributes:
         columns: material, the sizes, deformation and temperature by edge name;
-            force_median_N, force_lo_N, force_hi_N; stress_MPa, the median hoop bending
-            stress under the load.
+            force_median_N, force_lo_N, force_hi_N with the sign of the deformation;
+            stress_MPa, the median size of the hoop bending stress under the load.
         varied: names of the columns that were varied, in the order given.
         interval: probability inside the band.
         interval_kind: what kind of interval the band is.
@@ -73,7 +73,8 @@ def study(
         vary: values by name: wall_thickness_mm, radius_mm, length_mm, load_height_mm,
             deformation_mm, temperature_C.
         materials: names or .toml files; by default the gear's own.
-        deformation: radial, of the gear [mm]; by default its nominal one.
+        deformation: radial, of the gear, of either sign [mm]; by default its nominal
+            one.
         temperature: [°C]; by default the reference temperature.
         interval: probability inside the band.
         seed: of the draws of priors.
@@ -173,7 +174,7 @@ def _of_material(draws: DesignDraws, axes, interval: float) -> dict[str, np.ndar
     forces = force_quantiles(draws, factor, at, warm, tails)
     modulus, loss = (np.median(draws.values[name]) for name in ("E0", "alpha"))
     warm_modulus = modulus * (1.0 - loss * (warm - draws.gear.reference_temperature))
-    stress = np.broadcast_to(peak_stress(drawing, warm_modulus, at), at.shape)
+    stress = np.broadcast_to(peak_stress(drawing, warm_modulus, np.abs(at)), at.shape)
     named = ("force_median_N", "force_lo_N", "force_hi_N")
     return {
         "material": np.full(len(at), draws.material),
@@ -205,11 +206,12 @@ def force_quantiles(
     if not is_linear(draws):
         return general_quantiles(draws, factor, deformation, temperature, shares)
     # Multiplied by a positive number no draw changes its rank: one gear's quantiles
-    # at 1 mm, for each temperature, serve all designs.
-    levels, which = np.unique(temperature, return_inverse=True)
-    one = np.ones_like(levels)
-    unit = general_quantiles(draws, one, one, levels, shares)
-    return unit[:, which] * (factor * deformation)
+    # at 1 mm, for each temperature and sense of loading, serve all designs.
+    sense = np.sign(deformation)
+    places = np.stack([sense, temperature])
+    (way, levels), which = np.unique(places, axis=1, return_inverse=True)
+    unit = general_quantiles(draws, np.ones_like(levels), way, levels, shares)
+    return unit[:, which] * (factor * np.abs(deformation))
 
 
 def is_linear(draws: DesignDraws) -> bool:

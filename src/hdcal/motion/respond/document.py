@@ -21,14 +21,18 @@ if TYPE_CHECKING:
 _FROM_PRIORS = {"mass_kg": "mass", "damping_N_s_per_mm": "damping"}
 
 
-def headline(peak: Interval) -> str:
+def headline(peak: Interval, *, pulled: bool) -> str:
     """Return the answer in one sentence.
 
     Args:
-        peak: largest deformation [mm].
+        peak: largest size of the deformation [mm].
+        pulled: whether the force is negative at any time: the deformation then may be.
     """
     middle, span = estimate(peak)
-    return f"The deformation reaches {middle} mm, 95 % credible interval {span} mm."
+    size = " in size" if pulled else ""
+    return (
+        f"The deformation reaches {middle} mm{size}, 95 % credible interval {span} mm."
+    )
 
 
 def next_steps(

@@ -44,7 +44,8 @@ def tested_rows(posterior: Posterior, temperature: float, lo, hi) -> np.ndarray:
     """
     records = posterior.case.records
     zero = float(np.median(posterior.draws["deformation_offset"]))
+    # From the unloaded gear, where motion begins, in either sense of loading.
     low = min(0.0, float(np.min(records.deformation)) - zero)
-    high = float(np.max(records.deformation)) - zero
+    high = max(0.0, float(np.max(records.deformation)) - zero)
     inside = (lo >= low - NEAR_MM) & (hi <= high + NEAR_MM)
     return inside & temperature_is_tested(records, temperature)

@@ -44,8 +44,9 @@ class Response(Shown):
         tested: the whole band lies within the deformations and the temperature that
             were calibrated.
         estimates: mass_kg, damping_N_s_per_mm, damping_ratio, stiffness_N_per_mm,
-            natural_frequency_Hz, damped_frequency_Hz, peak_mm: each with median, lo,
-            hi and driven_by (data, prior or given).
+            natural_frequency_Hz, damped_frequency_Hz, peak_mm (the largest size of
+            the deformation): each with median, lo, hi and driven_by (data, prior or
+            given).
         request: what was asked.
         temperature_C: of the gear.
         draws: number of gears integrated.
@@ -95,7 +96,7 @@ def respond(
     Args:
         posterior: from `calibrate` or `calibrate_dynamic`.
         force: `step`, `sine`, `chirp`, or a pair of times [s] and forces [N].
-        amplitude: of a named shape [N].
+        amplitude: of a named shape, of either sign [N].
         frequency: of a sine, or first and last of a chirp [Hz].
         duration: of a named shape [s]; 0.5 by default.
         temperature: of the gear [°C]; by default the tested one nearest to the

@@ -23,7 +23,9 @@ def response_answer(response: Response) -> ResponseAnswer:
     return ResponseAnswer(
         status="ok",
         reasons=(),
-        headline=headline(estimates["peak_mm"]),
+        headline=headline(
+            estimates["peak_mm"], pulled=bool(np.min(response.force_N) < 0.0)
+        ),
         next_step=steps[0] if steps else None,
         gear=posterior.case.gear.name,
         calibration="moving" if moving else "at rest",

@@ -92,7 +92,8 @@ def predict(
         deformation: as read [mm], shape (n,).
         temperature: of the specimen [°C], shape (t,); by default the tested one
             nearest to the reference.
-        direction: of the movement, for effects that depend on it.
+        direction: of the movement, for effects that depend on it: up where the
+            deformation rises, as read and with its sign.
         interval: probability inside the bands.
         seed: of the new measurements' noise.
         allow_failed: also for a posterior that failed; the rows then say so.
@@ -207,7 +208,9 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
         ends.append(nominal)
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
-    grid = np.linspace(low - (beyond if low < 0.0 else 0.0), high + beyond, 67)
+    # Not beyond an end that is the unloaded gear and no tested deformation.
+    low, high = low - beyond * (low < 0.0), high + beyond * (high > 0.0)
+    grid = np.linspace(low, high, 67)
     # The ends of the data themselves, so that the tested range shows whole.
     grid = np.union1d(grid, ends)
     cold, warm = np.min(records.temperature), np.max(records.temperature)

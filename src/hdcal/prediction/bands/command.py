@@ -26,7 +26,7 @@ _BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
     type=NUMBERS,
     help="Temperatures [°C]: 20,60 [default: the reference one].",
 )
-@direction_option
+@direction_option("Of the movement: deformation rising or falling.")
 @click.option(
     "--out",
     metavar="FILE.csv",

@@ -3,6 +3,7 @@
 from typing import Literal, get_args
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -31,24 +32,36 @@ class Conditions(eqx.Module):
     Attributes:
         deformation: as read [mm].
         temperature: of the specimen [°C].
-        turn: where the movement turned before it came down [mm].
         known_sd: stated sd of a reading [N].
         low: end of the tested deformation [mm].
         high: other end [mm].
         scale: stiffness over that of the calibrated gear [-]: other sizes, modulus, K.
         strata: of the stiffness within the tolerances of the sizes.
-        down: whether the deformation is reached from above.
+        loading: sense of loading, +1 or −1.
+        down: whether the deformation is reached by unloading.
     """
 
     deformation: Float[Array, ""] | float
     temperature: Float[Array, ""] | float
-    turn: Float[Array, ""] | float
     known_sd: Float[Array, ""] | float
     low: Float[Array, ""] | float
     high: Float[Array, ""] | float
     scale: Float[Array, ""] | float
     strata: StiffnessStrata
+    loading: Float[Array, ""] | float
     down: bool = eqx.field(static=True)
+
+    @property
+    def movement(self) -> Float[Array, ""] | float:
+        """Sense of the movement: +1 where the deformation as read rises."""
+        return -self.loading if self.down else self.loading
+
+    @property
+    def turn(self) -> Float[Array, ""]:
+        """Where unloading begins: at the farthest tested deformation, or here [mm]."""
+        tested = jnp.where(self.loading > 0.0, self.high, self.low)
+        farthest = jnp.maximum(self.loading * tested, self.loading * self.deformation)
+        return self.loading * farthest
 
 
 def usual_temperature(case: Case) -> float:

@@ -113,13 +113,13 @@ def gear_forces(
 
     A product has neither the rig's zeros nor its compliance: ω is what the gear sees,
     counted from its free shape. Left are the force model, effects on the force and,
-    where it was fitted, the leftover discrepancy. Each row is another gear, pressed
+    where it was fitted, the leftover discrepancy. Each row is another gear, loaded
     from rest in one go.
 
     Args:
         problem: structure.
         values: draws by site: [draw, …].
-        deformation: radial ω [mm].
+        deformation: radial ω, of either sign [mm].
         temperature: of the gear [°C].
         factor: stiffness relative to the tested gear's [-], broadcast to [draw, n];
             the leftover discrepancy is taken to grow with it.
@@ -129,7 +129,8 @@ def gear_forces(
     """
     count = len(deformation)
     as_read = deformation / problem.reading.radial_per_read
-    records = grid_records(as_read, temperature, np.ones(count), 0.0)
+    pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
+    records = grid_records(as_read, temperature, pressed, 0.0)
     # A run for each row: what remembers starts from rest in each.
     records = replace(records, run=np.arange(count), specimen=np.arange(count))
 

@@ -6,6 +6,7 @@ exact, far into the tails, and differentiable.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import jax
@@ -50,6 +51,10 @@ class Mixture(eqx.Module):
     def above(self, force: Float[Array, "*b"]) -> Float[Array, "*b"]:
         """Return the share that exceeds a force, exact where it is tiny."""
         return self._share(self.mean - force[..., None])
+
+    def along(self, sense: Array | float) -> "Mixture":
+        """Return the forces times the sense of loading, +1 or −1."""
+        return replace(self, mean=sense * self.mean)
 
     def centre(self) -> Float[Array, "*b"]:
         """Return the mean force [N]."""

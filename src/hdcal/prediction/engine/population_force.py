@@ -26,6 +26,11 @@ from hdcal.prediction.engine.conditions import (
     usual_temperature,
 )
 from hdcal.prediction.engine.forces import Quantity, force_of, grid_records
+from hdcal.prediction.engine.loading_sense import (
+    LoadingSense,
+    loading_sense,
+    sense_of,
+)
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import Population, Whose
 from hdcal.prediction.engine.sizes import tolerance_strata
@@ -61,6 +66,10 @@ class PopulationForce:
         warm = replace(self.conditions, temperature=jnp.asarray(temperature, float))
         return replace(self, conditions=warm)
 
+    def of_sense(self, sense: LoadingSense) -> "PopulationForce":
+        """Return the forces of a gear that is loaded in a sense."""
+        return replace(self, conditions=replace(self.conditions, loading=float(sense)))
+
     @property
     def traced(self) -> tuple[Problem, Values, Whose, Conditions]:
         """What compiled functions are given: structure, draws, whose and where."""
@@ -70,6 +79,15 @@ class PopulationForce:
         """Return the mixture of every draw [draw, component]."""
         return mixtures(*self.traced)
 
+    @property
+    def sense(self) -> LoadingSense:
+        """Sense of loading."""
+        return sense_of(float(self.conditions.loading))
+
+    def along(self) -> Mixture:
+        """Return the mixture of every draw along the sense of loading."""
+        return self.mixture().along(self.sense)
+
 
 def population_force(
     cause: Cause,
@@ -78,6 +96,7 @@ def population_force(
     *,
     quantity: Quantity = "reading",
     direction: Direction = "up",
+    sense: LoadingSense | None = None,
     tolerances: Mapping[str, float] | None = None,
     seed: int = 0,
 ) -> PopulationForce:
@@ -88,12 +107,13 @@ def population_force(
         deformation: as read [mm].
         population: whose force; see `check_population`.
         quantity: which force.
-        direction: of the movement.
+        direction: up to load, down to unload.
+        sense: of loading; by default the one that this cause sees.
         tolerances: ± by field of the geometry [mm].
         seed: of what the data leave open about the centre of the population.
     """
     case, records = cause.posterior.case, cause.posterior.case.records
-    widths, high = dict(tolerances or {}), float(records.deformation.max())
+    widths = dict(tolerances or {})
     rounded = quantity == "reading" and float(cause.problem.step) > 0.0
     return PopulationForce(
         replace(cause, values=_with_scores(cause, seed)),
@@ -101,13 +121,12 @@ def population_force(
         Conditions(
             deformation=float(deformation),
             temperature=usual_temperature(case),
-            # Down from the largest deformation tested, or from where it is asked for.
-            turn=max(high, float(deformation)),
             known_sd=usual_sd(records),
             low=float(records.deformation.min()),
-            high=high,
+            high=float(records.deformation.max()),
             scale=1.0,
             strata=tolerance_strata(case.gear.geometry, widths, cause.posterior.theory),
+            loading=float(sense or loading_sense([cause], deformation)),
             down=direction == "down",
         ),
         widths,
@@ -175,7 +194,9 @@ def member_mixture(
         lambda f: jax.jvp(at, (f,), (one,), has_aux=True)
     )(factor.ravel())
     zero = value["run_offset_sd"] if mountings else 0.0
-    shift = zero * value[SCORES][1] / np.sqrt(max(mountings, 1))
+    # What is drawn about zero is drawn along the sense of loading.
+    score = conditions.loading * value[SCORES][1]
+    shift = zero * score / np.sqrt(max(mountings, 1))
     shift = shift + leftover(problem, value, conditions)
     variance = noise**2 + zero**2 + (slope**2 * width2)[:, None]
     # The root of zero has no derivative.
@@ -197,12 +218,16 @@ def member_force(
     problem: Problem, value: Values, quantity: Quantity, conditions: Conditions, factor
 ):
     """Return the mean force of one member, and weights and sds of its noise."""
-    along, sense = [conditions.deformation], [1.0]
+    along, sense = [conditions.deformation], [conditions.movement]
     if conditions.down:
-        along, sense = [conditions.turn, conditions.deformation], [1.0, -1.0]
-    path = jnp.stack([jnp.asarray(each, float) for each in along])
+        along = [conditions.turn, conditions.deformation]
+        sense = [conditions.loading, conditions.movement]
+    path, way = (
+        jnp.stack([jnp.asarray(each, float) for each in column])
+        for column in (along, sense)
+    )
     warmth = jnp.full(len(along), conditions.temperature)
-    records = grid_records(path, warmth, np.array(sense), conditions.known_sd)
+    records = grid_records(path, warmth, way, conditions.known_sd)
     mean, noise = force_of(problem, value, records, factor=factor, quantity=quantity)
     if quantity == "load":
         return mean[-1], (jnp.zeros(1), jnp.zeros(1))
@@ -229,7 +254,8 @@ def leftover(problem: Problem, value: Values, conditions: Conditions):
     deformation it is a new normal, beside what the end of the tested range still
     tells; both from the prior where no discrepancy was fitted.
     """
-    found = leftover_sd(value, conditions) * value[SCORES][2]
+    score = conditions.loading * value[SCORES][2]
+    found = leftover_sd(value, conditions) * score
     if problem.discrepancy is None or "gap_weights" not in value:
         return found
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)

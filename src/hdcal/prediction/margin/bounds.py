@@ -3,6 +3,8 @@
 A bound with content p and confidence γ: in each draw the force that the share p of the
 population does not exceed; of these over the draws the quantile γ. With a normal
 population and the reference prior that is the classical tolerance limit exactly.
+
+All of it is along the sense of loading; a `Level` has forces with their sign.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,26 +15,38 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.prediction.engine.loading_sense import (
+    LoadingSense,
+    ends_along,
+    interval_along,
+)
 from hdcal.prediction.engine.mixture import Mixture, pooled, weighted_quantile
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.request import Criteria
-from hdcal.prediction.margin.result import INTERVAL, Exceedance, Level, ModelBound
-from hdcal.report.parameters import Interval
+from hdcal.prediction.margin.result import (
+    INTERVAL,
+    Exceedance,
+    Level,
+    ModelBound,
+    sizes_needed,
+)
 
 _TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 
 
 @dataclass(frozen=True)
 class PopulationDraws:
-    """What every draw of all causes says of the population.
+    """What every draw of all causes says of the population, along the sense.
 
     Attributes:
+        sense: of loading.
         table: lower, upper and required quantile, centre [N] and the share above the
             limit; each [temperature, draw].
         weights: of the draws, sum 1.
         predicted: quantiles of the predictive law [temperature, share] [N].
     """
 
+    sense: LoadingSense
     table: Mapping[str, np.ndarray]
     weights: np.ndarray
     predicted: np.ndarray
@@ -64,44 +78,54 @@ def population_draws(
     weights = [force.cause.weights for force in forces]
     tables, predicted = [], []
     for warm in temperatures:
-        found = [force.at(warm).mixture() for force in forces]
+        found = [force.at(warm).along() for force in forces]
         each = [_each_draw(mixture, wanted, limit) for mixture in found]
         tables.append([np.concatenate(c) for c in zip(*each, strict=True)])
         parts = list(zip(map(jnp.asarray, weights), found, strict=True))
         predicted.append(np.asarray(_predicted(pooled(parts), levels)))
     names = ("lower", "upper", "required", "centre", "above")
     columns = {n: np.stack([t[i] for t in tables]) for i, n in enumerate(names)}
-    return PopulationDraws(columns, np.concatenate(weights), np.stack(predicted))
+    weight = np.concatenate(weights)
+    return PopulationDraws(forces[0].sense, columns, weight, np.stack(predicted))
 
 
 def level_of(
-    draws: Mapping[str, np.ndarray], weights, criteria: Criteria, ahead, warm, tested
+    draws: PopulationDraws, table, ahead, criteria: Criteria, warm, tested
 ) -> Level:
     """Put the draws of one temperature, or of the worst, together.
 
-    Args are a row of the table, weights and predictive law of `PopulationDraws`.
+    Args:
+        draws: of all causes.
+        table: what they say there, a row of that of `draws`.
+        ahead: the predictive quantiles there.
+        criteria: what is to be kept.
+        warm: the temperature [°C].
+        tested: whether the data hold it.
     """
 
     def at(name: str, share: float) -> float:
-        return weighted_quantile(draws[name], weights, share)
+        return weighted_quantile(table[name], draws.weights, share)
 
     low, middle, high = (at("centre", tail) for tail in _TAILS)
+    ahead = [float(quantile) for quantile in ahead]
+    bounds = at("lower", 1.0 - criteria.confidence), at("upper", criteria.confidence)
+    lower, upper = ends_along(*bounds, draws.sense)
     limited = criteria.limit_force is not None
     return Level(
         temperature_C=warm,
         tested=tested,
-        force_N=Interval(middle, low, high),
-        member_N=Interval(*(float(ahead[i]) for i in (1, 0, 2))),
-        lower_bound_N=at("lower", 1.0 - criteria.confidence),
-        upper_bound_N=at("upper", criteria.confidence),
+        force_N=interval_along(middle, low, high, draws.sense),
+        member_N=interval_along(ahead[1], ahead[0], ahead[2], draws.sense),
+        lower_bound_N=lower,
+        upper_bound_N=upper,
         capacity_N=at("required", criteria.confidence),
-        capacity_predictive_N=float(ahead[3]),
-        exceedance=_exceedance(draws, weights, criteria) if limited else None,
+        capacity_predictive_N=ahead[3],
+        exceedance=_exceedance(table, draws.weights, criteria) if limited else None,
     )
 
 
-def _exceedance(draws, weights, criteria: Criteria) -> Exceedance:
-    above = draws["above"]
+def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
+    above = table["above"]
     mean = float(np.sum(weights * above) / np.sum(weights))
     low, high, sure = (
         weighted_quantile(above, weights, share)
@@ -117,16 +141,16 @@ def worst_level(
     draws: PopulationDraws, criteria: Criteria, levels: Sequence[Level]
 ) -> Level:
     """Return what holds at every temperature at once: the worst one of each draw."""
-    hardest = max(levels, key=lambda level: level.upper_bound_N)
-    row = levels.index(hardest)
+    outer = [sizes_needed(level, draws.sense)[1] for level in levels]
+    row = int(np.argmax(outer))
     worst = {name: table.max(axis=0) for name, table in draws.table.items()}
     worst["lower"] = draws.table["lower"].min(axis=0)
     worst["centre"] = draws.table["centre"][row]
     tested = all(level.tested for level in levels)
     predicted = draws.predicted[row].copy()
     predicted[3] = draws.predicted[:, 3].max()
-    warm = hardest.temperature_C
-    return level_of(worst, draws.weights, criteria, predicted, warm, tested)
+    warm = levels[row].temperature_C
+    return level_of(draws, worst, predicted, criteria, warm, tested)
 
 
 def model_bounds(
@@ -146,8 +170,11 @@ def model_bounds(
             ModelBound(
                 cause.name,
                 cause.probability,
-                weighted_quantile(low, even, 1.0 - criteria.confidence),
-                weighted_quantile(high, even, criteria.confidence),
+                *ends_along(
+                    weighted_quantile(low, even, 1.0 - criteria.confidence),
+                    weighted_quantile(high, even, criteria.confidence),
+                    draws.sense,
+                ),
                 None if criteria.limit_force is None else float(above),
             )
         )

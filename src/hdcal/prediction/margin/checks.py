@@ -12,10 +12,12 @@ from hdcal.prediction.engine.conditions import (
     temperature_findings,
 )
 from hdcal.prediction.engine.forces import QUANTITIES
+from hdcal.prediction.engine.loading_sense import LoadingSense, capacity_findings
 from hdcal.prediction.engine.population import check_population
 from hdcal.prediction.engine.population_force import MOST_DRAWS
 from hdcal.prediction.engine.sizes import check_tolerances
 from hdcal.prediction.margin.request import Criteria, MarginRequest
+from hdcal.prediction.margin.result import Level
 from hdcal.prediction.tolerance_factors import check_shares
 
 # A force this many times larger or smaller than the one needed is a slip of the unit.
@@ -31,6 +33,7 @@ def check_margin(
     request: MarginRequest,
     temperature: np.ndarray,
     criteria: Criteria,
+    sense: LoadingSense,
 ) -> None:
     """Refuse what cannot be asked, all of it at once.
 
@@ -39,6 +42,7 @@ def check_margin(
         request: whose force, and where.
         temperature: all that are asked for [°C].
         criteria: what is to be kept.
+        sense: of loading.
 
     Raises:
         InputError: holds every finding.
@@ -47,7 +51,8 @@ def check_margin(
     gear, theory = cause.posterior.case.gear, cause.posterior.theory
     names = "content", "confidence", "required_probability"
     shares = {n: v for n in names if (v := getattr(criteria, n)) is not None}
-    forces = {"limit_force": criteria.limit_force, "given_force": request.given_force}
+    limit, place = criteria.limit_force, f"{at:g} mm"
+    forces = {"limit_force": limit, "given_force": request.given_force}
     findings = [
         *_check_deformation(cause, at),
         *_check_temperature(cause, temperature),
@@ -57,6 +62,8 @@ def check_margin(
         *check_tolerances(request.tolerances, gear.geometry, theory),
         *_check_forces(cause, at, forces),
     ]
+    if limit is not None:
+        findings += capacity_findings("limit_force", limit, sense, place)
     for name, known in (("quantity", QUANTITIES), ("direction", DIRECTIONS)):
         value = getattr(request, name)
         if value not in known:
@@ -64,6 +71,37 @@ def check_margin(
             findings.append(Finding(name, f"'{value}' is unknown", remedy))
     if findings:
         raise InputError(findings)
+
+
+def check_sign(
+    levels: Sequence[Level],
+    request: MarginRequest,
+    criteria: Criteria,
+    sense: LoadingSense,
+) -> None:
+    """Refuse a capacity where the force has the sign against the sense of loading.
+
+    Args:
+        levels: the force at each temperature.
+        request: whose force, and where.
+        criteria: with the capacity, if there is one.
+        sense: of loading.
+
+    Raises:
+        InputError: the gauge's zero is larger than the load.
+    """
+    members = [level.member_N for level in levels]
+    against = [one for one in members if max(sense * one.lo, sense * one.hi) < 0.0]
+    if criteria.limit_force is None or not against:
+        return
+    done, sign = ("pressed", "negative") if sense > 0 else ("pulled", "positive")
+    words = (
+        f"nothing can be said of {criteria.limit_force:g} N at "
+        f"{request.deformation:g} mm: the gear is {done} there, and its "
+        f"{request.quantity} is {sign}, {against[0].lo:.3g} … {against[0].hi:.3g} N"
+    )
+    remedy = "Ask for the quantity load, or at a larger deformation"
+    raise InputError([Finding("limit_force", words, remedy)])
 
 
 def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:

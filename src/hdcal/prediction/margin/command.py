@@ -17,9 +17,15 @@ from hdcal.cli.option_types import WINDOW
 @click.option(
     "--deformation", type=float, required=True, help="Deformation as read [mm]."
 )
-@click.option("--limit-force", type=float, help="Capacity of the actuator [N].")
 @click.option(
-    "--given-force", type=float, help="Force [N] whose deformation is asked for."
+    "--limit-force",
+    type=float,
+    help="Capacity of the actuator [N]: its size, in compression and in tension.",
+)
+@click.option(
+    "--given-force",
+    type=float,
+    help="Force with its sign [N] whose deformation is asked for.",
 )
 @click.option(
     "--temperature",
@@ -46,7 +52,7 @@ from hdcal.cli.option_types import WINDOW
     default="reading",
     help="What the gauge shows, or what acts on the gear.",
 )
-@options.direction_option
+@options.direction_option("Loading or unloading, in compression and in tension.")
 @options.tolerance_option
 @options.seed_option
 @options.folder_options("Write a result folder with a report.")

@@ -1,7 +1,8 @@
 """The inverse: the deformation that a given force reaches.
 
 A member reaches the deformation at which it needs this force, so that the share that
-gets beyond w is the share that needs less at w.
+gets beyond w is the share that needs less at w. All of it is along the sense of the
+force, which need not be the one that the rest of the question has.
 """
 
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
+from hdcal.prediction.engine.loading_sense import ends_along, sense_of
 from hdcal.prediction.engine.mixture import Mixture, quantile_weights
 from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
 from hdcal.prediction.margin.request import Criteria
@@ -34,8 +36,9 @@ class DeformationReached:
         median_mm: of the mean member, middle of its 95 % credible interval.
         lo_mm: lower end.
         hi_mm: upper end.
-        lower_bound_mm: reached by the share `content`, with the stated confidence.
-        upper_bound_mm: not passed by that share, with that confidence.
+        lower_bound_mm: of a positive force reached by the share `content`, with the
+            stated confidence; of a negative one not passed by it.
+        upper_bound_mm: the other one of the two.
         tested: the data hold the whole of it.
     """
 
@@ -59,14 +62,15 @@ def deformation_reached(
 
     Args:
         forces: of each cause, at the temperature in question.
-        given: force [N].
+        given: force [N], with its sign.
         criteria: content and confidence of the bounds.
     """
-    where = forces[0].conditions
+    where, sense = forces[0].conditions, sense_of(given)
     low, high, warm = map(float, (where.low, where.high, where.temperature))
     ends = min(0.0, REACH * low), max(0.0, REACH * high)
     shares = jnp.array([criteria.content, 1.0 - criteria.content])
-    parts = [_solve(*force.traced, given, shares, ends) for force in forces]
+    asked = abs(given), shares, ends_along(*ends, sense)
+    parts = [_solve(*force.of_sense(sense).traced, *asked) for force in forces]
     found = np.concatenate(parts)
     weights = np.concatenate([force.cause.weights for force in forces])
 
@@ -74,27 +78,32 @@ def deformation_reached(
         # Draws that never get there count as infinitely far.
         used = quantile_weights(found[:, column], weights, share)
         values = found[used > 0.0, column]
-        return float(used[used > 0.0] @ values) if np.isfinite(values).all() else None
+        middle = sense * float(used[used > 0.0] @ values)
+        return middle if np.isfinite(values).all() else None
 
-    numbers = at(2, 0.5), at(2, 0.025), at(2, 0.975)
     sure = criteria.confidence
-    bounds = at(0, 1.0 - sure), at(1, sure)
-    tested = all(n is not None and low <= n <= high for n in (*numbers, *bounds))
-    return DeformationReached(given, warm, ends, *numbers, *bounds, tested)
+    span, bounds = (at(2, 0.025), at(2, 0.975)), (at(0, 1.0 - sure), at(1, sure))
+    (lo, hi), (lower, upper) = (pair[::sense] for pair in (span, bounds))
+    numbers = at(2, 0.5), lo, hi, lower, upper
+    tested = all(n is not None and low <= n <= high for n in numbers)
+    return DeformationReached(given, warm, ends, *numbers, tested)
 
 
 @jax.jit
 def _solve(problem, values, whose, conditions, given, shares, ends):
-    """Return deformations [draw, 3]: at both shares and for the mean, [mm]."""
-    low, high = ends
+    """Return deformations [draw, 3]: at both shares and for the mean, [mm].
+
+    Force, ends and what is returned are along the sense of loading.
+    """
+    (low, high), sense = ends, conditions.loading
     method = optx.Bisection(rtol=0.0, atol=_CLOSE, flip=False)
 
     def of_draw(value):
         def excess(deformation, row):
-            there = replace(conditions, deformation=deformation)
+            there = replace(conditions, deformation=sense * deformation)
             parts = member_mixture(problem, value, whose, there)
             step = problem.step if whose.rounded else 0.0
-            mixture = Mixture(*parts, step, whose.rounded)
+            mixture = Mixture(*parts, step, whose.rounded).along(sense)
             # Positive where the force does not get this far.
             short = shares[jnp.minimum(row, 1)] - mixture.below(given)
             return jnp.where(row == 2, mixture.centre() - given, short)

@@ -10,8 +10,10 @@ from hdcal.prediction.margin.sentences import (
     bound_name,
     chance,
     headline,
+    in_tension,
     index,
     input_label,
+    larger_bound,
     newtons,
     next_steps,
 )
@@ -98,7 +100,8 @@ def _bounds(found: Margin) -> Section:
     )
     words = (
         "Mean: 95 % credible interval. One member: 95 % predictive interval. P: "
-        "probability that one future member needs more than the capacity; "
+        f"probability that one future member needs more{in_tension(found)} than the "
+        "capacity; "
         f"β = −Φ⁻¹(P). Lower and upper: a {bounds} bound is one that "
         f"{100.0 * found.content:g} % of the population keep to, with "
         f"{100.0 * found.confidence:g} % confidence. Each is one-sided: both together "
@@ -153,11 +156,12 @@ def _causes(found: Margin) -> Section:
 
 
 def _sensitivities(found: Margin) -> Section:
+    larger = larger_bound(found)
     shown = Picture(
         "tornado",
         "Shares of the variance, and the change of the bound for one per cent",
         "Left: shares of the variance of one future member's force, all at "
-        f"{found.worst.temperature_C} °C. Right: change of the upper bound when an "
+        f"{found.worst.temperature_C} °C. Right: change of the {larger} bound when an "
         "input grows by one per cent.",
     )
     slopes = ["d bound / d input [N per unit]", "d mean / d input [N per unit]"]

@@ -7,7 +7,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from hdcal.prediction.margin.result import Margin
-from hdcal.prediction.margin.sentences import bound_name, input_label, member_word
+from hdcal.prediction.margin.sentences import (
+    bound_name,
+    input_label,
+    larger_bound,
+    member_word,
+)
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -81,11 +86,13 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
     axes.set_xlabel("force [N]")
     axes.margins(x=0.1)
     if found.limit_force_N is not None:
-        axes.axvline(found.limit_force_N, color=RED, linewidth=1.4)
-        words, at = f"capacity {found.limit_force_N:g} N", (found.limit_force_N, 0.5)
+        sense, words = found.loading_sense, f"capacity {found.limit_force_N:g} N"
+        limit = sense * found.limit_force_N
+        axes.axvline(limit, color=RED, linewidth=1.4)
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-        place = {"ha": "right", "va": "center", "bbox": behind}
-        note(axes, words, at, (-4, 0), color=RED, **place)
+        side = "right" if sense > 0 else "left"
+        place = {"ha": side, "va": "center", "bbox": behind}
+        note(axes, words, (limit, 0.5), (-4 * sense, 0), color=RED, **place)
 
 
 def _draw_window(axes: Axes, found: Margin) -> None:
@@ -124,7 +131,8 @@ def _draw_window(axes: Axes, found: Margin) -> None:
         )
         texts.append("not tested: extrapolated")
     if found.limit_force_N is not None:
-        axes.axhline(found.limit_force_N, color=RED, linewidth=1.4)
+        limit = found.loading_sense * found.limit_force_N
+        axes.axhline(limit, color=RED, linewidth=1.4)
         handles.append(Line2D([], [], color=RED))
         texts.append("capacity")
     axes.set_xlabel("temperature [°C]")
@@ -167,10 +175,11 @@ def _draw_shares(axes: Axes, found: Margin) -> None:
 
 
 def _draw_gradients(axes: Axes, found: Margin) -> None:
-    heading(axes, "Upper bound, for + 1 % of")
+    heading(axes, f"{larger_bound(found).capitalize()} bound, for + 1 % of")
     ranked = sorted(found.gradients, key=lambda slope: -abs(slope.bound_N_per_percent))
     values = [slope.bound_N_per_percent for slope in ranked]
-    colours = [RED if value > 0.0 else BLUE for value in values]
+    sense = found.loading_sense
+    colours = [RED if sense * value > 0.0 else BLUE for value in values]
     axes.barh(range(len(ranked)), values, 0.66, color=colours, alpha=0.75)
     for place, value in enumerate(values):
         shift, side = ((3, 0), "left") if value > 0.0 else ((-3, 0), "right")

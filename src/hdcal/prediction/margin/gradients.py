@@ -32,12 +32,14 @@ _MPA_PER_GPA = 1e3
 
 @dataclass(frozen=True)
 class Gradient:
-    """How the upper bound and the mean force change with one input.
+    """How the bound of the larger size and the mean force change with one input.
+
+    All forces have their sign.
 
     Attributes:
         name: of the input, with its unit.
         value: where the derivative is taken.
-        bound_N: derivative of the upper bound [N per unit].
+        bound_N: derivative of that bound [N per unit].
         force_N: derivative of the mean force, averaged over the draws [N per unit].
         bound_N_per_percent: change of the bound when the input grows by 1 % [N].
     """
@@ -119,20 +121,27 @@ def _mean_slopes(gear: Redesign):
 
 @jax.jit
 def _bound_slopes(gear: Redesign, weights, content):
-    """Return the derivative of a weighted sum of the draws' quantiles, by input."""
-    return jax.jacfwd(lambda point: weights @ gear.mixture(point).quantile(content))(
-        gear.origin
-    )
+    """Return the derivative of a weighted sum of the draws' quantiles, by input.
+
+    The quantiles are those along the sense of loading, their sum has its sign.
+    """
+
+    def bound(point):
+        along = gear.mixture(point).along(gear.conditions.loading)
+        return gear.conditions.loading * (weights @ along.quantile(content))
+
+    return jax.jacfwd(bound)(gear.origin)
 
 
 def gradients(
     forces: Sequence[PopulationForce], quantiles: np.ndarray, criteria: Criteria
 ) -> tuple[Gradient, ...]:
-    """Return the exact derivatives of the upper bound at one temperature.
+    """Return the exact derivatives of the larger bound at one temperature.
 
     Args:
         forces: of each cause, at that temperature.
-        quantiles: of the population in each draw of all causes, shape (d,).
+        quantiles: of the population along the sense of loading, in each draw of all
+            causes, shape (d,).
         criteria: content and confidence of the bound.
     """
     gears = [Redesign.of(force) for force in forces]

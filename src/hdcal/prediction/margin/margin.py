@@ -11,8 +11,9 @@ from hdcal.prediction.engine.conditions import (
     is_tested,
 )
 from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.loading_sense import LoadingSense, loading_sense
 from hdcal.prediction.engine.population import Population, widest
-from hdcal.prediction.engine.population_force import population_force
+from hdcal.prediction.engine.population_force import PopulationForce, population_force
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
@@ -21,7 +22,7 @@ from hdcal.prediction.margin.bounds import (
     population_draws,
     worst_level,
 )
-from hdcal.prediction.margin.checks import check_margin
+from hdcal.prediction.margin.checks import check_margin, check_sign
 from hdcal.prediction.margin.deformation_reached import deformation_reached
 from hdcal.prediction.margin.gradients import gradients
 from hdcal.prediction.margin.remarks import (
@@ -59,14 +60,15 @@ def margin(
         deformation: as read [mm].
         temperature: of the specimen [°C]; of several the worst counts. By default
             the tested one nearest to the reference.
-        limit_force: capacity [N] whose exceedance is asked for.
-        given_force: force [N] whose deformation is asked for.
+        limit_force: capacity [N] whose exceedance is asked for: its size, along the
+            sense of loading, or with the sign of the force.
+        given_force: force [N] whose deformation is asked for, with its sign.
         content: share of the population within each one-sided bound.
         confidence: of each bound.
         required_probability: that a capacity is to meet; the content by default.
         population: whose force; by default the widest that the data support.
         quantity: `reading` of the rig's gauge, or `load` on the gear.
-        direction: of the movement.
+        direction: up to load, away from the unloaded gear; down to unload.
         tolerances: ± by wall_thickness_mm, radius_mm, length_mm, load_height_mm.
         sensitivities: with gradients and shares of the variance.
         seed: of what the data leave open about the population's centre.
@@ -93,17 +95,14 @@ def _margin(
 ) -> Margin:
     main = likeliest(causes)
     warm = request.temperatures(main.posterior.case)
-    check_margin(causes, request, warm, criteria)
+    sense = loading_sense(causes, request.deformation)
+    check_margin(causes, request, warm, criteria, sense)
+    criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
-    about = {
-        "quantity": request.quantity,
-        "direction": request.direction,
-        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
-        "seed": request.seed,
-    }
-    forces = [population_force(c, request.deformation, whose, **about) for c in causes]
+    forces = _forces(causes, request, whose, sense)
     draws = population_draws(forces, warm, criteria)
     levels = _levels(draws, main, request, warm, criteria)
+    check_sign(levels, request, criteria, sense)
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
     reached, slopes, shares = None, (), ()
@@ -116,6 +115,7 @@ def _margin(
     return Margin(
         deformation_mm=float(request.deformation),
         direction=request.direction,
+        loading_sense=sense,
         quantity=request.quantity,
         population=whose,
         population_words=population_words(whose, main.problem),
@@ -132,8 +132,25 @@ def _margin(
         gradients=slopes,
         shares=shares,
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, worst.exceedance, criteria),
+        remarks=remarks(forces, levels, worst, criteria),
     )
+
+
+def _forces(
+    causes: Sequence[Cause],
+    request: MarginRequest,
+    whose: Population,
+    sense: LoadingSense,
+) -> list[PopulationForce]:
+    """Return the forces that each cause expects."""
+    about = {
+        "quantity": request.quantity,
+        "direction": request.direction,
+        "sense": sense,
+        "tolerances": {SIZES[n]: t for n, t in request.tolerances.items() if t > 0.0},
+        "seed": request.seed,
+    }
+    return [population_force(c, request.deformation, whose, **about) for c in causes]
 
 
 def _levels(
@@ -144,12 +161,12 @@ def _levels(
         main.posterior.case.records,
         deformation=request.deformation,
         temperature=warm,
-        sense=SENSE[request.direction],
+        sense=draws.sense * SENSE[request.direction],
     )
     tables = [{n: t[i] for n, t in draws.table.items()} for i in range(len(warm))]
     places = zip(tables, draws.predicted, warm, tested, strict=True)
     return tuple(
-        level_of(table, draws.weights, criteria, ahead, float(at), bool(inside))
+        level_of(draws, table, ahead, criteria, float(at), bool(inside))
         for table, ahead, at, inside in places
     )
 

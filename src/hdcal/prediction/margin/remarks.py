@@ -8,10 +8,11 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
+from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.engine.population_force import PopulationForce, leftover_sd
 from hdcal.prediction.margin.request import Criteria
-from hdcal.prediction.margin.result import Exceedance
+from hdcal.prediction.margin.result import Level
 
 _LOAD = (
     "The load on the gear: without the gauge's zero, its errors and its noise. "
@@ -27,6 +28,14 @@ _TOLERANCES_OF_GEARS = (
 _TOLERANCES_ALONE = (
     "With tolerances the forces are those of gears that differ from the tested ones in "
     "these sizes and in nothing else."
+)
+_EITHER_SIGN = (
+    "The force may have either sign here: 95 % of members lie between {low:.3g} and "
+    "{high:.3g} N. Capacities and probabilities count the {sign} ones only."
+)
+_AGAINST = (
+    "The gauge's zero turns the sign of the force here, {low:.3g} … {high:.3g} N: no "
+    "capacity can be compared with it. The load has the sign of the loading."
 )
 _NORMAL_TAILS = (
     "Such rare cases rest on the normal tails of noise and scatter, which no test of "
@@ -66,7 +75,7 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
             f"the tested {low:g} … {high:g} mm. Widened by a leftover discrepancy of "
             f"{leftover:.2g} N (sd), from {source}."
         )
-    if (-1.0 if where.down else 1.0) not in np.asarray(records.sense):
+    if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
         yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
     if not temperature_is_tested(records, temperature).all():
@@ -89,20 +98,25 @@ def _untested_temperature(cause: Cause, temperature: np.ndarray) -> str:
 
 
 def remarks(
-    forces: Sequence[PopulationForce], risk: Exceedance | None, criteria: Criteria
+    forces: Sequence[PopulationForce],
+    levels: Sequence[Level],
+    worst: Level,
+    criteria: Criteria,
 ) -> tuple[str, ...]:
     """Return sentences on what the numbers rest on.
 
     Args:
         forces: of each cause; the likeliest speaks.
-        risk: of the given capacity, or None.
+        levels: the force at each temperature.
+        worst: of all of them.
         criteria: what was to be kept.
     """
     first = _main(forces)
-    said = list(_of_population(first))
+    said = [*_signs(levels, first.sense), *_of_population(first)]
     if all(force.cause.problem.discrepancy is None for force in forces):
         said += misfits(first.cause.posterior)
     used = sum(force.cause.size for force in forces)
+    risk = worst.exceedance
     rare = risk is not None and risk.probability < 1.0 / used
     if rare or max(criteria.content, criteria.required) > _TAIL:
         said.append(_NORMAL_TAILS)
@@ -110,6 +124,16 @@ def remarks(
     if used < total:
         said.append(f"{used} of {total} draws were used.")
     return tuple(dict.fromkeys(said))
+
+
+def _signs(levels: Sequence[Level], sense: LoadingSense) -> Iterator[str]:
+    spans = [level.member_N for level in levels]
+    low, high = min(span.lo for span in spans), max(span.hi for span in spans)
+    if max(sense * low, sense * high) < 0.0:
+        yield _AGAINST.format(low=low, high=high)
+    elif low < 0.0 < high:
+        sign = "positive" if sense > 0 else "negative"
+        yield _EITHER_SIGN.format(low=low, high=high, sign=sign)
 
 
 def _of_population(force: PopulationForce) -> Iterator[str]:

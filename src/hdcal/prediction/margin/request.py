@@ -1,7 +1,7 @@
 """What is asked of a margin."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ class Criteria:
         content: share of the population within each bound.
         confidence: of each bound.
         required_probability: that a capacity is to meet; None for the content.
-        limit_force: capacity [N], or None.
+        limit_force: capacity [N], or None; once it is checked, its size.
     """
 
     content: float
@@ -32,6 +32,11 @@ class Criteria:
         """Probability that a capacity is to meet."""
         asked = self.required_probability
         return self.content if asked is None else asked
+
+    def of_size(self) -> "Criteria":
+        """Return the same with the size of the capacity."""
+        limit = self.limit_force
+        return self if limit is None else replace(self, limit_force=abs(limit))
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Annotated
 from hdcal.notebook import Shown
 from hdcal.prediction.engine.conditions import Direction
 from hdcal.prediction.engine.forces import Quantity
+from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.margin.deformation_reached import DeformationReached
 from hdcal.prediction.margin.gradients import Gradient
@@ -59,7 +60,8 @@ class Level:
         member_N: of one future member, with its 95 % predictive interval.
         lower_bound_N: exceeded by the share `content`, with the stated confidence.
         upper_bound_N: not exceeded by that share, with that confidence.
-        capacity_N: smallest that meets the required probability, with confidence.
+        capacity_N: smallest that meets the required probability, with confidence; as
+            all capacities a size, along the sense of loading.
         capacity_predictive_N: the same for the predictive probability.
         exceedance: of the given capacity, or None.
     """
@@ -94,13 +96,20 @@ class ModelBound:
     probability_exceeded: Chance | None
 
 
+def sizes_needed(of: Level | ModelBound, sense: LoadingSense) -> tuple[float, float]:
+    """Return what most need at least and at most, along the sense of loading [N]."""
+    return ends_along(of.lower_bound_N, of.upper_bound_N, sense)
+
+
 @dataclass(frozen=True)
 class Margin(Shown):
     """The force needed at a deformation, and the margin of a capacity.
 
     Attributes:
         deformation_mm: as read.
-        direction: of the movement.
+        direction: up to load, down to unload.
+        loading_sense: +1 pressed, −1 pulled; capacities and what exceeds them are
+            along it, forces and bounds have their sign.
         quantity: reading of the rig, or load on the gear.
         population: readings, mountings or specimens.
         population_words: the same in a sentence.
@@ -108,13 +117,13 @@ class Margin(Shown):
         content: share of the population within each bound, one-sided.
         confidence: of each bound.
         required_probability: that the capacities are to meet.
-        limit_force_N: capacity asked about, or None.
+        limit_force_N: capacity asked about, its size, or None.
         tolerances_mm: ± of the sizes, by name.
         levels: one per temperature.
         worst: over all temperatures at once.
         reached: deformation reached by a given force, or None.
         models: each model's own bounds, if there are several.
-        gradients: of the upper bound.
+        gradients: of the bound that is the larger one in size.
         shares: of the variance of one future member's force.
         extrapolated: what lies outside the data, in sentences.
         remarks: what else to know, in sentences.
@@ -122,6 +131,7 @@ class Margin(Shown):
 
     deformation_mm: float
     direction: Direction
+    loading_sense: LoadingSense
     quantity: Quantity
     population: Population
     population_words: Words

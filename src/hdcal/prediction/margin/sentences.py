@@ -2,7 +2,13 @@
 
 from collections.abc import Iterator
 
-from hdcal.prediction.margin.result import Exceedance, Margin
+from hdcal.prediction.margin.result import (
+    Exceedance,
+    Level,
+    Margin,
+    ModelBound,
+    sizes_needed,
+)
 from hdcal.report.words import hypothesis, number
 
 _MEMBER = {"readings": "reading", "mountings": "mounting", "specimens": "gear"}
@@ -63,13 +69,23 @@ def index(beta: float) -> str:
     return "below −7" if beta < -7.0 else f"{beta:.2f}"
 
 
+def in_tension(found: Margin) -> str:
+    """Return what is added to the size of a force on a gear that is pulled."""
+    return "" if found.loading_sense > 0 else " in tension"
+
+
+def larger_bound(found: Margin) -> str:
+    """Return which of the bounds with their sign is the larger one in size."""
+    return "upper" if found.loading_sense > 0 else "lower"
+
+
 def headline(found: Margin) -> str:
     """Return whether the capacity is enough, or which force is needed."""
     if found.limit_force_N is not None:
         return _enough(found, found.limit_force_N)
     return (
         f"At {found.deformation_mm:g} mm {_percent(found.content)} of {_many(found)} "
-        f"need at most {newtons(found.worst.upper_bound_N)}, with "
+        f"need at most {_at_most(found, found.worst)}, with "
         f"{_percent(found.confidence)} confidence."
     )
 
@@ -79,8 +95,8 @@ def next_steps(found: Margin) -> Iterator[str]:
     level, limit = found.worst, found.limit_force_N
     if limit is not None and limit < level.capacity_N:
         yield (
-            f"Provide {newtons(level.capacity_N)}: that is enough with "
-            f"{_percent(found.confidence)} confidence."
+            f"Provide {newtons(level.capacity_N)}{in_tension(found)}: that is enough "
+            f"with {_percent(found.confidence)} confidence."
         )
     if found.extrapolated:
         yield (
@@ -114,6 +130,11 @@ def newtons(value: float) -> str:
     return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
 
 
+def _at_most(found: Margin, of: Level | ModelBound) -> str:
+    """Return the size of the force that most do not need more than."""
+    return newtons(sizes_needed(of, found.loading_sense)[1]) + in_tension(found)
+
+
 def _force(found: Margin) -> Iterator[str]:
     level, share = found.worst, _percent(found.content)
     what = "force that the gauge shows" if found.quantity == "reading" else "load"
@@ -134,9 +155,9 @@ def _force(found: Margin) -> Iterator[str]:
     basis = f", a {found.basis} value" if found.basis[:1] == "B" else basis
     yield (
         f"With {sure} confidence {share} of {_many(found)} need at most "
-        f"{newtons(level.upper_bound_N)} {_where(found)}{basis}. Taken by itself, the "
+        f"{_at_most(found, level)} {_where(found)}{basis}. Taken by itself, the "
         f"bound from below is as sure: {share} need at least "
-        f"{newtons(level.lower_bound_N)}."
+        f"{newtons(sizes_needed(level, found.loading_sense)[0])}."
     )
     yield f"Whose forces these are: {_lower(found.population_words)}"
 
@@ -153,7 +174,7 @@ def _capacity(found: Margin) -> Iterator[str]:
         yield from _exceedance(found, level.exceedance)
     yield (
         f"To hold {100.0 * found.required_probability:.8g} % of "
-        f"{_many(found)}, a capacity of "
+        f"{_many(found)}{in_tension(found)}, a capacity of "
         f"{newtons(level.capacity_predictive_N)} is expected to do; "
         f"{newtons(level.capacity_N)} does with {sure} confidence."
     )
@@ -164,20 +185,20 @@ def _enough(found: Margin, limit: float) -> str:
     level = found.worst
     share = f"{100.0 * found.required_probability:.8g} % of {_many(found)}"
     sure = _percent(found.confidence)
+    given = f"A capacity of {limit:g} N{in_tension(found)}"
     if limit >= level.capacity_N:
-        return (
-            f"A capacity of {limit:g} N is enough for {share}, with {sure} confidence."
-        )
+        return f"{given} is enough for {share}, with {sure} confidence."
     if limit >= level.capacity_predictive_N:
         return (
-            f"A capacity of {limit:g} N is expected to be enough for {share}, but not "
-            f"with {sure} confidence."
+            f"{given} is expected to be enough for {share}, but not with {sure} "
+            "confidence."
         )
-    return f"A capacity of {limit:g} N is NOT enough for {share}."
+    return f"{given} is NOT enough for {share}."
 
 
 def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
-    one = f"One future {member_word(found)} needs more than {found.limit_force_N:g} N"
+    more = f"more than {found.limit_force_N:g} N{in_tension(found)}"
+    one = f"One future {member_word(found)} needs {more}"
     sure = _percent(found.confidence)
     if max(risk.hi, risk.probability) < _RAREST:
         rarest = chance(risk.probability)
@@ -212,12 +233,15 @@ def _inverse(found: Margin) -> Iterator[str]:
     if got.lo_mm is not None and got.hi_mm is not None:
         span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} mm)"
     share = _percent(found.content)
+    least, most = got.lower_bound_mm, got.upper_bound_mm
+    if got.force_N < 0.0:
+        least, most = most, least
     tested = "" if got.tested else " Part of this lies outside what was tested."
     yield (
         f"The other way round: {middle} in the mean{span}. With "
         f"{_percent(found.confidence)} confidence {share} of "
-        f"{_many(found)} get at least to {at(got.lower_bound_mm)}, and as "
-        f"surely {share} get at most to {at(got.upper_bound_mm)}.{tested}"
+        f"{_many(found)} get at least to {at(least)}, and as surely {share} get at "
+        f"most to {at(most)}.{tested}"
     )
 
 
@@ -226,13 +250,15 @@ def _models(found: Margin) -> Iterator[str]:
         return
     each = "; ".join(
         f"{hypothesis(model.model)} ({100.0 * model.probability:.0f} %): "
-        f"{newtons(model.upper_bound_N)}"
+        f"{_at_most(found, model)}"
         for model in found.models
     )
     likeliest = max(found.models, key=lambda model: model.probability)
-    change = found.worst.upper_bound_N - likeliest.upper_bound_N
+    bound, alone = (
+        sizes_needed(of, found.loading_sense)[1] for of in (found.worst, likeliest)
+    )
     yield (
         "The cause of the gap is not settled, so the bounds average over the causes by "
         f"probability. Upper bound with each alone: {each}. The average is "
-        f"{found.worst.upper_bound_N:.4g} N, {change:+.2g} N from the likeliest alone."
+        f"{bound:.4g} N, {bound - alone:+.2g} N from the likeliest alone."
     )

@@ -49,17 +49,24 @@ class VarianceShare:
 
 @jax.jit
 def _mean_forces(problem, values, conditions):
-    """Return the mean reading of every draw [N], scatter and noise left out."""
+    """Return the mean reading of every draw along the sense of loading [N].
+
+    Scatter and noise are left out.
+    """
 
     def one(value):
-        return member_force(problem, value, "reading", conditions, 1.0)[0]
+        force = member_force(problem, value, "reading", conditions, 1.0)[0]
+        return conditions.loading * force
 
     return jax.vmap(one)(values)
 
 
 @jax.jit
 def _member_forces(problem, values, whose, conditions, factor, level):
-    """Return forces with their noise, each of draw, factor and level of its own."""
+    """Return forces with their noise, each of draw, factor and level of its own.
+
+    They are along the sense of loading.
+    """
 
     def one(value, factor, level):
         force, (log_weight, sd) = member_force(
@@ -67,7 +74,8 @@ def _member_forces(problem, values, whose, conditions, factor, level):
         )
         law = Mixture(jnp.exp(log_weight), jnp.zeros_like(sd), sd)
         noise = law.quantile(level) if whose.quantity == "reading" else 0.0
-        return force + leftover(problem, value, conditions) + noise
+        force = force + leftover(problem, value, conditions)
+        return conditions.loading * force + noise
 
     return jax.vmap(one)(values, factor, level)
 
@@ -152,7 +160,10 @@ def _inputs(forces: Sequence[PopulationForce]) -> dict[str, Driver]:
 def _forces_at(
     force: PopulationForce, ranked: np.ndarray, level: Mapping[str, np.ndarray]
 ) -> np.ndarray:
-    """Return the force of one cause at levels, between 0 and 1, of every input."""
+    """Return the force of one cause at levels, between 0 and 1, of every input.
+
+    It is along the sense of loading, as what scatters about zero is.
+    """
     cause, problem = force.cause, force.cause.problem
     rows = ranked[(level["calibration"] * len(ranked)).astype(int)]
     values = {name: column[rows] for name, column in cause.values.items()}
