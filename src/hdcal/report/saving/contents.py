@@ -89,23 +89,22 @@ def result_entries(folder: Path, unstamped: Unstamped = older_result) -> list[Pa
     known = _stamped(folder)
     if known is None:
         known = dict.fromkeys(unstamped(folder))
-    folders = {parent.as_posix() for name in known for parent in Path(name).parents}
-    found = list(_below(folder))
-    for path in found:
-        place = path.relative_to(folder)
-        name = place.as_posix()
-        if _is_folder(path) and name in folders:
-            continue
+    parents = {folder / parent for name in known for parent in Path(name).parents}
+
+    def checked(path: Path) -> Path:
+        # Before it is looked into: whose folder this is may hold anything.
+        name = path.relative_to(folder).as_posix()
+        if _is_folder(path) and path in parents:
+            return path
         if name not in known and not (path.name in _LITTER and _is_file(path)):
-            # Of a folder that is not hdcal's the folder is named, not what it holds.
-            above = (one.as_posix() for one in reversed(place.parents))
-            first = next((one for one in above if one not in {".", *folders}), name)
-            words = f"holds '{printable(first)}', which hdcal did not write with it"
+            words = f"holds '{printable(name)}', which hdcal did not write with it"
             raise Foreign(words)
         if not _is_file(path) or known.get(name) not in (None, _read(path)):
             words = f"holds '{printable(name)}', which was edited since hdcal wrote it"
             raise Foreign(words)
-    return found
+        return path
+
+    return list(_below(folder, checked))
 
 
 def _stamped(folder: Path) -> dict[str, Any] | None:
@@ -131,15 +130,20 @@ def _read(path: Path) -> tuple[int, str]:
         return os.fstat(stream.fileno()).st_size, sha256
 
 
-def _below(folder: Path) -> Iterator[Path]:
-    """Yield all below a folder: content before its folder, what tells of it last."""
+def _below(folder: Path, checked: Callable[[Path], Path] = Path) -> Iterator[Path]:
+    """Yield all below a folder: content before its folder, what tells of it last.
+
+    Args:
+        folder: to walk.
+        checked: is told of each before it is looked into.
+    """
 
     def place(path: Path) -> tuple[bool, bool, str]:
         return path.name == STAMP, bool(_ANSWER.fullmatch(path.name)), path.name
 
-    for path in sorted(folder.iterdir(), key=place):
+    for path in map(checked, sorted(folder.iterdir(), key=place)):
         if _is_folder(path):
-            yield from _below(path)
+            yield from _below(path, checked)
         yield path
 
 

@@ -44,7 +44,8 @@ def sweep(parent: Path, own: Lock) -> None:
                 continue
             try:
                 for working in sorted(parent.glob(f".hdcal-{key}-*")):
-                    if _HIDDEN.fullmatch(working.name):
+                    # A link may lead to what was never hdcal's.
+                    if _HIDDEN.fullmatch(working.name) and not working.is_symlink():
                         finish(working)
             finally:
                 if lock is not own:
