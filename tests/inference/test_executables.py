@@ -61,7 +61,11 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_sizes_of_one_bucket_share_every_executable(kind: str, compilations):
+def test_sizes_of_one_bucket_share_every_executable(
+    kind: str, compilations, monkeypatch
+):
+    # What other tests have compiled may be near the limit already.
+    monkeypatch.setattr(executables, "mappings_are_scarce", lambda: False)
     make, run, sizes = KINDS[kind]
     assert len({bucket_size(rows) for rows in sizes}) == 1
     first, same = map(make, sizes)
