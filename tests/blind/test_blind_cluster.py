@@ -115,7 +115,8 @@ def test_a_lost_scheduler_is_one_line_and_costs_no_answer(
         begun([*begin, "scheduler", "--port", "0", *own], quiet) as scheduler,
         begun([*begin, "worker", "--nthreads", "1", *own], quiet),
     ):
-        until(where.exists)
+        # It is there before it is written.
+        until(lambda: where.exists() and bool(where.read_text()))
         address = json.loads(where.read_text())["address"]
         folder = sealed_set(tmp_path / "set", 40)
         monkeypatch.setitem(DIAGNOSERS, "slow", slowly)

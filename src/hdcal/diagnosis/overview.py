@@ -67,7 +67,7 @@ def overview_document(found: VerdictsAnswer) -> Document:
     rows = [_overview_row(name, one) for name, one in found.cases.items()]
     table = Table(["case", "verdict", "cause", *numbers], rows, frozenset(numbers))
     return Document(
-        name=f"{len(rows)} cases",
+        name=f"{len(rows)} of {len(rows) + len(found.refused)} cases",
         kind="diagnoses",
         subtitle="diagnosed one by one",
         headline=f"{found.headline}.",
