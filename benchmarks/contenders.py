@@ -39,7 +39,7 @@ def hdcal(numbers):
     from hdcal.inference.sample import sample
 
     problem = make_problem()
-    whitening = laplace.fit(problem, jax.random.key(0))
+    whitening = laplace.fit(problem)
     return lambda seed: sample(problem, whitening, jax.random.key(seed)).values
 
 

@@ -76,7 +76,7 @@ def make_numbers() -> tuple[Numbers, float]:
     from hdcal.inference import laplace
 
     problem = make_problem()
-    whitening = laplace.fit(problem, jax.random.key(0))
+    whitening = laplace.fit(problem)
     laws = [problem.priors[name.replace("_KE0", "K")] for name in NAMES]
     centre = np.array([whitening.centre[name] for name in sorted(whitening.centre)])
     numbers = Numbers(

@@ -88,7 +88,7 @@ def measure(repeats: int) -> dict:
         case = replace(small, gear=gear, records=records)
         problem = build_problem(case, effect_priors())
         compressing = time.perf_counter() - began
-        whitening = laplace.fit(problem, key)
+        whitening = laplace.fit(problem)
         draws = sample(problem, whitening, key)
         ready[size] = problem, whitening
         found[size] = {"compressing": compressing, "sampling": []}

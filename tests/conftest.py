@@ -13,7 +13,8 @@ pytest_plugins = ["commands"]
 
 _OWN = pytest.StashKey[str]()
 _COMPILED_PLAINLY = (
-    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1"
+    "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1 "
+    "--xla_cpu_parallel_codegen_split_count=1"
 )
 
 
@@ -33,12 +34,28 @@ def pytest_configure(config: pytest.Config) -> None:
     # Most of a test run is compilation of programs that run for less than a second:
     # compiled plainly they take less time. `make demo` runs as users do.
     os.environ.setdefault("XLA_FLAGS", _COMPILED_PLAINLY)
+    os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "true")
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the cache."""
     if _OWN in config.stash:
         shutil.rmtree(config.stash[_OWN], ignore_errors=True)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def optimised(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Compile with more care where a file computes for longer than it compiles."""
+    if request.node.get_closest_marker("computes") is None:
+        yield
+        return
+    import jax
+
+    with pytest.MonkeyPatch.context() as commands:
+        commands.setenv("JAX_DISABLE_MOST_OPTIMIZATIONS", "false")
+        jax.config.update("jax_disable_most_optimizations", False)
+        yield
+        jax.config.update("jax_disable_most_optimizations", True)
 
 
 @pytest.fixture(scope="module", autouse=True)

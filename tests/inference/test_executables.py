@@ -19,6 +19,8 @@ from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem
 from hdcal.motion.bands import motion_bands
 
+pytestmark = pytest.mark.computes
+
 
 def mappings() -> int:
     return Path("/proc/self/maps").read_bytes().count(b"\n")
@@ -83,7 +85,7 @@ def test_sizes_of_one_bucket_share_every_executable(
 def test_they_go_when_half_the_limit_is_in_use(monkeypatch, tmp_path, compilations):
     theirs = jax.jit(lambda x: jnp.linalg.solve(x + 1.0, x))
     problem = build_problem(make_case(ramp()), effect_priors())
-    fitted = laplace.fit(problem, jax.random.key(0))
+    fitted = laplace.fit(problem)
     theirs(jnp.eye(2)).block_until_ready()
     full, limit = mappings(), tmp_path / "limit"
     monkeypatch.setattr(executables, "_LIMIT", limit)
@@ -96,7 +98,7 @@ def test_they_go_when_half_the_limit_is_in_use(monkeypatch, tmp_path, compilatio
     compilations.clear()
     assert np.asarray(theirs(jnp.eye(2)))[0, 0] == pytest.approx(2.0 / 3.0)
     assert not compilations
-    again = laplace.fit(problem, jax.random.key(0))
+    again = laplace.fit(problem)
     assert compilations
     assert (again.factor == fitted.factor).all()
 

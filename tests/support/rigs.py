@@ -136,6 +136,5 @@ def simulate(problem, case: Case, truth: dict, key) -> Case:
 def posterior_draws(case: Case, effects, key, **settings) -> tuple:
     """Fit a case; return its problem and draws, chains joined."""
     problem = build_problem(case, effect_priors(), effects)
-    of_fit, of_draws = jax.random.split(key)
-    draws = sample(problem, laplace.fit(problem, of_fit), of_draws, **settings)
+    draws = sample(problem, laplace.fit(problem), key, **settings)
     return problem, {n: v.reshape(-1, *v.shape[2:]) for n, v in draws.values.items()}

@@ -151,8 +151,8 @@ def calibrate(
     theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
-    of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
-    whitening = laplace.fit(problem, of_fit)
+    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    whitening = laplace.fit(problem)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
     own = _specifics(case, problem, found)

@@ -8,8 +8,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Float, Key
-from numpyro.handlers import seed, trace
+from jaxtyping import Float
+from numpyro.distributions import biject_to
+from numpyro.handlers import substitute, trace
 from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
@@ -23,8 +24,6 @@ Position = dict[str, Any]
 
 # Largest share of the gradient that may be left, in posterior sds, at the mode.
 _TOLERANCE = 1e-6
-# Prior draws whose median starts the search.
-_PRIOR_DRAWS = 15
 
 
 class Whitening(eqx.Module):
@@ -107,21 +106,25 @@ def _expand(problem: Sampled, like: Position, flat):
     return value, gradient, hessian
 
 
+def _middle(site: dict[str, Any]):
+    """Return the prior median of a site, or its mean where no median is stated."""
+    if site["type"] != "sample" or site["is_observed"]:
+        return None
+    try:
+        return site["fn"].icdf(0.5)
+    except (NotImplementedError, ImportError):
+        return site["fn"].mean
+
+
 @jax.jit
-def _prior_median(problem: Sampled, key: Key[Array, ""]) -> Position:
-    """Return the median of a few prior draws, unconstrained."""
-
-    def draw(key):
-        sites = trace(seed(model, key)).get_trace(problem)
-        values = {
-            name: site["value"]
-            for name, site in sites.items()
-            if site["type"] == "sample" and not site["is_observed"]
-        }
-        return unconstrain_fn(model, (problem,), {}, values)
-
-    draws = jax.vmap(draw)(jax.random.split(key, _PRIOR_DRAWS))
-    return jax.tree.map(lambda values: jnp.median(values, axis=0), draws)
+def _prior_middle(problem: Sampled) -> Position:
+    """Return the middle of the prior, unconstrained."""
+    sites = trace(substitute(model, substitute_fn=_middle)).get_trace(problem)
+    return {
+        name: biject_to(site["fn"].support).inv(site["value"])
+        for name, site in sites.items()
+        if site["type"] == "sample" and not site["is_observed"]
+    }
 
 
 @jax.jit
@@ -132,12 +135,11 @@ def _moved(problem: Sampled, position: Position, values) -> Position:
 
 
 # What is compiled anew for each kind of problem and takes many memory mappings.
-COMPILED = (_expand, _prior_median, _moved)
+COMPILED = (_expand, _prior_middle, _moved)
 
 
 def fit(
     problem: Sampled,
-    key: Key[Array, ""],
     start: Mapping[str, float] | None = None,
 ) -> Whitening:
     """Find the posterior mode and its curvature.
@@ -147,10 +149,9 @@ def fit(
 
     Args:
         problem: the inference problem.
-        key: for the prior draws whose median starts the search.
         start: sites whose value to start from instead, where it is roughly known.
     """
-    place = _prior_median(problem, key)
+    place = _prior_middle(problem)
     if start:
         place = _moved(problem, place, dict(start))
     flat = np.asarray(_flatten(place))

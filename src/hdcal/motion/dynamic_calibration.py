@@ -74,8 +74,8 @@ def calibrate_dynamic(
     theory = theory or case.gear.theory
     priors = dynamic_site_priors(case, theory)
     problem = build_dynamic(case, priors, theory)
-    of_fit, of_draws, of_prior = jax.random.split(jax.random.key(seed), 3)
-    whitening, rival = highest_peak(problem, of_fit)
+    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    whitening, rival = highest_peak(problem)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
@@ -134,14 +134,14 @@ def check_motion(case: Case) -> None:
         raise InputError(findings)
 
 
-def highest_peak(problem: DynamicProblem, key) -> tuple[laplace.Whitening, Check]:
+def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     """Search from every peak of the scan; return the highest, and check the next one.
 
     Chains start around one peak and never cross to another, so that no R-hat would
     show a second one.
     """
-    fits = [laplace.fit(problem, key, start) for start in scan(problem, _PEAKS)]
-    fits = fits or [laplace.fit(problem, key)]
+    fits = [laplace.fit(problem, start) for start in scan(problem, _PEAKS)]
+    fits = fits or [laplace.fit(problem)]
     level = [float(_potential(problem, fit.centre)) for fit in fits]
     order = np.argsort(level)
     best = fits[order[0]]
