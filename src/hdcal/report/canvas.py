@@ -4,13 +4,16 @@ import io
 import logging
 import math
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import fontManager
@@ -23,6 +26,8 @@ GREY, DARK, RED = "#8a8a8a", "#222222", "#b00020"
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, "#56B4E9", "#D55E00")
 FAILED = "FAILED — do not use"
 _MARK_LENGTH = 7.1
+# Of a PNG; an SVG is always drawn in points.
+_DPI, _SVG_DPI = 160, 72
 # More points than this tell the eye nothing and make files of many megabytes.
 MOST_POINTS = 4000
 
@@ -38,6 +43,8 @@ _STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.titlesize": 10,
     "axes.unicode_minus": True,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
     "figure.facecolor": "white",
     "font.size": 9.5,
     "grid.color": "#e6e6e6",
@@ -84,10 +91,31 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
         try:
-            figure.savefig(target, format=kind, dpi=160, metadata=metadata)
+            with _laid_out(figure, kind):
+                figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
         finally:
             logging.getLogger("matplotlib").setLevel(level)
     return target.getvalue()
+
+
+@contextmanager
+def _laid_out(figure: Figure, kind: Literal["svg", "png"]) -> Iterator[None]:
+    """Place what a figure holds; to place it, `savefig` would draw all of it twice."""
+    engine, canvas, dpi = figure.get_layout_engine(), figure.canvas, figure.dpi
+    if engine is None:
+        yield
+        return
+    try:
+        # Sizes of texts depend on who draws them, and how finely.
+        (FigureCanvasSVG if kind == "svg" else FigureCanvasAgg)(figure)
+        figure.dpi = _SVG_DPI if kind == "svg" else _DPI
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+        yield
+    finally:
+        figure.set_layout_engine(engine)
+        figure.set_canvas(canvas)
+        figure.dpi = dpi
 
 
 def watermark(figure: Figure) -> None:
