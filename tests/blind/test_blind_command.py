@@ -6,11 +6,11 @@ import stat
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 import sealing
 from commands import XB1, Hdcal
+from schema_checks import obeys
 from sealing import by_library, key_of, sealed_set
 
 from hdcal.blind.answer import FrozenAnswer, ScoresAnswer
@@ -19,7 +19,6 @@ from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
 from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import stamped
 from hdcal.errors import InputError
-from hdcal.report.answer import json_schema
 
 # What every answer says, and the file of frozen answers does not.
 NOT_IN_FILE = {"status", "reasons", "headline", "next_step"}
@@ -104,7 +103,7 @@ def test_make_answer_open(blind, tmp_path: Path):
     said = json.loads(done.stdout)
     assert f"answers {said['sha256']}" in done.stderr
     kept = json.loads((tmp_path / "set" / "answers-hdcal.json").read_text())
-    jsonschema.validate(said, json_schema(FrozenAnswer))
+    obeys(said, FrozenAnswer)
     assert kept == {k: v for k, v in said.items() if k not in NOT_IN_FILE}
     assert kept["blind"] and kept["set_commitment"] == manifest["commitment"]
     done = blind("open", "set", "--key", "set.key", "--json")
@@ -112,7 +111,7 @@ def test_make_answer_open(blind, tmp_path: Path):
     result = tmp_path / "set" / "result"
     assert {"scores.json", "labels.json"} <= seen(result).keys()
     said = json.loads(done.stdout)
-    jsonschema.validate(said, json_schema(ScoresAnswer))
+    obeys(said, ScoresAnswer)
     assert said["answers"]["hdcal"] == {"sha256": kept["sha256"], "blind": True}
 
 

@@ -121,6 +121,7 @@ def test_it_can_be_printed(folder: Path, tmp_path: Path):
     assert 2 <= print_pages(folder / "report.html", tmp_path) <= 15
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_everything_is_written_and_may_be_replaced(folder: Path, tmp_path: Path):
     folder = shutil.copytree(folder, tmp_path / "copy")
     names = {entry.name for entry in folder.iterdir()}

@@ -6,13 +6,12 @@ import json
 import re
 from pathlib import Path
 
-import jsonschema
 import pytest
 from commands import XB1, Done, Hdcal
+from schema_checks import obeys
 from short import TOO_SHORT, options
 
 from hdcal.calibration.answer import CalibrationAnswer
-from hdcal.report.answer import json_schema
 
 MARK = "FAILED — do not use"
 
@@ -33,7 +32,7 @@ def test_the_command_says_so(failed: tuple[Done, Path]):
 
 def test_the_summary_says_so(failed: tuple[Done, Path]):
     summary = json.loads((failed[1] / "summary.json").read_text("utf-8"))
-    jsonschema.validate(summary, json_schema(CalibrationAnswer))
+    obeys(summary, CalibrationAnswer)
     assert summary["status"] == "failed"
     assert summary["reasons"]
     assert "must not be used" in summary["headline"]

@@ -6,13 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-import jsonschema
 import pytest
 from commands import MAIN, XB1, Hdcal
+from schema_checks import obeys
 
 from hdcal.calibration.check.answer import CheckAnswer
 from hdcal.calibration.effects.answer import EffectsAnswer
-from hdcal.report.answer import json_schema
 
 
 @pytest.mark.parametrize(
@@ -58,7 +57,7 @@ def test_effects_lists_the_whole_library(here: Hdcal):
 
     done = here("effects", "--json")
     found = json.loads(done.stdout)
-    jsonschema.validate(found, json_schema(EffectsAnswer))
+    obeys(found, EffectsAnswer)
     assert found["headline"] == f"{len(EFFECTS)} effects can be added to the model."
     listed = found["effects"]
     assert [effect["name"] for effect in listed] == list(EFFECTS)
@@ -70,7 +69,7 @@ def test_effects_lists_the_whole_library(here: Hdcal):
 def test_check_says_what_was_read(here: Hdcal):
     done = here("check", XB1, "--json")
     found = json.loads(done.stdout)
-    jsonschema.validate(found, json_schema(CheckAnswer))
+    obeys(found, CheckAnswer)
     assert found["headline"] == "The input is in order."
     assert done.returncode == 0
     assert found["data"]["rows"] == 14

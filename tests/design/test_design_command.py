@@ -7,11 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-import jsonschema
 import pytest
 from browser import PHONE, look
 from commands import XB1, Done, Hdcal
 from results import write_result
+from schema_checks import obeys
 
 from hdcal.data.gear import read_gear
 from hdcal.design.answer import GeneratorAnswer, InverseAnswer
@@ -23,7 +23,7 @@ from hdcal.design.summary import generator_report, inverse_report
 from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
-from hdcal.report.answer import Answer, json_schema
+from hdcal.report.answer import Answer
 from hdcal.report.saving.contents import STAMP
 
 WALL = "wall_thickness_mm=0.5:0.8"
@@ -39,7 +39,7 @@ def run(calibrated: tuple[Done, Path]) -> Path:
 def valid(text: str, answer: type[Answer]) -> dict:
     """Return an answer that keeps what its schema promises."""
     found = json.loads(text)
-    jsonschema.validate(found, json_schema(answer))
+    obeys(found, answer)
     return found
 
 
@@ -63,6 +63,7 @@ def folders(run: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Pa
     return {name: base / name for name in ("generator", "inv", "study")}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     asked = ["design", run, "--window", "0.38:0.42", "--temperature=-20:80", "--json"]
     done = here(*asked, "--tolerance", "wall_thickness_mm=0.02")
@@ -84,6 +85,7 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     assert said["next_step"].startswith("Set the free end of a spring of ")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
     out = tmp_path / "made"
     done = here(
@@ -102,6 +104,7 @@ def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
     assert again.returncode == 2 and "exists already" in again.stderr
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
     vary = ["--vary", "wall_thickness_mm=0.6:0.76:5", "--vary", "radius_mm=35,40,45"]
     done = here("study", run, *vary)
@@ -237,6 +240,7 @@ def test_bad_input_is_told_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_longest_table_is_cut_and_says_so(folders: dict[str, Path]):
     gear = read_gear(XB1 / "gear.toml")
     many = study(gear, {"wall_thickness_mm": [0.6 + 1e-4 * i for i in range(201)]})

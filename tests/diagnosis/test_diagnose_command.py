@@ -7,19 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-import jsonschema
 import pytest
 from commands import XB1, Hdcal
+from schema_checks import obeys
 from verdicts import KINDS
 
 from hdcal.cli.processes import run_all
 from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.errors import Finding, InputError
-from hdcal.report.answer import json_schema
 from hdcal.report.saving.contents import STAMP
-
-SCHEMA = json_schema(VerdictAnswer)
-
 
 FILES = {
     "report.html",
@@ -81,7 +77,7 @@ def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
     assert done.returncode == 0, done.stderr
     assert names(tmp_path / "run") == FILES | {STAMP}
     found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
-    jsonschema.validate(found, SCHEMA)
+    obeys(found, VerdictAnswer)
     assert json.loads(done.stdout) == found
     assert found["seed"] == 3 and not found["quick"]
     assert "Most likely cause: hysteresis (96 %)" in done.stderr
@@ -93,6 +89,7 @@ def test_the_folder_is_named_after_the_case(diagnose, cases, tmp_path: Path):
     assert names(tmp_path / "none-diagnosis") == {"verdict.json", STAMP}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
     (tmp_path / "a.csv").write_bytes((XB1 / "data.csv").read_bytes())
     (tmp_path / "gear.toml").write_bytes((XB1 / "gear.toml").read_bytes())
@@ -159,12 +156,12 @@ def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path
     assert done.returncode == 2
     assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
     said = json.loads(done.stdout)
-    jsonschema.validate(said, json_schema(VerdictsAnswer))
+    obeys(said, VerdictsAnswer)
     assert list(said["cases"]) == ["none", "named"]
     assert list(said["refused"]) == [str(cases["unknown"]), "none", "refused"]
     assert "3 refused" in said["headline"] and said["status"] == "ok"
     written = json.loads((tmp_path / "all" / "refused.json").read_text("utf-8"))
-    jsonschema.validate(written, json_schema(RefusedAnswer))
+    obeys(written, RefusedAnswer)
     assert written["cases"] == said["refused"]
     assert said["refused"]["refused"][0]["problem"] == "is refused"
     for words in ("a second case is called 'none'", "is refused", "column"):
@@ -197,6 +194,7 @@ def test_the_library_can_do_without_an_effect(diagnose, cases, tmp_path: Path):
     assert "outliers" not in found["library"] and "coulomb_friction" in found["library"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_with_many_cases_reports_have_to_be_asked_for(
     diagnose, monkeypatch, cases, tmp_path: Path
 ):

@@ -5,13 +5,12 @@ import json
 import re
 from pathlib import Path
 
-import jsonschema
 import pytest
 from commands import Hdcal
 from moving import still_posterior
+from schema_checks import obeys
 
 from hdcal.motion.respond.answer import ResponseAnswer, ResponseWithColumns
-from hdcal.report.answer import json_schema
 
 SMALL = ["--points", "101", "--draws", "50"]
 FORCE = "time_s,force_N\n0.0,0\n0.01,40\n0.02,40\n"
@@ -31,7 +30,7 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     done = here("respond", run, "--force", "f.csv", *SMALL, "--json")
     assert done.returncode == 0, done.stderr
     printed = json.loads(done.stdout)
-    jsonschema.validate(printed, json_schema(ResponseWithColumns))
+    obeys(printed, ResponseWithColumns)
     assert printed["schema"] == "hdcal.response/1"
     assert printed["status"] == "ok"
     out = Path("run-response")
@@ -40,7 +39,7 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     assert {file.name for file in out.iterdir()} == names
     columns = printed.pop("columns")
     assert printed == json.loads((out / "response.json").read_text("utf-8"))
-    jsonschema.validate(printed, json_schema(ResponseAnswer))
+    obeys(printed, ResponseAnswer)
     assert "The deformation reaches" in printed["headline"]
     assert printed["next_step"].startswith("Measure a vibration")
     with (out / "response.csv").open() as stream:
@@ -53,6 +52,7 @@ def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path)
     assert not re.search(r"(?:src|href)=\"(?!data:)", page)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_words_are_for_people_and_units_are_named(here: Hdcal, run: Path):
     given = ["--force", "step", "--amplitude", "40", "--duration", "0.02"]
     known = ["--mass-kg", "0.04", "--damping", "0.003"]

@@ -5,15 +5,14 @@ import io
 import json
 from pathlib import Path
 
-import jsonschema
 import pytest
 from commands import Hdcal
 from posteriors import single, with_leftover
+from schema_checks import obeys
 
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.answer import PredictionAnswer
 from hdcal.prediction.bands.bands import predict
-from hdcal.report.answer import json_schema
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +50,7 @@ def test_json_is_the_table_by_column(here: Hdcal, runs: Path):
         asked = ["--deformation", "0.2,0.4", "--temperature", "20,60", "--json"]
         done = here("predict", runs / run, *asked)
         found = json.loads(done.stdout)
-        jsonschema.validate(found, json_schema(PredictionAnswer))
+        obeys(found, PredictionAnswer)
         columns = found["columns"]
         assert columns["deformation_mm"] == [0.2, 0.4, 0.2, 0.4]
         assert (columns["with_gap_median_N"][0] is not None) == gap

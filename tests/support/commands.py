@@ -62,6 +62,17 @@ def here(
     signal.signal(signal.SIGTERM, before)
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the drawing of figures, where a test looks at none of their files.
+
+    They are made as ever; to draw one, as SVG and PNG, takes most of a report's time.
+    """
+    from hdcal.report import canvas
+
+    monkeypatch.setattr(canvas, "render", lambda *_: b"<svg/>")
+
+
 @pytest.fixture(scope="session")
 def calibrated(
     hdcal: Hdcal, tmp_path_factory: pytest.TempPathFactory

@@ -6,6 +6,7 @@ any. Which hypothesis it is, and which r, follows exactly from the prior that dr
 """
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.special import gammaln, ive, logsumexp, softmax
@@ -40,6 +41,7 @@ class Check:
     mixed: set[str]
 
 
+@cache
 def directions() -> dict[str, np.ndarray]:
     """Return the unit direction of every effect and pair."""
     own = dict(zip(EFFECTS, SHAPES, strict=True))
@@ -57,11 +59,10 @@ def posterior(seen: np.ndarray, withheld: tuple[str, ...] = ()) -> dict[str, flo
         withheld: effects that the library lacks.
     """
     lengths = np.array(SIZES) * ROWS**0.5
-
-    def along(direction: np.ndarray) -> float:
-        return float(logsumexp(lengths * (seen @ direction) - 0.5 * lengths**2))
-
     own = directions()
+    cosines = np.array([*own.values()]) @ seen
+    each = np.multiply.outer(lengths, cosines) - 0.5 * lengths[:, None] ** 2
+    along = dict(zip(own, np.logaddexp.reduce(each), strict=True))
     prior = {"none": PRIOR["none"], "unknown": PRIOR["unknown"]}
     prior |= {name: PRIOR["pair"] / len(PAIRS) for name in PAIRS}
     prior |= {name: PRIOR["effect"] / len(EFFECTS) for name in EFFECTS}
@@ -71,7 +72,7 @@ def posterior(seen: np.ndarray, withheld: tuple[str, ...] = ()) -> dict[str, flo
         if name == "none"
         else _anywhere(seen, lengths)
         if name == "unknown"
-        else along(own[name])
+        else along[name]
         for name in kept
     }
     weight = softmax([np.log(kept[name]) + evidence[name] for name in kept])

@@ -6,7 +6,7 @@ takes away what it may have from the neighbours. Two things are compared: how of
 neighbours get the same answer, and how often an answer is what is true next door.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,9 +68,15 @@ def order_dependence(cases: Cases) -> FileOrder:
     halves = share(right[:half]), share(right[half:])
     if len(found) < 3:
         return FileOrder(len(found), None, *halves)
-    same = _tested(lambda a: _agree(a, a), stated, truth)
-    next_truth = _tested(lambda a: _agree(a, true) + _agree(true, a), stated, truth)
-    itself = _tested(lambda a: _agree(a, a), true, np.zeros_like(true))
+
+    def alike(dealt: np.ndarray) -> int:
+        return _agree(dealt, dealt)
+
+    def as_next_door(dealt: np.ndarray) -> int:
+        return _agree(dealt, true) + _agree(true, dealt)
+
+    same, next_truth = _tested((alike, as_next_door), stated, truth)
+    (itself,) = _tested((alike,), true, np.zeros_like(true))
     p_value = min(1.0, 2.0 * min(same.p_value, next_truth.p_value))
     return NeighbourTests(len(found), p_value, *halves, same, next_truth, itself)
 
@@ -85,16 +91,22 @@ def _agree(one: np.ndarray, two: np.ndarray) -> int:
 
 
 def _tested(
-    statistic: Callable[[np.ndarray], int], values: np.ndarray, group: np.ndarray
-) -> PermutationTest:
-    """Return a count beside what permuting within groups gives."""
+    statistics: Sequence[Callable[[np.ndarray], int]],
+    values: np.ndarray,
+    group: np.ndarray,
+) -> list[PermutationTest]:
+    """Return counts beside what permuting within groups 0, 1, … gives."""
     rng = np.random.default_rng(SEED)
     own = np.argsort(group, kind="stable")
-    counts = np.empty(_PERMUTATIONS)
-    for place in range(_PERMUTATIONS):
+    counts = np.empty((_PERMUTATIONS, len(statistics)))
+    for row in counts:
         permuted = np.empty_like(values)
-        permuted[own] = values[np.lexsort((rng.random(len(values)), group))]
-        counts[place] = statistic(permuted)
-    seen = statistic(values)
-    p_value = (1 + np.sum(counts >= seen)) / (1 + _PERMUTATIONS)
-    return PermutationTest(seen, float(counts.mean()), float(p_value))
+        # Sorted by group, and at random within each.
+        permuted[own] = values[np.argsort(group + rng.random(len(values)))]
+        row[:] = [statistic(permuted) for statistic in statistics]
+    found = []
+    for statistic, column in zip(statistics, counts.T, strict=True):
+        seen = statistic(values)
+        p_value = (1 + np.sum(column >= seen)) / (1 + _PERMUTATIONS)
+        found.append(PermutationTest(seen, float(column.mean()), float(p_value)))
+    return found

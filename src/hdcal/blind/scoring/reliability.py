@@ -11,6 +11,7 @@ same would show by the same estimator: mean and 95 % point of simulations.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.special import ndtr
@@ -204,16 +205,24 @@ def calibration_error(found: Statements) -> Estimate:
 
 
 def _spread(places, found: Statements, value: float) -> tuple[float, float]:
-    rng = np.random.default_rng(SEED)
     index = np.unique(found.case, return_inverse=True)[1]
-    n = index.max() + 1
     repeats = []
-    for _ in range(_REPEATS):
-        weight = rng.multinomial(n, np.full(n, 1.0 / n))[index].astype(float)
+    for count in _resamplings(int(index.max()) + 1):
+        weight = count[index].astype(float)
         repeats.append(errors(places, found.stated, found.true, weight)[1])
     # Resampling scatters twice, which lifts an error; only its spread is used.
     low, high = np.quantile(repeats, [0.025, 0.975]) - np.mean(repeats)
     return float(np.clip(value + low, 0.0, value)), float(value + max(high, 0.0))
+
+
+@lru_cache(maxsize=1)
+def _resamplings(n: int) -> np.ndarray:
+    """Return how often each of n cases is drawn, shape (repeats, n).
+
+    Kept for the next effect: each of them is stated in every case.
+    """
+    rng = np.random.default_rng(SEED)
+    return rng.multinomial(n, np.full(n, 1.0 / n), size=_REPEATS).astype(np.int32)
 
 
 def _floor(places: np.ndarray, found: Statements) -> Floor:
