@@ -8,8 +8,6 @@ import pytest
 from commands import MAIN, XB1, Done, Hdcal
 from short import SHORT, options
 
-pytestmark = pytest.mark.computes
-
 # Two short runs of the sampler: their forces differ by tenths of a newton.
 NEAR = {"rel": 0.01}
 

@@ -10,7 +10,6 @@ import pytest
 from compiling import compilations
 from moving import moving_case
 from rigs import make_case, ramp
-from short import TOO_SHORT
 
 from hdcal import calibrate, calibrate_dynamic, residuals
 from hdcal.data.priors import effect_priors
@@ -19,7 +18,8 @@ from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem
 from hdcal.motion.bands import motion_bands
 
-pytestmark = pytest.mark.computes
+# What is compiled does not depend on how long it runs.
+BRIEFLY = {"warmup": 50, "draws": 50}
 
 
 def mappings() -> int:
@@ -42,16 +42,16 @@ def bent(rows: int):
 
 
 def calibrate_bent(case):
-    settings = {"effects": ["progressive_stiffening"], "with_gap": True, **TOO_SHORT}
+    settings = {"effects": ["progressive_stiffening"], "with_gap": True, **BRIEFLY}
     return residuals(calibrate(case, **settings))
 
 
 def calibrate_with_gap(case):
-    return residuals(calibrate(case, with_gap=True, **TOO_SHORT))
+    return residuals(calibrate(case, with_gap=True, **BRIEFLY))
 
 
 def calibrate_moving(case):
-    return motion_bands(calibrate_dynamic(case, **TOO_SHORT))
+    return motion_bands(calibrate_dynamic(case, **BRIEFLY))
 
 
 # Two numbers of rows of one bucket.

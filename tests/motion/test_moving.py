@@ -74,7 +74,7 @@ def test_a_few_seeds_are_recovered():
 
 def test_noise_taken_too_small_is_told_by_the_distance():
     small = certain(0.3 * TRUTH["deformation_sigma"])
-    _, p = recovered(range(2), deformation_sigma=small)
+    _, p = recovered(range(4), deformation_sigma=small)
     assert p < LEVEL
 
 
