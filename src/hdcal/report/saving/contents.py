@@ -6,6 +6,7 @@ import os
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -48,11 +49,15 @@ def seal(folder: Path) -> None:
             size, sha256 = _read(path)
             name = path.relative_to(folder).as_posix()
             files.append({"file": name, "bytes": size, "sha256": sha256})
-    version = metadata.version("hdcal")
-    stamp = {"schema": SCHEMA, "version": version, "files": files}
+    stamp = {"schema": SCHEMA, "version": _version(), "files": files}
     write_file(folder / STAMP, as_json(stamp).encode())
     for path in [*below, folder / STAMP, folder]:
         sync(path)
+
+
+@cache
+def _version() -> str:
+    return metadata.version("hdcal")
 
 
 def older_result(folder: Path) -> list[str]:
