@@ -21,7 +21,8 @@ from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.calibration.summary import summarise
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
-from hdcal.inference.density import draw_members, log_likelihood
+from hdcal.inference.density import log_likelihood
+from hdcal.inference.integrated import draw_members
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters

@@ -13,8 +13,8 @@ from rigs import cycles, draw_truth, make_case, make_gear, posterior_draws, simu
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference.density import member_base
 from hdcal.inference.problem import build_problem
+from hdcal.inference.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.registry import EFFECTS
 

@@ -10,10 +10,11 @@ from scipy import stats
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import effect_priors, material_priors, rig_priors
-from hdcal.inference import compress, density
+from hdcal.inference import compress, density, integrated
+from hdcal.inference import values as of_draw
 from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.likelihood import log_probability
-from hdcal.inference.member_offsets import Linear, contrasts
+from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.problem import build_problem
 from hdcal.physics.chain import (
     Base,
@@ -24,7 +25,7 @@ from hdcal.physics.chain import (
 
 SHIPPED = effect_priors()
 log_likelihood = jax.jit(density.log_likelihood)
-predict_rows = jax.jit(density.predict_rows)
+predict_rows = jax.jit(of_draw.predict_rows)
 pointwise = jax.jit(density.pointwise_log_likelihood)
 
 
@@ -151,7 +152,7 @@ def test_a_compressed_problem_is_its_rows(loading, gear):
 # --- integrating out ---------------------------------------------------------------
 
 
-def random_linear(seed, rows, weights):
+def random_linear(seed, rows, weights, members=0):
     rng = np.random.default_rng(seed)
     sd = rng.uniform(0.3, 2.0, rows)
     return Linear(
@@ -161,21 +162,33 @@ def random_linear(seed, rows, weights):
         scale=jnp.asarray(rng.uniform(0.1, 3.0, weights)),
         log_volume=jnp.asarray(np.log(sd).sum()),
         count=rows,
+        grouped=random_members(rng, rows, members) if members else None,
     )
+
+
+def random_members(rng, rows, members):
+    """Return members of which some may have no row."""
+    index = jnp.asarray(rng.integers(0, members, rows))
+    column = jnp.asarray(rng.normal(size=rows))
+    return Grouped(index, column, jnp.asarray(rng.uniform(0.1, 3.0)), members)
 
 
 def dense(linear):
     """Return design, prior covariance and noise covariance as dense matrices."""
-    return (
-        np.asarray(linear.design),
-        np.diag(np.asarray(linear.scale) ** 2),
-        np.diag(np.asarray(linear.sd) ** 2),
-    )
+    design, scale = np.asarray(linear.design), np.asarray(linear.scale)
+    if linear.grouped is not None:
+        design = np.hstack([linear.grouped.columns(), design])
+        own = np.full(linear.grouped.count - 1, linear.grouped.sd)
+        scale = np.concatenate([own, scale])
+    return design, np.diag(scale**2), np.diag(np.asarray(linear.sd) ** 2)
 
 
-@pytest.mark.parametrize(("rows", "weights"), [(30, 4), (5, 12), (1, 1)])
-def test_the_integral_is_the_dense_density(rows, weights):
-    linear = random_linear(rows, rows, weights)
+@pytest.mark.parametrize(
+    ("rows", "weights", "members"),
+    [(30, 4, 0), (5, 12, 0), (1, 1, 0), (30, 4, 7), (30, 0, 7), (5, 3, 9), (9, 0, 2)],
+)
+def test_the_integral_is_the_dense_density(rows, weights, members):
+    linear = random_linear(rows, rows, weights, members)
     design, prior, noise = dense(linear)
     slow = stats.multivariate_normal(
         np.zeros(rows), design @ prior @ design.T + noise
@@ -183,21 +196,28 @@ def test_the_integral_is_the_dense_density(rows, weights):
     assert float(linear.log_likelihood()) == pytest.approx(slow, rel=1e-11)
 
 
-@pytest.mark.parametrize(("rows", "weights"), [(30, 4), (3, 5)])
-def test_draws_are_conditional(rows, weights):
-    linear = random_linear(rows + 1, rows, weights)
+@pytest.mark.parametrize(
+    ("rows", "weights", "members"),
+    [(30, 4, 0), (3, 5, 0), (30, 3, 6), (20, 0, 5), (4, 2, 6)],
+)
+def test_draws_are_conditional(rows, weights, members):
+    linear = random_linear(rows + 1, rows, weights, members)
     design, prior, noise = dense(linear)
     gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + noise)
     mean = gain @ np.asarray(linear.residual)
     covariance = prior - gain @ design @ prior
     count = 40_000
     keys = jax.random.split(jax.random.key(rows), count)
-    drawn = np.asarray(jax.jit(jax.vmap(linear.draw))(keys))
+    drawn, own = jax.jit(jax.vmap(linear.draw))(keys)
+    drawn = np.asarray(drawn)
+    if members:
+        assert np.abs(own.sum(axis=1)).max() < 1e-12
+        drawn = np.hstack([own @ contrasts(members), drawn])
     root = np.linalg.cholesky(covariance)
     standard = np.linalg.solve(root, (drawn - mean).T)
     bound = 5.0 / np.sqrt(count)
     assert np.max(np.abs(standard.mean(axis=1))) < bound
-    spread = standard @ standard.T / count - np.eye(weights)
+    spread = standard @ standard.T / count - np.eye(len(standard))
     assert np.max(np.abs(spread)) < bound * np.sqrt(2.0)
 
 
@@ -241,6 +261,7 @@ STRUCTURES = {
     "gap": (set(), True),
     "runs and gap": ({"run", "force_sd"}, True),
     "all": ({"run", "specimen", "force_sd"}, True),
+    "more specimens": ({"run", "specimen"}, True),
 }
 
 
@@ -252,7 +273,7 @@ def structured(request, loading, gear):
         11,
         known=known,
         runs=4 if "run" in known else 1,
-        specimens=3 if "specimen" in known else 1,
+        specimens=6 if "more" in request.param else 3 if "specimen" in known else 1,
         sds=(0.1, 0.6) if "force_sd" in known else (0.0,),
     )
     case = case_of(records, gear, resolution=0.3)
@@ -288,17 +309,12 @@ def test_drawn_members_explain_the_data(structured):
     """Given the members the readings scatter by σ, and deviations sum to zero."""
     case, problem = structured
     values = random_values(0)
-    drawn = jax.jit(density.draw_members)(problem, values, jax.random.key(0))
-    names = {
-        "run": "run_offset",
-        "specimen": "specimen_deviation",
-        "discrepancy": "gap_weights",
-    }
-    assert set(drawn) == {names[kind] for kind in problem.integrated}
+    drawn = jax.jit(integrated.draw_members)(problem, values, jax.random.key(0))
+    assert set(drawn) == {of_draw.MEMBERS[kind] for kind in problem.integrated}
     for name in set(drawn) - {"gap_weights"}:
         assert abs(float(drawn[name].sum())) < 1e-9
     # Bayes: p(y) = p(y | w) p(w) / p(w | y), with the two latter from dense algebra.
-    linear = jax.jit(density.linear_part)(problem, values)
+    linear = jax.jit(integrated.linear_part)(problem, values)
     weights = members_of(problem, drawn)
     design, prior, noise = dense(linear)
     precision = np.linalg.inv(noise)
@@ -307,7 +323,7 @@ def test_drawn_members_explain_the_data(structured):
     own = slow_given_members(problem, case, values, drawn)
     bayes = (
         own
-        + stats.norm.logpdf(weights, 0.0, np.asarray(linear.scale)).sum()
+        + stats.norm.logpdf(weights, 0.0, np.sqrt(np.diag(prior))).sum()
         - log_normal(weights - mean, posterior)
     )
     whole = float(log_likelihood(problem, values))
@@ -321,13 +337,12 @@ def log_normal(error, covariance):
 
 
 def members_of(problem, drawn):
-    """Return the weights behind drawn members, in the order of the design."""
-    parts = []
-    if "run" in problem.integrated:
-        parts.append(contrasts(problem.runs).T @ drawn["run_offset"])
-    if "specimen" in problem.integrated:
-        own = drawn["specimen_deviation"]
-        parts.append(contrasts(problem.specimens).T @ own)
+    """Return the weights behind drawn members, in the order of the dense design."""
+    parts = [np.zeros(0)]
+    for kind, count in (("run", problem.runs), ("specimen", problem.specimens)):
+        if kind in problem.integrated:
+            parts.append(contrasts(count).T @ drawn[of_draw.MEMBERS[kind]])
+    parts.sort(key=len, reverse=True)
     if "discrepancy" in problem.integrated:
         parts.append(drawn["gap_weights"])
     return np.concatenate(parts)

@@ -19,15 +19,17 @@ from hdcal.inference.dynamic_problem import (
     dynamic_site_priors,
     predict_motion,
 )
+from hdcal.inference.integrated import draw_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
+from hdcal.inference.values import predict_rows
 from hdcal.physics.registry import EFFECTS
 
 # Sums over more rows are added up in another order.
 CLOSE = {"rtol": 1e-11, "atol": 1e-12}
 EXPAND = jax.jit(jax.value_and_grad(density.log_likelihood, argnums=1))
-DRAW = jax.jit(density.draw_members)
+DRAW = jax.jit(draw_members)
 MOVE = jax.jit(predict_motion)
 STAGES = ("deformation", "force", "sensor", "noise")
 
@@ -201,9 +203,9 @@ def test_derivatives_of_measured_rows_are_those_without_padding():
 
         def mean(moved):
             everything = values | moved
-            return density.predict_rows(problem, everything, case.records, columns)[0]
+            return predict_rows(problem, everything, case.records, columns)[0]
 
-        _, noise = density.predict_rows(problem, values, case.records, columns)
+        _, noise = predict_rows(problem, values, case.records, columns)
         stiffer = {"K": values["K"]}
         gain = jax.jvp(mean, (stiffer,), (stiffer,))[1]
         return jax.jacfwd(mean)(part), gain, noise.sd[0]

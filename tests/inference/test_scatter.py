@@ -12,9 +12,9 @@ from hdcal.calibration.calibrate import calibrate, check_effect_priors
 from hdcal.calibration.summary import summarise
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
-from hdcal.inference.density import MEMBER_SD, MEMBERS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
+from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
 

@@ -15,9 +15,9 @@ from rigs import draw_truth, make_case, make_records, posterior_draws
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
-from hdcal.inference.density import member_base
 from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
+from hdcal.inference.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.mixture import Mixture, pooled, weighted_quantile

@@ -9,11 +9,11 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.priors import effect_priors, material_priors, rig_priors
 from hdcal.data.records import Geometry, Records
 from hdcal.inference import laplace
-from hdcal.inference.density import POSITIVE, build_effects, member_base
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
+from hdcal.inference.values import POSITIVE, build_effects, member_base
 from hdcal.physics.chain import predict_reading
 
 BASE = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")

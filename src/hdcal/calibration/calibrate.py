@@ -13,7 +13,6 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import rounding_check
-from hdcal.inference.density import MEMBER_SD, MEMBERS
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
@@ -21,6 +20,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter

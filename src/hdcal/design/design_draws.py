@@ -23,11 +23,11 @@ from hdcal.data.priors import (
 from hdcal.data.records import Geometry, Records
 from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import Values
 from hdcal.inference.distributions import frozen, scaled
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
+from hdcal.inference.values import Values
 from hdcal.physics.chain import Reading
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.causes import ORIGIN, causes_of, sample_prior

@@ -15,7 +15,7 @@ from hdcal.data.case import Case, Gear, Theory
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import Values, log_likelihood
+from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import scaled
 from hdcal.inference.model import model, sample_influence, sample_site
 from hdcal.inference.padding import measured, pad_records
@@ -26,6 +26,7 @@ from hdcal.inference.problem import (
     without_texts,
 )
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.values import Values
 from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.linear_response import linear_response
 

@@ -8,10 +8,10 @@ import jax
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.inference.density import predict_rows
 from hdcal.inference.discrepancy import discrepancy_columns, prior_sd
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import predict_rows
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
 # parameter of an effect on the noise.

@@ -13,11 +13,12 @@ import numpyro.distributions as dist
 from jax.nn import log_sigmoid, softplus
 
 from hdcal.data.priors import Prior
-from hdcal.inference.density import POSITIVE, log_likelihood, stiffness
+from hdcal.inference.density import log_likelihood
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.values import POSITIVE, stiffness
 from hdcal.physics.effect import parameters
 
 

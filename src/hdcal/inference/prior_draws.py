@@ -7,9 +7,9 @@ import jax
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.density import POSITIVE
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import without_texts
+from hdcal.inference.values import POSITIVE
 
 _PRIOR_DRAWS = 2000
 

@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hdcal.inference.density import predict_rows
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
 from hdcal.inference.linearisation import Linearisation, linearise
@@ -18,6 +17,7 @@ from hdcal.inference.residual_shapes import (
     find_structure,
     shapes_of,
 )
+from hdcal.inference.values import predict_rows
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.

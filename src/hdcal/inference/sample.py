@@ -18,7 +18,7 @@ from numpyro.infer.util import constrain_fn
 
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import draw_members
+from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
 from hdcal.inference.sampled_problem import Sampled

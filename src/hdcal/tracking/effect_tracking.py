@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.errors import Finding, InputError
-from hdcal.inference.density import build_effects
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.prediction.engine.forces import grid_records

@@ -6,9 +6,9 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.priors import Prior
-from hdcal.inference.density import POSITIVE
 from hdcal.inference.distributions import bounds, frozen, scaled
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.values import POSITIVE
 from hdcal.physics.chain import Base, Reading, linear_coefficients
 from hdcal.physics.theory import THEORIES
 

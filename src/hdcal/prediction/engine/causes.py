@@ -11,10 +11,10 @@ import numpy as np
 from hdcal.data.prior import Prior
 from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError, NotUsable
-from hdcal.inference.density import POSITIVE, Values
 from hdcal.inference.distributions import distribution
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import POSITIVE, Values
 
 VERDICT = "verdict.json"
 SCHEMA = "hdcal.verdict/1"

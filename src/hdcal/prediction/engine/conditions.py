@@ -10,7 +10,7 @@ from jaxtyping import Float
 from hdcal.data.case import Case, Gear
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding
-from hdcal.inference.density import Values
+from hdcal.inference.values import Values
 from hdcal.prediction.engine.sizes import StiffnessStrata
 
 Direction = Literal["up", "down"]

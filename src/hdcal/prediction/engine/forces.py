@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
-from hdcal.inference.density import Values, build_effects, member_base
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values, build_effects, member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 

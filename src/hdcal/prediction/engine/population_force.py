@@ -14,10 +14,10 @@ import numpy as np
 from scipy import stats
 from scipy.stats import qmc
 
-from hdcal.inference.density import Values
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.conditions import (
     Conditions,

@@ -4,8 +4,8 @@ import jax
 from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
-from hdcal.inference.density import Values
 from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
 from hdcal.physics.effect import Noise
 from hdcal.prediction.engine.forces import force_of, leftover_of
 from hdcal.prediction.engine.population import new_member_sd

@@ -1,0 +1,150 @@
+"""The members of a problem that are integrated out, and drawn again."""
+
+from functools import singledispatch
+
+import jax.numpy as jnp
+from jaxtyping import Key
+
+from hdcal.data.records import Array
+from hdcal.inference import compress
+from hdcal.inference.discrepancy import prior_sd
+from hdcal.inference.member_offsets import Grouped, Linear, contrasts
+from hdcal.inference.padding import measured
+from hdcal.inference.problem import Problem
+from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.values import (
+    CORE,
+    MEMBER_SD,
+    MEMBERS,
+    ONE,
+    Values,
+    block_coefficients,
+    member_base,
+    predict_rows,
+    with_rounding,
+)
+from hdcal.physics.chain import linear_coefficients
+
+
+def linear_part(problem: Problem, values: Values) -> Linear:
+    """Return the residual that the integrated members have to explain.
+
+    Members already drawn are left out: they are what is integrated over.
+    """
+    drawn = {MEMBERS[kind] for kind in problem.integrated}
+    values = {name: value for name, value in values.items() if name not in drawn}
+    if problem.blocks is not None:
+        return _linear_blocks(problem, problem.blocks, values)
+    return _linear_rows(problem, values)
+
+
+def _by_number(problem: Problem) -> list[str]:
+    """Return the integrated kinds that are labels in the data, most members first."""
+    return sorted(
+        problem.integrated & MEMBER_SD.keys(),
+        key=lambda kind: (-getattr(problem, f"{kind}s"), kind),
+    )
+
+
+def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Grouped]:
+    """Return the integrated members of each kind, most members first.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        labels: rows or groups of rows, with the index of each one's members.
+        columns: what a member of each kind adds to its rows [N per unit].
+    """
+    return {
+        kind: Grouped(
+            jnp.repeat(getattr(labels, kind), columns[kind][0].size),
+            columns[kind].reshape(-1),
+            values[MEMBER_SD[kind]],
+            getattr(problem, f"{kind}s"),
+        )
+        for kind in _by_number(problem)
+    }
+
+
+def _linear(problem: Problem, values: Values, grouped, discrepancy, **rows) -> Linear:
+    """Return a residual in which only the most numerous members stay members."""
+    largest, *others = list(grouped.values()) or [None]
+    design = [other.columns() for other in others]
+    scale = [jnp.full(other.count - 1, other.sd) for other in others]
+    if "discrepancy" in problem.integrated:
+        design.append(discrepancy)
+        scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
+    return Linear(
+        design=jnp.hstack([jnp.zeros((len(rows["residual"]), 0)), *design]),
+        scale=jnp.concatenate([jnp.zeros(0), *scale]),
+        grouped=largest,
+        **rows,
+    )
+
+
+def _linear_rows(problem: Problem, values: Values) -> Linear:
+    records = problem.rows
+    mean, noise = predict_rows(problem, values, records, None)
+    sd = with_rounding(noise, problem.step).sd[0]
+    real = measured(len(sd), problem.count)
+    columns = {"run": jnp.where(real, 1.0, 0.0)[:, None]}
+    discrepancy = problem.columns
+    if discrepancy is not None:
+        discrepancy = jnp.where(real[:, None], discrepancy, 0.0)
+    return _linear(
+        problem,
+        values,
+        _grouped(problem, values, records, columns),
+        discrepancy,
+        residual=jnp.where(real, records.force - mean, 0.0),
+        sd=sd,
+        log_volume=jnp.sum(jnp.where(real, jnp.log(sd), 0.0)),
+        count=problem.count,
+    )
+
+
+def _linear_blocks(
+    problem: Problem, blocks: compress.CompressedRows, values: Values
+) -> Linear:
+    groups, width = blocks.factor.shape[:2]
+    base = member_base(problem, {**values, "force_offset": 0.0})
+    slope = linear_coefficients(base, problem.reading)
+    columns = {
+        "run": blocks.factor[..., ONE],
+        "specimen": blocks.factor[..., :CORE] @ slope,
+    }
+    variance = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    residual = compress.residual(blocks, block_coefficients(problem, blocks, values))
+    return _linear(
+        problem,
+        values,
+        _grouped(problem, values, blocks, columns),
+        blocks.factor[..., CORE:-1].reshape(groups * width, -1),
+        residual=residual.reshape(-1),
+        sd=jnp.repeat(jnp.sqrt(variance), width),
+        log_volume=0.5 * jnp.sum(blocks.count * jnp.log(variance)),
+        count=jnp.sum(blocks.count),
+    )
+
+
+@singledispatch
+def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
+    """Draw the integrated members given the shared parameters of one draw."""
+    return {}
+
+
+@draw_members.register
+def _(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
+    if not problem.integrated:
+        return {}
+    weights, members = linear_part(problem, values).draw(key)
+    drawn, used = {}, 0
+    for place, kind in enumerate(_by_number(problem)):
+        if place > 0:
+            count = getattr(problem, f"{kind}s")
+            members = contrasts(count) @ weights[used : used + count - 1]
+            used += count - 1
+        drawn[MEMBERS[kind]] = members
+    if "discrepancy" in problem.integrated:
+        drawn["gap_weights"] = weights[used:]
+    return drawn

@@ -1,0 +1,103 @@
+"""The parameters of one draw, and what they say of each row."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from hdcal.data.records import Array, Records
+from hdcal.inference import compress
+from hdcal.inference.problem import Problem
+from hdcal.physics.chain import Base, linear_coefficients, predict_reading
+from hdcal.physics.effect import Effect, Noise, parameters
+
+# Float scalars and arrays by site name; what each one is depends on the name.
+Values = Mapping[str, Any]
+
+# A normal prior of these is cut at zero.
+POSITIVE = frozenset({"E0", "mass", "damping_ratio", "deformation_sigma"})
+MEMBERS = {
+    "run": "run_offset",
+    "specimen": "specimen_deviation",
+    "discrepancy": "gap_weights",
+}
+# The site of the spread of those that are labels in the data.
+MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
+# Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
+CORE, ONE = 4, 2
+
+
+def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
+    """Return K·k_theory at T_ref, per mm as read [N/mm]."""
+    radial = values["K"] * values["E0"] * problem.unit_stiffness
+    return radial * problem.reading.radial_per_read
+
+
+def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
+    """Return the base parameters of given runs and specimens.
+
+    Deviations that are not among the values (integrated out) count as zero.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        run: run indices, or None for the mean of the tested runs.
+        specimen: specimen indices, or None likewise.
+    """
+    scale, offset = values["K"] * values["E0"] * problem.unit_stiffness, 0.0
+    if specimen is not None and "specimen_deviation" in values:
+        scale = scale * (1.0 + values["specimen_deviation"][specimen])
+    if run is not None and "run_offset" in values:
+        offset = values["run_offset"][run]
+    return Base(
+        stiffness=scale,
+        alpha=values["alpha"],
+        deformation_offset=values["deformation_offset"],
+        force_offset=values["force_offset"] + offset,
+        sigma=values["sigma"],
+    )
+
+
+def build_effects(problem: Problem, values: Values) -> tuple[Effect, ...]:
+    """Return the effects of the problem with the parameters of one draw."""
+    return tuple(
+        effect(**{name: values[f"{effect.name}.{name}"] for name in parameters(effect)})
+        for effect in problem.effects
+    )
+
+
+def predict_rows(
+    problem: Problem, values: Values, records: Records, columns
+) -> tuple[Float[Array, " n"], Noise]:
+    """Return mean reading [N] and noise of rows of the tested runs and specimens.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        records: the rows.
+        columns: basis of the discrepancy at the rows, or None.
+    """
+    base = member_base(problem, values, records.run, records.specimen)
+    mean, noise = predict_reading(
+        base, build_effects(problem, values), records, problem.reading
+    )
+    if "gap_weights" in values:
+        mean = mean + columns @ values["gap_weights"]
+    return mean, noise
+
+
+def with_rounding(noise: Noise, step) -> Noise:
+    """Add Sheppard's variance of the rounding to the noise."""
+    return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + step**2 / 12.0))
+
+
+def block_coefficients(
+    problem: Problem, blocks: compress.CompressedRows, values: Values
+) -> Float[Array, "g p"]:
+    """Return the coefficients of each block, those of the discrepancy zero."""
+    base = member_base(problem, values, blocks.run, blocks.specimen)
+    core = linear_coefficients(base, problem.reading)
+    core = jnp.broadcast_to(core, (len(blocks.count), CORE))
+    width = blocks.factor.shape[-1] - 1
+    return jnp.pad(core, ((0, 0), (0, width - CORE)))
