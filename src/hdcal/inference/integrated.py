@@ -52,12 +52,12 @@ def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Gro
     Args:
         problem: structure.
         values: parameters of one draw.
-        labels: rows or groups of rows, with the index of each one's members.
+        labels: rows or blocks of rows, with the index of each one's members.
         columns: what a member of each kind adds to its rows [N per unit].
     """
     return {
         kind: Grouped(
-            jnp.repeat(getattr(labels, kind), columns[kind][0].size),
+            getattr(labels, kind),
             columns[kind].reshape(-1),
             values[MEMBER_SD[kind]],
             getattr(problem, f"{kind}s"),
@@ -87,7 +87,7 @@ def _linear_rows(problem: Problem, values: Values) -> Linear:
     mean, noise = predict_rows(problem, values, records, None)
     sd = with_rounding(noise, problem.step).sd[0]
     real = measured(len(sd), problem.count)
-    columns = {"run": jnp.where(real, 1.0, 0.0)[:, None]}
+    columns = {"run": jnp.where(real, 1.0, 0.0)}
     discrepancy = problem.columns
     if discrepancy is not None:
         discrepancy = jnp.where(real[:, None], discrepancy, 0.0)

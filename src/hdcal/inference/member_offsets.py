@@ -27,24 +27,30 @@ class Grouped(eqx.Module):
     """Members of which each row has one and which sum to zero: runs, or specimens.
 
     Attributes:
-        index: member of each row [-].
+        index: member of each block of rows [-]; blocks have the same number of rows.
         column: contribution of its member to each row [N per unit].
         sd: prior sd of a member on its own.
         count: number of members [-].
     """
 
-    index: Int[Array, " r"]
+    index: Int[Array, " b"]
     column: Float[Array, " r"]
     sd: Float[Array, ""]
     count: int = eqx.field(static=True)
 
+    @property
+    def _block(self) -> int:
+        return len(self.column) // len(self.index)
+
     def columns(self) -> Float[Array, "r k"]:
         """Return the contribution of each contrast between the members to each row."""
-        return self.column[:, None] * contrasts(self.count)[self.index]
+        index = jnp.repeat(self.index, self._block)
+        return self.column[:, None] * contrasts(self.count)[index]
 
     def sums(self, rows: Float[Array, " r ..."]) -> Float[Array, " count ..."]:
         """Return the sum over the rows of each member."""
-        return jax.ops.segment_sum(rows, self.index, self.count)
+        blocks = rows.reshape(len(self.index), self._block, *rows.shape[1:]).sum(axis=1)
+        return jax.ops.segment_sum(blocks, self.index, self.count)
 
 
 class _Eliminated(eqx.Module):

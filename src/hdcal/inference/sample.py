@@ -111,14 +111,16 @@ def _advance(problem, whitening, states, target, warmup, length):
 
 @jax.jit
 def _constrain(problem, whitening, standard, keys):
-    def one(e, key):
+    def one(drawn):
+        e, key = drawn
         values = constrain_fn(
             model, (problem,), {}, whitening.position(e), return_deterministic=True
         )
         named = {name: v for name, v in values.items() if not name.startswith("_")}
         return named | draw_members(problem, named, key)
 
-    return jax.vmap(jax.vmap(one))(standard, keys)
+    # One draw after the other: side by side members by the thousand fill the memory.
+    return jax.vmap(partial(jax.lax.map, one))((standard, keys))
 
 
 # What is compiled anew for each kind of problem and takes many memory mappings.
