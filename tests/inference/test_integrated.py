@@ -10,6 +10,7 @@ from scipy import stats
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import effect_priors, material_priors, rig_priors
+from hdcal.errors import InputError
 from hdcal.inference import compress, density, integrated
 from hdcal.inference import values as of_draw
 from hdcal.inference.discrepancy import prior_sd
@@ -353,3 +354,40 @@ def slow_given_members(problem, case, values, drawn):
     rows = rows_form(problem, case)
     given = pointwise(rows, {**values, **drawn}, case.records, rows.columns)
     return float(given.sum())
+
+
+@pytest.mark.parametrize(
+    ("runs", "specimens", "resolution", "words"),
+    [
+        (10_001, 1, 0.0, "10001 runs are too many for one calibration. Give it 10000"),
+        (600, 600, 0.0, "too many for one calibration with effects, coarse"),
+        (
+            600,
+            1,
+            50.0,
+            "600 runs are too many for one calibration with effects",
+        ),
+    ],
+)
+def test_too_many_members_are_refused(
+    loading, gear, runs, specimens, resolution, words
+):
+    """Their number is what would take hours or the memory, so it is said at once."""
+    rows = max(runs, specimens) * 2
+    many = jax.tree.map(lambda leaf: np.resize(np.asarray(leaf), rows), loading)
+    known = {"run"} | ({"specimen"} if specimens > 1 else set())
+    records = labelled(many, 1, known=known, runs=runs, specimens=specimens)
+    with pytest.raises(InputError, match=words):
+        build_problem(case_of(records, gear, resolution=resolution), SHIPPED)
+
+
+def test_runs_by_the_thousand_are_integrated_out(loading, gear):
+    many = jax.tree.map(lambda leaf: np.resize(np.asarray(leaf), 4_000), loading)
+    records = labelled(many, 1, known={"run"}, runs=2_000)
+    problem = build_problem(case_of(records, gear), SHIPPED)
+    values = random_values(3)
+    linear = jax.jit(integrated.linear_part)(problem, values)
+    # No array has an entry for each pair of runs.
+    largest = max(leaf.size for leaf in jax.tree.leaves(linear))
+    assert largest <= 2_000 * 5
+    assert np.isfinite(log_likelihood(problem, values))

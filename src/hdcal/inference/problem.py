@@ -13,12 +13,9 @@ from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
-from hdcal.inference.discrepancy import (
-    BASIS_SIZE,
-    Discrepancy,
-    build_discrepancy,
-)
+from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
 from hdcal.inference.distributions import scaled
+from hdcal.inference.member_counts import check_member_counts, member_counts
 from hdcal.inference.padding import pad_records
 from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
@@ -226,12 +223,13 @@ def build_problem(
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
     check_padding(effects, records, reading)
-    noise_sd, members = pilot_noise(records), _member_counts(case, with_gap)
+    noise_sd, members = pilot_noise(records), member_counts(case, with_gap)
     rounded = _is_rounded(case, noise_sd, members)
     leftover = build_discrepancy(records.deformation) if with_gap else None
     columns = _columns(records, reading)
     rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
+    check_member_counts(case.name, members, linear)
     return Problem(
         priors=without_texts(priors),
         units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
@@ -260,17 +258,6 @@ def _columns(records: Records, reading: Reading) -> np.ndarray:
     """Return the columns of the base model at the measured rows, shape (n, 4)."""
     columns = _base_columns(pad_records(records), reading)
     return np.asarray(columns)[: len(records.force)]
-
-
-def _member_counts(case: Case, with_gap: bool) -> dict[str, int]:
-    """Return how many members of each kind have a parameter of their own."""
-    known = case.records.known
-    counts = {
-        "run": len(case.run_labels) if "run" in known else 0,
-        "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "discrepancy": BASIS_SIZE if with_gap else 0,
-    }
-    return {kind: count for kind, count in counts.items() if count}
 
 
 def _is_rounded(case: Case, noise_sd: float, members: Mapping[str, int]) -> bool:

@@ -1,0 +1,49 @@
+"""How many runs and specimens have a parameter of their own, and how many may."""
+
+from collections.abc import Mapping
+
+from hdcal.data.case import Case
+from hdcal.errors import Finding, InputError
+from hdcal.inference.discrepancy import BASIS_SIZE
+
+# Runs or specimens: of the kind that is eliminated one by one, and of any other, whose
+# cost grows with the cube of their number.
+_MOST_MEMBERS, _MOST_DENSE = 10_000, 500
+
+
+def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
+    """Return how many members of each kind have a parameter of their own."""
+    known = case.records.known
+    counts = {
+        "run": len(case.run_labels) if "run" in known else 0,
+        "specimen": len(case.specimen_labels) if "specimen" in known else 0,
+        "discrepancy": BASIS_SIZE if with_gap else 0,
+    }
+    return {kind: count for kind, count in counts.items() if count}
+
+
+def check_member_counts(
+    name: str, counts: Mapping[str, int], linear: frozenset[str]
+) -> None:
+    """Check that runs and specimens are not too many.
+
+    Args:
+        name: of the case.
+        counts: from `member_counts`.
+        linear: kinds that enter a Gaussian likelihood linearly.
+
+    Raises:
+        InputError: they are.
+    """
+    kinds = sorted(counts.keys() - {"discrepancy"}, key=lambda kind: counts[kind])
+    findings = []
+    for place, kind in enumerate(kinds, start=1):
+        eliminated = kind in linear and place == len(kinds)
+        most = _MOST_MEMBERS if eliminated else _MOST_DENSE
+        if counts[kind] > most:
+            words = f"{counts[kind]} {kind}s are too many for one calibration"
+            if not eliminated:
+                words += " with effects, coarse readings or both runs and specimens"
+            findings.append(Finding(name, words, f"give it {most} or fewer"))
+    if findings:
+        raise InputError(findings)
