@@ -1,6 +1,7 @@
 """The members of a problem that are integrated out, and drawn again."""
 
 from functools import singledispatch
+from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Key
@@ -69,7 +70,7 @@ def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Gro
 def _linear(problem: Problem, values: Values, grouped, discrepancy, **rows) -> Linear:
     """Return a residual in which only the most numerous members stay members."""
     largest, *others = list(grouped.values()) or [None]
-    design: list[Array] = [other.columns() for other in others]
+    design: list[Any] = [other.columns() for other in others]
     scale = [jnp.full(other.count - 1, other.sd) for other in others]
     if "discrepancy" in problem.integrated:
         design.append(discrepancy)
