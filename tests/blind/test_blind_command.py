@@ -540,7 +540,7 @@ def test_spoiled_answers_or_labels_are_not_opened(blind, frozen: Path, kind: str
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("none.key", "none.key: the key cannot be read (No such file"),
+        ("none.key", "none.key: is missing"),
         ("other.key", "other.key: is not the key of this set"),
         ("short.key", "short.key: is no key"),
     ],

@@ -295,7 +295,7 @@ NO_JSON = "is no JSON, or only half of it"
 HOSTILE = {
     "200 MB of answers": (enlarged(FROZEN, 200_000_000), f"{FROZEN}: is larger than"),
     "200 MB of one": (enlarged(ONE, 200_000_000), "c01.json: is larger than 1 MiB"),
-    "huge manifest": (enlarged("set.json", 1 << 27), "set.json: is larger than 64 MiB"),
+    "huge manifest": (enlarged("set.json", 1 << 27), "set.json: is larger than 32 MiB"),
     "huge record": (enlarged("opened.json", 1 << 27), "opened.json: is larger than"),
     "huge seal": (enlarged("sealed.bin", 1 << 31), "sealed.bin: is larger than 1 GiB"),
     "huge key": (enlarged(KEY, 1 << 20), "set.key: is larger than 1 KiB"),

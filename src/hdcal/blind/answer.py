@@ -49,12 +49,7 @@ class ScoredAnswers:
 class Opening:
     """Which set was opened and whose answers were scored, as in opening.json.
 
-    Attributes:
-        schema: name and version of its format.
-        set_commitment: of the set.
-        mix: what its cases were drawn from.
-        not_bound: what the commitment of an older set does not promise.
-        answers: by who answered.
+    `not_bound` is what the commitment of an older set does not promise.
     """
 
     schema: Literal["hdcal.blind-result/1"] = "hdcal.blind-result/1"

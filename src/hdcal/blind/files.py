@@ -45,15 +45,15 @@ def read_bytes(path: Path, remedy: str, largest: int = LARGEST) -> bytes:
         raise refusal(path, words, remedy) from None
 
 
-def read_checked(path: Path, sha256: str, problem: str) -> bytes:
-    """Read a file whose hash is known.
+def read_checked(path: Path, sha256: str) -> bytes:
+    """Read a file of a set whose hash was promised.
 
     Raises:
         InputError: it is missing, or another one.
     """
     data = read_bytes(path, GET_AGAIN)
     if digest(data) != sha256:
-        raise refusal(path, problem, GET_AGAIN)
+        raise refusal(path, "was changed or is incomplete", GET_AGAIN)
     return data
 
 

@@ -10,12 +10,18 @@ from hdcal.blind.answer import Opening, ScoredAnswers
 from hdcal.blind.answer_files import AnswerFiles, answering_names, frozen_names
 from hdcal.blind.canonical import Broken, is_stamped, stamped
 from hdcal.blind.closures import closures
-from hdcal.blind.files import GET_AGAIN, LARGEST_ANSWER, LARGEST_KEY, read_json, refusal
+from hdcal.blind.files import (
+    GET_AGAIN,
+    LARGEST_ANSWER,
+    LARGEST_KEY,
+    read_bytes,
+    read_json,
+    refusal,
+)
 from hdcal.blind.scoring.scores import JUDGED, Scores, score
 from hdcal.blind.seal import Sealed, check_labels, unseal
 from hdcal.blind.sealed_set import RESTORE_OPENED, RESULT, SEALED, BlindSet, read_set
 from hdcal.blind.summary import scores_report
-from hdcal.data.regular_file import why_not_readable
 from hdcal.report.plain import as_json, printable
 from hdcal.report.saving.reserve import reserve_folder, write_whole
 from hdcal.report.saving.target import TargetFolder
@@ -61,7 +67,8 @@ def _open(
     found: BlindSet, key: Path, by: Sequence[str], target: TargetFolder
 ) -> OpenedSet:
     # Whoever is not scored today was blind all the same, and is recorded as such.
-    everyone = frozen_names(found) if not by else _present(found, by)
+    ended = answering_names(found, ".json")
+    everyone = sorted(ended.union(by)) if by else frozen_names(found)
     frozen = {name: AnswerFiles(found, name).frozen() for name in everyone}
     hashes = {name: data["sha256"] for name, (data, _) in frozen.items()}
     before = _read_opened(found)
@@ -100,32 +107,18 @@ def _open(
     return OpenedSet(found.folder / RESULT, opening, report, when)
 
 
-def _present(found: BlindSet, by: Sequence[str]) -> list[str]:
-    """Return who was asked for, and who else has frozen answers."""
-    return sorted({*by, *answering_names(found, ".json")})
-
-
 def _unsealed(found: BlindSet, key: Path) -> Sealed:
+    remedy = "Name the key file that was written with this set"
     try:
-        secret = unseal(found.sealed(), _read_key(key))
+        own = read_bytes(key, remedy, LARGEST_KEY).strip()
+        secret = unseal(found.sealed(), own)
     except Broken as error:
-        remedy = "Name the key file that was written with this set"
         raise refusal(key, str(error), remedy) from None
     try:
         check_labels(found.manifest, secret)
     except Broken as error:
         raise refusal(found.folder / SEALED, str(error), GET_AGAIN) from None
     return secret
-
-
-def _read_key(path: Path) -> bytes:
-    if (why := why_not_readable(path, LARGEST_KEY)) is not None:
-        raise refusal(path, why[0], "Name the key file of this set")
-    try:
-        return path.read_bytes().strip()
-    except OSError as error:
-        words = f"the key cannot be read ({error.strerror or error})"
-        raise refusal(path, words, "Name the key file of this set") from None
 
 
 def _read_opened(found: BlindSet) -> dict[str, Any] | None:

@@ -82,7 +82,7 @@ class BlindSet:
             InputError: they are missing or were changed.
         """
         path = self.folder / CASES / f"{entry.case}.csv"
-        return read_checked(path, entry.sha256, "was changed since the set was sealed")
+        return read_checked(path, entry.sha256)
 
     def gear(self) -> bytes:
         """Return the gear file.
@@ -90,8 +90,7 @@ class BlindSet:
         Raises:
             InputError: it is missing or was changed.
         """
-        words = "was changed since the set was sealed"
-        return read_checked(self.folder / GEAR, self.manifest.gear_sha256, words)
+        return read_checked(self.folder / GEAR, self.manifest.gear_sha256)
 
     def material(self) -> bytes | None:
         """Return the material file, empty where the gear names a shipped material.
@@ -103,10 +102,7 @@ class BlindSet:
         """
         if self.manifest.material_sha256 is None:
             return None if self.manifest.not_bound else b""
-        words = "was changed since the set was sealed"
-        return read_checked(
-            self.folder / MATERIAL, self.manifest.material_sha256, words
-        )
+        return read_checked(self.folder / MATERIAL, self.manifest.material_sha256)
 
     def sealed(self) -> bytes:
         """Return the encrypted labels.
@@ -114,8 +110,7 @@ class BlindSet:
         Raises:
             InputError: they are missing or were changed.
         """
-        words = "was changed or is incomplete"
-        return read_checked(self.folder / SEALED, self.manifest.sealed_sha256, words)
+        return read_checked(self.folder / SEALED, self.manifest.sealed_sha256)
 
 
 def read_set(folder: Path | str) -> BlindSet:
