@@ -9,12 +9,9 @@ from hdcal.data.typed_json import parse_json
 from hdcal.errors import Finding, InputError
 from hdcal.report.plain import printable
 
-LARGEST, LARGEST_MANIFEST, LARGEST_ANSWER, LARGEST_KEY = (
-    1 << 30,
-    1 << 26,
-    1 << 20,
-    1 << 10,
-)
+# Sizes that are still read [bytes]: of any file, and of some kinds.
+LARGEST, LARGEST_KEY = 1 << 30, 1 << 10
+LARGEST_MANIFEST, LARGEST_ANSWER = 1 << 25, 1 << 20
 GET_AGAIN = "Get the set again from whoever made it; this copy proves nothing"
 
 
