@@ -15,9 +15,9 @@ from sealing import by_library, key_of, sealed_set
 
 from hdcal.blind.answer import FrozenAnswer, ScoresAnswer
 from hdcal.blind.answering import answer_set
+from hdcal.blind.canonical import stamped
 from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
 from hdcal.blind.label import CaseAnswer
-from hdcal.blind.seal import stamped
 from hdcal.errors import InputError
 
 # What every answer says, and the file of frozen answers does not.
@@ -400,7 +400,8 @@ def edit_label(folder: Path) -> None:
     """Exchange a label, by somebody who has the key and hashes the seal anew."""
     from dataclasses import replace
 
-    from hdcal.blind.seal import digest, seal, unseal
+    from hdcal.blind.canonical import digest
+    from hdcal.blind.seal import seal, unseal
 
     key = key_of(folder).read_bytes().strip()
     secret = unseal((folder / "sealed.bin").read_bytes(), key)
@@ -538,7 +539,7 @@ def test_spoiled_answers_or_labels_are_not_opened(blind, frozen: Path, kind: str
 @pytest.mark.parametrize(
     ("key", "words"),
     [
-        ("none.key", "none.key: the key cannot be read (No such file"),
+        ("none.key", "none.key: is missing"),
         ("other.key", "other.key: is not the key of this set"),
         ("short.key", "short.key: is no key"),
     ],

@@ -7,24 +7,18 @@ import numpy as np
 import pytest
 from sealing import label
 
+from hdcal.blind.canonical import Broken, canonical, digest, is_stamped, stamped
 from hdcal.blind.label import Label
+from hdcal.blind.manifest import Entry, Manifest, check_names
 from hdcal.blind.seal import (
-    Broken,
-    Entry,
-    Manifest,
     Sealed,
-    canonical,
     check_labels,
-    check_names,
     commit,
-    digest,
     drawn_salt,
-    is_stamped,
     library_of,
     new_key,
     new_salt,
     seal,
-    stamped,
     unseal,
 )
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from hdcal.blind.manifest import Entry
 from hdcal.blind.scoring.scores import Scores
-from hdcal.blind.seal import Entry
 from hdcal.report.answer import Answer, Digest
 
 
@@ -12,12 +12,14 @@ from hdcal.report.answer import Answer, Digest
 class SetAnswer(Answer):
     """What `hdcal blind make` answers: the manifest of the set, as in set.json."""
 
-    schema: Literal["hdcal.blind/1"] = "hdcal.blind/1"
+    schema: Literal["hdcal.blind/2"] = "hdcal.blind/2"
     commitment: Digest
     cases: tuple[Entry, ...]
     gear_sha256: Digest
     sealed_sha256: Digest
     versions: dict[str, str]
+    origin: Digest
+    material_sha256: Digest | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,11 +47,15 @@ class ScoredAnswers:
 
 @dataclass(frozen=True, kw_only=True)
 class Opening:
-    """Which set was opened and whose answers were scored, as in opening.json."""
+    """Which set was opened and whose answers were scored, as in opening.json.
+
+    `not_bound` is what the commitment of an older set does not promise.
+    """
 
     schema: Literal["hdcal.blind-result/1"] = "hdcal.blind-result/1"
     set_commitment: Digest
     mix: str | None
+    not_bound: tuple[str, ...] = ()
     answers: dict[str, ScoredAnswers]
 
 

@@ -4,9 +4,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from hdcal.blind.canonical import is_stamped, stamped
+from hdcal.blind.files import LARGEST, LARGEST_ANSWER, read_json, refusal
 from hdcal.blind.label import CaseAnswer
-from hdcal.blind.seal import Entry, is_name, is_stamped, stamped
-from hdcal.blind.sealed_set import BlindSet, read_json, refusal
+from hdcal.blind.manifest import Entry, is_name
+from hdcal.blind.sealed_set import BlindSet
+from hdcal.data.typed_json import Name, typed
 from hdcal.errors import InputError
 from hdcal.report.plain import as_json, as_plain
 from hdcal.report.saving.leftovers import sweep
@@ -15,7 +18,8 @@ from hdcal.report.saving.target import TargetFile
 
 ANSWER_SCHEMA, ANSWERS_SCHEMA = "hdcal.blind-answer/1", "hdcal.blind-answers/1"
 _PREFIX = "answers-"
-_WORDS = ("none", "named", "ambiguous", "unknown")
+# Of frozen answers, in bytes; those of hdcal take a quarter of it.
+_PER_CASE = 1 << 16
 _ASK_AGAIN = "Delete it and run 'hdcal blind answer' again"
 
 
@@ -82,7 +86,7 @@ class AnswerFiles:
             InputError: it is missing, broken, edited, or belongs to other data.
         """
         path = self.path(entry.case)
-        data = read_json(path, ANSWER_SCHEMA, _ASK_AGAIN)
+        data = read_json(path, ANSWER_SCHEMA, _ASK_AGAIN, LARGEST_ANSWER)
         if not is_stamped(data):
             raise refusal(path, "was edited: its hash does not fit", _ASK_AGAIN)
         bound = data.get("set_commitment"), data.get("csv_sha256"), data.get("by")
@@ -134,7 +138,7 @@ class AnswerFiles:
                 "library": library,
                 "fingerprint": dict(fingerprint),
                 "families": dict(families),
-                "blind": not self.set.opened.exists(),
+                "blind": not self.set.was_opened,
                 "answers": answers,
             }
         )
@@ -152,21 +156,27 @@ class AnswerFiles:
             remedy = "Let 'hdcal blind answer' come to its end first"
             raise refusal(self.file, words, remedy)
         remedy = "Restore the file, or move it and its folder away and answer again"
-        data = read_json(self.file, ANSWERS_SCHEMA, remedy)
+        cases = self.set.manifest.cases
+        most = min(LARGEST_ANSWER + _PER_CASE * len(cases), LARGEST)
+        data = read_json(self.file, ANSWERS_SCHEMA, remedy, most)
         if not is_stamped(data):
             words = "was edited: its hash does not fit"
             raise refusal(self.file, words, remedy)
         if data.get("set_commitment") != self.set.manifest.commitment:
             words = "answers another set: the commitments differ"
             raise refusal(self.file, words, "Answer this set")
-        listed, cases = data.get("answers"), self.set.manifest.cases
+        listed = data.get("answers")
         if not isinstance(listed, list) or len(listed) != len(cases):
             words = "does not answer every case once"
             raise refusal(self.file, words, remedy)
         pairs = list(zip(listed, cases, strict=True))
         found = [read_answer(one, entry.case, self.file) for one, entry in pairs]
-        kinds = {"blind": bool, "fingerprint": dict, "families": dict}
-        sound = all(isinstance(data.get(key), kind) for key, kind in kinds.items())
+        try:
+            typed(dict[Name, Name], data.get("families"))
+            kinds = {"blind": bool, "fingerprint": dict}
+            sound = all(isinstance(data.get(key), kind) for key, kind in kinds.items())
+        except ValueError:
+            sound = False
         if data.get("by") != self.by or not sound:
             words = "is not what 'hdcal blind answer' writes"
             raise refusal(self.file, words, remedy)
@@ -205,16 +215,30 @@ def read_answer(data: Any, case: str, path: Path) -> CaseAnswer:
     """
     try:
         answer = CaseAnswer.from_plain(data)
-        numbers = [*answer.probabilities.values(), *answer.inclusion.values()]
-        # Sums of shares may pass 1 by a rounding error.
-        if not all(0.0 <= number <= 1.001 for number in numbers):
+        if answer.case != case:
             raise ValueError
-        if (answer.case, answer.verdict in _WORDS) != (case, True):
-            raise ValueError
-    except (AttributeError, KeyError, TypeError, ValueError):
+    except ValueError:
         words = f"holds no answer to the case '{case}'"
         raise refusal(path, words, _ASK_AGAIN) from None
     return answer
+
+
+def answering_names(found: BlindSet, ending: str = "") -> set[str]:
+    """Return who has begun to answer a set, or with `.json` who has come to the end.
+
+    Raises:
+        InputError: a file is called like answers, but after nobody.
+    """
+    names = set()
+    for path in sorted(found.folder.glob(f"{_PREFIX}*{ending}")):
+        if not path.is_dir() and path.suffix != ".json":
+            continue
+        name = path.name.removesuffix(".json").removeprefix(_PREFIX)
+        if not is_name(name):
+            words, remedy = "is no file of this set", "Take it out of the folder"
+            raise refusal(path, words, remedy)
+        names.add(name)
+    return names
 
 
 def frozen_names(found: BlindSet) -> list[str]:
@@ -223,11 +247,7 @@ def frozen_names(found: BlindSet) -> list[str]:
     Raises:
         InputError: somebody has begun and not come to the end, or nobody has begun.
     """
-    names = {
-        path.name.removesuffix(".json").removeprefix(_PREFIX)
-        for path in found.folder.glob(f"{_PREFIX}*")
-        if path.is_dir() or path.suffix == ".json"
-    }
+    names = answering_names(found)
     if not names:
         words = "holds no frozen answers"
         raise refusal(found.folder, words, "Run 'hdcal blind answer' first")

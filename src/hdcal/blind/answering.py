@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.blind.answer_files import AnswerFiles
+from hdcal.blind.canonical import canonical, digest
 from hdcal.blind.diagnosers import (
     DIAGNOSERS,
     Diagnoser,
@@ -15,9 +16,10 @@ from hdcal.blind.diagnosers import (
     fingerprint,
     withheld_from,
 )
+from hdcal.blind.files import refusal
 from hdcal.blind.label import CaseAnswer
-from hdcal.blind.seal import Entry, canonical, digest
-from hdcal.blind.sealed_set import CASES, SET, BlindSet, read_set, refusal
+from hdcal.blind.manifest import Entry
+from hdcal.blind.sealed_set import CASES, MATERIAL, SET, BlindSet, read_set
 from hdcal.cli.processes import completed
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.library import choose_library
@@ -129,29 +131,33 @@ def _outcomes(
 
 def _travelling(found: BlindSet, tasks: list[CaseTask]) -> Iterator[tuple]:
     """Yield tasks with their data, read only when a worker is about to be free."""
-    gear = found.gear()
+    rig = found.gear(), found.material()
     for task in tasks:
-        yield task, found.csv(task.entry), gear
+        yield task, found.csv(task.entry), *rig
 
 
 def answer_here(found: BlindSet, task: CaseTask) -> CaseOutcome:
     """Answer a case that this machine's disk holds."""
     try:
-        csv, gear = found.csv(task.entry), found.gear()
+        files = found.csv(task.entry), found.gear(), found.material()
     except InputError as error:
         return task.entry.case, None, error.findings
-    return answer_bytes(task, csv, gear)
+    return answer_bytes(task, *files)
 
 
-def answer_there(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
+def answer_there(
+    task: CaseTask, csv: bytes, gear: bytes, material: bytes | None
+) -> CaseOutcome:
     """Answer a case on a worker of a cluster, which shares no disk with anyone."""
     from hdcal.cli.compilation_cache import keep_compilations
 
     keep_compilations()
-    return answer_bytes(task, csv, gear)
+    return answer_bytes(task, csv, gear, material)
 
 
-def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
+def answer_bytes(
+    task: CaseTask, csv: bytes, gear: bytes, material: bytes | None
+) -> CaseOutcome:
     """Answer a case from the bytes of its files."""
     name = task.entry.case
     if digest(canonical(fingerprint(task.library))) != task.fingerprint:
@@ -164,7 +170,11 @@ def answer_bytes(task: CaseTask, csv: bytes, gear: bytes) -> CaseOutcome:
             table, rig = Path(place, f"{name}.csv"), Path(place, "gear.toml")
             table.write_bytes(csv)
             rig.write_bytes(gear)
-            case = read_case(table, rig)
+            own = None
+            if material is not None:
+                own = Path(place, MATERIAL)
+                own.write_bytes(material)
+            case = read_case(table, rig, material=own)
         return name, task.diagnose(case, library), ()
     except InputError as error:
         here = (replace(one, file=Path(one.file).name) for one in error.findings)

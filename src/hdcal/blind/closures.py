@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from hdcal.blind.files import GET_AGAIN, refusal
 from hdcal.blind.label import CaseAnswer, Label
 from hdcal.blind.rival_methods import own_form_closure
-from hdcal.blind.sealed_set import CASES, GEAR, BlindSet
+from hdcal.blind.sealed_set import CASES, GEAR, MATERIAL, SEALED, BlindSet
 from hdcal.data.reading import read_case
 from hdcal.physics.registry import EFFECTS
 
@@ -27,6 +28,9 @@ def closures(
         found: the set.
         labels: the truth.
         answers: in the order of the labels.
+
+    Raises:
+        InputError: a label says nothing of its readings.
     """
     result = {}
     for label, answer in zip(labels, answers, strict=True):
@@ -35,7 +39,11 @@ def closures(
         if (answer.effect,) != label.truth or answer.effect not in EFFECTS:
             continue
         table = found.folder / CASES / f"{label.case}.csv"
-        case = read_case(table, found.folder / GEAR)
+        own = None if found.manifest.not_bound else found.folder / MATERIAL
+        case = read_case(table, found.folder / GEAR, material=own)
+        if len(label.clean) != len(case.records.force) or not label.sigma:
+            words = f"holds a label of '{label.case}' that does not fit its readings"
+            raise refusal(found.folder / SEALED, words, GET_AGAIN)
         clean = replace(case.records, force=np.asarray(label.clean))
         closed = own_form_closure(
             replace(case, records=clean), answer.effect, EFFECTS, label.sigma

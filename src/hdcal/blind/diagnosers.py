@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from hdcal.blind.canonical import canonical, digest
 from hdcal.blind.label import CaseAnswer, Quantiles
 from hdcal.blind.rival_methods import fit_each
-from hdcal.blind.seal import canonical, digest
 from hdcal.data.case import Case
 from hdcal.data.resources import priors_folder
 from hdcal.diagnosis import model_posterior

@@ -3,8 +3,10 @@
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from hdcal.data.typed_json import STRICT, Count, Name, Number, Share, Size, typed
+
 CaseKind = Literal["null", "effect", "pair", "outside", "real"]
-Quantiles = tuple[float, float, float]
+Quantiles = tuple[Number, Number, Number]
 
 
 @dataclass(frozen=True)
@@ -33,26 +35,33 @@ class Label:
         mix: the part of the check that the case belongs to.
     """
 
+    __pydantic_config__ = STRICT
+
     case: str
     kind: CaseKind
-    truth: tuple[str, ...]
-    program: str
-    rows: int
-    r: float
-    noise: str
-    correlation: float
-    sigma: float
+    truth: tuple[Name, ...]
+    program: Name
+    rows: Count
+    r: Size
+    noise: Name
+    correlation: Number
+    sigma: Size
     spanned: bool | None = None
-    withheld: tuple[str, ...] = ()
-    clean: tuple[float, ...] = ()
-    curve: tuple[float, ...] = ()
-    amplitude: dict[str, float] = field(default_factory=dict)
-    oracle: dict[str, float] = field(default_factory=dict)
+    withheld: tuple[Name, ...] = ()
+    clean: tuple[Number, ...] = ()
+    curve: tuple[Number, ...] = ()
+    amplitude: dict[Name, Number] = field(default_factory=dict)
+    oracle: dict[Name, Share] = field(default_factory=dict)
     mix: str = ""
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "Label":
-        """Return the label of plain data."""
+        """Return the label of plain data, each number as it was written.
+
+        Raises:
+            ValueError: it is none.
+        """
+        typed(cls, data)
         lists = ("truth", "withheld", "clean", "curve")
         made: dict[str, Any] = {
             name: tuple(value) if name in lists else value
@@ -81,23 +90,27 @@ class CaseAnswer:
         noise_sd: of a reading [N].
     """
 
+    __pydantic_config__ = STRICT
+
     case: str
     verdict: Literal["none", "named", "ambiguous", "unknown"]
-    effect: str | None
-    second_effect: str | None
-    set: tuple[str, ...]
-    probabilities: dict[str, float]
-    inclusion: dict[str, float]
+    effect: Name | None
+    second_effect: Name | None
+    set: tuple[Name, ...]
+    probabilities: dict[Name, Share]
+    inclusion: dict[Name, Share]
     detected: bool
-    p_value: float | None = None
+    p_value: Share | None = None
     gap: Quantiles | None = None
-    amplitude: dict[str, Quantiles] = field(default_factory=dict)
+    amplitude: dict[Name, Quantiles] = field(default_factory=dict)
     closed: Quantiles | None = None
-    noise_sd: float | None = None
+    noise_sd: Size | None = None
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":
-        """Return the answer of plain data."""
-        spans = {k: data[k] and tuple(data[k]) for k in ("gap", "closed") if k in data}
-        sizes = {k: tuple(v) for k, v in data.get("amplitude", {}).items()}
-        return cls(**{**data, **spans, "amplitude": sizes, "set": tuple(data["set"])})
+        """Return the answer of plain data.
+
+        Raises:
+            ValueError: it is none.
+        """
+        return typed(cls, data)

@@ -7,21 +7,27 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.blind.answer import Opening, ScoredAnswers
-from hdcal.blind.answer_files import AnswerFiles, frozen_names
+from hdcal.blind.answer_files import AnswerFiles, answering_names, frozen_names
+from hdcal.blind.canonical import Broken, is_stamped, stamped
 from hdcal.blind.closures import closures
+from hdcal.blind.files import (
+    GET_AGAIN,
+    LARGEST_ANSWER,
+    LARGEST_KEY,
+    read_bytes,
+    read_json,
+    refusal,
+)
 from hdcal.blind.scoring.scores import JUDGED, Scores, score
-from hdcal.blind.seal import Broken, Sealed, check_labels, is_stamped, stamped, unseal
-from hdcal.blind.sealed_set import GET_AGAIN, BlindSet, read_json, read_set, refusal
+from hdcal.blind.seal import Sealed, check_labels, unseal
+from hdcal.blind.sealed_set import RESTORE_OPENED, RESULT, SEALED, BlindSet, read_set
 from hdcal.blind.summary import scores_report
-from hdcal.data.regular_file import why_not_readable
-from hdcal.report.plain import as_json
+from hdcal.report.plain import as_json, printable
 from hdcal.report.saving.reserve import reserve_folder, write_whole
 from hdcal.report.saving.target import TargetFolder
 from hdcal.report.write import Report, write_report
 
 OPENED_SCHEMA = "hdcal.blind-opened/1"
-RESULT = "result"
-_LARGEST_KEY = 1 << 10
 
 
 @dataclass(frozen=True)
@@ -32,11 +38,13 @@ class OpenedSet:
         folder: where the result is.
         opening: whose answers were scored.
         report: of their scores.
+        before: when it was opened first; None where that is now.
     """
 
     folder: Path
     opening: Opening
     report: Report[Scores]
+    before: str | None
 
 
 def open_set(folder: Path | str, key: Path, by: Sequence[str] = ()) -> OpenedSet:
@@ -59,7 +67,8 @@ def _open(
     found: BlindSet, key: Path, by: Sequence[str], target: TargetFolder
 ) -> OpenedSet:
     # Whoever is not scored today was blind all the same, and is recorded as such.
-    everyone = frozen_names(found) if not by else _present(found, by)
+    ended = answering_names(found, ".json")
+    everyone = sorted(ended.union(by)) if by else frozen_names(found)
     frozen = {name: AnswerFiles(found, name).frozen() for name in everyone}
     hashes = {name: data["sha256"] for name, (data, _) in frozen.items()}
     before = _read_opened(found)
@@ -70,6 +79,7 @@ def _open(
     opening = Opening(
         set_commitment=found.manifest.commitment,
         mix=secret.mix,
+        not_bound=found.manifest.not_bound,
         answers={
             name: ScoredAnswers(
                 hashes[name],
@@ -93,46 +103,32 @@ def _open(
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(_record(found, hashes))))
     write_report(report, target)
-    return OpenedSet(found.folder / RESULT, opening, report)
-
-
-def _present(found: BlindSet, by: Sequence[str]) -> list[str]:
-    """Return who was asked for, and who else has frozen answers."""
-    files = found.folder.glob("answers-*.json")
-    others = {path.stem.removeprefix("answers-") for path in files}
-    return sorted({*by, *others})
+    when = None if before is None else printable(before["time"][:40])
+    return OpenedSet(found.folder / RESULT, opening, report, when)
 
 
 def _unsealed(found: BlindSet, key: Path) -> Sealed:
+    remedy = "Name the key file that was written with this set"
     try:
-        secret = unseal(found.sealed(), _read_key(key))
+        own = read_bytes(key, remedy, LARGEST_KEY).strip()
+        secret = unseal(found.sealed(), own)
     except Broken as error:
-        remedy = "Name the key file that was written with this set"
         raise refusal(key, str(error), remedy) from None
     try:
         check_labels(found.manifest, secret)
     except Broken as error:
-        raise refusal(found.folder / "sealed.bin", str(error), GET_AGAIN) from None
+        raise refusal(found.folder / SEALED, str(error), GET_AGAIN) from None
     return secret
-
-
-def _read_key(path: Path) -> bytes:
-    if (why := why_not_readable(path, _LARGEST_KEY)) is not None:
-        raise refusal(path, why[0], "Name the key file of this set")
-    try:
-        return path.read_bytes().strip()
-    except OSError as error:
-        words = f"the key cannot be read ({error.strerror or error})"
-        raise refusal(path, words, "Name the key file of this set") from None
 
 
 def _read_opened(found: BlindSet) -> dict[str, Any] | None:
     """Return the record of the first opening, None before it."""
-    path, remedy = found.opened, "Restore the file; it tells which answers were blind"
-    if not path.exists():
+    path, remedy = found.opened, RESTORE_OPENED
+    if not found.was_opened:
         return None
-    data = read_json(path, OPENED_SCHEMA, remedy)
-    if not is_stamped(data) or not isinstance(data.get("answers"), dict):
+    data = read_json(path, OPENED_SCHEMA, remedy, LARGEST_ANSWER)
+    whole = isinstance(data.get("answers"), dict) and isinstance(data.get("time"), str)
+    if not is_stamped(data) or not whole:
         raise refusal(path, "was edited: its hash does not fit", remedy)
     if data.get("set_commitment") != found.manifest.commitment:
         raise refusal(path, "tells of another set", remedy)

@@ -8,6 +8,7 @@ from hdcal.blind.label import Label
 from hdcal.blind.virtual_rig.cases import GEAR_TOML
 from hdcal.blind.virtual_rig.loadings import Loading, loading_of
 from hdcal.calibration.calibrate import check_names
+from hdcal.data.priors import material_names
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, InputError
 from hdcal.evidence.case_evidence import UNKNOWN
@@ -19,8 +20,8 @@ NAME = "case"
 
 def sealed_measurement(
     source: str, *, gear: str, cause: str, withhold: str | None
-) -> tuple[bytes, bytes, Label]:
-    """Return table, gear file and label of a measurement.
+) -> tuple[bytes, bytes, bytes | None, Label]:
+    """Return table, gear file, material file if the gear names one, and label.
 
     Args:
         source: a CSV file.
@@ -41,19 +42,19 @@ def sealed_measurement(
     for name in sorted(set(truth) & set(withheld)):
         words, remedy = f"'{name}' is withheld", "Say `cause` unknown, or keep it"
         findings.append(Finding("cause", words, remedy))
-    rows = 0
+    case = None
     try:
-        rows = len(read_case(source, gear).records.force)
+        case = read_case(source, gear)
     except InputError as error:
         findings += error.findings
-    if findings:
+    if findings or case is None:
         raise InputError(findings)
     label = Label(
         case=NAME,
         kind="real",
         truth=truth,
         program="measured",
-        rows=rows,
+        rows=len(case.records.force),
         # Of a measurement nobody knows them.
         r=0.0,
         noise="unknown",
@@ -61,7 +62,10 @@ def sealed_measurement(
         sigma=0.0,
         withheld=withheld,
     )
-    return Path(source).read_bytes(), Path(gear).read_bytes(), label
+    name, material = case.gear.material, None
+    if name not in material_names():
+        material = (Path(gear).parent / name).read_bytes()
+    return Path(source).read_bytes(), Path(gear).read_bytes(), material, label
 
 
 def loading_at(source: str) -> Loading:

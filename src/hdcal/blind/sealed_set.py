@@ -1,46 +1,48 @@
 """A set of the blind check on disk: written whole, and never believed unread."""
 
-import json
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
+from hdcal.blind.canonical import Broken, digest
+from hdcal.blind.files import (
+    GET_AGAIN,
+    LARGEST_MANIFEST,
+    read_checked,
+    read_json,
+    refusal,
+)
 from hdcal.blind.label import Label
-from hdcal.blind.seal import (
+from hdcal.blind.manifest import (
+    FIRST_SCHEMA,
     SET_SCHEMA,
-    Broken,
     Entry,
     Manifest,
-    Sealed,
     check_names,
+)
+from hdcal.blind.seal import (
+    Sealed,
     commit,
-    digest,
+    commit_origin,
     drawn_salt,
     library_of,
     new_key,
     new_salt,
     seal,
 )
-from hdcal.data.regular_file import why_not_readable
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import versions
-from hdcal.report.plain import as_json, printable
+from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
 from hdcal.report.saving.reserve import reserve_file, reserve_folder
 from hdcal.report.saving.target import KeptBeside
 
-# Of one file of a set.
-_LARGEST = 1 << 30
-SET, SEALED, GEAR, CASES = "set.json", "sealed.bin", "gear.toml", "cases"
-GET_AGAIN = "Get the set again from whoever made it; this copy proves nothing"
-
-
-def refusal(file: Path | str, problem: str, remedy: str) -> InputError:
-    """Return what is wrong with one file as an error."""
-    return InputError([Finding(str(file), printable(problem), remedy)])
+SET, SEALED, GEAR, MATERIAL = "set.json", "sealed.bin", "gear.toml", "material.toml"
+CASES, RESULT = "cases", "result"
+SCHEMAS = SET_SCHEMA, FIRST_SCHEMA
+RESTORE_OPENED = "Restore the file; it tells which answers were blind"
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,19 @@ class BlindSet:
         """File that tells when it was opened, and for which answers."""
         return self.folder / "opened.json"
 
+    @property
+    def was_opened(self) -> bool:
+        """Whether it was opened before.
+
+        Raises:
+            InputError: a result says so, but the file that tells when is gone.
+        """
+        found = self.opened.exists()
+        if not found and (self.folder / RESULT / "opening.json").exists():
+            words = f"is missing, and {RESULT} says that the set was opened"
+            raise refusal(self.opened, words, RESTORE_OPENED)
+        return found
+
     def csv(self, entry: Entry) -> bytes:
         """Return the data of a case.
 
@@ -67,7 +82,7 @@ class BlindSet:
             InputError: they are missing or were changed.
         """
         path = self.folder / CASES / f"{entry.case}.csv"
-        return _checked(path, entry.sha256, "was changed since the set was sealed")
+        return read_checked(path, entry.sha256)
 
     def gear(self) -> bytes:
         """Return the gear file.
@@ -75,8 +90,19 @@ class BlindSet:
         Raises:
             InputError: it is missing or was changed.
         """
-        words = "was changed since the set was sealed"
-        return _checked(self.folder / GEAR, self.manifest.gear_sha256, words)
+        return read_checked(self.folder / GEAR, self.manifest.gear_sha256)
+
+    def material(self) -> bytes | None:
+        """Return the material file, empty where the gear names a shipped material.
+
+        None for an older set, whose material did not travel.
+
+        Raises:
+            InputError: it is missing or was changed.
+        """
+        if self.manifest.material_sha256 is None:
+            return None if self.manifest.not_bound else b""
+        return read_checked(self.folder / MATERIAL, self.manifest.material_sha256)
 
     def sealed(self) -> bytes:
         """Return the encrypted labels.
@@ -84,8 +110,7 @@ class BlindSet:
         Raises:
             InputError: they are missing or were changed.
         """
-        words = "was changed or is incomplete"
-        return _checked(self.folder / SEALED, self.manifest.sealed_sha256, words)
+        return read_checked(self.folder / SEALED, self.manifest.sealed_sha256)
 
 
 def read_set(folder: Path | str) -> BlindSet:
@@ -98,13 +123,14 @@ def read_set(folder: Path | str) -> BlindSet:
     if not (folder / SET).is_file():
         words = f"is no blind check: it holds no {SET}"
         raise refusal(folder, words, "Name a folder that 'hdcal blind make' has made")
-    data = read_json(folder / SET, SET_SCHEMA, GET_AGAIN)
+    data = read_json(folder / SET, SCHEMAS, GET_AGAIN, LARGEST_MANIFEST)
     try:
         found = BlindSet(folder, Manifest.from_plain(data))
     except Broken as error:
         raise refusal(folder / SET, str(error), GET_AGAIN) from None
     findings: list[Finding] = []
-    reads: list[Callable[[], bytes]] = [found.gear, found.sealed]
+    reads: list[Callable[[], object]] = [found.gear, found.material, found.sealed]
+    reads += [lambda: found.was_opened]
     reads += [lambda entry=entry: found.csv(entry) for entry in found.manifest.cases]
     for read in reads:
         try:
@@ -121,37 +147,13 @@ def read_set(folder: Path | str) -> BlindSet:
     return found
 
 
-def read_json(path: Path, schema: str, remedy: str) -> dict[str, Any]:
-    """Read an object of one schema.
-
-    Args:
-        path: the file.
-        schema: what its `schema` has to be.
-        remedy: what to do where it is not.
-
-    Raises:
-        InputError: it is missing, no JSON, or of another schema.
-    """
-
-    def refuse(_: str) -> float:
-        raise ValueError
-
-    text = _bytes(path, remedy)
-    try:
-        data = json.loads(text, parse_constant=refuse)
-    except (ValueError, RecursionError):
-        raise refusal(path, "is no JSON, or only half of it", remedy) from None
-    if not isinstance(data, dict) or data.get("schema") != schema:
-        raise refusal(path, f"is not of the schema {schema}", remedy)
-    return data
-
-
 def write_set(
     target: Path | str,
     drawn: Iterable[tuple[str | bytes, Label]],
     gear: str | bytes,
     key: Path,
     *,
+    material: bytes | None = None,
     mix: str = "",
     seed: int | None = None,
     force: bool = False,
@@ -163,6 +165,7 @@ def write_set(
         drawn: table and label of each case; first asked when both may be written.
         gear: text of the gear file of all of them.
         key: the file to make, readable to its owner only; no other is ever replaced.
+        material: the file of the gear's material, where hdcal ships none.
         mix: name of the mix, sealed with the labels.
         seed: of the mix, sealed too; salts follow from it. None for a measurement.
         force: whether an older set without answers may be replaced.
@@ -179,7 +182,7 @@ def write_set(
         _removed_on_failure(key, secret),
         folder.filled() as into,
     ):
-        manifest = _fill(into, drawn, _encoded(gear), secret, mix, seed)
+        manifest = _fill(into, drawn, _encoded(gear), material, secret, mix, seed)
         # No set is ever seen without its key.
         file.write(secret + b"\n", 0o600)
     return manifest
@@ -189,6 +192,7 @@ def _fill(
     into: Path,
     drawn: Iterable[tuple[str | bytes, Label]],
     gear: bytes,
+    material: bytes | None,
     secret: bytes,
     mix: str,
     seed: int | None,
@@ -205,10 +209,23 @@ def _fill(
         labels.append(label)
         salts.append(salt)
     check_names([entry.case for entry in entries])
-    token = seal(Sealed(mix, seed or 0, tuple(labels), tuple(salts)), secret)
-    write_file(into / SEALED, token)
     write_file(into / GEAR, gear)
-    manifest = Manifest(tuple(entries), digest(gear), digest(token), versions())
+    if material is not None:
+        write_file(into / MATERIAL, material)
+    # No case has an empty name.
+    salt = new_salt() if seed is None else drawn_salt(seed, "")
+    manifest = Manifest(
+        tuple(entries),
+        digest(gear),
+        "",
+        versions(),
+        commit_origin(mix, seed or 0, salt),
+        None if material is None else digest(material),
+    )
+    parts = mix, seed or 0, tuple(labels), tuple(salts), salt, manifest.commitment
+    token = seal(Sealed(*parts), secret)
+    write_file(into / SEALED, token)
+    manifest = replace(manifest, sealed_sha256=digest(token))
     write_file(into / SET, as_json(manifest.plain()).encode())
     return manifest
 
@@ -228,7 +245,13 @@ def _plain_set(folder: Path) -> list[str]:
         cases = read_set(folder).manifest.cases
     except InputError:
         return []
-    return [SET, SEALED, GEAR, *(f"{CASES}/{entry.case}.csv" for entry in cases)]
+    return [
+        SET,
+        SEALED,
+        GEAR,
+        MATERIAL,
+        *(f"{CASES}/{entry.case}.csv" for entry in cases),
+    ]
 
 
 @contextmanager
@@ -246,22 +269,3 @@ def _removed_on_failure(path: Path, secret: bytes) -> Iterator[None]:
 
 def _encoded(text: str | bytes) -> bytes:
     return text.encode() if isinstance(text, str) else text
-
-
-def _bytes(path: Path, remedy: str) -> bytes:
-    if (why := why_not_readable(path, _LARGEST)) is not None:
-        raise refusal(path, why[0], remedy)
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise refusal(path, "is missing", remedy) from None
-    except OSError as error:
-        words = f"cannot be read ({error.strerror or error})"
-        raise refusal(path, words, remedy) from None
-
-
-def _checked(path: Path, sha256: str, problem: str) -> bytes:
-    data = _bytes(path, GET_AGAIN)
-    if digest(data) != sha256:
-        raise refusal(path, problem, GET_AGAIN)
-    return data

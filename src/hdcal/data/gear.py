@@ -25,7 +25,9 @@ from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 
-def read_gear(path: Path | str, theory: str | None = None) -> Gear:
+def read_gear(
+    path: Path | str, theory: str | None = None, material: Path | None = None
+) -> Gear:
     """Read a gear file and merge its priors.
 
     Later ones win: shipped rig priors, the material's, those of the gear file.
@@ -35,6 +37,7 @@ def read_gear(path: Path | str, theory: str | None = None) -> Gear:
     Args:
         path: the TOML file.
         theory: overrides the theory that K multiplies, not what K's prior means.
+        material: stands for the material file that the gear names, wherever that is.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -47,7 +50,7 @@ def read_gear(path: Path | str, theory: str | None = None) -> Gear:
         if theory is not None and theory not in get_args(Theory):
             remedy = did_you_mean(theory, list(get_args(Theory)))
             wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
-        facts = wrong.attempt(_material, toml, path.parent)
+        facts = wrong.attempt(_material, toml, path.parent, material)
         given = wrong.attempt(_given_priors, toml)
     assert model is not None and facts is not None and given is not None
     return _assemble(model, theory, facts, given, path, toml)
@@ -92,8 +95,8 @@ def _assemble(
     )
 
 
-def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
-    """Priors and facts of the material that the gear file names."""
+def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Prior]:
+    """Priors and facts of the material that the gear file names, or of a given one."""
     table = toml.table.get("gear")
     name = table.get("material", "steel") if isinstance(table, dict) else "steel"
     if not isinstance(name, str) or not 0 < len(name) <= 1000:
@@ -109,7 +112,7 @@ def _material(toml: TomlFile, folder: Path) -> dict[str, Prior]:
         known = f"Shipped are: {', '.join(shipped)}"
         remedy = f"{hint}{known}; for another one give the path of a .toml file"
         raise toml.error(words, remedy, "gear.material")
-    facts = read_priors(folder / name, MATERIAL_UNITS, name)
+    facts = read_priors(given or folder / name, MATERIAL_UNITS, name)
     lacking = [need for need in ("E0", "alpha", "poisson") if need not in facts]
     if lacking:
         words = "the material says nothing of " + " and ".join(lacking)

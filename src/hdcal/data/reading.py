@@ -24,6 +24,7 @@ def read_case(
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
+    material: Path | None = None,
 ) -> Case:
     """Read a case from a CSV file or from a folder.
 
@@ -32,6 +33,7 @@ def read_case(
         gear: a gear file; by default the gear.toml beside the data.
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`.
         theory: overrides the gear file's theory.
+        material: stands for the material file that the gear names.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -47,7 +49,7 @@ def read_case(
         if gear is None and not os.path.exists(gear_path):
             wrong.append(_no_gear(data))
         else:
-            found = wrong.attempt(read_gear, gear_path, theory)
+            found = wrong.attempt(read_gear, gear_path, theory, material)
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None

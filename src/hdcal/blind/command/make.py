@@ -71,7 +71,7 @@ def _drawn(mix, cases, seed, program, **_) -> dict[str, Any]:
 def _measured(source, gear, cause, withhold, **_) -> dict[str, Any]:
     from hdcal.blind.sealed_measurement import sealed_measurement
 
-    table, gear, label = sealed_measurement(
+    table, gear, material, label = sealed_measurement(
         source, gear=gear, cause=cause, withhold=withhold
     )
-    return {"drawn": [(table, label)], "gear": gear}
+    return {"drawn": [(table, label)], "gear": gear, "material": material}

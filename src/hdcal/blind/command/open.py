@@ -33,6 +33,11 @@ def open_(console: Console, folder, key, by) -> None:
         if not one.blind:
             words = "were frozen after the set was opened"
             console.words(f"NOT BLIND: the answers of '{name}' {words}")
+    if not_bound := ", ".join(opened.opening.not_bound):
+        console.words(f"the commitment of this older set does not bind: {not_bound}")
+    if opened.before is not None:
+        words = "its record stays, and what was answered since is not blind"
+        console.words(f"this set was opened before, at {opened.before}: {words}")
     console.words(f"verified and scored: {opened.folder}")
     document = opened.report.document
     if console.json:
