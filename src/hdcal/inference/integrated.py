@@ -70,8 +70,8 @@ def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Gro
 def _linear(problem: Problem, values: Values, grouped, discrepancy, **rows) -> Linear:
     """Return a residual in which only the most numerous members stay members."""
     largest, *others = list(grouped.values()) or [None]
-    design: list[Any] = [other.columns() for other in others]
-    scale = [jnp.full(other.count - 1, other.sd) for other in others]
+    design = [other.columns() for other in others]
+    scale: list[Any] = [jnp.full(other.count - 1, other.sd) for other in others]
     if "discrepancy" in problem.integrated:
         design.append(discrepancy)
         scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
