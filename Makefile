@@ -4,6 +4,7 @@ UV ?= uv
 JOBS ?= auto
 ARGS ?=
 CASES ?= 400
+ATTACKS ?= 100000
 WORKERS ?= 2
 
 BIN := .venv/bin
@@ -14,7 +15,7 @@ COMPILE := $(UV) pip compile pyproject.toml --universal --python-version 3.11 \
 
 .DEFAULT_GOAL := help
 .PHONY: help venv demo test slow lint format types contracts docs bench \
-	bench-diagnosis blind lock clean
+	bench-diagnosis blind attacks lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
@@ -31,6 +32,10 @@ test: .venv/installed  ## all tests but the long statistical ones
 
 slow: .venv/installed  ## the long statistical tests
 	$(BIN)/python -m pytest -m slow $(ARGS)
+
+attacks: .venv/installed  ## ATTACKS hostile inputs, each answered or refused (minutes)
+	HDCAL_ATTACKS=$(ATTACKS) $(BIN)/python -m pytest -m slow -n $(JOBS) \
+		tests/cli/test_attacks.py
 
 lint: .venv/installed  ## style and formatting
 	$(BIN)/ruff check .
