@@ -26,7 +26,7 @@ from hdcal.inference.sample import check_settings
         ),
         (
             ["design", "--window", ".3:.4", "--temperature=-300:0"],
-            "--temperature: is below absolute zero",
+            "--temperature: -300 °C does not lie between -273.15",
         ),
         (
             [
@@ -39,8 +39,14 @@ from hdcal.inference.sample import check_settings
             ["study", "--vary", "radius_mm=38", "--material", "stel"],
             "--material: unknown material 'stel'",
         ),
-        (["respond", "--force", "step", "--draws", "3"], "--draws: 3 is no usable"),
-        (["respond", "--force", "step", "--mass-kg", "-1"], "--mass-kg: -1 kg is no"),
+        (
+            ["respond", "--force", "step", "--draws", "3"],
+            "--draws: 3 does not lie between 20 and 10000:",
+        ),
+        (
+            ["respond", "--force", "step", "--mass-kg", "-1"],
+            "--mass-kg: -0.001 N·s²/mm does not lie",
+        ),
         (["respond", "--force", "step", "--amplitude", "0"], "--amplitude: 0 drives"),
     ],
 )
@@ -54,8 +60,8 @@ def test_every_command_speaks_of_its_options(here: Hdcal, tmp_path, asked, words
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        (["--chains", "1"], "--chains: 1 is too few. Use 2 or more."),
-        (["--draws", "3"], "--draws: 3 is too few. Use 4 or more."),
+        (["--chains", "1"], "--chains: 1 does not lie between 2 and 64:"),
+        (["--draws", "3"], "--draws: 3 does not lie between 4 and 1000000:"),
         (["--effect", "outlier"], "--effect: no effect is called 'outlier'."),
     ],
 )
@@ -67,8 +73,8 @@ def test_calibrate_speaks_of_its_options(here: Hdcal, asked, words):
 
 def test_the_library_speaks_of_its_parameters():
     with pytest.raises(InputError) as short:
-        check_settings(chains=1, warmup=0, draws=3)
+        check_settings(chains=1, warmup=0, draws=3, seed=-1)
     with pytest.raises(InputError) as unknown:
         choose_effects(["outlier"])
     named = [f.file for error in (short, unknown) for f in error.value.findings]
-    assert named == ["chains", "warmup", "draws", "effects"]
+    assert named == ["chains", "warmup", "draws", "seed", "effects"]
