@@ -6,6 +6,8 @@ from moving import still_posterior
 
 from hdcal import InputError
 from hdcal.calibration.calibrate import choose_effects
+from hdcal.data.measurements import read_measurements
+from hdcal.errors import Finding
 from hdcal.inference.sample import check_settings
 
 
@@ -78,3 +80,58 @@ def test_the_library_speaks_of_its_parameters():
         choose_effects(["outlier"])
     named = [f.file for error in (short, unknown) for f in error.value.findings]
     assert named == ["chains", "warmup", "draws", "seed", "effects"]
+
+
+LONG = "x" * 50_000
+
+
+def test_nothing_long_is_printed_whole(here: Hdcal, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "gear.toml").write_bytes((XB1 / "gear.toml").read_bytes())
+    cells = f"deformation_mm,{LONG}\n{LONG},1\n" + "0,1\n" * 5
+    (tmp_path / "data.csv").write_text(cells)
+    asked = ["--column", f"force={LONG}", "--theory", "ring", "--json"]
+    for arguments in (
+        ["check", "data.csv", *asked],
+        ["check", "data.csv", "--column", f"force={LONG}[{LONG}]", "--json"],
+        ["check", LONG, "--json"],
+        ["margin", ".", "--deformation", LONG],
+        ["predict", ".", "--deformation", LONG],
+        ["calibrate", "data.csv", "--effect", LONG],
+    ):
+        done = here(*arguments)
+        assert done.returncode == 2, arguments[0]
+        assert "x" * 20 in done.stderr
+        assert "x" * 256 not in done.stderr
+        assert max(map(len, done.stderr.splitlines())) < 2500
+
+
+def test_a_gear_file_may_be_as_long(here: Hdcal, tmp_path):
+    sizes = "wall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
+    (tmp_path / "data.csv").write_bytes((XB1 / "data.csv").read_bytes())
+    for line in (f'theory = "{LONG}"', f'material = "{LONG[:999]}"', f"{LONG} = 1"):
+        (tmp_path / "gear.toml").write_text(f"[gear]\n{line}\n{sizes}")
+        done = here("check", "data.csv")
+        assert done.returncode == 2 and "x" * 20 in done.stderr
+        assert "x" * 121 not in done.stderr
+
+
+def test_long_names_are_cut_in_their_middle():
+    name = "begin" + LONG + "end"
+    found = Finding("data.csv", f"'{name}' is the gear's", "Say it", 1, name)
+    assert found.column is not None and len(found.column) == 121
+    for text in (found.problem, found.column):
+        assert "begin" in text and "end" in text and "…" in text
+    assert len(str(found)) < 400
+    kept = Finding("data.csv", "the gear's " + "word " * 40 + "file's", "Say it")
+    assert kept.problem.endswith("file's") and "…" not in kept.problem
+    assert len(Finding("a", LONG, LONG).problem) == 1001
+
+
+def test_names_steer_no_terminal_and_begin_no_line(tmp_path):
+    found = Finding("a\nb", "'\x1b[2J\n' is unknown", "Say \r", None, "c\td\u202e")
+    assert str(found) == (r"a\nb, column 'c\td\u202e': '\x1b[2J\n' is unknown. Say \r.")
+    (tmp_path / "data.csv").write_text("deformation_mm,force_N\n" + "0,\x1b[2J\n" * 5)
+    with pytest.raises(InputError) as caught:
+        read_measurements(tmp_path / "data.csv")
+    assert r"'\x1b[2J' is not a number" in str(caught.value)
