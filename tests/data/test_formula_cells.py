@@ -32,6 +32,12 @@ def test_no_formula_begins_a_cell(text: str):
     assert header == ["label", "'" + text]
 
 
+@pytest.mark.parametrize("end", ["\r", "\n"])
+def test_no_formula_begins_a_line_within_a_cell(end: str):
+    table = columns_csv({"label": np.array([f"a{end}=1+1"], object)})
+    assert table == f'label\n"a{end}=1+1"\n'
+
+
 @pytest.mark.parametrize("text", HARMLESS)
 def test_what_runs_nowhere_stays(text: str):
     assert without_formula(text) == with_formula(text) == text

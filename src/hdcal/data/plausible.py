@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 from hdcal.errors import Finding
 
-ABSOLUTE_ZERO = -273.15  # °C
-
 
 class Range(NamedTuple):
     """What a quantity can be.
@@ -46,9 +44,7 @@ RANGES = {
     # readings
     "deformation": Range(-1e3, 1e3, "mm", "no gear gives way by a metre"),
     "force": Range(-1e9, 1e9, "N", "no rig presses with the weight of a large ship"),
-    "temperature": Range(
-        ABSOLUTE_ZERO, 3e3, "°C", "absolute zero, and where steel boils"
-    ),
+    "temperature": Range(-273.15, 3e3, "°C", "absolute zero, and where steel boils"),
     "time": Range(-1e12, 1e12, "s", "thirty thousand years"),
     "angle": Range(-1e9, 1e9, "rad", "a hundred million turns"),
     "force_sd": Range(0.0, 1e9, "N", _SCATTER),
@@ -156,5 +152,6 @@ def _shown(number: float) -> str:
 
 def _flat(given: Any) -> list:
     if hasattr(given, "ravel"):  # NumPy, without importing it
-        return given.ravel().tolist()
+        # Of millions these say enough; each is NaN where one is.
+        return [given.min().item(), given.max().item()] if given.size else []
     return list(given) if isinstance(given, list | tuple) else [given]

@@ -55,7 +55,7 @@ def make_request(
         findings.append(Finding(name, problem, remedy))
 
     findings += implausible("points", points) + implausible("amplitude", amplitude)
-    findings += implausible("duration", duration)
+    findings += (wrong := implausible("duration", duration))
     if isinstance(drive, str) and drive not in SHAPES:
         known = ", ".join(SHAPES)
         find("force", f"'{drive}' is no known force", f"Use {known} or a table")
@@ -63,7 +63,7 @@ def make_request(
         find("amplitude", "0 drives nothing", "Give a force in N")
     if not isinstance(drive, str) and duration is not None:
         find("duration", "a sampled force has its own", "Leave it out")
-    length = _DURATION if implausible("duration", duration) else duration or _DURATION
+    length = _DURATION if wrong or duration is None else duration
     tones = _tones(drive, frequency, length, points, find)
     if not isinstance(drive, str):
         _check_table(drive, find)
