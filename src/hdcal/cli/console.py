@@ -205,6 +205,4 @@ def usage_error(error: click.UsageError) -> Finding:
     """Return a mistake on the command line as a finding."""
     command = error.ctx.command_path if error.ctx else "hdcal"
     remedy = f"See {command} --help"
-    # Click repeats what was written, however long; a finding does not.
-    error.message = Finding("command line", error.message, remedy).problem
     return Finding("command line", error.format_message().rstrip("."), remedy)
