@@ -37,7 +37,7 @@ class Finding:
 
     def __post_init__(self) -> None:
         for name in ("problem", "remedy"):
-            text = _QUOTED.sub(_cut_quoted, getattr(self, name))
+            text = _QUOTED.sub(lambda long: quoted(long[0][1:-1]), getattr(self, name))
             object.__setattr__(self, name, _shown(text, _LONGEST_SENTENCE))
         if self.column is not None:
             object.__setattr__(self, "column", _shown(self.column, _LONGEST_NAME))
@@ -52,8 +52,9 @@ class Finding:
         return f"{where}: {self.problem}. {remedy}."
 
 
-def _cut_quoted(quoted: re.Match) -> str:
-    return f"'{_shown(quoted[0][1:-1], _LONGEST_NAME)}'"
+def quoted(name: str) -> str:
+    """Return a name from a file in quotes, as findings show it."""
+    return f"'{_shown(name, _LONGEST_NAME)}'"
 
 
 def _shown(text: str, longest: int) -> str:

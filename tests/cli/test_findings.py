@@ -116,6 +116,15 @@ def test_a_gear_file_may_be_as_long(here: Hdcal, tmp_path):
         assert "x" * 121 not in done.stderr
 
 
+def test_a_note_is_as_short(here: Hdcal, tmp_path):
+    (tmp_path / "gear.toml").write_bytes((XB1 / "gear.toml").read_bytes())
+    rows = "".join(f"{i / 10},{10 * i},1\n" for i in range(6))
+    (tmp_path / "data.csv").write_text(f"deformation_mm,force_N,{LONG}\n{rows}")
+    done = here("check", "data.csv")
+    assert done.returncode == 0 and "x" * 20 in done.stdout
+    assert len(done.stdout + done.stderr) < 4000
+
+
 def test_long_names_are_cut_in_their_middle():
     name = "begin" + LONG + "end"
     found = Finding("data.csv", f"'{name}' is the gear's", "Say it", 1, name)
