@@ -99,7 +99,10 @@ def _run(arguments: list[str], console: Console) -> int:
         code = hdcal.main(arguments, "hdcal", standalone_mode=False, obj=console)
         return code if isinstance(code, int) else DONE
     except click.UsageError as error:
-        console.findings([usage_error(error)], error.show)
+        found = usage_error(error)
+        # Click would repeat what was written, however long.
+        short = click.UsageError(f"{found.problem}.", error.ctx)
+        console.findings([found], short.show)
         return BAD_INPUT
     except InputError as error:
         console.findings(error.findings)

@@ -1,11 +1,16 @@
 """The errors a user can meet: every one carries words, none needs a traceback."""
 
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import ParamSpec, Self, TypeVar
 
 P = ParamSpec("P")
 T = TypeVar("T")
+# What stands in a file may be of any length: most letters of a name or cell that is
+# quoted, of a file's name, and of a sentence, that a finding repeats.
+_LONGEST_NAME, _LONGEST_FILE, _LONGEST_SENTENCE = 120, 255, 1000
+_QUOTED = re.compile(rf"(?<!\w)'[^']{{{_LONGEST_NAME + 1},}}'(?!\w)")
 
 
 @dataclass(frozen=True)
@@ -13,7 +18,8 @@ class Finding:
     """One thing wrong with an input, and what to do about it.
 
     A parameter of the library is written in backticks within the words; a command
-    says its own option in its place.
+    says its own option in its place. Long names and cells are cut in their middle,
+    and characters that steer a terminal are escaped.
 
     Attributes:
         file: the input the finding is about, as the user named it, or a parameter.
@@ -29,14 +35,38 @@ class Finding:
     row: int | None = None
     column: str | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("problem", "remedy"):
+            text = _QUOTED.sub(lambda long: quoted(long[0][1:-1]), getattr(self, name))
+            object.__setattr__(self, name, _shown(text, _LONGEST_SENTENCE))
+        if self.column is not None:
+            object.__setattr__(self, "column", _shown(self.column, _LONGEST_NAME))
+
     def __str__(self) -> str:
-        where = self.file
+        where = _shown(self.file, _LONGEST_FILE)
         if self.row is not None:
             where += f", row {self.row}"
         if self.column is not None:
             where += f", column '{self.column}'"
         remedy = self.remedy[:1].upper() + self.remedy[1:]
         return f"{where}: {self.problem}. {remedy}."
+
+
+def quoted(name: str) -> str:
+    """Return a name from a file in quotes, as findings show it."""
+    return f"'{_shown(name, _LONGEST_NAME)}'"
+
+
+def _shown(text: str, longest: int) -> str:
+    """Return a text on one line, cut in its middle where it is longer."""
+    if len(text) > longest:
+        half = longest // 2
+        text = f"{text[:half]}…{text[-half:]}"
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
 
 
 class HdcalError(Exception):

@@ -305,9 +305,16 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     assert kept.items() <= seen(fresh / "answers-hdcal").items()
 
 
-def test_several_processes_answer_the_same(fresh: Path, frozen_data: dict):
+def test_several_processes_answer_the_same(
+    fresh: Path, answered: Path, frozen_data: dict
+):
     data = answer_set(fresh, diagnosers={"hdcal": by_library}, jobs=2)
     assert data == frozen_data
+    names = {path.name for path in answered.glob("answers-hdcal*")}
+    assert names == {"answers-hdcal", "answers-hdcal.json"}
+    frozen = "answers-hdcal.json"
+    assert (fresh / frozen).read_bytes() == (answered / frozen).read_bytes()
+    assert seen(fresh / "answers-hdcal") == seen(answered / "answers-hdcal")
 
 
 @pytest.fixture

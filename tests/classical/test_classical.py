@@ -182,7 +182,11 @@ def test_confidence_intervals_hold_what_they_promise():
 
 @pytest.mark.parametrize(
     ("degrees", "words"),
-    [([0], "0 is out of range"), ([1, 10], "10 is out of range"), ([], "is empty")],
+    [
+        ([0], "0 does not lie between 1 and 9"),
+        ([1, 10], "10 does not lie between 1 and 9"),
+        ([], "is empty"),
+    ],
 )
 def test_degrees_out_of_range_are_refused(xb1, degrees, words):
     with pytest.raises(InputError, match=words):

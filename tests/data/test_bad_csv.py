@@ -53,7 +53,10 @@ CASES = {
     "NA": (H + GOOD.replace("4\n", "NA\n"), [(4, "force_N", "'NA'")]),
     "inf": (H + GOOD.replace("4\n", "-inf\n"), [(4, "force_N", "not a finite")]),
     "overflow": (H + GOOD.replace("4\n", "1e999\n"), [(4, "force_N", "too large")]),
-    "enormous": (H + GOOD.replace("4\n", "1e200\n"), [(4, "force_N", "beyond any")]),
+    "enormous": (
+        H + GOOD.replace("4\n", "1e200\n"),
+        [(4, "force_N", "does not lie between")],
+    ),
     "cell empty": (H + GOOD.replace(".2,4", ".2,"), [(4, "force_N", "empty")]),
     "too few cells": (H + GOOD.replace(".2,4", ".2"), [(4, None, "1 cells")]),
     "too many cells": (H + GOOD.replace(".2,4", ".2,4,5"), [(4, None, "3 cells")]),
@@ -83,7 +86,7 @@ CASES = {
     ),
     "negative sd": (
         timed(1, 1, -1, 1, 1).replace("time_s", "force_sd_N"),
-        [(4, "force_sd_N", "negative")],
+        [(4, "force_sd_N", "between 0 and 1000000000 N")],
     ),
     "empty label": (
         R + FIVE.format("a", "a", " ", "b", "b"),

@@ -28,15 +28,15 @@ CASES = {
     ),
     "negative": (
         GEAR.replace("0.68", "-1"),
-        [(2, "gear.wall_thickness_mm", "positive")],
+        [(2, "gear.wall_thickness_mm", "-1 mm does not lie")],
     ),
-    "zero": (GEAR.replace("70.0", "0"), [(4, "gear.length_mm", "not positive")]),
+    "zero": (GEAR.replace("70.0", "0"), [(4, "gear.length_mm", "0 mm does not lie")]),
     "nan": (GEAR.replace("70.0", "nan"), [(4, "gear.length_mm", "finite")]),
     "inf": (GEAR.replace("70.0", "inf"), [(4, "gear.length_mm", "")]),
     "text": (GEAR.replace("70.0", '"70"'), [(4, "gear.length_mm", "number")]),
     "bool": (GEAR.replace("70.0", "true"), [(4, "gear.length_mm", "number")]),
     "huge": (GEAR.replace("70.0", "1" + "0" * 400), [(4, "gear.length_mm", "")]),
-    "metres": (GEAR.replace("70.0", "1e9"), [(4, "gear.length_mm", "larger than any")]),
+    "metres": (GEAR.replace("70.0", "1e9"), [(4, "gear.length_mm", "does not lie")]),
     "material": (
         GEAR + 'material = "40CrNiMo"\n',
         [(5, "gear.material", "'40CrNiMoA'")],
@@ -65,7 +65,7 @@ CASES = {
     ),
     "resolution": (
         GEAR + "[measurement]\nforce_resolution_N = 0\n",
-        [(6, "measurement.force_resolution_N", "positive")],
+        [(6, "measurement.force_resolution_N", "0 N does not lie")],
     ),
     "gear is a number": ("gear = 3\n", [(1, "gear", "")]),
     "priors is a number": ("priors = 3\n" + GEAR, [(1, "priors", "")]),
@@ -141,7 +141,7 @@ CASES = {
         [
             (1, "gear.wall_thickness_mm", "missing"),
             (2, "gear.wall_thicknes_mm", "'wall_thickness_mm'"),
-            (3, "gear.radius_mm", "not positive"),
+            (3, "gear.radius_mm", "-4 mm does not lie"),
             (5, "gear.material", "'steel'"),
             (7, "measurement.deformation", "'radial'"),
             (9, "priors.K.sd", "needs 'sd'"),

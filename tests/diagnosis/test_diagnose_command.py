@@ -12,8 +12,12 @@ from commands import XB1, Hdcal
 from schema_checks import obeys
 from verdicts import KINDS
 
+from hdcal.cli.console import Console
 from hdcal.cli.processes import run_all
+from hdcal.data.reading import read_case
 from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
+from hdcal.diagnosis.many_cases import AskedCases, diagnose_all
+from hdcal.diagnosis.summary import write_verdict
 from hdcal.errors import Finding, InputError
 from hdcal.report.saving.contents import STAMP
 
@@ -181,10 +185,47 @@ def test_where_every_case_is_refused_nothing_is_written(
 
 
 def test_a_defect_leaves_nothing(diagnose, cases, tmp_path: Path):
-    done = diagnose(cases["none"], cases["defect"], "--no-report")
+    done = diagnose(cases["defect"], "--no-report")
     assert done.returncode == 1
-    assert "defect" in done.stderr and "Traceback" not in done.stderr
+    assert "internal error" in done.stderr and "Traceback" not in done.stderr
     assert names(tmp_path) == {"cases"}
+
+
+@pytest.mark.parametrize("where", ["diagnosis", "report", "reader"])
+def test_a_defect_in_one_case_does_not_stop_the_others(
+    diagnose, monkeypatch, cases, tmp_path: Path, where: str
+):
+    broken = cases["defect"]
+    if where == "report":
+        broken = cases["unknown"]
+        monkeypatch.setattr("hdcal.diagnosis.summary.write_verdict", half_written)
+    if where == "reader":
+        broken = cases["unknown"]
+        monkeypatch.setattr("hdcal.diagnosis.many_cases.read_case", unreadable)
+    done = diagnose(cases["none"], broken, cases["named"], "--out", "all", "--json")
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
+    said = json.loads(done.stdout)
+    assert list(said["cases"]) == ["none", "named"]
+    ((finding,),) = said["refused"].values()
+    assert finding["problem"].startswith("internal error (ValueError: broken")
+    assert "report it" in finding["remedy"] and "HDCAL_DEBUG=1" in finding["remedy"]
+    assert "internal error" in done.stdout
+
+
+def half_written(verdict, folder, command, *, report=True):
+    """Write a verdict, or part of one."""
+    if verdict.case.name == "unknown":
+        (folder / "where.svg").touch()
+        raise ValueError("broken within a report")
+    return write_verdict(verdict, folder, command, report=False)
+
+
+def unreadable(path, *rest, **options):
+    """Read a case, unless a defect of the reader meets it."""
+    if "unknown" in str(path):
+        raise ValueError("broken")
+    return read_case(path, *rest, **options)
 
 
 def test_the_library_can_do_without_an_effect(diagnose, cases, tmp_path: Path):
@@ -218,6 +259,29 @@ def test_several_processes_give_the_same_in_the_same_order():
     assert run_all(operator.pow, tasks, 1) == expected
     assert run_all(operator.pow, tasks, 2, tell) == expected
     assert told == [(done, 6) for done in range(1, 7)]
+
+
+def test_any_number_of_processes_writes_the_same_bytes(tmp_path: Path):
+    found = [read_case(XB1), replace(read_case(XB1), name="again")]
+    settings = {"library": None, "quick": True, "report": True, "seed": 3}
+    for jobs in (1, 2):
+        (tmp_path / str(jobs)).mkdir()
+        settings |= {"jobs": jobs, "command": "hdcal diagnose"}
+        diagnose_all(AskedCases(found, {}), tmp_path / str(jobs), **settings)
+    one, two = (contents(tmp_path / jobs) for jobs in "12")
+    assert len(one) == 2 * len(FILES) and one == two
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return the bytes of every file below a folder, by its name there."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize("jobs", [[], ["--jobs", "2"], ["--jobs=2"]])
+def test_the_number_of_processes_is_not_in_a_result(monkeypatch, jobs: list[str]):
+    monkeypatch.setattr(sys, "argv", ["hdcal", "diagnose", "a", *jobs, "b c"])
+    assert Console(json=False).command == "hdcal diagnose a 'b c'"
 
 
 def test_an_error_in_another_process_comes_back():

@@ -27,10 +27,10 @@ def test_a_failed_calibration_gives_no_margin(one):
 
 BAD = {
     "deformation in um": ({"deformation": 400.0}, "Give it in mm"),
-    "no deformation": ({"deformation": np.nan}, "is no deformation"),
+    "no deformation": ({"deformation": np.nan}, "nan mm does not lie"),
     "limit in mN": ({"limit_force": 120_000.0}, "Give it in N"),
     "limit in kN": ({"limit_force": 0.12}, "Give it in N"),
-    "no limit": ({"limit_force": np.inf}, "is no force"),
+    "no limit": ({"limit_force": np.inf}, "inf N does not lie"),
     "given in mN": ({"given_force": 80_000.0}, "Give it in N"),
     "empty window": ({"temperature": []}, "empty window"),
     "endless window": ({"temperature": [20.0] * 1001}, "at most 1000"),
@@ -46,7 +46,7 @@ BAD = {
     "unknown direction": ({"direction": "sideways"}, "is unknown"),
     "unknown size": ({"tolerances": {"colour_mm": 0.1}}, "is no size"),
     "tolerance in um": ({"tolerances": {"wall_thickness_mm": 20.0}}, "Give it in mm"),
-    "negative": ({"tolerances": {"radius_mm": -0.1}}, "is no tolerance"),
+    "negative": ({"tolerances": {"radius_mm": -0.1}}, "-0.1 mm does not lie between 0"),
     "no part of ring": ({"tolerances": {"load_height_mm": 1.0}}, "theory 'ring'"),
 }
 

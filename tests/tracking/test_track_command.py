@@ -29,6 +29,23 @@ BAD = [
 ]
 
 
+def test_a_wild_reading_is_refused_with_its_reason(hdcal: Hdcal):
+    wild = [
+        (name, json.dumps({**json.loads(GOOD), name: "?"}).replace('"?"', number))
+        for name in ("deformation_mm", "force_N", "temperature_C", "time_s")
+        for number in ("1e308", "-1e308", "1e400", "-Infinity")
+    ]
+    lines = "\n".join([*(line for _, line in wild), GOOD.decode()])
+    done = hdcal("track", "--gear", GEAR, input=lines)
+    assert done.returncode == 2, done.stderr
+    *bad, good = map(json.loads, done.stdout.splitlines())
+    for (name, _), found in zip(wild, bad, strict=True):
+        assert f"the {name.rpartition('_')[0]} of " in found["error"]
+        assert "does not lie between" in found["error"] and ": " in found["error"]
+    assert "force of -1e+308 N does not lie between -1000000000 and" in bad[5]["error"]
+    assert good["status"] == "ok"
+
+
 @pytest.mark.parametrize(("line", "words"), BAD)
 def test_what_is_no_reading_is_said(line, words):
     with pytest.raises(ValueError, match=words):

@@ -36,7 +36,7 @@ class AnswerFiles:
 
     def __init__(self, found: BlindSet, by: str):
         if not is_name(by):
-            words = f"'{by[:60]}' cannot be part of a file's name"
+            words = f"'{by}' cannot be part of a file's name"
             raise refusal("by", words, "Use letters, digits, - and _")
         self.set, self.by = found, by
         self.folder = found.folder / f"{_PREFIX}{by}"

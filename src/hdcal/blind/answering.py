@@ -21,6 +21,7 @@ from hdcal.blind.label import CaseAnswer
 from hdcal.blind.manifest import Entry
 from hdcal.blind.sealed_set import CASES, MATERIAL, SET, BlindSet, read_set
 from hdcal.cli.processes import completed
+from hdcal.data.plausible import implausible
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.library import choose_library
 from hdcal.errors import Finding, HdcalError, InputError, NotWritable
@@ -77,8 +78,10 @@ def answer_set(
         InputError: the set, older answers or a case are not what they should be.
     """
     if by not in diagnosers:
-        words, known = f"nobody is called '{by[:60]}'", ", ".join(sorted(diagnosers))
+        words, known = f"nobody is called '{by}'", ", ".join(sorted(diagnosers))
         raise refusal("by", words, f"Known are: {known}")
+    if wrong := implausible("jobs", jobs):
+        raise InputError(wrong)
     choose_library(library)
     found = read_set(folder)
     _check_libraries(found)

@@ -143,7 +143,7 @@ def calibrate(
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
-    check_settings(chains, warmup, draws)
+    check_settings(chains, warmup, draws, seed)
     bound_executables()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)

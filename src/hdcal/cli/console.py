@@ -4,6 +4,7 @@ import contextlib
 import io
 import logging
 import os
+import re
 import shlex
 import sys
 import warnings
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from hdcal.report.write import Report
 
 T = TypeVar("T", bound="Target")
+_JOBS = re.compile(r" --jobs[= ]\S+")
 
 
 class Console:
@@ -63,8 +65,11 @@ class Console:
 
     @property
     def command(self) -> str:
-        """Return the command line as it was given, for a result's provenance."""
-        return shlex.join(["hdcal", *sys.argv[1:]])
+        """Return the command line for a result's provenance.
+
+        Without --jobs: the same result has the same bytes.
+        """
+        return _JOBS.sub("", shlex.join(["hdcal", *sys.argv[1:]]))
 
     def reserve_folder(
         self, out: str | None, force: bool, replace: str = "force"

@@ -25,7 +25,7 @@ def read_tones(text: str, option: str) -> list[float]:
     try:
         return [float(part) for part in text.split(":")]
     except ValueError:
-        words = f"'{text[:60]}' is no frequency"
+        words = f"'{text}' is no frequency"
         remedy = "Write it like 5, or 5:200 for a chirp"
         raise InputError([Finding(option, words, remedy)]) from None
 

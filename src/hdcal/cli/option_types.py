@@ -76,7 +76,7 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     except ValueError:
         number = None
     if match is None or number is None:
-        raise _refused(option, f"'{text[:60]}' is no number", remedy)
+        raise _refused(option, f"'{text}' is no number", remedy)
     if match["unit"] is None:
         return number
     try:
@@ -84,7 +84,7 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     except UnitError as error:
         raise _refused(option, str(error), remedy) from None
     if code != unit:
-        words = f"'{text[:60]}' is not {_KINDS[unit]}: its unit is that of {code}"
+        words = f"'{text}' is not {_KINDS[unit]}: its unit is that of {code}"
         raise _refused(option, words, remedy)
     return number * factor
 
@@ -101,7 +101,7 @@ def read_ends(text: str, option: str) -> tuple[float, float]:
             return low, high
     except ValueError:
         pass
-    words = f"'{text[:60]}' is not LO:HI"
+    words = f"'{text}' is not LO:HI"
     raise _refused(option, words, "Write it like 0.38:0.42")
 
 
@@ -114,7 +114,7 @@ def read_whole_numbers(text: str, option: str) -> list[int]:
     try:
         return [int(part) for part in text.split(",")]
     except ValueError:
-        words = f"'{text[:60]}' is no list of whole numbers"
+        words = f"'{text}' is no list of whole numbers"
         raise _refused(option, words, "Write it like 1,3") from None
 
 
@@ -129,7 +129,7 @@ def read_grid(text: str, option: str) -> list[float]:
     except ValueError:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
-        words = f"'{text[:60]}' is neither start:stop:count nor a list of numbers"
+        words = f"'{text}' is neither start:stop:count nor a list of numbers"
         remedy = f"Write it like 0:0.6:61 or 0.1,0.2, with at most {MOST_POINTS} points"
         raise _refused(option, words, remedy)
     return numbers
@@ -169,7 +169,7 @@ def read_window(text: str, option: str, *, count: int = 2) -> list[float]:
         return read_grid(text, option)
     low, high = read_ends(text, option)
     if high < low:
-        words = f"'{text[:60]}' is an empty window"
+        words = f"'{text}' is an empty window"
         raise _refused(option, words, "Give the lower end first")
     return _between(low, high, count if high > low else 1)
 
@@ -201,11 +201,11 @@ def read_named(
         for text in texts:
             name, sign, rest = (part.strip() for part in text.partition("="))
             if not (name and sign and rest):
-                words = f"'{text[:60]}' {fault}"
+                words = f"'{text}' {fault}"
                 wrong.append(Finding(option, words, f"Write it like {example}"))
                 continue
             if name in found:
-                words = f"'{name[:60]}' is given twice"
+                words = f"'{name}' is given twice"
                 wrong.append(Finding(option, words, "Keep one of them"))
             if known is not None and name not in known():
                 wrong.append(_unknown(name, known(), option))
@@ -219,9 +219,7 @@ def read_named(
 def _unknown(name: str, known: Sequence[str], option: str) -> Finding:
     from hdcal.data.toml_file import did_you_mean
 
-    return Finding(
-        option, f"unknown key '{name[:60]}'", did_you_mean(name, list(known))
-    )
+    return Finding(option, f"unknown key '{name}'", did_you_mean(name, list(known)))
 
 
 def read_columns(texts: Sequence[str], option: str = "--column") -> dict[str, str]:

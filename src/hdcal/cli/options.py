@@ -15,11 +15,18 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
+from hdcal.data.plausible import range_of
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
+
+
+def count_type(name: str) -> click.IntRange:
+    """Return the type of an option whose whole number is refused before any work."""
+    known = range_of(name)
+    return click.IntRange(int(known.low), int(known.high))
 
 
 def repeated_option(
@@ -151,7 +158,7 @@ def seed_option(command: Callable) -> Callable:
     """Add --seed."""
     return click.option(
         "--seed",
-        type=click.IntRange(0, 2**32 - 1),
+        type=count_type("seed"),
         default=0,
         show_default=True,
         help="The same seed gives the same result.",

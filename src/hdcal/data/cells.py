@@ -8,6 +8,7 @@ import numpy as np
 from hdcal.data.columns import LABELS, Column
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
+from hdcal.data.formula_cells import with_formula
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
@@ -35,7 +36,7 @@ def read_cells(
     odd = [c for c in numeric if c.position not in numbers]
     texts = table.texts(c.position for c in (*labels, *odd))
     for column in labels:
-        cells = texts[column.position]
+        cells = [with_formula(cell) for cell in texts[column.position]]
         words = f"the {column.quantity} label is empty"
         empty = [
             (int(row), words, "Name it")
@@ -86,19 +87,13 @@ def read_number(cell: str, comma: bool) -> float:
     point = cell
     if comma:
         if "." in cell and "," not in cell and any(map(str.isdigit, cell)):
-            words = f"'{_shown(cell)}' has a decimal point among decimal commas"
+            words = f"'{cell}' has a decimal point among decimal commas"
             raise CellError(words, "Use one decimal sign in the whole column")
         point = cell if "." in cell else cell.replace(",", ".")
     if not _NUMBER.fullmatch(point):
-        raise CellError(f"'{_shown(cell)}' is not a number", "Write a plain number")
+        raise CellError(f"'{cell}' is not a number", "Write a plain number")
     number = float(point)
     if math.isinf(number):
-        words = f"'{_shown(cell)}' is too large for a finite number"
+        words = f"'{cell}' is too large for a finite number"
         raise CellError(words, "Check the cell")
     return number
-
-
-def _shown(cell: str) -> str:
-    # what stands in the file goes to a terminal: neither long nor with escapes
-    text = "".join(c if c.isprintable() else "�" for c in cell)
-    return text if len(text) <= 40 else text[:40] + "…"

@@ -105,7 +105,7 @@ def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Pri
     if name in shipped:
         return material_priors(name)
     if not name.endswith(".toml"):
-        words = f"unknown material '{name[:60]}'"
+        words = f"unknown material '{name}'"
         # A slip of the pen only: the nearest name may be quite another steel.
         near = get_close_matches(name, shipped, n=1, cutoff=0.85)
         hint = f"Did you mean '{near[0]}'? " if near else ""

@@ -7,11 +7,18 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hdcal.data.case import Theory
+from hdcal.data.plausible import implausible, range_of
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.errors import Finding, InputError
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
-_Size = Annotated[float, Field(gt=0.0, le=1e5)]
+
+
+def _within(name: str) -> Any:
+    return Field(ge=range_of(name).low, le=range_of(name).high)
+
+
+_Size = Annotated[float, _within("size")]
 
 
 class GearTable(BaseModel):
@@ -33,8 +40,8 @@ class MeasurementTable(BaseModel):
 
     model_config = _STRICT
     deformation: Literal["radial", "diametral"] = "radial"
-    reference_temperature_C: Annotated[float, Field(ge=-273.15, le=1e4)] = 20.0
-    force_resolution_N: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    reference_temperature_C: Annotated[float, _within("temperature")] = 20.0
+    force_resolution_N: Annotated[float, _within("force_resolution")] | None = None
 
 
 class GearFile(BaseModel):
@@ -75,15 +82,11 @@ def _translate(error: dict, toml: TomlFile) -> Finding:
         remedy = did_you_mean(
             str(value), re.findall(r"'(\w+)'", error["ctx"]["expected"])
         )
-        return toml.finding(f"unknown choice {value!r:.60}", remedy, key)
-    if kind in ("greater_than", "greater_than_equal") and "temperature" in key:
-        return toml.finding("is below absolute zero", "Write it in °C", key)
-    if kind == "greater_than":
-        remedy = "Write the size in the unit that the key names"
-        return toml.finding(f"{value} is not positive", remedy, key)
-    if kind == "less_than_equal":
-        words = f"{value:g} is larger than any rig"
-        return toml.finding(words, "Check the number and its unit", key)
+        return toml.finding(f"unknown choice '{value}'", remedy, key)
+    if kind in ("greater_than_equal", "less_than_equal"):
+        quantity = key.rpartition(".")[2].rpartition("_")[0]
+        (found,) = implausible(key, value, quantity)
+        return toml.finding(found.problem, found.remedy, key)
     words = error["msg"][:1].lower() + error["msg"][1:]
     return toml.finding(words, f"Write it like {_example(key)}", key)
 
@@ -111,7 +114,7 @@ def size_findings(toml: TomlFile) -> list[Finding]:
         name: value
         for name, value in table.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
-        if 0 < value <= 1e5
+        if range_of("size").holds(value)
     }
     radius = size.get("radius_mm", math.inf)
     findings = []

@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+from hdcal.data.plausible import RANGES, out_of_range, range_of
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.units import UnitError, to_code
@@ -67,6 +68,7 @@ def read_prior(
         number if size in ("log_sd", "a", "b") else number * scale
         for size, number in zip(FAMILIES[family], numbers, strict=True)
     )
+    _check_plausible(family, scaled, key, toml, own=unit is not None)
     return Prior(family, scaled, name, source)
 
 
@@ -133,6 +135,31 @@ def _conversion(
         words = f"'{given}' does not measure this"
         raise toml.error(words, f'Write a unit that converts to "{unit}"', here)
     return scale, name
+
+
+def _check_plausible(family: str, numbers, key: str, toml: TomlFile, own: bool):
+    """Refuse numbers in code units that no gear and no rig can have.
+
+    Args:
+        family: of the prior.
+        numbers: of the family.
+        key: dotted key.
+        toml: the file it stands in.
+        own: whether the key names a quantity; else it is a parameter of an effect.
+
+    Raises:
+        InputError: holds a finding for each of them.
+    """
+    known = range_of(key.rpartition(".")[2] if own else "effect")
+    widest = max(-known.low, known.high)
+    spread = known._replace(low=0.0, high=widest)
+    ranges = {"log_sd": RANGES["log_sd"], "a": RANGES["beta"], "b": RANGES["beta"]}
+    ranges |= {"sd": spread, "low": known._replace(low=min(known.low, 0.0))}
+    with Findings() as wrong:
+        for size, number in zip(FAMILIES[family], numbers, strict=True):
+            for found in out_of_range(size, number, ranges.get(size, known)):
+                place = f"{key}.{size}"
+                wrong.append(toml.finding(found.problem, found.remedy, place))
 
 
 def _check_sign(family: str, numbers: list[float], key: str, toml: TomlFile) -> None:

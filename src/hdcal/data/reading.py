@@ -12,7 +12,7 @@ from hdcal.data.gear import read_gear
 from hdcal.data.loading import derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
-from hdcal.errors import Finding, Findings
+from hdcal.errors import Finding, Findings, quoted
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
@@ -115,7 +115,7 @@ def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
 def _left_out(columns: Columns) -> Iterator[str]:
     positions = {column.position for column in columns.used.values()}
     headers = enumerate(columns.table.headers)
-    extra = [f"'{header}'" for place, header in headers if place not in positions]
+    extra = [quoted(header) for place, header in headers if place not in positions]
     if extra:
         yield f"columns not used: {', '.join(extra)}"
     if skipped := columns.table.skipped:

@@ -3,20 +3,12 @@
 import numpy as np
 
 from hdcal.data.columns import Columns
+from hdcal.data.plausible import RANGES
+from hdcal.data.units import COLUMN_UNITS
 
 FEWEST_ROWS = 5
-ABSOLUTE_ZERO = -273.15
-
-# Beyond these a cell is a slip of the pen or of the unit, and its square would
-# leave the range of floating point: mm, N, °C, s, rad.
-_LIMITS = {
-    "deformation": 1e6,
-    "force": 1e12,
-    "temperature": 1e4,
-    "time": 1e12,
-    "angle": 1e9,
-    "force_sd": 1e12,
-}
+# Kelvin become degrees Celsius with an error of rounding.
+_ROUNDED = 1e-9
 
 
 def check_values(columns: Columns, fewest: int) -> None:
@@ -30,21 +22,12 @@ def check_values(columns: Columns, fewest: int) -> None:
     if count < fewest:
         words = f"holds {count} rows of readings"
         columns.findings.add(words, f"At least {fewest} are needed")
-    for quantity, limit in _LIMITS.items():
-        if quantity not in values:
-            continue
-        number = values[quantity]
-        # not `abs(number) > limit` alone: a NaN was reported where it stands
-        wild = np.abs(number) > limit
-        words = f"is beyond any {quantity} that a rig can see"
-        columns.find(wild, quantity, words, "Check the number and its unit")
-        if quantity == "temperature":
-            cold = (number < ABSOLUTE_ZERO - 1e-9) & ~wild
-            columns.find(cold, quantity, "is below absolute zero", "Check the unit")
-        if quantity == "force_sd":
-            words = "a standard deviation cannot be negative"
-            remedy = "Write its size, or 0 when it is not known"
-            columns.find(number < 0, quantity, words, remedy)
+    for quantity in filter(values.__contains__, COLUMN_UNITS):
+        number, known = values[quantity], RANGES[quantity]
+        slack = _ROUNDED if quantity == "temperature" else 0.0
+        # a NaN was reported where it stands
+        wild = (number < known.low - slack) | (number > known.high)
+        columns.find(wild, quantity, known.problem(), "Check the number and its unit")
     if "deformation" in values:
         known = values["deformation"][np.isfinite(values["deformation"])]
         if known.size > 1 and known.min() == known.max():

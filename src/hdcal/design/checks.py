@@ -4,13 +4,13 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.data.toml_file import did_you_mean
 from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding
 from hdcal.prediction.engine.conditions import level_findings, temperature_findings
 from hdcal.prediction.engine.sizes import SIZES, matters
 
-_LARGEST = 1e5
 # Draws that have to fall outside for a probability to be told from its neighbours.
 _LEAST_OUTSIDE = 10
 
@@ -21,7 +21,7 @@ def name_findings(
     """Return a finding for each name that is not known, with the nearest one."""
     listed = list(known)
     return [
-        Finding(where, f"unknown key '{name[:60]}'", did_you_mean(name, listed))
+        Finding(where, f"unknown key '{name}'", did_you_mean(name, listed))
         for name in names
         if name not in listed
     ]
@@ -46,9 +46,8 @@ def size_findings(draws: DesignDraws, sizes: Mapping[str, np.ndarray]) -> list[F
     """
     findings = []
     for name, values in sizes.items():
-        bad = [v for v in values if not 0.0 < v <= _LARGEST]
-        if bad:
-            words = f"{name} = {bad[0]:g} is no size"
+        for wrong in implausible("vary", values, "size"):
+            words = f"{name} = {wrong.problem}"
             findings.append(Finding("vary", words, "Give positive sizes in mm"))
     if findings:
         return findings
@@ -87,8 +86,10 @@ def place_findings(
     """
     findings, (where, warmth) = [], names
     farthest = deformation[np.argmax(np.abs(deformation))]
-    if not np.isfinite(deformation).all() or (deformation == 0.0).any():
-        words = "a deformation that is zero or not finite"
+    if wrong := implausible(where, deformation, "deformation"):
+        findings += wrong
+    elif (deformation == 0.0).any():
+        words = "a deformation that is zero"
         findings.append(Finding(where, words, "Give it in mm, above or below zero"))
     elif abs(farthest) >= least_radius:
         words = f"{farthest:g} mm on a radius of {least_radius:g} mm"
@@ -101,9 +102,8 @@ def place_findings(
 
 def probability_findings(draws: DesignDraws, probability: float) -> list[Finding]:
     """Return what is wrong with a required probability."""
-    if not 0.0 < probability < 1.0:
-        words = f"{probability:g} is not between 0 and 1"
-        return [Finding("probability", words, "Use e.g. 0.99")]
+    if wrong := implausible("probability", probability):
+        return wrong
     if (1.0 - probability) * draws.size < _LEAST_OUTSIDE * (1.0 - 1e-9):
         words = f"{probability:g} cannot be told from {draws.size} draws"
         most = 1.0 - _LEAST_OUTSIDE / draws.size

@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 from hdcal.data.case import Gear, Theory
+from hdcal.data.plausible import implausible
 from hdcal.data.priors import (
     MATERIAL_UNITS,
     Prior,
@@ -22,7 +23,7 @@ from hdcal.data.priors import (
 )
 from hdcal.data.records import Geometry, Records
 from hdcal.data.toml_file import did_you_mean
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.distributions import frozen, scaled
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -172,7 +173,10 @@ def design_draws(
 
     Raises:
         NotUsable: the calibration failed its checks.
+        InputError: the seed is none.
     """
+    with Findings() as wrong:
+        wrong += implausible("seed", seed)
     if isinstance(source, Posterior):
         return _calibrated(source)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
@@ -221,7 +225,7 @@ def read_material(name: str) -> dict[str, Prior]:
     """
     if not name.endswith(".toml"):
         if name not in material_names():
-            words = f"unknown material '{name[:60]}'"
+            words = f"unknown material '{name}'"
             remedy = did_you_mean(name, material_names(), "Shipped are")
             raise InputError([Finding("materials", words, remedy)])
         return material_priors(name)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.data.plausible import implausible
 from hdcal.data.records import Geometry
 from hdcal.design.answer import LimitAsked
 from hdcal.design.candidate import Candidate, best_candidate, candidate, elasticities
@@ -194,9 +195,10 @@ def _findings(
         ("limit_force", asked.limit_force_N, "N"),
         ("limit_stress", asked.limit_stress_MPa, "MPa"),
     ):
-        if value is not None and not 0.0 < value < np.inf:
-            words = f"{value:g} is no limit"
-            findings.append(Finding(name, words, f"Give it in {unit}"))
+        wrong = implausible(name, value)
+        if value == 0.0 and not wrong:
+            wrong = [Finding(name, "0 is no limit", f"Give it in {unit}")]
+        findings += wrong
     findings += probability_findings(draws, asked.probability)
     if any(name not in SIZES for name in vary):
         return findings

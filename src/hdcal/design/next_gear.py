@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.design.checks import name_findings
 from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding, InputError
@@ -63,7 +64,9 @@ def next_gear(
     findings = name_findings(tolerances, SIZES, "tolerances")
     for name, width in tolerances.items() if not findings else ():
         own = float(getattr(draws.gear.geometry, SIZES[name]))
-        if not 0.0 < width < 0.5 * own:
+        if wrong := implausible("tolerances", width):
+            findings += wrong
+        elif not 0.0 < width < 0.5 * own:
             words = f"{name} = {width:g} is no tolerance of {own:g} mm"
             remedy = "Give the ± part in mm, such as 0.02"
             findings.append(Finding("tolerances", words, remedy))

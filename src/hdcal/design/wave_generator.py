@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.data.plausible import implausible
 from hdcal.design.answer import WindowAsked
 from hdcal.design.checks import place_findings, probability_findings
 from hdcal.design.design_draws import DesignDraws, design_draws
@@ -174,10 +175,8 @@ def _findings(draws: DesignDraws, asked: WindowAsked, rates) -> list[Finding]:
         remedy = "Give both ends one sign, e.g. 0.38:0.42"
         findings.append(Finding("window", words, remedy))
     findings += probability_findings(draws, asked.probability)
-    if not 0.0 <= setting_sd < np.inf:
-        words = f"{setting_sd:g} is no standard deviation"
-        findings.append(Finding("setting_sd", words, "Give it in mm"))
-    if rates is not None and not 0.0 < rates[0] < rates[1] < np.inf:
+    findings += implausible("setting_sd", setting_sd) + implausible("rates", rates)
+    if rates is not None and not rates[0] < rates[1]:
         words = f"{rates[0]:g}:{rates[1]:g} is no range of spring rates"
         findings.append(Finding("rates", words, "Write LO:HI in N/mm"))
     radius = float(draws.gear.geometry.radius)

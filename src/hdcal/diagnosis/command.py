@@ -5,7 +5,13 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import force_option, json_option, reading_options, seed_option
+from hdcal.cli.options import (
+    count_type,
+    force_option,
+    json_option,
+    reading_options,
+    seed_option,
+)
 
 # With more cases than this reports are made only when asked for.
 MANY = 20
@@ -27,7 +33,7 @@ MANY = 20
 )
 @click.option(
     "--jobs",
-    type=click.IntRange(1, 256),
+    type=count_type("jobs"),
     default=1,
     show_default=True,
     help="Processes to share many cases.",

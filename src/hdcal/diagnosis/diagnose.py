@@ -6,6 +6,7 @@ import numpy as np
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case
+from hdcal.data.plausible import implausible
 from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
@@ -15,7 +16,7 @@ from hdcal.diagnosis.refit import Refits, failure_reasons, refit, with_sampled_s
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
 from hdcal.diagnosis.which import identify_cause
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
@@ -53,7 +54,7 @@ def diagnose(
     Raises:
         InputError: an effect, a prior or the data cannot be used, see `_check`.
     """
-    _check(case, library)
+    _check(case, library, seed)
     rng = np.random.default_rng(seed)
     averaged, group = average_rows(case)
     library = _testable(library, group)
@@ -90,13 +91,16 @@ def _testable(
     return {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
 
 
-def _check(case: Case, library: Mapping[str, type[Effect]]) -> None:
+def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     """Refuse priors of unknown effects, and forces that fall with the deformation.
 
     Raises:
         InputError: an effect has no prior or does not bear padded rows, the gear file
-            names an unknown one, or the force does not grow with the deformation.
+            names an unknown one, or the force does not grow with the deformation; or
+            the seed is none.
     """
+    with Findings() as wrong:
+        wrong += implausible("seed", seed)
     check_effect_priors(case, {**EFFECTS, **library})
     deformation = case.records.deformation - np.mean(case.records.deformation)
     if deformation @ np.asarray(case.records.force) > 0.0:

@@ -1,9 +1,11 @@
 """Many cases: read all of them before any work, then diagnose one after the other."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from shutil import rmtree
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.console import Console
@@ -56,7 +58,13 @@ def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
     refused: dict[str, tuple[Finding, ...]] = {}
     for path in paths:
         wrong = Findings()
-        case = wrong.attempt(_read, path, gear, columns, theory)
+        case = None
+        try:
+            case = wrong.attempt(_read, path, gear, columns, theory)
+        except (HdcalError, OSError):
+            raise
+        except Exception as error:
+            wrong.append(_defect(path, error, alone=len(paths) == 1))
         if case is not None and case.name.casefold() in found:
             words = f"a second case is called '{case.name}', as is its result"
             wrong.append(Finding(path, words, "Rename one, or run it by itself"))
@@ -103,7 +111,7 @@ def diagnose_all(
     Raises:
         InputError: holds everything that is wrong where no case can be used.
     """
-    work = partial(_diagnose_one, command=command, **settings)
+    work = partial(_diagnose_one, alone=not asked.many, command=command, **settings)
     cases = asked.found
     with progress_bar("diagnosing") as progress:
         if not asked.many:
@@ -122,7 +130,8 @@ def diagnose_all(
         else:
             refused[case.name] = outcome
             if asked.many:
-                (folder / case.name).rmdir()
+                # A defect may have come between two files.
+                rmtree(folder / case.name)
     left = AskedCases([case for case in cases if case.name in found], refused)
     if not found:
         raise InputError(left.findings)
@@ -130,7 +139,16 @@ def diagnose_all(
 
 
 def _diagnose_one(
-    case: Case, folder: Path, *, command, library, quick, report, seed, progress=None
+    case: Case,
+    folder: Path,
+    *,
+    alone: bool,
+    command: str,
+    library: str | None,
+    quick: bool,
+    report: bool,
+    seed: int,
+    progress=None,
 ) -> VerdictAnswer | tuple[Finding, ...]:
     """Return the answer, or what is wrong with the case."""
     from hdcal.diagnosis.diagnose import diagnose
@@ -148,5 +166,16 @@ def _diagnose_one(
     except (HdcalError, OSError):
         raise
     except Exception as error:
-        # Of two hundred cases the one that failed has to be known.
-        raise RuntimeError(f"{case.name}: {type(error).__name__}: {error}") from error
+        return (_defect(case.name, error, alone),)
+
+
+def _defect(name: str, error: Exception, alone: bool) -> Finding:
+    """Return a finding that tells of a defect of hdcal, so that other cases go on.
+
+    Raises:
+        RuntimeError: there are no others, or the traceback is wanted.
+    """
+    if alone or os.environ.get("HDCAL_DEBUG") == "1":
+        raise RuntimeError(f"{name}: {type(error).__name__}: {error}") from error
+    words = f"internal error ({type(error).__name__}: {error})"
+    return Finding(name, words, "Please report it, with what HDCAL_DEBUG=1 prints")

@@ -16,8 +16,9 @@ from jaxtyping import Key
 from numpyro.infer.hmc import hmc
 from numpyro.infer.util import constrain_fn
 
+from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Findings
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential
 from hdcal.inference.model import model
@@ -189,17 +190,13 @@ def _run(problem, whitening, key, chains, warmup, draws, progress, target):
     return [np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)]
 
 
-def check_settings(chains: int, warmup: int, draws: int) -> None:
-    """Check that a run is long enough for its own checks.
+def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:
+    """Check that a run is long enough for its own checks, and not endless.
 
     Raises:
         InputError: it is not.
     """
-    least = {"chains": (chains, 2), "warmup": (warmup, 1), "draws": (draws, 4)}
-    findings = [
-        Finding(name, f"{value} is too few", f"use {low} or more")
-        for name, (value, low) in least.items()
-        if value < low
-    ]
-    if findings:
-        raise InputError(findings)
+    given = {"chains": chains, "warmup": warmup, "draws": draws, "seed": seed}
+    with Findings() as wrong:
+        for name, value in given.items():
+            wrong += implausible(name, value)

@@ -67,7 +67,7 @@ def calibrate_dynamic(
     Raises:
         InputError: the record is no time series that the model can be held against.
     """
-    check_settings(chains, warmup, draws)
+    check_settings(chains, warmup, draws, seed)
     check_motion(case)
     bound_executables()
     began = time.perf_counter()

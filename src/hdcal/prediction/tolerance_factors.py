@@ -8,6 +8,7 @@ bounds of `margin`, which agree with them where both exist.
 import numpy as np
 from scipy import stats
 
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
 
 # Content and confidence of the bounds that aviation names; of a population only.
@@ -16,15 +17,7 @@ BASES = {"A-basis": (0.99, 0.95), "B-basis": (0.90, 0.95)}
 
 def check_shares(**shares: float) -> list[Finding]:
     """Return a finding for every share that does not lie between 0 and 1."""
-    return [
-        Finding(
-            name,
-            f"{value:g} does not lie between 0 and 1",
-            "Give a share, such as 0.95",
-        )
-        for name, value in shares.items()
-        if not 0.0 < value < 1.0
-    ]
+    return [f for name, value in shares.items() for f in implausible(name, value)]
 
 
 def k_factor(size: int, content: float = 0.99, confidence: float = 0.95) -> float:
@@ -44,9 +37,7 @@ def k_factor(size: int, content: float = 0.99, confidence: float = 0.95) -> floa
         Owen (1968), Technometrics 10; CMH-17, vol. 1, ch. 8 (A- and B-basis).
     """
     findings = check_shares(content=content, confidence=confidence)
-    if size < 2:
-        words = f"{size} specimens have no spread"
-        findings.append(Finding("size", words, "Give two or more"))
+    findings += implausible("size", size, "sample")
     if findings:
         raise InputError(findings)
     root = np.sqrt(size)

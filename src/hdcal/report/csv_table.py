@@ -6,15 +6,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from hdcal.data.formula_cells import without_formula
+
 
 def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
     """Return columns as the text of a CSV file."""
     target = io.StringIO()
-    writer = csv.writer(target, lineterminator="\n")
-    writer.writerow(columns)
+    # It quotes a cell for the characters that end lines: both of them, so that no cell
+    # begins a line.
+    writer = csv.writer(target, lineterminator="\r\n")
+    writer.writerow(map(without_formula, columns))
     texts = [[_cell(value) for value in column.tolist()] for column in columns.values()]
     writer.writerows(zip(*texts, strict=True))
-    return target.getvalue()
+    return target.getvalue().replace("\r\n", "\n")
 
 
 def _cell(value) -> str:
@@ -23,4 +27,4 @@ def _cell(value) -> str:
     if isinstance(value, float):
         # A millionth of a newton is far below any reading.
         return "" if value != value else f"{value:.9g}"
-    return str(value)
+    return without_formula(str(value)) if isinstance(value, str) else str(value)

@@ -3,6 +3,7 @@
 import base64
 from collections.abc import Mapping
 from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
@@ -24,8 +25,15 @@ def html_page(document: Document, images: Mapping[str, bytes]) -> str:
     pictures = {name: _address(image) for name, image in images.items()}
     style = files("hdcal.report").joinpath("templates/style.css").read_text("utf-8")
     return _template("page.html.j2").render(
-        document=document, images=pictures, style=style
+        document=document, images=pictures, style=style, policy=_policy(style)
     )
+
+
+def _policy(style: str) -> str:
+    """Return what the page may do: show its own style and pictures, and no more."""
+    digest = base64.b64encode(sha256(style.encode()).digest()).decode("ascii")
+    own = f"style-src 'sha256-{digest}'; img-src data:"
+    return f"default-src 'none'; {own}; base-uri 'none'; form-action 'none'"
 
 
 def notebook_html(document: Document) -> str:

@@ -1,17 +1,15 @@
 """Which numbers can be a reading of a gear, and which of them were tested."""
 
 from dataclasses import dataclass
-from math import isfinite
 
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.data.plausible import implausible
 from hdcal.inference.posterior import Posterior
 from hdcal.tracking.stream_prior import StreamPrior
 
-_COLDEST, _NEAR_K, _NEAR_MM = -273.15, 1.0, 1e-9
-# Beyond it a force [N] or a time [s] was not measured, and squares would overflow.
-_MOST = 1e12
+_NEAR_K, _NEAR_MM = 1.0, 1e-9
 
 
 @dataclass(frozen=True)
@@ -41,16 +39,12 @@ class ReadingLimits:
         for name, value in given.items():
             if value is None and name in self.needs:
                 raise ValueError(f"the {name} is missing, and an effect needs it")
-            if value is not None and not isfinite(value):
-                raise ValueError(f"the {name} is not finite")
+            for wrong in implausible(name, value):
+                raise ValueError(f"the {name} of {wrong.problem}")
         if abs(deformation) >= self.radius:
             raise ValueError(
                 f"a deformation of {deformation:g} mm is none of this gear"
             )
-        if abs(force) > _MOST or abs(time or 0.0) > _MOST:
-            raise ValueError("the force or the time is no measured one")
-        if temperature is not None and temperature < _COLDEST:
-            raise ValueError("the temperature is below absolute zero")
         if temperature is not None and temperature > self.hottest:
             raise ValueError(f"{temperature:g} °C leaves nothing of the stiffness")
 

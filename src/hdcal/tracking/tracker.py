@@ -6,7 +6,8 @@ from math import isfinite
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.errors import Finding, InputError
+from hdcal.data.plausible import implausible
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.tracking.change_alarm import ChangeAlarm
 from hdcal.tracking.effect_tracking import build_particles
@@ -62,7 +63,10 @@ class Tracker:
         reopen: float = 0.0,
         seed: int = 0,
     ):
-        _check_settings(alarm_rows, forget, reopen)
+        with Findings() as wrong:
+            wrong += implausible("alarm_rows", alarm_rows)
+            wrong += implausible("forget", forget) + implausible("reopen", reopen)
+            wrong += implausible("seed", seed)
         prior = _stream_prior(known, seed)
         self._core, self._columns = _core(known, prior, forget)
         self._limits = reading_limits(known, prior)
@@ -180,21 +184,6 @@ def _degeneracy(core: Particles, stiffness: dict) -> dict:
         # A few draws are left: their spread is no posterior's.
         stiffness |= {"sd": None, "credible_95": None, "narrowed": None}
     return {"effective_particles": effective, "degenerate": degenerate}
-
-
-def _check_settings(alarm_rows: float, forget: float, reopen: float) -> None:
-    keep = "Use 0.5 to 1; 0.999 keeps about the last thousand readings"
-    findings = [
-        Finding(name, f"{value:g} is out of range", remedy)
-        for name, value, low, high, remedy in (
-            ("alarm_rows", alarm_rows, 10.0, 1e9, "Use 10 to 1e9"),
-            ("forget", forget, 0.5, 1.0, keep),
-            ("reopen", reopen, 0.0, 1.0, "Use a share of the stiffness, such as 0.1"),
-        )
-        if not low <= value <= high
-    ]
-    if findings:
-        raise InputError(findings)
 
 
 def _stream_prior(known: Posterior | Gear, seed: int) -> StreamPrior:

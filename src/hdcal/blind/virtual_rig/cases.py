@@ -24,7 +24,8 @@ from hdcal.blind.virtual_rig.virtual_rig import (
     draw_noise,
     draw_rig,
 )
-from hdcal.errors import Finding, InputError
+from hdcal.data.plausible import implausible
+from hdcal.errors import Finding, Findings, InputError
 
 # Material and geometry are those that the rigs are drawn about.
 GEAR_TOML = """\
@@ -60,8 +61,11 @@ def draw_cases(
         The measurement file and the label of each.
 
     Raises:
-        InputError: no mix has this name, or a loading shows next to nothing.
+        InputError: no mix has this name, or a loading shows next to nothing, or the
+            count or the seed is none.
     """
+    with Findings() as wrong:
+        wrong += implausible("cases", count) + implausible("seed", seed, "secret_seed")
     rng = np.random.default_rng(seed)
     digits = len(str(count))
     for number, plan in enumerate(draw_plans(mix, count, rng), start=1):

@@ -64,7 +64,7 @@ def draw_plans(mix: str, count: int, rng: np.random.Generator) -> list[Plan]:
         InputError: no mix has this name.
     """
     if mix not in MIXES:
-        words, remedy = f"no mix is called '{mix[:60]}'", did_you_mean(mix, list(MIXES))
+        words, remedy = f"no mix is called '{mix}'", did_you_mean(mix, list(MIXES))
         raise InputError([Finding("mix", words, remedy)])
     if mix != "all":
         return list(islice(_endless(mix, rng), count))

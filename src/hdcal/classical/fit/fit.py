@@ -15,11 +15,11 @@ from scipy.stats import f as f_law
 from scipy.stats import t as t_law
 
 from hdcal.data.case import Case
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.report.answer import Real
 
 LEVEL = 0.95
-MOST_DEGREE = 9
 # A smaller chance than this says that the curve is too simple.
 DOUBT = 0.05
 # Beyond this condition number of the scaled columns no digit of a coefficient is left.
@@ -156,10 +156,7 @@ def fit(
 
 def _check(name: str, deformation, degrees, wanted) -> None:
     with Findings() as wrong:
-        for degree in degrees:
-            if not 1 <= degree <= MOST_DEGREE:
-                words = f"{degree} is out of range"
-                wrong.append(Finding("degrees", words, f"Use 1 to {MOST_DEGREE}"))
+        wrong += implausible("degrees", list(degrees))
         if not degrees:
             wrong.append(Finding("degrees", "is empty", "Write it like 1,3"))
     distinct = np.unique(deformation)

@@ -17,6 +17,7 @@ from hdcal.classical.fit.document import fit_document, headline, notes
 from hdcal.classical.fit.fit import LEVEL, PolynomialFit
 from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
@@ -91,7 +92,8 @@ def fit_report(
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
     reach = case.gear.geometry.radius * (2 if case.gear.reading == "diametral" else 1)
     with Findings() as wrong:
-        if at is not None and not abs(at) < reach:
+        wrong += (outside := implausible("at", at))
+        if at is not None and not outside and not abs(at) < reach:
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
         if posterior is not None and posterior.case.data_sha256 != case.data_sha256:

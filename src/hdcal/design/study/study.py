@@ -7,6 +7,7 @@ from math import prod
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.data.plausible import implausible
 from hdcal.design.checks import (
     name_findings,
     no_deformation,
@@ -126,9 +127,7 @@ def _findings(draws: DesignDraws, axes, materials, interval) -> list[Finding]:
     if len(materials) > MOST_MATERIALS or len(set(materials)) < len(materials):
         words = f"more than {MOST_MATERIALS} materials, or one of them twice"
         findings.append(Finding("materials", words, "Name each of a few once"))
-    if not 0.0 < interval < 1.0:
-        words = f"{interval} is not between 0 and 1"
-        findings.append(Finding("interval", words, "Use e.g. 0.95"))
+    findings += implausible("interval", interval)
     sizes = {name: values for name, values in axes.items() if name in SIZES}
     findings += unseen_findings(draws, sizes)
     wrong = size_findings(draws, sizes)

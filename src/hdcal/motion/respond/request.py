@@ -1,16 +1,15 @@
 """What is asked of a response: the force, the times, what is given beforehand."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
 from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Sine, Step
 
 SHAPES = ("step", "sine", "chirp")
-MOST_POINTS = 100_001
 # Time and force of a sampled force, [s] and [N], or the name of a shape.
 Drive = str | tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray]
 _DURATION = 0.5
@@ -55,19 +54,16 @@ def make_request(
     def find(name: str, problem: str, remedy: str) -> None:
         findings.append(Finding(name, problem, remedy))
 
-    if not 2 <= points <= MOST_POINTS:
-        find("points", f"{points} is no usable number", f"Use 2 to {MOST_POINTS}")
+    findings += implausible("points", points) + implausible("amplitude", amplitude)
+    findings += (wrong := implausible("duration", duration))
     if isinstance(drive, str) and drive not in SHAPES:
         known = ", ".join(SHAPES)
-        find("force", f"'{drive[:60]}' is no known force", f"Use {known} or a table")
-    if not math.isfinite(amplitude) or amplitude == 0.0:
-        find("amplitude", f"{amplitude:g} drives nothing", "Give a force in N")
-    if duration is not None and not (math.isfinite(duration) and duration > 0.0):
-        find("duration", f"{duration:g} s is not positive", "Give it in seconds")
-        duration = None
+        find("force", f"'{drive}' is no known force", f"Use {known} or a table")
+    if amplitude == 0.0:
+        find("amplitude", "0 drives nothing", "Give a force in N")
     if not isinstance(drive, str) and duration is not None:
         find("duration", "a sampled force has its own", "Leave it out")
-    length = duration or _DURATION
+    length = _DURATION if wrong or duration is None else duration
     tones = _tones(drive, frequency, length, points, find)
     if not isinstance(drive, str):
         _check_table(drive, find)
@@ -113,8 +109,10 @@ def _tones(drive, frequency, duration: float, points: int, find) -> list[float]:
     highest = 0.5 * (points - 1) / duration
     for tone in given:
         lowest = tone == 0.0 and need == 2
-        if not (math.isfinite(tone) and (tone > 0.0 or lowest)):
-            find("frequency", f"{tone:g} Hz is not positive", "Give it in hertz")
+        if wrong := implausible("frequency", tone):
+            find("frequency", wrong[0].problem, wrong[0].remedy)
+        elif tone == 0.0 and not lowest:
+            find("frequency", "0 Hz is not positive", "Give it in hertz")
         elif tone > highest:
             words = f"{tone:g} Hz cannot be seen at {points} points in {duration:g} s"
             remedy = f"Stay below {highest:g} Hz, or use more points"
@@ -128,8 +126,8 @@ def _check_table(drive, find) -> None:
     time, force = (np.asarray(part, dtype=float) for part in drive)
     if time.shape != force.shape or time.ndim != 1 or len(time) < 2:
         find("force", "needs as many times as forces, two or more", "Mend the table")
-    elif not (np.isfinite(time).all() and np.isfinite(force).all()):
-        find("force", "holds what is no finite number", "Mend the table")
+    elif wrong := implausible("force", force) + implausible("force", time, "time"):
+        find("force", f"the table holds {wrong[0].problem}", "Mend the table")
     elif np.any(np.diff(time) <= 0.0):
         find("force", "has times that do not rise", "Put them in order")
     elif not np.any(force):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
@@ -24,7 +25,6 @@ from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.report.parameters import INTERVAL, credible_interval
 
-_MOST_DRAWS = 10_000
 # More take minutes, and a band that long past its start says nothing new.
 _MOST_SWINGS = 20_000
 
@@ -117,7 +117,7 @@ def respond(
         request = wrong.attempt(
             make_request, force, amplitude, frequency, duration, points
         )
-        wrong += _problems(posterior, temperature, mass, damping, draws)
+        wrong += _problems(posterior, temperature, mass, damping, draws, seed)
     assert request is not None
     return _move(posterior, request, temperature, mass, damping, draws, seed)
 
@@ -175,24 +175,19 @@ def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
     return np.quantile(deformation, [tail, 0.5, 1.0 - tail], axis=0)
 
 
-def _problems(posterior, temperature, mass, damping, draws) -> list[Finding]:
+def _problems(posterior, temperature, mass, damping, draws, seed) -> list[Finding]:
     findings = []
 
     def find(name: str, problem: str, remedy: str) -> None:
         findings.append(Finding(name, problem, remedy))
 
-    if mass is not None and not (np.isfinite(mass) and mass > 0.0):
-        find("mass", f"{1e3 * mass:g} kg is no mass", "Give a positive one in kg")
-    if damping is not None and not (np.isfinite(damping) and damping >= 0.0):
-        words = f"{damping:g} N·s/mm is no damping"
-        find("damping", words, "Give zero or more")
+    findings += implausible("mass", mass) + implausible("damping", damping)
+    findings += implausible("draws", draws, "gears") + implausible("seed", seed)
     if isinstance(posterior, DynamicPosterior):
         for name, value in (("mass", mass), ("damping", damping)):
             if value is not None:
                 words = "this calibration of the moving gear knows it already"
                 find(name, words, "Leave it out")
-    if not 20 <= draws <= _MOST_DRAWS:
-        find("draws", f"{draws} is no usable number", f"Use 20 to {_MOST_DRAWS}")
     if temperature is not None:
         gear, values = posterior.case.gear, posterior.draws
         findings += temperature_findings(gear, values, np.array([temperature]))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 import jax
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.data.records import Records
 from hdcal.errors import Finding, InputError
 from hdcal.notebook import Shown
@@ -110,7 +111,7 @@ def predict(
     warm = usual_temperature(case) if temperature is None else temperature
     along = np.atleast_1d(np.asarray(deformation, dtype=float))
     levels = np.atleast_1d(np.asarray(warm, dtype=float))
-    _check(likeliest(causes), along, levels, direction, interval)
+    _check(likeliest(causes), along, levels, direction, interval, seed)
     return _bands(causes, along, levels, direction, interval, seed)
 
 
@@ -165,7 +166,7 @@ def _quantiles(causes: Sequence[Cause], records: Records, tails, seed: int):
     return np.stack(found)
 
 
-def _check(cause: Cause, deformation, temperature, direction, interval) -> None:
+def _check(cause: Cause, deformation, temperature, direction, interval, seed) -> None:
     """Refuse what cannot be asked, slips of the unit as the data's reader does."""
     gear, findings = cause.posterior.case.gear, []
 
@@ -173,19 +174,20 @@ def _check(cause: Cause, deformation, temperature, direction, interval) -> None:
         findings.append(Finding(name, problem, remedy))
 
     limit = gear.geometry.radius / cause.problem.reading.radial_per_read
-    if deformation.size == 0 or not np.isfinite(deformation).all():
-        find("deformation", "is empty or not finite", "give numbers in mm")
+    if deformation.size == 0:
+        find("deformation", "is empty", "give numbers in mm")
+    elif wrong := implausible("deformation", deformation):
+        findings += wrong
     elif (worst := float(np.max(np.abs(deformation)))) >= limit:
         problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
         find("deformation", problem, "Give it in mm")
-    if temperature.size == 0 or not np.isfinite(temperature).all():
-        find("temperature", "is empty or not finite", "give numbers in °C")
+    if temperature.size == 0:
+        find("temperature", "is empty", "give numbers in °C")
     else:
         findings += temperature_findings(gear, cause.values, temperature)
     if direction not in DIRECTIONS:
         find("direction", f"'{direction}' is unknown", "use up or down")
-    if not 0.0 < interval < 1.0:
-        find("interval", f"{interval} is not between 0 and 1", "use e.g. 0.95")
+    findings += implausible("interval", interval) + implausible("seed", seed)
     if findings:
         raise InputError(findings)
 

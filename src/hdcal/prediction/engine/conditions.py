@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear
+from hdcal.data.plausible import implausible
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding
 from hdcal.inference.values import Values
@@ -21,7 +22,6 @@ SENSE = {"up": 1.0, "down": -1.0}
 NEAR_K, NEAR_MM = 1.0, 1e-9
 # Temperatures of one answer; each is a row of it.
 MOST_LEVELS = 1_000
-_ABSOLUTE_ZERO = -273.15
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
 
@@ -128,9 +128,8 @@ def temperature_findings(
         temperature: at least one.
         name: of the parameter.
     """
-    # What is no number is no temperature either.
-    if not np.min(temperature) >= _ABSOLUTE_ZERO:
-        return [Finding(name, "is below absolute zero", "Give it in °C")]
+    if wrong := implausible(name, temperature, "temperature"):
+        return wrong
     rise = np.max(np.abs(temperature - gear.reference_temperature))
     if np.median(values["alpha"]) * rise >= _MOST_LOSS:
         words = "the linear law E(T) would lose half of Young's modulus"

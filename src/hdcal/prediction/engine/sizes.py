@@ -13,6 +13,7 @@ from jaxtyping import Float
 from scipy.stats import qmc
 
 from hdcal.data.case import Theory
+from hdcal.data.plausible import implausible
 from hdcal.data.records import Array, Geometry
 from hdcal.errors import Finding
 from hdcal.physics.theory import THEORIES
@@ -59,8 +60,8 @@ def check_tolerances(
             find(f"'{name}'", "is no size with a tolerance", f"Use {', '.join(SIZES)}")
             continue
         nominal = float(getattr(geometry, SIZES[name]))
-        if not np.isfinite(size) or size < 0.0:
-            find(name, f"= {size:g} is no tolerance", "Give the ± part, in mm")
+        if wrong := implausible("tolerances", size):
+            find(name, f"= {wrong[0].problem}", "Give the ± part, in mm")
         elif size > _LARGEST * nominal:
             find(name, f"= {size:g} on a size of {nominal:g} mm", "Give it in mm")
         elif not matters(SIZES[name], geometry, theory):

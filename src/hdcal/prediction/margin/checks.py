@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
 from hdcal.prediction.engine.causes import Cause, likeliest
 from hdcal.prediction.engine.conditions import (
@@ -58,6 +59,7 @@ def check_margin(
         *_check_temperature(cause, temperature),
         *check_shares(**shares),
         *_check_rarity(shares, sum(min(c.size, MOST_DRAWS) for c in causes)),
+        *implausible("seed", request.seed),
         *check_population(request.population, cause.problem),
         *check_tolerances(request.tolerances, gear.geometry, theory),
         *_check_forces(cause, at, forces),
@@ -106,7 +108,9 @@ def check_sign(
 
 def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
     radius = cause.posterior.case.gear.geometry.radius
-    if not np.isfinite(deformation) or deformation == 0.0:
+    if wrong := implausible("deformation", deformation):
+        return wrong
+    if deformation == 0.0:
         words = f"{deformation:g} mm is no deformation"
         return [Finding("deformation", words, "Give a number of mm")]
     if abs(deformation) >= radius / cause.problem.reading.radial_per_read:
@@ -144,7 +148,9 @@ def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
     for name, force in forces.items():
         if force is None:
             continue
-        if not np.isfinite(force) or force == 0.0:
+        if wrong := implausible(name, force):
+            findings += wrong
+        elif force == 0.0:
             words = f"{force:g} N is no force"
             findings.append(Finding(name, words, "Give a number of N"))
         elif scale > 0.0 and not scale / _OFF < abs(force) < scale * _OFF:

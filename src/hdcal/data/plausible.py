@@ -1,0 +1,157 @@
+"""What numbers can be, whatever the rig: one wide range for everything that is given.
+
+A number beyond its range is a slip of the pen or of the unit; no honest rig, however
+large or small, comes near the ends. docs/reliability.md prints this table.
+"""
+
+from typing import Any, NamedTuple
+
+from hdcal.errors import Finding
+
+
+class Range(NamedTuple):
+    """What a quantity can be.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+        unit: of both; empty for counts and shares.
+        why: what the ends stand for.
+        inner: whether the ends themselves are out.
+    """
+
+    low: float
+    high: float
+    unit: str
+    why: str
+    inner: bool = False
+
+    def holds(self, number: float) -> bool:
+        """Tell whether a number is one of this quantity; NaN is none."""
+        if self.inner:
+            return self.low < number < self.high
+        return self.low <= number <= self.high
+
+    def problem(self) -> str:
+        """Return in words what is wrong with any other number."""
+        ends = f"{self.low:.15g} and {self.high:.15g} {self.unit}".rstrip()
+        return f"does not lie between {ends}: {self.why}"
+
+
+_SCATTER = "from nothing to as large as the largest force"
+_STEEL = "from the softest gel to ten times diamond"
+RANGES = {
+    # readings
+    "deformation": Range(-1e3, 1e3, "mm", "no gear gives way by a metre"),
+    "force": Range(-1e9, 1e9, "N", "no rig presses with the weight of a large ship"),
+    "temperature": Range(-273.15, 3e3, "°C", "absolute zero, and where steel boils"),
+    "time": Range(-1e12, 1e12, "s", "thirty thousand years"),
+    "angle": Range(-1e9, 1e9, "rad", "a hundred million turns"),
+    "force_sd": Range(0.0, 1e9, "N", _SCATTER),
+    # the gear and what is believed of it
+    "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
+    "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
+    "K": Range(1e-6, 1e6, "", "a millionth to a million times the theory"),
+    "E0": Range(1e-6, 1e7, "MPa", _STEEL),
+    "alpha": Range(-1.0, 1.0, "1/K", "nothing loses all of its stiffness in a kelvin"),
+    "sigma": Range(1e-15, 1e9, "N", _SCATTER),
+    "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
+    "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
+    "mass": Range(1e-15, 1e6, "N·s²/mm", "from a nanogram to a million tonnes"),
+    "damping_ratio": Range(1e-9, 1e3, "", "from a bell to tar"),
+    "initial_velocity": Range(-1e9, 1e9, "mm/s", "far beyond the speed of sound"),
+    "deformation_sigma": Range(1e-15, 1e3, "mm", "from nothing to a metre"),
+    "poisson": Range(0.0, 0.5, "", "what an isotropic solid can have", inner=True),
+    "density": Range(1e-13, 1e-6, "N·s²/mm⁴", "from smoke to beyond any metal"),
+    "cte": Range(-1.0, 1.0, "1/K", "nothing doubles its length in a kelvin"),
+    "yield_strength": Range(1e-6, 1e7, "MPa", _STEEL),
+    "effect": Range(-1e15, 1e15, "", "of any parameter of an effect, in code units"),
+    "log_sd": Range(1e-9, 100.0, "", "a hundred powers of e"),
+    "beta": Range(1e-6, 1e9, "", "any shape that is not a spike"),
+    # what is asked
+    "share": Range(0.0, 1.0, "", "a share, neither none nor all", inner=True),
+    "limit_stress": Range(1e-6, 1e7, "MPa", _STEEL),
+    "tolerance": Range(0.0, 1e5, "mm", "from exact to a hundred metres"),
+    "setting_sd": Range(0.0, 1e3, "mm", "from exact to a metre"),
+    "rate": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
+    "frequency": Range(0.0, 1e9, "Hz", "from a steady sweep's start to ultrasound"),
+    "duration": Range(1e-9, 1e9, "s", "from a nanosecond to thirty years"),
+    "damping": Range(0.0, 1e9, "N·s/mm", "from none to as stiff as a wall"),
+    # how it is computed
+    "points": Range(2, 100_001, "", "a line has two ends, a plot no more room"),
+    "gears": Range(20, 10_000, "", "fewer have no spread, more take hours"),
+    "chains": Range(2, 64, "", "one cannot be compared, more add nothing"),
+    "warmup": Range(1, 1_000_000, "", "more take days"),
+    "draws": Range(4, 1_000_000, "", "fewer cannot be checked, more take days"),
+    "seed": Range(0, 2**32 - 1, "", "32 bits"),
+    "secret_seed": Range(0, 2**256 - 1, "", "256 bits"),
+    "jobs": Range(1, 256, "", "processes of one machine"),
+    "cases": Range(1, 100_000, "", "more take weeks"),
+    "degree": Range(1, 9, "", "higher ones leave no digits"),
+    "sample": Range(2, 1e9, "", "one specimen has no spread"),
+    "alarm_rows": Range(10.0, 1e9, "", "less is noise, more is never"),
+    "forget": Range(0.5, 1.0, "", "0.999 keeps about the last thousand readings"),
+    "reopen": Range(0.0, 1.0, "", "a share of the stiffness, such as 0.1"),
+}
+# Parameters, keys of files and options that are such a quantity under another name.
+NAMES = {
+    **dict.fromkeys(("at", "window"), "deformation"),
+    **dict.fromkeys(("deformation_offset", "initial_deformation"), "deformation"),
+    **dict.fromkeys(("limit_force", "given_force", "amplitude"), "force"),
+    "force_offset": "force",
+    **dict.fromkeys(("run_offset_sd", "gap_sd"), "sigma"),
+    **dict.fromkeys(("temperatures", "reference_temperature"), "temperature"),
+    **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), "size"),
+    "nominal_deformation": "size",
+    **dict.fromkeys(("content", "confidence", "required_probability"), "share"),
+    **dict.fromkeys(("probability", "interval"), "share"),
+    "tolerances": "tolerance",
+    "rates": "rate",
+    "degrees": "degree",
+    "mass_ratio": "K",
+}
+
+
+def range_of(name: str) -> Range:
+    """Return the range of a quantity, or of a parameter that is one.
+
+    Args:
+        name: a key of `RANGES` or `NAMES`.
+    """
+    return RANGES[NAMES.get(name, name)]
+
+
+def implausible(name: str, given: Any, quantity: str = "") -> list[Finding]:
+    """Return a finding where a number, or one of several, is beyond its range.
+
+    Args:
+        name: of the parameter.
+        given: the number or numbers; None for none.
+        quantity: that it is, where the parameter's name does not say so.
+    """
+    return out_of_range(name, given, range_of(quantity or name))
+
+
+def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
+    """Return a finding as `implausible` does, of a range that is known."""
+    numbers = [] if given is None else _flat(given)
+    for number in numbers:
+        if not known.holds(number):
+            words = f"{_shown(number)} {known.unit}".rstrip()
+            remedy = "Check the number and its unit"
+            return [Finding(name, f"{words} {known.problem()}", remedy)]
+    return []
+
+
+def _shown(number: float) -> str:
+    try:
+        return f"{number:.6g}"
+    except OverflowError:
+        return "a number of more than 300 digits"
+
+
+def _flat(given: Any) -> list:
+    if hasattr(given, "ravel"):  # NumPy, without importing it
+        # Of millions these say enough; each is NaN where one is.
+        return [given.min().item(), given.max().item()] if given.size else []
+    return list(given) if isinstance(given, list | tuple) else [given]
