@@ -5,16 +5,19 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import click
 import h5py
+import xarray as xr
 from commands import XB1
 from mutations import RAW, damaged_bytes, damaged_data, damaged_text
 from posteriors import single
 from sealing import sealed_set
 
 from hdcal.__main__ import hdcal
+from hdcal.inference import posterior_file
 
 WORDS = [
     *(
@@ -60,6 +63,30 @@ HEADERS = [
     ),
     *("temperature_K", "force_sd_N", "force_dB", "deformation_mm/N", "x", " " * 50_000),
 ]
+NUMBERS = [
+    *("0", "-0.0", "1", "-1", "2", "0.3", "-0.25", "1e-3", "1e-9", "1e3", "1e6", "1e9"),
+    *("1e30", "-1e30", "1e300", "1e-300", "0.999", "37.8", "20", "-273", "-274", "1e4"),
+]
+PRIORS = [
+    "K",
+    "E0",
+    "alpha",
+    "sigma",
+    "force_offset",
+    "gap_sd",
+    "hysteresis.width",
+    "x",
+]
+LAWS = [
+    f"{{ family = '{family}', {one} = {number}, {other} = {size}, unit = '{unit}' }}"
+    for family, one, other in [
+        *(("normal", "mean", "sd"), ("lognormal", "median", "log_sd")),
+        *(("uniform", "low", "high"), ("beta", "a", "b"), ("fixed", "value", "x")),
+    ]
+    for number in NUMBERS
+    for size in ("1", "0", "1e-9", "1e9", "-1")
+    for unit in ("1", "mm", "GPa", "N", "1/K", "dB")
+]
 VALUES = [
     *('"x"', '"steel"', "[]", "{}", "[[1], [2]]", "1979-05-27", "true", "nan", "-inf"),
     *("1e308", "0x10", "-1", "0", "1e-320", '"../x.toml"', '"\\u0000"', "'''x\ny'''"),
@@ -68,7 +95,7 @@ VALUES = [
 ]
 READING = {"deformation_mm": 0.2, "force_N": 37.8, "temperature_C": 20.0, "run": "a"}
 # What a few milliseconds can answer; other commands are named a case that is none.
-QUICK = ("check", "fit", "effects", "audit")
+QUICK = ("check", "fit", "effects", "audit", "predict")
 
 
 def make_targets(folder: Path) -> None:
@@ -78,19 +105,33 @@ def make_targets(folder: Path) -> None:
     sealed_set(folder / "set", count=2)
 
 
+def _mostly(rng: random.Random) -> bool:
+    """Say whether to be mild: what is refused at the door never gets inside."""
+    return rng.random() < 0.7
+
+
 def attack_table(rng: random.Random, targets: Path) -> list[str]:
     """Spoil a table of readings."""
     text = (targets / "case/data.csv").read_text()
     lines = [line.split(",") for line in text.splitlines()]
-    for _ in range(rng.choice([1, 1, 2, 5])):
-        line = rng.choice([0, rng.randrange(len(lines))])
-        place = rng.randrange(len(lines[line]) + 1)
-        new = rng.choice(HEADERS if line == 0 else CELLS)
-        lines[line][place : place + rng.randrange(3)] = [new]
-    separator, end = rng.choice(",,,;\t|"), rng.choice(["\n", "\n", "\r\n", "\x85"])
+    mild = _mostly(rng)
+    for _ in range(1 if mild else 4):
+        line = rng.choice([0, *range(len(lines))])
+        place = rng.randrange(len(lines[line]))
+        new = rng.choice(HEADERS if line == 0 else NUMBERS if mild else CELLS)
+        lines[line][place : place + (1 if mild else rng.randrange(3))] = [new]
+        if mild and line == 0 and _mostly(rng):
+            # A column more, of numbers that may be anything.
+            header = ["deformation_mm", "force_N", new]
+            own = rng.choice(NUMBERS)
+            rest = [
+                [*one, rng.choice([own, f"{k}"])] for k, one in enumerate(lines[1:])
+            ]
+            lines = [header, *rest]
+    separator, end = (",", "\n") if mild else rng.choice([",;", "\t\n", "|\x85", ",\r"])
     raw = end.join(separator.join(cells) for cells in lines).encode("utf-8", "replace")
     shutil.copytree(targets / "case", "case")
-    whole = raw if rng.random() < 0.7 else damaged_bytes(raw, rng)
+    whole = raw if mild else damaged_bytes(raw, rng)
     Path("case/data.csv").write_bytes(whole)
     return [rng.choice(["check", "fit"]), "case"]
 
@@ -98,30 +139,44 @@ def attack_table(rng: random.Random, targets: Path) -> list[str]:
 def attack_gear(rng: random.Random, targets: Path) -> list[str]:
     """Spoil a gear file."""
     lines = (targets / "case/gear.toml").read_text().splitlines()
-    for _ in range(rng.choice([1, 1, 2, 5])):
-        line = rng.randrange(len(lines))
-        key = lines[line].partition("=")[0].strip() or "priors.K"
-        new = [f"{key} = {rng.choice(VALUES)}", f"[{key}]", f"{key}.x = 1", ""]
-        lines[line : line + rng.randrange(2)] = [rng.choice(new)]
+    mild = _mostly(rng)
+    for _ in range(1 if mild else 3):
+        line = rng.choice([k for k, one in enumerate(lines) if "=" in one])
+        key = lines[line].partition("=")[0].strip()
+        new = [f"{key} = {rng.choice(NUMBERS if mild else VALUES)}"]
+        if not mild:
+            new += [f"[{key}]", f"{key}.x = 1", "", f"priors.{key} = 1"]
+        lines[line] = rng.choice(new)
+    if mild and _mostly(rng):
+        lines += ["[priors]", f"{rng.choice(PRIORS)} = {rng.choice(LAWS)}"]
     raw = "\n".join(lines).encode()
     shutil.copytree(targets / "case", "case")
-    whole = raw if rng.random() < 0.7 else damaged_bytes(raw, rng)
-    Path("case/gear.toml").write_bytes(whole)
+    Path("case/gear.toml").write_bytes(raw if mild else damaged_bytes(raw, rng))
     return ["check", "case"]
 
 
 def attack_posterior(rng: random.Random, targets: Path) -> list[str]:
-    """Spoil a posterior: its bytes, or what its variables and attributes are."""
+    """Spoil a posterior: its bytes, or what it holds, with a digest that fits."""
     file = Path("posterior.nc")
     shutil.copy(targets / "posterior.nc", file)
-    if rng.random() < 0.4:
+    if not _mostly(rng):
         file.write_bytes(damaged_bytes(file.read_bytes(), rng))
     else:
         with h5py.File(file, "r+") as tree:
             found: list[str] = []
             tree.visit(found.append)
             _spoil(rng, tree, rng.choice(found))
+        with suppress(Exception):
+            _stamp(file)
     return ["predict", str(file), "--deformation", "0.3", "--json"]
+
+
+def _stamp(file: Path) -> None:
+    """Make the digest fit, as anybody can."""
+    with xr.open_datatree(file, engine="h5netcdf") as tree:
+        value = posterior_file.digest(tree.load())
+    with h5py.File(file, "r+") as whole:
+        whole.attrs[posterior_file.DIGEST] = value
 
 
 def _spoil(rng: random.Random, tree: h5py.File, name: str) -> None:
@@ -137,8 +192,13 @@ def _spoil(rng: random.Random, tree: h5py.File, name: str) -> None:
         case 3:
             tree[f"{name}/more" if isinstance(one, h5py.Group) else "more"] = one
         case _:
-            key = rng.choice([*one.attrs, *tree.attrs, "units"])
-            tree.attrs[key] = rng.choice(["x", "{}", "[1, 2]", 7, b"\xff", *RAW[:3]])
+            texts = [name for name, v in tree.attrs.items() if str(v).startswith("{")]
+            key = rng.choice([*tree.attrs, *texts * 9])
+            odd = ["x", "{}", "[1, 2]", 7, b"\xff", *RAW[:3]]
+            if key in texts:
+                plain = json.loads(str(tree.attrs[key]))
+                odd += [json.dumps(damaged_data(plain, rng)) for _ in range(40)]
+            tree.attrs[key] = rng.choice(odd)
 
 
 def attack_set(rng: random.Random, targets: Path) -> list[str]:
@@ -171,19 +231,23 @@ def attack_lines(rng: random.Random, targets: Path) -> list[str]:
 
 def attack_options(rng: random.Random, targets: Path) -> list[str]:
     """Give a command any words for any of its options."""
-    name = rng.choice([*hdcal.commands, *QUICK, *QUICK])
-    command = hdcal.commands[name]
+    name = rng.choice([*hdcal.commands, *QUICK * 4])
+    arguments, command = [name], hdcal.commands[name]
     if isinstance(command, click.Group):
-        inner = rng.choice(list(command.commands))
-        arguments, command = [name, inner], command.commands[inner]
-    else:
-        arguments = [name]
-    arguments.append(str(targets / "case") if name in QUICK else "none-such")
-    known = [one for p in command.params for one in p.opts if one.startswith("-")]
+        arguments.append(rng.choice(list(command.commands)))
+        command = command.commands[arguments[-1]]
+    takes = any(isinstance(one, click.Argument) for one in command.params)
+    if takes:
+        place = "posterior.nc" if name == "predict" else "case"
+        arguments.append(str(targets / place) if name in QUICK else "none-such")
+    known = [one for one in command.params if isinstance(one, click.Option)]
     for _ in range(rng.choice([1, 2, 4])):
-        arguments.append(rng.choice([*known, *known, *WORDS]))
-        if rng.random() < 0.8:
-            arguments.append(rng.choice(WORDS))
+        one = rng.choice(known)
+        arguments.append(rng.choice(one.opts))
+        if not one.is_flag:
+            arguments.append(rng.choice(WORDS if rng.random() < 0.3 else NUMBERS))
+    if not _mostly(rng):
+        arguments.append(rng.choice(WORDS))
     return [argument.replace("\x00", "") for argument in arguments]
 
 

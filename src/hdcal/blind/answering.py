@@ -83,8 +83,7 @@ def answer_set(
     if wrong := implausible("jobs", jobs):
         raise InputError(wrong)
     choose_library(library)
-    found = read_set(folder)
-    _check_libraries(found)
+    found = _readable_set(folder)
     entries = {entry.case: entry for entry in found.manifest.cases}
     answers, made_by = AnswerFiles(found, by), fingerprint(library)
     with answers.reserve() as target:
@@ -102,8 +101,9 @@ def answer_set(
         return answers.freeze(target, made_by, families(), library or "")
 
 
-def _check_libraries(found: BlindSet) -> None:
-    """Check that this library holds what the cases of a set withhold."""
+def _readable_set(folder: Path | str) -> BlindSet:
+    """Read a set; this library has to hold what its cases withhold."""
+    found = read_set(folder)
     libraries = {entry.library for entry in found.manifest.cases}
     for library in sorted(filter(None, libraries)):
         try:
@@ -113,6 +113,7 @@ def _check_libraries(found: BlindSet) -> None:
             words += error.findings[0].problem
             remedy = "Answer it with the version of hdcal that made it"
             raise refusal(found.folder / SET, words, remedy) from None
+    return found
 
 
 def _outcomes(

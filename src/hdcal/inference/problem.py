@@ -203,8 +203,7 @@ def build_problem(
 ) -> Problem:
     """Turn a case into an inference problem.
 
-    Rows are kept when an effect bends the chain or the rounding is coarse; else
-    they are compressed to triangular factors.
+    Rows are compressed unless an effect bends the chain or the rounding is coarse.
 
     Args:
         case: records and gear.
