@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from numpyro.handlers import seed, trace
 from scipy import stats
 
 from hdcal.data.case import Case, Gear
@@ -16,6 +17,7 @@ from hdcal.inference import values as of_draw
 from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
+from hdcal.inference.model import model
 from hdcal.inference.problem import build_problem
 from hdcal.physics.chain import (
     Base,
@@ -304,6 +306,21 @@ def test_blocks_rows_and_dense_agree(structured, seed):
     if "specimen" not in problem.integrated:
         rows = float(log_likelihood(rows_form(problem, case), values))
         assert rows == pytest.approx(slow, rel=1e-10)
+
+
+def test_a_draw_holds_what_is_said_of_it(structured):
+    case, problem = structured
+    sites = trace(seed(model, jax.random.key(0))).get_trace(problem)
+    values = {
+        name: site["value"]
+        for name, site in sites.items()
+        if site["type"] in ("sample", "deterministic") and not name.startswith("_")
+    }
+    values = {name: value for name, value in values.items() if name != "force"}
+    values |= jax.jit(integrated.draw_members)(problem, values, jax.random.key(0))
+    shapes = {name: np.shape(value) for name, value in values.items()}
+    with_gap = problem.discrepancy is not None
+    assert shapes == of_draw.site_shapes(case, (), with_gap)
 
 
 def test_drawn_members_explain_the_data(structured):

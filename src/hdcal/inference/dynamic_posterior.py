@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from hdcal.errors import Finding, InputError
 from hdcal.inference import posterior_file
-from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
+from hdcal.inference.dynamic_problem import SITES, DynamicProblem, build_dynamic
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.problem import Problem
 
@@ -19,6 +19,11 @@ class DynamicPosterior(Posterior):
     """
 
     kind: ClassVar[str] = "dynamic"
+
+    @staticmethod
+    def sites(case, effects, with_gap) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each parameter that a draw holds."""
+        return dict.fromkeys(("E0", "K", *SITES), ())
 
     @cached_property
     def problem(self) -> Problem:

@@ -1,7 +1,7 @@
 """The calibrated posterior: draws, what they rest on, and whether they may be used."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import metadata
@@ -17,8 +17,10 @@ from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.held import HeldModel
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
+from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
@@ -52,6 +54,13 @@ class Posterior(Shown):
     diagnoses: Mapping[str, Diagnosis]
     checks: tuple[Check, ...]
     settings: Mapping[str, object]
+
+    @staticmethod
+    def sites(
+        case: Case, effects: Sequence[type[Effect]], with_gap: bool
+    ) -> dict[str, tuple[int, ...]]:
+        """Return the shape of each parameter that a draw holds."""
+        return site_shapes(case, effects, with_gap)
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -155,27 +164,25 @@ class Posterior(Shown):
         tree = posterior_file.open_tree(file)
         posterior_file.check_unchanged(tree, file)
         try:
-            model = json.loads(tree.attrs["model"])
-            if model["settings"].get("kind", "static") != cls.kind:
+            model = HeldModel.model_validate_json(tree.attrs["model"])
+            if model.settings.kind != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
-            check_draws(tree, model["priors"])
             case = posterior_file.restore_case(
                 tree.attrs["case"],
                 tree["constant_data"].to_dataset(),
                 tree["observed_data"].to_dataset()["force"],
             )
+            chosen = _look_up(model.effects, effects, file)
+            check_draws(tree, cls.sites(case, chosen, model.settings.with_gap))
             return cls(
                 case=case,
-                theory=model["theory"],
-                effects=_look_up(model["effects"], effects, file),
-                priors={
-                    name: posterior_file.restore_prior(prior)
-                    for name, prior in model["priors"].items()
-                },
+                theory=model.theory,
+                effects=chosen,
+                priors=posterior_file.restore_priors(model.priors),
                 tree=tree,
-                diagnoses={n: Diagnosis(**d) for n, d in model["diagnoses"].items()},
-                checks=tuple(Check(**check) for check in model["checks"]),
-                settings=model["settings"],
+                diagnoses=model.diagnoses,
+                checks=tuple(model.checks),
+                settings=model.settings.model_dump(exclude_unset=True),
             )
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.errors import Finding, InputError
-from hdcal.inference.posterior_limits import check_container
+from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
+from hdcal.inference.posterior_limits import check_container, check_rows
 
 FORMAT = "hdcal.posterior/1"
 # The attribute that holds the digest of everything else.
@@ -48,11 +50,12 @@ def describe_prior(prior: Prior) -> dict:
     }
 
 
-def restore_prior(plain: dict) -> Prior:
-    """Return the prior that `describe_prior` described."""
-    return Prior(
-        plain["family"], tuple(plain["numbers"]), plain["unit"], plain["source"]
-    )
+def restore_priors(held: Mapping[str, HeldPrior]) -> dict[str, Prior]:
+    """Return the priors that `describe_prior` described."""
+    return {
+        name: Prior(one.family, tuple(one.numbers), one.unit, one.source)
+        for name, one in held.items()
+    }
 
 
 _TABLES = ("priors", "scale_priors", "effect_priors", "dynamic_priors")
@@ -84,25 +87,25 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     """Return the case that was described, with its rows.
 
     Raises:
-        KeyError, ValueError: the description is not one.
+        KeyError, TypeError, ValueError: the description is not one, or not of these
+            rows.
     """
-    plain = json.loads(text)
-    gear = plain["gear"]
-    # A file of before there were dynamics is as good as ever for the rest.
-    gear.setdefault("dynamic_priors", {})
+    held = HeldCase.model_validate_json(text)
+    gear = {name: getattr(held.gear, name) for name in HeldGear.model_fields}
     for table in _TABLES:
-        gear[table] = {name: restore_prior(p) for name, p in gear[table].items()}
+        gear[table] = restore_priors(gear[table])
     gear["geometry"] = Geometry(**gear["geometry"])
     rows = {name: constant[name].to_numpy() for name in UNITS}
-    records = Records(**rows, force=force.to_numpy(), known=frozenset(plain["known"]))
+    rows["force"] = force.to_numpy()
+    check_rows(rows, len(held.run_labels), len(held.specimen_labels))
     return Case(
-        name=plain["name"],
+        name=held.name,
         gear=Gear(**gear),
-        records=records,
-        run_labels=tuple(plain["run_labels"]),
-        specimen_labels=tuple(plain["specimen_labels"]),
-        data_sha256=plain["data_sha256"],
-        notes=tuple(plain["notes"]),
+        records=Records(**rows, known=frozenset(held.known)),
+        run_labels=tuple(held.run_labels),
+        specimen_labels=tuple(held.specimen_labels),
+        data_sha256=held.data_sha256,
+        notes=tuple(held.notes),
     )
 
 

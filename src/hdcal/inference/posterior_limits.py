@@ -1,6 +1,6 @@
 """Posterior files from strangers: refused by what they declare, before it is read."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import h5py
@@ -19,8 +19,6 @@ _MOST_OBJECTS, _MOST_ATTRIBUTES, _MOST_TEXTS = 2_000, 500, 20_000
 _MOST_LETTERS = 64 << 20
 # How NetCDF names what HDF5 itself needs; they hold references.
 _OF_DIMENSIONS = frozenset({"DIMENSION_LIST", "REFERENCE_LIST"})
-# Parameters of every model; others depend on what was measured.
-_EVERYWHERE = frozenset({"K", "E0", "alpha", "deformation_offset"})
 
 
 def check_container(path: Path) -> None:
@@ -124,30 +122,45 @@ def _letters(found: h5py.Dataset, count: int) -> int:
     return letters
 
 
-def check_draws(tree: xr.DataTree, sites: Iterable[str]) -> None:
-    """Check that draws and rows are whole, whoever wrote them.
+def check_draws(tree: xr.DataTree, sites: Mapping[str, tuple[int, ...]]) -> None:
+    """Check that draws are whole, whoever wrote them.
 
     Args:
         tree: as it was read.
-        sites: parameters that the model has a prior of; those that every model has
-            and those of effects have to be there.
+        sites: shape of each parameter that the model has.
 
     Raises:
         KeyError, ValueError: they are not.
     """
-    for name, group in (("posterior", ("chain", "draw")), ("constant_data", ())):
-        for variable in tree[name].to_dataset().data_vars.values():
-            if variable.dims[: len(group)] != group:
-                raise ValueError(f"{variable.name} has other axes")
-            if variable.dtype.kind not in "biuf" or not np.isfinite(variable).all():
-                raise ValueError(f"{variable.name} is not finite")
-    needed = {name for name in sites if name in _EVERYWHERE or "." in name}
-    missing = needed - set(tree["posterior"].data_vars)
-    if missing:
-        raise KeyError(*missing)
-    sizes = tree["posterior"].sizes
-    if sizes["chain"] < 1 or sizes["draw"] < 1:
+    draws = tree["posterior"].to_dataset()
+    size = draws.sizes["chain"], draws.sizes["draw"]
+    if min(size) < 1:
         raise ValueError("there are no draws")
+    for name in {*sites, *map(str, draws.data_vars)}:
+        one = draws[name]
+        if one.dims[:2] != ("chain", "draw"):
+            raise ValueError(f"{name} has other axes")
+        if name in sites and one.shape != (*size, *sites[name]):
+            raise ValueError(f"{name} has another shape")
+        if one.dtype.kind not in "biuf" or not np.isfinite(one).all():
+            raise ValueError(f"{name} is not finite")
+
+
+def check_rows(rows: Mapping[str, np.ndarray], runs: int, specimens: int) -> None:
+    """Check that rows are whole and that their labels exist.
+
+    Raises:
+        ValueError: they are not.
+    """
+    for name, column in rows.items():
+        if column.shape != rows["force"].shape or column.ndim != 1 or not column.size:
+            raise ValueError(f"{name} has another shape")
+        if column.dtype.kind not in "biuf" or not np.isfinite(column).all():
+            raise ValueError(f"{name} is not finite")
+    for name, count in (("run", runs), ("specimen", specimens)):
+        index = rows[name]
+        if index.dtype.kind not in "iu" or index.min() < 0 or index.max() >= count:
+            raise ValueError(f"{name} is no index of a label")
 
 
 def _refusal(path: Path, words: str) -> InputError:

@@ -1,14 +1,16 @@
 """The parameters of one draw, and what they say of each row."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
-from hdcal.inference.problem import Problem
+from hdcal.inference.member_counts import member_counts
+from hdcal.inference.problem import Problem, without_scatter
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
@@ -24,8 +26,27 @@ MEMBERS = {
 }
 # The site of the spread of those that are labels in the data.
 MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
+_SCALES = {
+    "run": ("run_offset_sd",),
+    "specimen": ("specimen_sd",),
+    "discrepancy": ("gap_sd", "gap_length"),
+}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
+
+
+def site_shapes(
+    case: Case, effects: Sequence[type[Effect]], with_gap: bool
+) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each parameter that a draw of the model holds."""
+    names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
+    for effect in without_scatter(effects):
+        names += [f"{effect.name}.{field}" for field in parameters(effect)]
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
+    for kind, count in member_counts(case, with_gap).items():
+        shapes |= dict.fromkeys(_SCALES[kind], ())
+        shapes[MEMBERS[kind]] = (count,)
+    return shapes
 
 
 def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
