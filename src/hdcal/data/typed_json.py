@@ -10,6 +10,9 @@ T = TypeVar("T")
 
 # Of dataclasses, as `__pydantic_config__`: no other fields, no text for a number.
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+# The same of results, whose numbers need not be finite; and of some fields of many.
+RESULT = ConfigDict(extra="forbid", strict=True)
+PART = ConfigDict(extra="ignore", strict=True)
 # Names of things go into tables and figures: `a`, `a.b`, `a+b` or `a b`.
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+ -]{1,200}$")]
 Share = Annotated[float, Field(ge=0.0, le=1.001)]  # a sum may pass 1 by rounding
@@ -48,6 +51,15 @@ def typed(kind: type[T], data: Any) -> T:
     except (TypeError, RecursionError):
         raise ValueError("is no plain data") from None
     return _adapter(kind).validate_json(text, strict=True)
+
+
+def typed_text(kind: type[T], text: str) -> T:
+    """Return JSON as a type; numbers need not be finite.
+
+    Raises:
+        ValueError: it is something else.
+    """
+    return _adapter(kind).validate_json(text)
 
 
 @cache

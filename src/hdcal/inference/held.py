@@ -1,20 +1,19 @@
 """What the attributes of a posterior file hold as JSON, typed: whoever wrote it."""
 
-from typing import Any, Literal
-
-from pydantic import BaseModel, ConfigDict
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
+from hdcal.data.typed_json import PART, RESULT
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 
-_STRICT = ConfigDict(extra="forbid", strict=True)
 
-
-class HeldPrior(BaseModel):
+@dataclass(frozen=True)
+class HeldPrior:
     """A prior, in code units."""
 
-    model_config = _STRICT
+    __pydantic_config__: ClassVar = RESULT
     family: Literal["fixed", "normal", "lognormal", "half_normal", "uniform", "beta"]
     numbers: list[float]
     unit: str
@@ -24,10 +23,11 @@ class HeldPrior(BaseModel):
 Priors = dict[str, HeldPrior]
 
 
-class HeldGear(BaseModel):
+@dataclass(frozen=True)
+class HeldGear:
     """A gear; lengths in mm."""
 
-    model_config = _STRICT
+    __pydantic_config__: ClassVar = RESULT
     name: str
     geometry: dict[str, float]
     material: str
@@ -42,14 +42,15 @@ class HeldGear(BaseModel):
     scale_priors: Priors
     effect_priors: Priors
     # A file of before there were dynamics is as good as ever for the rest.
-    dynamic_priors: Priors = {}
+    dynamic_priors: Priors = field(default_factory=dict)
     density: float | None = None
 
 
-class HeldCase(BaseModel):
+@dataclass(frozen=True)
+class HeldCase:
     """A case without its rows."""
 
-    model_config = _STRICT
+    __pydantic_config__: ClassVar = RESULT
     name: str
     gear: HeldGear
     known: list[str]
@@ -59,10 +60,11 @@ class HeldCase(BaseModel):
     notes: list[str]
 
 
-class HeldSettings(BaseModel):
-    """How it was sampled; each kind of calibration may say more."""
+@dataclass(frozen=True)
+class HeldSettings:
+    """How it was sampled; a file says more than this."""
 
-    model_config = ConfigDict(extra="allow", strict=True)
+    __pydantic_config__: ClassVar = PART
     seed: int
     chains: int
     warmup: int
@@ -73,13 +75,14 @@ class HeldSettings(BaseModel):
     kind: Literal["static", "dynamic"] = "static"
 
 
-class HeldModel(BaseModel):
+@dataclass(frozen=True)
+class HeldModel:
     """What was sampled, how, and how well."""
 
-    model_config = _STRICT
+    __pydantic_config__: ClassVar = RESULT
     theory: Theory
     effects: list[str]
     priors: Priors
-    settings: HeldSettings
+    settings: dict[str, Any]
     diagnoses: dict[str, Diagnosis]
     checks: list[Check]

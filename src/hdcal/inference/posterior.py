@@ -13,11 +13,12 @@ import xarray as xr
 
 from hdcal.data.case import Case, Theory
 from hdcal.data.priors import Prior
+from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.held import HeldModel
+from hdcal.inference.held import HeldModel, HeldSettings
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.values import site_shapes
@@ -164,8 +165,9 @@ class Posterior(Shown):
         tree = posterior_file.open_tree(file)
         posterior_file.check_unchanged(tree, file)
         try:
-            model = HeldModel.model_validate_json(tree.attrs["model"])
-            if model.settings.kind != cls.kind:
+            model = typed_text(HeldModel, tree.attrs["model"])
+            settings = typed(HeldSettings, model.settings)
+            if settings.kind != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
             case = posterior_file.restore_case(
                 tree.attrs["case"],
@@ -173,7 +175,7 @@ class Posterior(Shown):
                 tree["observed_data"].to_dataset()["force"],
             )
             chosen = _look_up(model.effects, effects, file)
-            check_draws(tree, cls.sites(case, chosen, model.settings.with_gap))
+            check_draws(tree, cls.sites(case, chosen, settings.with_gap))
             return cls(
                 case=case,
                 theory=model.theory,
@@ -182,7 +184,7 @@ class Posterior(Shown):
                 tree=tree,
                 diagnoses=model.diagnoses,
                 checks=tuple(model.checks),
-                settings=model.settings.model_dump(exclude_unset=True),
+                settings=model.settings,
             )
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error

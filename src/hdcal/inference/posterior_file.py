@@ -12,6 +12,7 @@ import xarray as xr
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
+from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, InputError
 from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
 from hdcal.inference.posterior_limits import check_container, check_rows
@@ -90,8 +91,8 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
         KeyError, TypeError, ValueError: the description is not one, or not of these
             rows.
     """
-    held = HeldCase.model_validate_json(text)
-    gear = {name: getattr(held.gear, name) for name in HeldGear.model_fields}
+    held = typed_text(HeldCase, text)
+    gear = {f.name: getattr(held.gear, f.name) for f in fields(HeldGear)}
     for table in _TABLES:
         gear[table] = restore_priors(gear[table])
     gear["geometry"] = Geometry(**gear["geometry"])
