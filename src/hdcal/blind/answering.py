@@ -58,9 +58,7 @@ def answer_set(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Answer every case of a set and freeze the answers.
-
-    The same call after an interruption goes on where the first one stopped.
+    """Answer every case of a set and freeze the answers; called again it goes on.
 
     Args:
         folder: the set.
