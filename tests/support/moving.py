@@ -110,7 +110,8 @@ def still_posterior(effects: dict | None = None, *, usable: bool = True, **sprea
     )
     driven = Diagnosis(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
     check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
-    settings = {"with_gap": False, "seed": 0}
+    settings = {"with_gap": False, "seed": 0, "chains": 2, "warmup": 1, "draws": 100}
+    settings |= {"seconds": 0.0, "versions": {}}
     priors = problem_priors(case, chosen, effect_priors(), "ring")
     return Posterior(
         case, "ring", chosen, priors, tree, {"K": driven}, (check,), settings
