@@ -96,13 +96,13 @@ class Manifest:
         try:
             cases = tuple(Entry(**entry) for entry in rest.pop("cases"))
             found = cls(cases, **rest)
+            check_names([entry.case for entry in cases])
             _check_types(found)
             plain = found.plain()
             if plain.keys() != data.keys():
                 raise KeyError
         except (AttributeError, KeyError, TypeError):
             raise Broken("lacks something that every set has, or holds more") from None
-        check_names([entry.case for entry in cases])
         if any(plain[key] != data[key] for key in ("schema", "commitment")):
             raise Broken("was changed: its commitment is not that of its content")
         return found

@@ -162,6 +162,8 @@ def check_rows(rows: Mapping[str, np.ndarray], runs: int, specimens: int) -> Non
             raise ValueError(f"{name} is not finite")
         if name in _READ and implausible(name, [column.min(), column.max()]):
             raise ValueError(f"{name} is beyond every rig")
+    if np.ptp(rows["deformation"]) == 0.0:
+        raise ValueError("nothing was deformed")
     for name, count in (("run", runs), ("specimen", specimens)):
         index = rows[name]
         if index.dtype.kind not in "iu" or index.min() < 0 or index.max() >= count:
