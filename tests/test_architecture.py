@@ -1,6 +1,7 @@
-"""The page about the way of data names every room, and files that exist."""
+"""The page about the way of data is true, and no two classes share a name."""
 
 import re
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -16,6 +17,13 @@ def named() -> list[str]:
 def test_every_file_that_is_named_exists():
     assert len(named()) > 20
     assert [path for path in named() if not (PACKAGE / path).is_file()] == []
+
+
+def test_no_name_stands_for_two_classes():
+    texts = (path.read_text("utf-8") for path in PACKAGE.rglob("*.py"))
+    count = Counter(n for t in texts for n in re.findall(r"^class (\w+)", t, re.M))
+    assert len(count) > 100
+    assert [name for name, often in count.items() if often > 1] == []
 
 
 def test_every_room_is_named():

@@ -1,9 +1,12 @@
 """A posterior file from a stranger is refused by what it declares, unread."""
 
+import json
 import os
 import shutil
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -160,9 +163,63 @@ def rows_not_finite(tree) -> None:
     tree["constant_data/deformation"].values[0] = np.inf
 
 
+def other_shape(tree) -> None:
+    draws = tree["posterior"].to_dataset()
+    draws["sigma"] = draws["run_offset"]
+    tree["posterior"] = draws
+
+
+def a_label_too_few(tree) -> None:
+    tree["constant_data/run"].values[0] = 99
+
+
+def nothing_deformed(tree) -> None:
+    tree["constant_data/deformation"].values[:] = 0.0
+
+
+def beyond_every_rig(tree) -> None:
+    tree["constant_data/deformation"].values[0] = 1e200
+
+
+def described(name: str, *path: str, value: object) -> Callable[[Any], None]:
+    """Return what puts another value into an attribute's JSON."""
+
+    def spoil(tree) -> None:
+        whole = part = json.loads(tree.attrs[name])
+        for key in path[:-1]:
+            part = part[key]
+        assert path[-1] in part
+        part[path[-1]] = value
+        tree.attrs[name] = json.dumps(whole)
+
+    spoil.__name__ = ".".join((name, *path))
+    return spoil
+
+
+TYPES = [
+    described("model", "priors", "K", "numbers", value=[]),
+    described("model", "priors", "K", "family", value="x"),
+    described("model", "theory", value="x"),
+    described("model", "settings", "seed", value="1"),
+    described("model", "checks", value=[{"name": "x"}]),
+    described("case", "gear", "reference_temperature", value="warm"),
+    described("case", "gear", "geometry", "radius", value=[1.0]),
+    described("case", "run_labels", value=7),
+]
+
+
+def test_what_hdcal_wrote_is_read(file):
+    assert Posterior.load(file).usable
+
+
 @pytest.mark.parametrize(
     "spoil",
     [
+        *TYPES,
+        other_shape,
+        a_label_too_few,
+        nothing_deformed,
+        beyond_every_rig,
         nothing_drawn,
         not_finite,
         without_a_parameter,

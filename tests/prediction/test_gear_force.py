@@ -11,7 +11,7 @@ from posteriors import single
 
 from hdcal.design.answer import LimitAsked
 from hdcal.design.design_draws import design_draws
-from hdcal.design.force_limit import Target
+from hdcal.design.force_limit import LimitedGear
 from hdcal.design.next_gear import next_gear
 from hdcal.design.study.study import force_quantiles, general_quantiles, is_linear
 from hdcal.errors import InputError
@@ -94,7 +94,7 @@ def limit(deformation, temperatures, probability) -> LimitAsked:
 def test_derivatives_are_those_of_finite_differences(make, theory):
     draws = make(500, theory)
     gear = next_gear(draws, {"wall_thickness_mm": 0.02, "radius_mm": 0.05})
-    target = Target.of(draws, gear, limit(0.3, (-20.0, 80.0), 0.95))
+    target = LimitedGear.of(draws, gear, limit(0.3, (-20.0, 80.0), 0.95))
     place = {
         "wall_thickness_mm": 0.66,
         "radius_mm": 41.0,
@@ -120,7 +120,7 @@ def test_derivatives_are_those_of_finite_differences(make, theory):
 
 def test_a_wrong_derivative_would_be_seen():
     draws = bent(500)
-    target = Target.of(draws, next_gear(draws), limit(0.4, (20.0,), 0.95))
+    target = LimitedGear.of(draws, next_gear(draws), limit(0.4, (20.0,), 0.95))
     slope = jax.grad(lambda x: target.force({"deformation_mm": x}))
     # That of the straight line alone.
     straight = target.force({}) / 0.4
@@ -130,7 +130,9 @@ def test_a_wrong_derivative_would_be_seen():
 def test_no_fewer_draws_keep_the_limit_than_were_asked_for():
     draws = known(2000)
     for probability in (0.5, 0.9, 0.99, 0.995):
-        target = Target.of(draws, next_gear(draws), limit(0.4, (20.0,), probability))
+        target = LimitedGear.of(
+            draws, next_gear(draws), limit(0.4, (20.0,), probability)
+        )
         share = np.mean(np.asarray(target.forces({})) <= float(target.force({})))
         assert probability <= share < probability + 2.0 / draws.size
 

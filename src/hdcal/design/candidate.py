@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.design.design_draws import DesignDraws
-from hdcal.design.force_limit import Target
+from hdcal.design.force_limit import LimitedGear
 from hdcal.design.nearest_point import CLOSE, nearest_kept
 from hdcal.prediction.engine.sizes import SIZES
 
@@ -45,7 +45,7 @@ class Candidate:
 
 
 def best_candidate(
-    draws: DesignDraws, target: Target, bounds: Mapping[str, tuple[float, float]]
+    draws: DesignDraws, target: LimitedGear, bounds: Mapping[str, tuple[float, float]]
 ) -> Candidate:
     """Return the best sizes of one material.
 
@@ -69,13 +69,13 @@ def best_candidate(
     return candidate(draws, target, sizes)
 
 
-def _own(target: Target, name: str) -> float:
+def _own(target: LimitedGear, name: str) -> float:
     return float(getattr(target.drawing, SIZES[name]))
 
 
 # Compiled once for all materials: everything but the names is an argument.
 @partial(jax.jit, static_argnames="names")
-def _excess(target: Target, z, names):
+def _excess(target: LimitedGear, z, names):
     """Return the logarithms of force and stress over what is allowed."""
     place = dict(zip(names, jnp.exp(z), strict=True))
     force = target.force(place) / target.limit_force
@@ -87,7 +87,7 @@ _slopes = partial(jax.jit, static_argnames="names")(jax.jacfwd(_excess, argnums=
 
 
 def candidate(
-    draws: DesignDraws, target: Target, sizes: Mapping[str, float]
+    draws: DesignDraws, target: LimitedGear, sizes: Mapping[str, float]
 ) -> Candidate:
     """Return what given sizes [mm] come to, by edge name."""
     forces, stresses = map(np.asarray, _draws(target, dict(sizes)))
@@ -110,12 +110,12 @@ def candidate(
 
 
 @jax.jit
-def _draws(target: Target, sizes):
+def _draws(target: LimitedGear, sizes):
     return target.forces(sizes), target.stresses(sizes)
 
 
 def spreads(
-    target: Target, sizes: Mapping[str, np.ndarray], shares: np.ndarray
+    target: LimitedGear, sizes: Mapping[str, np.ndarray], shares: np.ndarray
 ) -> np.ndarray:
     """Return quantiles of the force, and the force kept, for many sizes [N].
 
@@ -133,7 +133,7 @@ def spreads(
 
 
 @jax.jit
-def _spreads(target: Target, sizes, shares):
+def _spreads(target: LimitedGear, sizes, shares):
     def one(place):
         ranked = jnp.sort(target.forces(place))
         return jnp.append(jnp.quantile(ranked, shares), ranked[target.rank])
@@ -142,7 +142,7 @@ def _spreads(target: Target, sizes, shares):
     return jax.lax.map(one, sizes)
 
 
-def elasticities(target: Target, sizes: Mapping[str, float]) -> dict[str, float]:
+def elasticities(target: LimitedGear, sizes: Mapping[str, float]) -> dict[str, float]:
     """Return d ln F / d ln x of the kept force by sizes, ω, modulus and K."""
     names = ("wall_thickness_mm", "radius_mm", "length_mm")
     place = {name: _own(target, name) for name in names} | dict(sizes)
@@ -152,6 +152,6 @@ def elasticities(target: Target, sizes: Mapping[str, float]) -> dict[str, float]
 
 
 @jax.jit
-def _elasticities(target: Target, place):
+def _elasticities(target: LimitedGear, place):
     force, slopes = jax.value_and_grad(target.force)(place)
     return {name: slope * place[name] / force for name, slope in slopes.items()}

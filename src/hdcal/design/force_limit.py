@@ -23,7 +23,7 @@ from hdcal.prediction.engine.sampled_gears import SampledGears
 from hdcal.prediction.engine.sizes import SIZES
 
 
-class Target(eqx.Module):
+class LimitedGear(eqx.Module):
     """The next gear at the worst of some temperatures, beside what it has to keep.
 
     Its methods take a place: what differs from the tested gear, by name. That may be
@@ -51,8 +51,8 @@ class Target(eqx.Module):
     rank: int = eqx.field(static=True)
 
     @classmethod
-    def of(cls, draws: DesignDraws, gear: NextGear, asked: LimitAsked) -> "Target":
-        """Return the target of the material whose draws they are."""
+    def of(cls, draws: DesignDraws, gear: NextGear, asked: LimitAsked) -> "LimitedGear":
+        """Return the gear of the material whose draws they are."""
         strength = draws.yield_strength
         if asked.limit_stress_MPa is not None:
             strength = np.full(draws.size, asked.limit_stress_MPa)

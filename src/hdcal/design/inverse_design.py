@@ -29,7 +29,7 @@ from hdcal.design.checks import (
     unseen_findings,
 )
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.design.force_limit import Target
+from hdcal.design.force_limit import LimitedGear
 from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import (
@@ -66,7 +66,7 @@ class InverseDesign(Shown):
     chosen: Candidate
     candidates: tuple[Candidate, ...]
     tested: Candidate
-    target: Target
+    target: LimitedGear
     elasticities: Mapping[str, float]
     warnings: tuple[str, ...]
 
@@ -133,12 +133,14 @@ def _nearest_design(
 ) -> InverseDesign:
     """Return the nearest to the tested gear of the designs of all materials."""
     vary = asked.bounds
-    found = [best_candidate(one, Target.of(one, gear, asked), vary) for one in made]
+    found = [
+        best_candidate(one, LimitedGear.of(one, gear, asked), vary) for one in made
+    ]
     met = [one for one in found if one.met]
     if not met:
         raise InputError([_unmet(found, asked)])
     chosen = min(met, key=lambda one: one.change)
-    kept = Target.of(chosen.basis, gear, asked)
+    kept = LimitedGear.of(chosen.basis, gear, asked)
     place = np.array([asked.deformation_mm]), np.asarray(asked.temperature_C)
     sizes = {name: np.array([value]) for name, value in chosen.sizes.items()}
     return InverseDesign(
@@ -147,7 +149,7 @@ def _nearest_design(
         asked=asked,
         chosen=chosen,
         candidates=tuple(found),
-        tested=candidate(draws, Target.of(draws, gear, asked), {}),
+        tested=candidate(draws, LimitedGear.of(draws, gear, asked), {}),
         target=kept,
         elasticities=elasticities(kept, chosen.sizes),
         warnings=(

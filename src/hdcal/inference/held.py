@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
+from hdcal.data.prior import FAMILIES
 from hdcal.data.typed_json import PART, RESULT
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
@@ -14,10 +15,15 @@ class HeldPrior:
     """A prior, in code units."""
 
     __pydantic_config__: ClassVar = RESULT
-    family: Literal["fixed", "normal", "lognormal", "half_normal", "uniform", "beta"]
+    family: str
     numbers: list[float]
     unit: str
     source: str
+
+    def __post_init__(self) -> None:
+        known = FAMILIES.get(self.family)
+        if known is None or len(self.numbers) != len(known):
+            raise ValueError("is no prior of a family that is known")
 
 
 Priors = dict[str, HeldPrior]
