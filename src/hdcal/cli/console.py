@@ -4,7 +4,6 @@ import contextlib
 import io
 import logging
 import os
-import re
 import shlex
 import sys
 import warnings
@@ -25,7 +24,6 @@ if TYPE_CHECKING:
     from hdcal.report.write import Report
 
 T = TypeVar("T", bound="Target")
-_JOBS = re.compile(r" --jobs[= ]\S+")
 
 
 class Console:
@@ -69,7 +67,13 @@ class Console:
 
         Without --jobs: the same result has the same bytes.
         """
-        return _JOBS.sub("", shlex.join(["hdcal", *sys.argv[1:]]))
+        given, kept = iter(sys.argv[1:]), ["hdcal"]
+        for part in given:
+            if part == "--jobs":
+                next(given, None)
+            elif not part.startswith("--jobs="):
+                kept.append(part)
+        return shlex.join(kept)
 
     def reserve_folder(
         self, out: str | None, force: bool, replace: str = "force"

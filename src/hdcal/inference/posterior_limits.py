@@ -10,14 +10,13 @@ from h5py import h5o  # pyright: ignore[reportAttributeAccessIssue]
 
 from hdcal.data.plausible import implausible
 from hdcal.data.regular_file import why_not_readable
+from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import Finding, InputError
 
 LARGEST_FILE = 1 << 32
 # What a file may unpack to: this many times its size, but at least so many bytes.
 _MOST_UNPACKED, _LEAST_LIMIT = 16, 64 << 20
 _LARGEST_CHUNK = 64 << 20
-# Columns of a data file; others follow from them.
-_READ = ("deformation", "force", "temperature", "time", "angle", "force_sd")
 _MOST_OBJECTS, _MOST_ATTRIBUTES, _MOST_TEXTS = 2_000, 500, 20_000
 _MOST_LETTERS = 64 << 20
 # How NetCDF names what HDF5 itself needs; they hold references.
@@ -160,7 +159,7 @@ def check_rows(rows: Mapping[str, np.ndarray], runs: int, specimens: int) -> Non
             raise ValueError(f"{name} has another shape")
         if column.dtype.kind not in "biuf" or not np.isfinite(column).all():
             raise ValueError(f"{name} is not finite")
-        if name in _READ and implausible(name, [column.min(), column.max()]):
+        if name in COLUMN_UNITS and implausible(name, [column.min(), column.max()]):
             raise ValueError(f"{name} is beyond every rig")
     if np.ptp(rows["deformation"]) == 0.0:
         raise ValueError("nothing was deformed")

@@ -26,11 +26,6 @@ MEMBERS = {
 }
 # The site of the spread of those that are labels in the data.
 MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
-_SCALES = {
-    "run": ("run_offset_sd",),
-    "specimen": ("specimen_sd",),
-    "discrepancy": ("gap_sd", "gap_length"),
-}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
 
@@ -44,8 +39,8 @@ def site_shapes(
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
     for kind, count in member_counts(case, with_gap).items():
-        shapes |= dict.fromkeys(_SCALES[kind], ())
-        shapes[MEMBERS[kind]] = (count,)
+        scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
+        shapes |= {**dict.fromkeys(scales, ()), MEMBERS[kind]: (count,)}
     return shapes
 
 
