@@ -53,8 +53,11 @@ def optimised(request: pytest.FixtureRequest) -> Iterator[None]:
 
     with pytest.MonkeyPatch.context() as commands:
         commands.setenv("JAX_DISABLE_MOST_OPTIMIZATIONS", "false")
+        # What is compiled one way rounds otherwise: none of it goes into other files.
+        jax.clear_caches()
         jax.config.update("jax_disable_most_optimizations", False)
         yield
+        jax.clear_caches()
         jax.config.update("jax_disable_most_optimizations", True)
 
 

@@ -11,6 +11,8 @@ from short import SHORT, options
 # Two short runs of the sampler: their forces differ by tenths of a newton.
 NEAR = {"rel": 0.01}
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture(scope="module")
 def runs(

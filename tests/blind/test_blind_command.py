@@ -25,6 +25,8 @@ NOT_IN_FILE = {"status", "reasons", "headline", "next_step"}
 
 Seen = dict[str, bytes]
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def seen(folder: Path) -> Seen:
     """Return every file below a folder."""

@@ -24,6 +24,8 @@ from hdcal.errors import InputError
 OPEN = ("open", "set", "--key", "set.key")
 ANSWER = ("answer", "set", "--by", "none")
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 @pytest.fixture
 def blind(here: Hdcal, monkeypatch: pytest.MonkeyPatch) -> Hdcal:

@@ -191,6 +191,7 @@ def test_a_defect_leaves_nothing(diagnose, cases, tmp_path: Path):
     assert names(tmp_path) == {"cases"}
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("where", ["diagnosis", "report", "reader"])
 def test_a_defect_in_one_case_does_not_stop_the_others(
     diagnose, monkeypatch, cases, tmp_path: Path, where: str

@@ -9,10 +9,11 @@ from rigs import make_case, make_records
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
+from hdcal.data.versions import versions
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.posterior import Posterior, versions
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 
 CHAINS = 2

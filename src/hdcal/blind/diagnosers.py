@@ -13,13 +13,13 @@ from hdcal.blind.label import CaseAnswer, Quantiles
 from hdcal.blind.rival_methods import fit_each
 from hdcal.data.case import Case
 from hdcal.data.resources import priors_folder
+from hdcal.data.versions import versions
 from hdcal.diagnosis import model_posterior
 from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.library import choose_library
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.where import FALSE_ALARM
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
-from hdcal.inference.posterior import versions
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.parameters import Interval

@@ -32,8 +32,8 @@ from hdcal.blind.seal import (
     new_salt,
     seal,
 )
+from hdcal.data.versions import versions
 from hdcal.errors import Finding, InputError
-from hdcal.inference.posterior import versions
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
 from hdcal.report.saving.reserve import reserve_file, reserve_folder

@@ -5,11 +5,12 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
-from hdcal.inference.posterior import FILE_NAME, Posterior, versions
+from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.prediction.engine.causes import ORIGIN

@@ -10,6 +10,7 @@ from jaxtyping import Key
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
+from hdcal.data.versions import versions
 from hdcal.inference.checks import (
     Check,
     bound_check,
@@ -20,7 +21,6 @@ from hdcal.inference.checks import (
 from hdcal.inference.density import densities
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
-from hdcal.inference.posterior import versions
 from hdcal.inference.posterior_tree import build_tree
 from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.sample import Draws

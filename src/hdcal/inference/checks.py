@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
 
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import Mixing
@@ -53,6 +52,9 @@ def sampling_checks(
         stats: energy, diverging, n_steps; dimensions chain and draw.
         mixed: by quantity.
     """
+    # Late: it takes as long to import as a finished result to be read.
+    from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
+
     chains = stats.sizes["chain"]
     worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
     least = min(

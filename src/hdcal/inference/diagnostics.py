@@ -7,14 +7,6 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from arviz_base import from_dict
-
-# They are put there at import time, out of pyright's sight.
-from arviz_stats import (
-    ess,  # pyright: ignore[reportPrivateImportUsage]
-    psense,  # pyright: ignore[reportPrivateImportUsage]
-    rhat,  # pyright: ignore[reportPrivateImportUsage]
-)
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import frozen
@@ -74,6 +66,8 @@ def diagnose_parameters(
         log_prior: of each draw.
         log_likelihood: of each draw, all data.
     """
+    from arviz_base import from_dict
+
     tree = from_dict(
         {
             "posterior": dict(draws),
@@ -105,6 +99,11 @@ def diagnose_parameters(
 
 def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
     """Return how well the chains mixed in each quantity, (chain, draw) each."""
+    # Late: a finished result is read without them. They are put there at import time,
+    # out of pyright's sight.
+    from arviz_base import from_dict
+    from arviz_stats import ess, rhat  # pyright: ignore[reportPrivateImportUsage]
+
     tree = from_dict({"posterior": dict(draws)})
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -114,6 +113,8 @@ def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
 
 
 def _sensitivity(tree: xr.DataTree, group: str) -> dict[str, float]:
+    from arviz_stats import psense  # pyright: ignore[reportPrivateImportUsage]
+
     try:
         return _by_name(psense(tree, group=group))
     except ValueError:  # draws that are all alike have no tail to smooth

@@ -4,7 +4,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import metadata
 from pathlib import Path
 from typing import ClassVar
 
@@ -26,7 +25,6 @@ from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
 FILE_NAME = "posterior.nc"
-_PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
 
 
 @dataclass(frozen=True, repr=False)
@@ -212,8 +210,3 @@ def _look_up(names, library, file) -> tuple[type[Effect], ...]:
             for name in unknown
         )
     return tuple(library[name] for name in names)
-
-
-def versions() -> dict[str, str]:
-    """Return the versions of the packages that a result depends on."""
-    return {package: metadata.version(package) for package in _PACKAGES}

@@ -1,6 +1,7 @@
 """A margin as an answer, and all that its result folder holds."""
 
-from hdcal.inference.posterior import Posterior, versions
+from hdcal.data.versions import versions
+from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
 from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin

@@ -1,0 +1,10 @@
+"""Which versions of which packages a result depends on."""
+
+from importlib import metadata
+
+_PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of the packages that a result depends on."""
+    return {package: metadata.version(package) for package in _PACKAGES}
