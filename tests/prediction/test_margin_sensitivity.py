@@ -1,9 +1,19 @@
 """What a margin hangs on: exact gradients, and shares that know the answer."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
-from posteriors import batch, plain_draws, ramp_case, single, stiffer, written_posterior
+from posteriors import (
+    batch,
+    compensated,
+    plain_draws,
+    ramp_case,
+    single,
+    stiffer,
+    written_posterior,
+)
 from rigs import make_gear
 
 import hdcal
@@ -73,7 +83,7 @@ def test_the_ring_has_the_exponents_of_its_formula():
 
 def test_shares_of_a_sum_are_its_variances():
     """All inputs add up here, so that the shares are known."""
-    case = ramp_case()
+    case = ramp_case(compensated())
     draws = plain_draws(case, 2000) | {
         "sigma": np.full(2000, 0.8),
         "deformation_offset": np.zeros(2000),
@@ -87,15 +97,27 @@ def test_shares_of_a_sum_are_its_variances():
         "noise": 0.64,
         "alpha": np.var(0.4 * 205.0 * 40.0 * draws["alpha"]),
     }
-    total = sum(parts.values())
-    for name, part in parts.items():
-        assert found[name].first == pytest.approx(part / total, abs=0.02)
-        assert found[name].total == pytest.approx(part / total, abs=0.02)
+    check_shares(found, parts)
     assert {s.name: s.driven_by for s in found.values()} == {
         "calibration": "data",
         "alpha": "prior",
         "noise": "data",
     }
+    # On a rig that drifts by 0.1 N and a micrometre per kelvin, 40 K away.
+    case = replace(case, gear=make_gear())
+    force = population_force(*causes_of(replace(posterior, case=case)), 0.4, "readings")
+    found = {s.name: s for s in variance_shares([force.at(60.0)])}
+    drifts = {"zero_drift": 0.1, "frame": 1e-3 * 205.0 * (1.0 - 3e-4 * 40.0)}
+    check_shares(found, parts | {n: (40.0 * sd) ** 2 for n, sd in drifts.items()})
+    assert {found[name].driven_by for name in drifts} == {"prior"}
+
+
+def check_shares(found, parts):
+    """Require shares to be those of independent parts of a variance."""
+    total = sum(parts.values())
+    for name, part in parts.items():
+        assert found[name].first == pytest.approx(part / total, abs=0.02)
+        assert found[name].total == pytest.approx(part / total, abs=0.02)
 
 
 def test_every_source_has_its_share():
@@ -104,7 +126,8 @@ def test_every_source_has_its_share():
     models = [(0.6, gears), (0.4, stiffer(gears, 1.05))]
     found = hdcal.margin(models, 0.6, **asked).shares
     names = {"calibration", "cause", "alpha", "noise", "mounting", "gear"}
-    assert {s.name for s in found} == names | {"wall_thickness", "leftover"}
+    untested = {"leftover", "zero_drift", "frame"}
+    assert {s.name for s in found} == names | untested | {"wall_thickness"}
     assert {s.driven_by for s in found if s.name == "wall_thickness"} == {"given"}
     assert sum(share.first for share in found) < 1.05
     assert sum(share.total for share in found) > 0.95

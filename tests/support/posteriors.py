@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 from arviz_base import from_dict
-from rigs import make_case, make_records
+from rigs import make_case, make_gear, make_records
 
 from hdcal.calibration.calibrate import choose_effects
-from hdcal.data.case import Case
-from hdcal.data.priors import effect_priors
+from hdcal.data.case import Case, Gear
+from hdcal.data.priors import Prior, effect_priors
 from hdcal.data.versions import versions
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
@@ -17,6 +17,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 
 CHAINS = 2
+DRIFTS = ("thermal_zero_drift", "thermal_expansion")
 BY_PRIOR = ("alpha", "E0", "gap_length")
 
 
@@ -105,6 +106,47 @@ def ramp_case(gear=None, rows: int = 30, **columns) -> Case:
     noise = np.random.default_rng(5).normal(0.0, 0.6, rows)
     records = make_records(deformation, 205.0 * deformation - 1.0 + noise, **columns)
     return make_case(records, gear)
+
+
+def compensated(gear=None) -> Gear:
+    """Return a gear on a rig that no temperature moves."""
+    still = {f"{name}.slope": Prior("fixed", (0.0,)) for name in DRIFTS}
+    return replace(gear or make_gear(), effect_priors=still)
+
+
+def regressed(
+    deformation, force, rng, size: int = 1000, *, effects=(), **others
+) -> Posterior:
+    """Return what least squares says of one gear, under flat priors.
+
+    Args:
+        deformation: of the rows [mm].
+        force: likewise [N].
+        rng: draws.
+        size: number of draws.
+        effects: also in the model, their parameters among the others.
+        others: values of parameters, instead of those of least squares.
+    """
+    case = make_case(make_records(deformation, force))
+    columns = np.stack([deformation, np.ones_like(deformation)], axis=1)
+    found, left, *_ = np.linalg.lstsq(columns, force, rcond=None)
+    sigma = np.sqrt(left[0] / rng.chisquare(len(force) - 2, size))
+    root = np.linalg.cholesky(np.linalg.inv(columns.T @ columns))
+    slope, zero = (found + sigma[:, None] * (rng.normal(size=(size, 2)) @ root.T)).T
+    draws = plain_draws(case, size)
+    return written_posterior(
+        case,
+        draws
+        | {
+            "K": draws["K"] * slope / draws["stiffness"],
+            "stiffness": slope,
+            "force_offset": zero,
+            "deformation_offset": np.zeros(size),
+            "sigma": sigma,
+            **{n.replace("__", "."): np.full(size, v) for n, v in others.items()},
+        },
+        effects=effects,
+    )
 
 
 def single(gear=None, size: int = 2000) -> Posterior:

@@ -20,7 +20,7 @@ from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.parameter_grid import quantile_grid
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.inference.distributions import distribution
-from hdcal.inference.likelihood import log_probability
+from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
 
@@ -89,9 +89,7 @@ def _row_precision(point, effect, problem: NoiseProblem):
     """Return the effective precision of each row at a point [1/N²]."""
     noise = _noise_of(effect, problem, point[-1])
     error = problem.reading - problem.columns @ point[:-1]
-    log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
-    share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
-    return jnp.sum(share / noise.sd**2, axis=0)
+    return row_precision(error, noise)
 
 
 @jax.jit

@@ -52,9 +52,6 @@ def sampling_checks(
         stats: energy, diverging, n_steps; dimensions chain and draw.
         mixed: by quantity.
     """
-    # Late: it takes as long to import as a finished result to be read.
-    from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
-
     chains = stats.sizes["chain"]
     worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
     least = min(
@@ -63,8 +60,7 @@ def sampling_checks(
     )
     top, need = mixed[worst].rhat, ESS_PER_CHAIN * chains
     low = _least(mixed[least])
-    with np.errstate(all="ignore"):
-        energy = np.asarray(bfmi(stats["energy"].to_numpy(), chain_axis=0, draw_axis=1))
+    energy = _explored(stats["energy"].to_numpy())
     divergent = int(stats["diverging"].sum())
     saturated = float((stats["n_steps"] >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
@@ -95,6 +91,15 @@ def sampling_checks(
             f"{MAX_SATURATED:.0%}",
         ),
     )
+
+
+def _explored(energy: np.ndarray) -> np.ndarray:
+    """Return the BFMI of each chain."""
+    # Late: it takes as long to import as a finished result to be read.
+    from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
+
+    with np.errstate(all="ignore"):
+        return np.asarray(bfmi(energy, chain_axis=0, draw_axis=1))
 
 
 def _bad(value: float) -> float:

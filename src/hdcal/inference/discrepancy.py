@@ -41,22 +41,6 @@ class Discrepancy(eqx.Module):
         scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
         return _basis(scaled) - _line(scaled) @ self.absorbed
 
-    def columns_beyond(self, deformation: Float[Array, " n"], length):
-        """Return columns that forget the data with their distance from them.
-
-        Where it was tested these are `columns`. Beyond, what is known of the process
-        is its value at the end, times the correlation exp(−d²/2ℓ²); the line that was
-        projected off goes on.
-
-        Args:
-            deformation: as read [mm].
-            length: ℓ, length-scale as a share of the tested range [-].
-        """
-        scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
-        inside = jnp.clip(scaled, -1.0, 1.0)
-        known = jnp.exp(-0.5 * ((scaled - inside) / (2.0 * length)) ** 2)
-        return known[:, None] * _basis(inside) - _line(scaled) @ self.absorbed
-
 
 def _basis(scaled):
     # Beyond the interval the eigenfunctions would repeat; hold them at its end.

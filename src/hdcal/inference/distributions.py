@@ -62,6 +62,14 @@ def bounds(prior: Prior) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def moments(prior: Prior) -> tuple[float, float]:
+    """Return mean and sd of a prior, in its own unit."""
+    if prior.family == "fixed":
+        return float(prior.numbers[0]), 0.0
+    law = frozen(prior)
+    return float(law.mean()), float(law.std())
+
+
 def scaled(prior: Prior, factor) -> Prior:
     """Return the prior of factor × parameter (factor > 0)."""
     count = {"lognormal": 1, "beta": 0}.get(prior.family, len(prior.numbers))

@@ -45,6 +45,18 @@ def log_probability(
     return logsumexp(each + noise.log_weight[:, None], axis=0)
 
 
+def row_precision(error: Float[Array, " n"], noise: Noise) -> Float[Array, " n"]:
+    """Return the precision that each row has, as narrow a component as it is of [1/N²].
+
+    Args:
+        error: reading less its mean [N].
+        noise: mixture of normals.
+    """
+    log_share = noise.log_weight[:, None] - 0.5 * (error / noise.sd) ** 2
+    share = jax.nn.softmax(log_share - jnp.log(noise.sd), axis=0)
+    return jnp.sum(share / noise.sd**2, axis=0)
+
+
 def draw_reading(
     key: Key[Array, ""],
     mean: Float[Array, " n"],

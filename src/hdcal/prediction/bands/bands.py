@@ -27,6 +27,7 @@ from hdcal.prediction.engine.conditions import (
 from hdcal.prediction.engine.forces import grid_records
 from hdcal.prediction.engine.mixture import draw_quantiles
 from hdcal.prediction.engine.readings import readings
+from hdcal.prediction.engine.untested import with_untested
 
 # Rows predicted at a time: with 4000 draws a block takes 64 MB.
 _BLOCK = 2000
@@ -129,11 +130,12 @@ def _bands(
     sense = np.full(len(at), SENSE[direction])
     known_sd = usual_sd(case.records)
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
+    models = [(cause.problem, *with_untested(cause, seed)) for cause in causes]
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
         records = grid_records(at[rows], warm[rows], sense[rows], known_sd)
-        blocks.append(_quantiles(causes, records, tails, seed))
+        blocks.append(_quantiles(causes, models, records, tails, seed))
     physics, with_gap, new = np.concatenate(blocks, axis=2)
     tested = is_tested(case.records, deformation=at, temperature=warm, sense=sense)
     usable = all(cause.posterior.usable for cause in causes)
@@ -149,12 +151,15 @@ def _bands(
     )
 
 
-def _quantiles(causes: Sequence[Cause], records: Records, tails, seed: int):
-    """Return quantiles of mean, mean with leftover and new reading: [3, 3, row]."""
+def _quantiles(causes: Sequence[Cause], models, records: Records, tails, seed: int):
+    """Return quantiles of mean, mean with leftover and new reading: [3, 3, row].
+
+    `models` holds for each cause its problem, its draws and what they leave open.
+    """
     parts = []
-    for cause in causes:
-        keys = jax.random.split(jax.random.key(seed), cause.size)
-        parts.append(readings(cause.problem, cause.values, records, keys))
+    for model in models:
+        keys = jax.random.split(jax.random.key(seed), len(model[1]["K"]))
+        parts.append(readings(*model, records, keys))
     tables = [np.concatenate(kind) for kind in zip(*parts, strict=True)]
     if len(causes) == 1:
         found = [np.quantile(table, tails, axis=0) for table in tables]

@@ -13,6 +13,7 @@ from hdcal.data.records import Array, Records
 from hdcal.errors import Finding
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.sizes import StiffnessStrata
+from hdcal.prediction.engine.untested import Untested
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -35,6 +36,7 @@ class Conditions(eqx.Module):
         known_sd: stated sd of a reading [N].
         low: end of the tested deformation [mm].
         high: other end [mm].
+        untested: what is not known beyond the tested conditions.
         scale: stiffness over that of the calibrated gear [-]: other sizes, modulus, K.
         strata: of the stiffness within the tolerances of the sizes.
         loading: sense of loading, +1 or −1.
@@ -46,6 +48,7 @@ class Conditions(eqx.Module):
     known_sd: Float[Array, ""] | float
     low: Float[Array, ""] | float
     high: Float[Array, ""] | float
+    untested: Untested
     scale: Float[Array, ""] | float
     strata: StiffnessStrata
     loading: Float[Array, ""] | float

@@ -58,7 +58,8 @@ def force_of(
     records: Records,
     *,
     factor: Float[Array, ""] | float = 1.0,
-    zero: Float[Array, ""] | float = 0.0,
+    zero: Float[Array, "*n"] | float = 0.0,
+    moved: Float[Array, "*n"] | float = 0.0,
     quantity: Quantity | Literal["gear"] = "reading",
 ) -> tuple[Float[Array, " n"], Noise]:
     """Compute mean force and noise of one draw, without the leftover discrepancy.
@@ -69,7 +70,9 @@ def force_of(
         records: from `grid_records`.
         factor: stiffness relative to the tested gear's [-]: another geometry, or
             another specimen.
-        zero: of another mounting, from the mean of the tested ones [N].
+        zero: of another mounting, or of a warmer gauge, from that of the tested
+            ones [N].
+        moved: radial deformation that a warmer frame gains [mm].
         quantity: `reading` includes the zero of the force and the effects of the
             sensor; `load` leaves them out; `gear` also leaves out the zero of the
             deformation and the compliance of the rig.
@@ -80,7 +83,11 @@ def force_of(
     effects = build_effects(problem, values)
     base = member_base(problem, values)
     base = replace(
-        base, stiffness=base.stiffness * factor, force_offset=base.force_offset + zero
+        base,
+        stiffness=base.stiffness * factor,
+        force_offset=base.force_offset + zero,
+        deformation_offset=base.deformation_offset
+        - moved / problem.reading.radial_per_read,
     )
     if quantity != "reading":
         base = replace(base, force_offset=jnp.zeros_like(base.force_offset))
@@ -89,16 +96,6 @@ def force_of(
         nothing = jnp.zeros_like(base.deformation_offset)
         base = replace(base, deformation_offset=nothing)
     return predict_reading(base, effects, records, problem.reading)
-
-
-def leftover_of(problem: Problem, values: Values, deformation) -> Float[Array, " n"]:
-    """Return the fitted leftover discrepancy of one draw at deformations as read [N].
-
-    Zero where none was fitted; beyond the tested range the fit simply goes on.
-    """
-    if problem.discrepancy is None:
-        return jnp.zeros(len(deformation))
-    return problem.discrepancy.columns(deformation) @ values["gap_weights"]
 
 
 @jax.jit
@@ -137,7 +134,10 @@ def gear_forces(
     def of_draw(value, own):
         force, _ = force_of(problem, value, records, factor=own, quantity="gear")
         place = as_read + value["deformation_offset"]
-        return force + own * leftover_of(problem, value, place)
+        if problem.discrepancy is None:
+            return force
+        # Beyond the tested range the fit simply goes on.
+        return force + own * (problem.discrepancy.columns(place) @ value["gap_weights"])
 
     factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
     return jax.vmap(of_draw, out_axes=1)(values, factor)

@@ -11,11 +11,8 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy import stats
-from scipy.stats import qmc
+from scipy.special import ndtri
 
-from hdcal.inference.distributions import frozen
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.causes import Cause
@@ -34,6 +31,12 @@ from hdcal.prediction.engine.loading_sense import (
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import Population, Whose
 from hdcal.prediction.engine.sizes import tolerance_strata
+from hdcal.prediction.engine.untested import (
+    SITES,
+    Untested,
+    spread_evenly,
+    untested_of,
+)
 
 # More draws than this change no digit that is printed.
 MOST_DRAWS = 8000
@@ -41,7 +44,7 @@ MOST_DRAWS = 8000
 # goes to nodes, the rest is narrow enough to go along the tangent.
 _AT_NODES, _SPLIT = 0.8, 7
 # Standard normal scores of each draw: of the population's centre of gears and of
-# mountings, and of the leftover beyond the tested deformation.
+# mountings.
 SCORES = "_scores"
 
 
@@ -113,10 +116,11 @@ def population_force(
         seed: of what the data leave open about the centre of the population.
     """
     case, records = cause.posterior.case, cause.posterior.case.records
+    values, untested = _with_scores(cause, seed)
     widths = dict(tolerances or {})
     rounded = quantity == "reading" and float(cause.problem.step) > 0.0
     return PopulationForce(
-        replace(cause, values=_with_scores(cause, seed)),
+        replace(cause, values=values),
         Whose(population, quantity, rounded),
         Conditions(
             deformation=float(deformation),
@@ -124,6 +128,7 @@ def population_force(
             known_sd=usual_sd(records),
             low=float(records.deformation.min()),
             high=float(records.deformation.max()),
+            untested=untested,
             scale=1.0,
             strata=tolerance_strata(case.gear.geometry, widths, cause.posterior.theory),
             loading=float(sense or loading_sense([cause], deformation)),
@@ -133,25 +138,14 @@ def population_force(
     )
 
 
-def _with_scores(cause: Cause, seed: int) -> dict[str, np.ndarray]:
+def _with_scores(cause: Cause, seed: int) -> tuple[dict[str, np.ndarray], Untested]:
     """Return draws, thinned where they are many, with what the data leave open."""
     kept = np.linspace(0, cause.size - 1, min(cause.size, MOST_DRAWS))
     kept = kept.round().astype(int)
     values = {name: column[kept] for name, column in cause.values.items()}
-    spread = qmc.Sobol(5, rng=seed).random(1 << int(np.ceil(np.log2(len(kept)))))
-    spread = np.clip(spread[: len(kept)], 1e-9, 1.0 - 1e-9)
-    values[SCORES] = stats.norm.ppf(spread[:, :3])
-    for column, name in enumerate(("gap_sd", "gap_length"), start=3):
-        if name not in values:
-            values[name] = _prior_draws(cause.posterior, name, spread[:, column])
-    return values
-
-
-def _prior_draws(posterior: Posterior, name: str, levels: np.ndarray) -> np.ndarray:
-    prior = posterior.priors[name]
-    if prior.family == "fixed":
-        return np.full(len(levels), float(prior.numbers[0]))
-    return np.asarray(frozen(prior).ppf(levels))
+    levels = spread_evenly(len(kept), 2 + SITES, seed)
+    untested, open_sites = untested_of(cause, levels[:, 2:])
+    return {**values, SCORES: ndtri(levels[:, :2]), **open_sites}, untested
 
 
 @jax.jit
@@ -228,36 +222,38 @@ def member_force(
     )
     warmth = jnp.full(len(along), conditions.temperature)
     records = grid_records(path, warmth, way, conditions.known_sd)
-    mean, noise = force_of(problem, value, records, factor=factor, quantity=quantity)
+    zero, moved = conditions.untested.drift(
+        value, conditions.temperature, conditions.loading
+    )
+    mean, noise = force_of(
+        problem,
+        value,
+        records,
+        factor=factor,
+        zero=zero,
+        moved=moved,
+        quantity=quantity,
+    )
     if quantity == "load":
         return mean[-1], (jnp.zeros(1), jnp.zeros(1))
     return mean[-1], (noise.log_weight, noise.sd[:, -1])
 
 
-def leftover_sd(values: Values, conditions: Conditions):
-    """Return the sd of what is new in the leftover beyond the tested range [N].
+def bend_sd(force: PopulationForce) -> float:
+    """Return the sd of the bend that untested deformation may bring [N]."""
+    values, where = force.cause.values, force.conditions
+    at = jnp.reshape(jnp.asarray(where.deformation, float), 1)
 
-    At a distance d beyond the tested deformation s √(1 − exp(−(d/ℓ)²)).
-    """
-    at, low, high = conditions.deformation, conditions.low, conditions.high
-    beyond = jnp.maximum(jnp.maximum(low - at, at - high), 0.0)
-    length = values["gap_length"] * (high - low)
-    new = -jnp.expm1(-((beyond / length) ** 2))
-    # The root has no derivative at zero.
-    return values["gap_sd"] * (jnp.sqrt(jnp.where(new > 0.0, new, 1.0)) * (new > 0.0))
+    def one(value):
+        mean, sd, share = where.untested.bend_law(value, at)
+        return share * mean, share * sd
+
+    mean, sd = map(np.asarray, jax.vmap(one)(values))
+    return float(np.sqrt(np.mean(sd**2) + np.var(mean)))
 
 
 def leftover(problem: Problem, value: Values, conditions: Conditions):
-    """Return the leftover discrepancy of one draw [N].
-
-    Where it was fitted and tested this is what was found. Beyond the tested
-    deformation it is a new normal, beside what the end of the tested range still
-    tells; both from the prior where no discrepancy was fitted.
-    """
-    score = conditions.loading * value[SCORES][2]
-    found = leftover_sd(value, conditions) * score
-    if problem.discrepancy is None or "gap_weights" not in value:
-        return found
+    """Return the leftover discrepancy of one draw at the deformation asked for [N]."""
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)
-    columns = problem.discrepancy.columns_beyond(at, value["gap_length"])
-    return found + (columns @ value["gap_weights"])[0]
+    bend, fitted = conditions.untested.leftover(problem, value, at, conditions.loading)
+    return (bend + fitted)[0]

@@ -6,11 +6,10 @@ import numpy as np
 
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
-from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
-from hdcal.prediction.engine.population_force import PopulationForce, leftover_sd
+from hdcal.prediction.engine.population_force import PopulationForce, bend_sd
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import Level
 
@@ -66,23 +65,20 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
     records = cause.posterior.case.records
     at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
     if max(low - at, at - high) > NEAR_MM:
-        sd = np.asarray(leftover_sd(cause.values, where))
-        leftover = float(np.sqrt(np.mean(sd**2)))
-        fitted = cause.problem.discrepancy is not None
-        source = "the fitted leftover discrepancy" if fitted else "the prior only"
         yield (
             f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
-            f"the tested {low:g} … {high:g} mm. Widened by a leftover discrepancy of "
-            f"{leftover:.2g} N (sd), from {source}."
+            f"the tested {low:g} … {high:g} mm. A bend that these rows need not show "
+            f"may bring {bend_sd(force):.2g} N (sd) there."
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
         yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
     if not temperature_is_tested(records, temperature).all():
-        yield _untested_temperature(cause, temperature)
+        yield _untested_temperature(force, temperature)
 
 
-def _untested_temperature(cause: Cause, temperature: np.ndarray) -> str:
+def _untested_temperature(force: PopulationForce, temperature: np.ndarray) -> str:
+    cause = force.cause
     records = cause.posterior.case.records
     cold, warm = np.min(records.temperature), np.max(records.temperature)
     seen = f"{cold:g} °C" if cold == warm else f"{cold:g} … {warm:g} °C"
@@ -90,11 +86,28 @@ def _untested_temperature(cause: Cause, temperature: np.ndarray) -> str:
     assumed = "" if known else " (assumed, it was not measured)"
     by_data = cause.driver("alpha") == "data"
     source = "the data" if by_data else "its prior (the material), not from the data"
+    low, high = np.min(temperature), np.max(temperature)
+    asked = f"{low:g} °C" if low == high else f"{low:g} … {high:g} °C"
     return (
-        f"Extrapolated: {np.min(temperature):g} … {np.max(temperature):g} °C lies "
+        f"Extrapolated: {asked} lies "
         f"outside the tested {seen}{assumed}. Young's modulus carries it, linearly; "
-        f"its loss per kelvin is from {source}."
+        f"its loss per kelvin is from {source}." + _rig_drift(force)
     )
+
+
+def _rig_drift(force: PopulationForce) -> str:
+    """Say what the rig may do at untested temperatures."""
+    untested, stiff = force.conditions.untested, force.cause.values["stiffness"]
+    (_, zero), (_, frame) = untested.zero, untested.frame
+    reading = force.whose.quantity == "reading" and zero > 0.0
+    moves = (
+        frame * float(np.median(stiff)) / force.cause.problem.reading.radial_per_read
+    )
+    parts = [f"{zero:.2g} N per kelvin by the zero of its gauge"] * reading
+    parts += [f"{moves:.2g} N per kelvin by the length of its frame"] * (moves > 0.0)
+    if not parts:
+        return ""
+    return f" The rig may drift too, by its priors (sd) {' and '.join(parts)}."
 
 
 def remarks(

@@ -21,6 +21,8 @@ _INPUTS = {
     "mounting": "mounting to mounting",
     "gear": "gear to gear",
     "leftover": "leftover beyond the tested range",
+    "zero_drift": "zero of the gauge with temperature",
+    "frame": "frame with temperature",
     "wall_thickness": "wall thickness δ",
     "radius": "radius R",
     "length": "length L",

@@ -17,15 +17,17 @@ from hdcal.prediction.engine.causes import Cause, Driver
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.population_force import (
-    SCORES,
     PopulationForce,
     leftover,
     member_force,
 )
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
+from hdcal.prediction.engine.untested import PLACES
 
 # Points of each input's sample; a power of two.
 _POINTS = 4096
+# What untested conditions may add, in the order of a draw's places.
+_UNTESTED = ("leftover", "zero_drift", "frame")
 # Largest correlation at which α counts as an input of its own.
 _INDEPENDENT = 0.2
 
@@ -152,8 +154,13 @@ def _inputs(forces: Sequence[PopulationForce]) -> dict[str, Driver]:
         found["gear"] = cause.driver("specimen_sd")
     found |= dict.fromkeys(forces[0].tolerances, "given")
     if not where.low <= where.deformation <= where.high:
-        fitted = all(force.cause.problem.discrepancy is not None for force in forces)
-        found["leftover"] = cause.driver("gap_sd") if fitted else "prior"
+        found["leftover"] = "prior"
+    untested = where.untested
+    if float(untested.kelvins(where.temperature)):
+        drifts = {"zero_drift": untested.zero[1], "frame": untested.frame[1]}
+        if whose.quantity == "load":
+            del drifts["zero_drift"]
+        found |= {name: "prior" for name, sd in drifts.items() if sd > 0.0}
     return found
 
 
@@ -183,8 +190,8 @@ def _forces_at(
     if "mounting" in level:
         spread = new_member_sd(values["run_offset_sd"], problem.runs)
         zero = spread * ndtri(level["mounting"])
-    # The leftover has the third score; of the centres the members know nothing.
-    values[SCORES] = np.outer(ndtri(level.get("leftover", even)), [0.0, 0.0, 1.0])
+    open_inputs = (ndtri(level.get(name, even)) for name in _UNTESTED)
+    values[PLACES] = np.stack(list(open_inputs), axis=1)
     noise = level.get("noise", even)
     found = _member_forces(
         problem, values, force.whose, force.conditions, factor, noise

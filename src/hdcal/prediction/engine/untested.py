@@ -1,0 +1,150 @@
+"""What untested conditions may add to a force: unknown, so one place of it a draw.
+
+Nothing of it is scatter: beyond the tested deformation a bend may grow, beyond the
+tested temperatures the rig may drift, for every member alike.
+"""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from hdcal.data.priors import effect_priors
+from hdcal.data.records import Array
+from hdcal.inference.distributions import moments
+from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
+from hdcal.physics.effects.thermal_expansion import ThermalExpansion
+from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
+from hdcal.prediction.engine.causes import Cause
+from hdcal.prediction.engine.growth import Growth, fit_growth
+
+# Sites of a draw beside those of the posterior: size of the bend and its noise beyond
+# each end, and standard normal scores of the bend, the zero and the frame.
+BENDS, PLACES = "_bends", "_places"
+# Numbers of a draw that they are made of.
+SITES = 4
+
+
+class Untested(eqx.Module):
+    """What is not known of conditions beyond the tested ones.
+
+    Attributes:
+        below: the bend beyond the low end of the tested deformation.
+        above: and beyond the high one.
+        coldest: tested temperature [°C].
+        warmest: likewise.
+        zero: mean and sd of the zero's drift with temperature [N/K].
+        frame: mean and sd of the radial deformation that the frame gains [mm/K].
+    """
+
+    below: Growth
+    above: Growth
+    coldest: Float[Array, ""] | float
+    warmest: Float[Array, ""] | float
+    zero: tuple[float, float]
+    frame: tuple[float, float]
+
+    def kelvins(self, temperature):
+        """Return how far temperatures lie outside the tested ones, with sign [K]."""
+        warm = jnp.asarray(temperature, float)
+        return warm - jnp.clip(warm, self.coldest, self.warmest)
+
+    def drift(self, value: Values, temperature, loading):
+        """Return shifts of the force's zero [N] and of the deformation, radial [mm].
+
+        Args:
+            value: one draw, with its scores.
+            temperature: of the specimen [°C].
+            loading: sense of loading, along which the scores are.
+        """
+        _, zero, frame = value[PLACES]
+        kelvins = self.kelvins(temperature)
+        return tuple(
+            (mean + sd * loading * score) * kelvins
+            for (mean, sd), score in ((self.zero, zero), (self.frame, frame))
+        )
+
+    def bend_law(self, value: Values, deformation):
+        """Return mean and sd of the bend [N], and how much of it is in [-]; each (n,).
+
+        Args:
+            value: one draw.
+            deformation: as read [mm], shape (n,).
+        """
+        sides = self.below, self.above
+        laws = [
+            (*side.law(deformation, size, noise), side.share(deformation))
+            for side, (size, noise) in zip(sides, value[BENDS], strict=True)
+        ]
+        over = jnp.asarray(deformation) > self.above.far
+        return tuple(jnp.where(over, *pair) for pair in zip(*laws[::-1], strict=True))
+
+    def leftover(self, problem: Problem, value: Values, deformation, loading):
+        """Return the bend and the fitted leftover discrepancy of a draw [N], (n,) each.
+
+        The bend has no part in what was tested, and the fit none in what is far from
+        it; without a fit that is zero.
+
+        Args:
+            problem: structure.
+            value: one draw, with its scores.
+            deformation: as read [mm], shape (n,).
+            loading: sense of loading, along which the score is.
+        """
+        mean, sd, share = self.bend_law(value, deformation)
+        bend = share * (mean + sd * loading * value[PLACES][0])
+        if problem.discrepancy is None or "gap_weights" not in value:
+            return bend, jnp.zeros_like(bend)
+        inside = jnp.clip(deformation, self.above.far, self.below.far)
+        fitted = problem.discrepancy.columns(inside) @ value["gap_weights"]
+        return bend, (1.0 - share) * fitted
+
+
+def spread_evenly(count: int, columns: int, seed: int) -> np.ndarray:
+    """Return points that fill the unit cube evenly, (count, columns), none at 0 or 1.
+
+    Args:
+        count: of the points.
+        columns: dimensions.
+        seed: of the scrambling.
+    """
+    points = qmc.Sobol(columns, rng=seed).random(1 << int(np.ceil(np.log2(count))))
+    return np.clip(points[:count], 1e-9, 1.0 - 1e-9)
+
+
+def with_untested(cause: Cause, seed: int) -> tuple[Values, Untested]:
+    """Return all draws of a cause with what they leave open, and what that is.
+
+    Args:
+        cause: from `causes_of`.
+        seed: of what they leave open.
+    """
+    untested, sites = untested_of(cause, spread_evenly(cause.size, SITES, seed))
+    return {**cause.values, **sites}, untested
+
+
+def untested_of(cause: Cause, levels: np.ndarray) -> tuple[Untested, dict]:
+    """Return what a cause leaves open, and the sites that its draws get.
+
+    Args:
+        cause: from `causes_of`.
+        levels: from `spread_evenly`, (draw, SITES).
+    """
+    records = cause.posterior.case.records
+    low, high = float(records.deformation.min()), float(records.deformation.max())
+    below, above = fit_growth(cause, low, high), fit_growth(cause, high, low)
+    known = {effect.name for effect in cause.posterior.effects}
+    priors = {**effect_priors(), **cause.posterior.case.gear.effect_priors}
+    zero, frame = (
+        (0.0, 0.0) if effect.name in known else moments(priors[f"{effect.name}.slope"])
+        for effect in (ThermalZeroDrift, ThermalExpansion)
+    )
+    warm = records.temperature
+    untested = Untested(
+        below.growth, above.growth, float(warm.min()), float(warm.max()), zero, frame
+    )
+    sizes = np.stack([side.drawn(levels[:, 0]) for side in (below, above)], axis=1)
+    return untested, {BENDS: sizes, PLACES: ndtri(levels[:, 1:])}

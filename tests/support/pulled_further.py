@@ -1,0 +1,112 @@
+"""Virtual rigs of which a part of the stroke was measured, and the truth beyond it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hdcal.blind.virtual_rig.history import FULL, History
+from hdcal.blind.virtual_rig.virtual_rig import (
+    MECHANISMS,
+    ActiveMechanism,
+    VirtualRig,
+    draw_rig,
+)
+
+# A prediction is an immediate reading: what time alone brings is no part of it.
+OF_TIME = ("charge_leakage", "amplifier_drift")
+
+
+@dataclass(frozen=True)
+class PulledFurther:
+    """A ramp, and the reading without noise where it was not measured.
+
+    Attributes:
+        deformation: measured rows [mm].
+        force: likewise, with noise [N].
+        at: beyond them [mm].
+        truth: reading there without noise [N].
+    """
+
+    deformation: np.ndarray
+    force: np.ndarray
+    at: float
+    truth: float
+
+
+def _ramp(deformation) -> History:
+    count = len(deformation)
+    none, one = np.zeros(count, dtype=int), np.ones(count)
+    return History(
+        deformation=deformation,
+        temperature=20.0 * one,
+        time=2.0 * np.arange(count),
+        angle=np.linspace(0.0, 2.0 * np.pi, count),
+        direction=one,
+        sense=one,
+        cycle=none,
+        run=none,
+        specimen=none,
+        force=0.0 * one,
+    )
+
+
+def pulled_further(
+    name: str, r: float, times: float, rng: np.random.Generator, rows: int = 30
+) -> PulledFurther | None:
+    """Return a ramp on which a mechanism leaves a gap of r noise sds.
+
+    Args:
+        name: of the mechanism.
+        r: RMS of the gap over the noise in the measured rows.
+        times: the deformation asked for, over the largest measured.
+        rng: draws rig, shape and noise.
+        rows: that were measured.
+
+    Returns:
+        None where no plausible size reaches r.
+    """
+    measured = np.linspace(0.02, FULL / times, rows)
+    on = np.linspace(FULL / times, FULL, 20)[1:]
+    rig = draw_rig(_ramp(np.concatenate([measured, on])), rng)
+    seen = replace(rig, history=_ramp(measured))
+    active = _sized(name, r, rig, seen, rng)
+    if active is None:
+        return None
+    full = rig.readings([active])
+    noise = rig.sigma * rng.normal(size=rows)
+    return PulledFurther(measured, full[:rows] + noise, FULL, float(full[-1]))
+
+
+def _sized(
+    name: str, r: float, rig: VirtualRig, seen: VirtualRig, rng: np.random.Generator
+) -> ActiveMechanism | None:
+    mechanism = MECHANISMS[name]
+    shape = mechanism.draw(rng)
+    sign = rng.choice([-1.0, 1.0]) if mechanism.signed else 1.0
+    rows = len(seen.history.deformation)
+
+    def of(log_size: float) -> ActiveMechanism:
+        return ActiveMechanism(name, sign * float(np.exp(log_size)), shape)
+
+    def excess(log_size: float) -> float:
+        gap = seen.gap_over_noise(rig.curve(of(log_size))[:rows])
+        return float(np.log(max(float(gap), 1e-9) / r))
+
+    low, high = np.log(1e-4 * mechanism.largest), np.log(mechanism.largest)
+    if excess(high) < 0.0 or excess(low) > 0.0:
+        return None
+    return of(float(brentq(excess, low, high, xtol=1e-4)))  # type: ignore[arg-type]
+
+
+def all_pulled_further(
+    names, times: float, count: int, seed: int
+) -> Iterator[PulledFurther]:
+    """Yield ramps of mechanisms at gaps of one and two noise sds."""
+    rng = np.random.default_rng(seed)
+    for name in names:
+        for r in (1.0, 2.0):
+            for _ in range(count):
+                if (found := pulled_further(name, r, times, rng)) is not None:
+                    yield found
