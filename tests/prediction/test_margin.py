@@ -76,6 +76,9 @@ def test_the_numbers_are_those_of_brute_force(gears):
     assert level.capacity_N == level.upper_bound_N
     expected = np.quantile(drawn, 0.9)
     assert level.capacity_predictive_N == pytest.approx(expected, rel=5e-3)
+    members_need = np.quantile(drawn, 0.9, axis=1)
+    middle = np.median(members_need)
+    assert level.capacity_median_N == pytest.approx(middle, rel=5e-3)
 
 
 def test_a_capacity_meets_what_it_was_asked_to(gears):
@@ -85,6 +88,15 @@ def test_a_capacity_meets_what_it_was_asked_to(gears):
     assert risk.probability == pytest.approx(1e-3, rel=1e-4)
     risk = hdcal.margin(gears, 0.4, limit_force=sure, **QUICK).worst.exceedance
     assert risk.at_confidence == pytest.approx(1e-3, rel=1e-2)
+
+
+@pytest.mark.parametrize("limit", [0.02, 90.0])
+def test_no_probability_is_nothing_or_all(one, limit: float):
+    risk = hdcal.margin(one, 0.4, limit_force=80.0 * limit, **QUICK).worst.exceedance
+    for share in (risk.probability, risk.lo, risk.hi, risk.at_confidence):
+        assert 0.0 < share < 1.0
+    for beta in (risk.beta, risk.beta_lo, risk.beta_hi, risk.beta_at_confidence):
+        assert np.isfinite(beta) and abs(beta) > 8.0
 
 
 def test_the_population_is_the_widest_that_was_tested(gears, one):

@@ -23,12 +23,23 @@ def verdict(posterior, limit: float) -> str:
 
 def test_enough_not_surely_and_not(posterior):
     level = hdcal.margin(posterior, 0.4).worst
-    sure, expected = level.capacity_N, level.capacity_predictive_N
-    assert expected < sure
+    sure, middle = level.capacity_N, level.capacity_median_N
+    assert middle < sure
     assert "is enough for 99 % of readings" in verdict(posterior, sure + 0.1)
-    between = verdict(posterior, 0.5 * (sure + expected))
-    assert "expected to be enough" in between and "but not with 95 %" in between
-    assert "is NOT enough" in verdict(posterior, expected - 0.1)
+    between = verdict(posterior, 0.5 * (sure + middle))
+    assert "more likely than not" in between and "but not with 95 %" in between
+    assert "is NOT enough" in verdict(posterior, middle - 0.1)
+
+
+def test_the_surer_capacity_is_never_the_smaller_one(posterior):
+    """Far outside a few draws make the average: it may lie above the sure one."""
+    found = hdcal.margin(posterior, 0.9, content=0.999)
+    level = found.worst
+    assert level.capacity_N < level.capacity_predictive_N
+    assert level.capacity_median_N < level.capacity_N
+    (said,) = (words for words in answer(found) if words.startswith("To hold"))
+    assert f"{level.capacity_median_N:.1f} N is as likely as not to do" in said
+    assert f"{level.capacity_N:.1f} N does with 95 % confidence" in said
 
 
 def test_a_notebook_shows_the_answer(posterior):
@@ -42,6 +53,7 @@ def test_a_probability_has_no_more_digits_than_it_can_have():
     assert chance(0.990173) == "99.0 %"
     assert chance(0.999966) == "more than 99.9 %"
     assert chance(0.98) == "98 %"
+    assert chance(1.0 - 1e-16) == "more than 99.9 %"
 
 
 def test_the_stated_probability_belongs_to_its_index(posterior):

@@ -31,6 +31,8 @@ from hdcal.prediction.margin.result import (
     sizes_needed,
 )
 
+# The least probability and the least distance to 1 that a number can hold.
+_LEAST, _LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
 _TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 
 
@@ -119,6 +121,7 @@ def level_of(
         lower_bound_N=lower,
         upper_bound_N=upper,
         capacity_N=at("required", criteria.confidence),
+        capacity_median_N=at("required", 0.5),
         capacity_predictive_N=ahead[3],
         exceedance=_exceedance(table, draws.weights, criteria) if limited else None,
     )
@@ -131,7 +134,8 @@ def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
         weighted_quantile(above, weights, share)
         for share in (_TAILS[0], _TAILS[2], criteria.confidence)
     )
-    chances = np.clip([mean, low, high, sure], 0.0, 1.0)
+    # Nobody can know that nothing or everything exceeds it.
+    chances = np.clip([mean, low, high, sure], _LEAST, 1.0 - _LEAST_LEFT)
     beta, beta_hi, beta_lo, beta_sure = map(float, -ndtri(chances))
     mean, low, high, sure = map(float, chances)
     return Exceedance(mean, low, high, sure, beta, beta_lo, beta_hi, beta_sure)

@@ -62,7 +62,9 @@ class Level:
         upper_bound_N: not exceeded by that share, with that confidence.
         capacity_N: smallest that meets the required probability, with confidence; as
             all capacities a size, along the sense of loading.
-        capacity_predictive_N: the same for the predictive probability.
+        capacity_median_N: the same with a confidence of a half.
+        capacity_predictive_N: the same for one future member, all that is unknown
+            averaged over.
         exceedance: of the given capacity, or None.
     """
 
@@ -73,6 +75,7 @@ class Level:
     lower_bound_N: float
     upper_bound_N: float
     capacity_N: float
+    capacity_median_N: float
     capacity_predictive_N: float
     exceedance: Exceedance | None
 

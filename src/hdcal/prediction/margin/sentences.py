@@ -53,8 +53,6 @@ def chance(probability: float) -> str:
     """Return a probability; never one that nobody can know."""
     if probability < _RAREST:
         return f"less than {_RAREST:.0e}"
-    if probability > 1.0 - _RAREST:
-        return "certain"
     if probability > 0.999:
         return "more than 99.9 %"
     if probability > 0.99:
@@ -177,7 +175,7 @@ def _capacity(found: Margin) -> Iterator[str]:
     yield (
         f"To hold {100.0 * found.required_probability:.8g} % of "
         f"{_many(found)}{in_tension(found)}, a capacity of "
-        f"{newtons(level.capacity_predictive_N)} is expected to do; "
+        f"{newtons(level.capacity_median_N)} is as likely as not to do; "
         f"{newtons(level.capacity_N)} does with {sure} confidence."
     )
 
@@ -190,9 +188,9 @@ def _enough(found: Margin, limit: float) -> str:
     given = f"A capacity of {limit:g} N{in_tension(found)}"
     if limit >= level.capacity_N:
         return f"{given} is enough for {share}, with {sure} confidence."
-    if limit >= level.capacity_predictive_N:
+    if limit >= level.capacity_median_N:
         return (
-            f"{given} is expected to be enough for {share}, but not with {sure} "
+            f"{given} is more likely than not enough for {share}, but not with {sure} "
             "confidence."
         )
     return f"{given} is NOT enough for {share}."

@@ -15,6 +15,7 @@ KINDS = {
     "lower_bound_N": "one-sided bound, content and confidence",
     "upper_bound_N": "one-sided bound, content and confidence",
     "capacity_N": "quantile of the population, with the stated confidence",
+    "capacity_median_N": "quantile of the population, median over the draws",
     "capacity_predictive_N": "quantile of the predictive distribution",
     "exceedance": "of one future member; lo and hi: credible interval of the share",
 }
