@@ -1,6 +1,7 @@
 """Nothing is replaced or removed but what hdcal wrote, and nobody else writes."""
 
 import errno
+import json
 import os
 import platform
 import re
@@ -18,6 +19,10 @@ from hdcal.report.saving.reserve import reserve_file, reserve_folder
 from hdcal.report.saving.target import KeptBeside
 
 NEW = {STAMP, "summary.json"}
+NUMBERS = {
+    "schema": "hdcal.result/1",
+    "files": [{"file": 5, "bytes": 4, "sha256": "0"}],
+}
 
 
 def content(folder: Path) -> dict[str, bytes | None]:
@@ -59,6 +64,10 @@ FOREIGN: dict[str, tuple[Callable[[Path], object], str]] = {
         "'inner/verdict.json', which was edited",
     ),
     "an edited stamp": (edited(STAMP), f"'{STAMP}', which was edited"),
+    "a stamp of numbers": (
+        lambda run: (run / STAMP).write_text(json.dumps(NUMBERS)),
+        f"'{STAMP}', which was edited",
+    ),
     "a file that is now a link": (
         lambda run: (
             (run / "summary.json").rename(run.parent / "moved"),

@@ -122,6 +122,8 @@ def _stamped(folder: Path) -> dict[str, Any] | None:
         if data["schema"] != SCHEMA:
             raise ValueError
         known = {one["file"]: (one["bytes"], one["sha256"]) for one in data["files"]}
+        if not all(isinstance(name, str) for name in known):
+            raise ValueError
     except (KeyError, TypeError, ValueError, RecursionError):
         words = f"holds '{STAMP}', which was edited since hdcal wrote it"
         raise Foreign(words) from None
