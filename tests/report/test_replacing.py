@@ -249,6 +249,27 @@ def test_a_second_run_is_told_at_once_who_is_at_work(writer, tmp_path: Path):
     assert content(tmp_path / "run").keys() == NEW
 
 
+def test_a_lock_of_another_user_says_who_is_at_work(
+    writer, tmp_path: Path, monkeypatch
+):
+    open_ = os.open
+
+    def denied(path, flags: int, *given) -> int:
+        # As the kernel does where the file is another user's.
+        if str(path).endswith(".lock") and flags & os.O_RDWR:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return open_(path, flags, *given)
+
+    monkeypatch.setattr(os, "open", denied)
+    with pytest.raises(InputError) as raised:
+        reserve_folder(tmp_path / "run")
+    assert f"is being written by process {writer.pid} on" in str(raised.value)
+    writer.kill()
+    writer.wait()
+    with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
+        reserve_folder(tmp_path / "run")
+
+
 def test_the_lock_of_a_killed_run_is_recognised(writer, tmp_path: Path):
     writer.kill()
     writer.wait()
