@@ -117,13 +117,19 @@ def _run(arguments: list[str], console: Console) -> int:
         # So click ends when nobody reads its help.
         console.unread = True
         return DONE
-    except (KeyboardInterrupt, click.Abort):
-        console.words("interrupted: nothing was written")
+    except (KeyboardInterrupt, click.Abort) as error:
+        # Click raises its own one from it; what was written then is noted there.
+        notes = getattr(error.__cause__ or error, "__notes__", ())
+        console.words(f"interrupted: {'; '.join(notes) or 'nothing was written'}")
         return INTERRUPTED
     except OSError as error:
-        # A full disk behind standard output: what is left for it would fail again.
-        discard_output()
-        return _failed(error, f"the system refused: {error.strerror or error}", console)
+        words = f"the system refused: {error.strerror or error}"
+        if error.filename is None:
+            # A full disk behind standard output: what is left for it would fail again.
+            discard_output()
+        else:
+            words += f": {error.filename}"
+        return _failed(error, words, console)
     except Exception as error:
         what = " ".join(str(error).split())[:200] or "no further words"
         words = f"internal error ({type(error).__name__}: {what}); please report it, "

@@ -1,7 +1,8 @@
 """The errors a user can meet: every one carries words, none needs a traceback."""
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ParamSpec, Self, TypeVar
 
@@ -82,11 +83,21 @@ class InputError(HdcalError):
 
 
 class NotWritable(HdcalError):
-    """The disk refused a result while it was written; nothing of it is left there."""
+    """The disk refused a result while it was written; the text says what is there."""
 
 
 class NotUsable(HdcalError):
     """A result exists but failed its checks, so nothing may be derived from it."""
+
+
+@contextmanager
+def said_if_interrupted(words: str) -> Iterator[None]:
+    """Let an interruption of what is done within say what was written before."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        error.add_note(words)
+        raise
 
 
 class Findings(list[Finding]):

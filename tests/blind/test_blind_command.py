@@ -1,5 +1,6 @@
 """`hdcal blind`: what was sealed is answered as it was, and opened as it was."""
 
+import errno
 import json
 import shutil
 import stat
@@ -18,7 +19,10 @@ from hdcal.blind.answering import answer_set
 from hdcal.blind.canonical import stamped
 from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
 from hdcal.blind.label import CaseAnswer
+from hdcal.blind.seal import unseal
+from hdcal.cli.console import Console
 from hdcal.errors import InputError
+from hdcal.report.saving import target as target_module
 
 # What every answer says, and the file of frozen answers does not.
 NOT_IN_FILE = {"status", "reasons", "headline", "next_step"}
@@ -257,6 +261,122 @@ def test_a_set_that_fails_leaves_neither_folder_nor_key(
     done = blind("make", "--cases", "2", "--mix", mix(), "--out", "set")
     assert done.returncode == 1 and "ZeroDivisionError" in done.stderr
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("older", [False, True])
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, OSError])
+def test_a_set_that_has_its_name_keeps_its_key(
+    older: bool, kind: type[BaseException], blind, monkeypatch, tmp_path: Path
+):
+    error = kind(errno.EIO, "EIO")
+    made = ["make", "--cases", "1", "--mix", mix(), "--out", "set", "--force"]
+    if older:
+        assert blind(*made, "--key", "older").returncode == 0
+    before, sync = seen(tmp_path), target_module.sync
+
+    def refused_sync(path: Path) -> None:
+        there = path / "set" / "sealed.bin"
+        former = before.get("set/sealed.bin")
+        if path == tmp_path and there.exists() and there.read_bytes() != former:
+            raise error
+        sync(path)
+
+    monkeypatch.setattr(target_module, "sync", refused_sync)
+    done = blind(*made)
+    if kind is KeyboardInterrupt:
+        words = f"hdcal: interrupted: {tmp_path}/set.key is written; set is written"
+        assert (done.returncode, done.stderr.strip()) == (130, words)
+    else:
+        assert done.returncode == 1 and "set: is written, but" in done.stderr
+    sealed = (tmp_path / "set" / "sealed.bin").read_bytes()
+    assert unseal(sealed, (tmp_path / "set.key").read_bytes().strip()).labels
+    there = {"set", "set.key", "older"} if older else {"set", "set.key"}
+    assert {path.name for path in tmp_path.iterdir()} == there
+
+
+def test_an_interruption_before_the_set_has_its_name_leaves_no_key(
+    blind, monkeypatch, tmp_path: Path
+):
+    def interrupted(*_) -> None:
+        assert (tmp_path / "set.key").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(target_module, "seal", interrupted)
+    done = blind("make", "--cases", "1", "--mix", mix(), "--out", "set")
+    assert done.returncode == 130
+    assert done.stderr.strip() == "hdcal: interrupted: nothing was written"
+    assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["make", "open"])
+def test_an_interruption_of_the_last_words_says_what_is_written(
+    command: str, blind, frozen: Path, monkeypatch
+):
+    def interrupted(*_) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Console, "result", interrupted)
+    if command == "make":
+        shutil.rmtree(frozen)
+        key_of(frozen).unlink()
+        done = blind("make", "--cases", "1", "--mix", mix(), "--out", "set")
+        assert done.stderr.strip() == "hdcal: interrupted: set is written"
+    else:
+        done = blind("open", "set", "--key", "set.key")
+        assert done.stderr.strip() == "hdcal: interrupted: set/result is written"
+    assert done.returncode == 130
+
+
+def test_an_interrupted_opening_says_that_it_is_recorded(
+    blind, frozen: Path, monkeypatch
+):
+    def interrupted(*_) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hdcal.blind.open.write_report", interrupted)
+    done = blind("open", "set", "--key", "set.key")
+    assert done.stderr.strip() == "hdcal: interrupted: set/opened.json is written"
+    assert (frozen / "opened.json").exists() and not (frozen / "result").exists()
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_key_whose_place_is_taken_goes_beside_with_its_set(
+    both: bool, blind, monkeypatch, tmp_path: Path
+):
+    def taking(*_) -> Iterator:
+        (tmp_path / "set.key").write_text("mine")
+        if both:
+            (tmp_path / "set").mkdir()
+        yield from sealing.drawn(1)
+
+    monkeypatch.setattr("hdcal.blind.virtual_rig.cases.draw_cases", taking)
+    done = blind("make", "--cases", "1", "--mix", mix(), "--out", "set")
+    assert done.returncode == 2 and "lies beside it, in 'set-2.key'" in done.stderr
+    assert ("lies beside it, in 'set-2'" in done.stderr) == both
+    there = tmp_path / ("set-2" if both else "set")
+    secret = (tmp_path / "set-2.key").read_bytes().strip()
+    assert unseal((there / "sealed.bin").read_bytes(), secret).labels
+    assert (tmp_path / "set.key").read_text() == "mine"
+    names = {"set", "set.key", "set-2.key", there.name}
+    assert {path.name for path in tmp_path.iterdir()} == names
+
+
+def test_a_key_beside_its_place_goes_with_a_set_that_fails(
+    blind, monkeypatch, tmp_path: Path
+):
+    def taking(*_) -> Iterator:
+        (tmp_path / "set.key").write_text("mine")
+        yield from sealing.drawn(1)
+
+    def interrupted(*_) -> None:
+        assert (tmp_path / "set-2.key").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hdcal.blind.virtual_rig.cases.draw_cases", taking)
+    monkeypatch.setattr(target_module, "seal", interrupted)
+    done = blind("make", "--cases", "1", "--mix", mix(), "--out", "set")
+    assert done.returncode == 130
+    assert seen(tmp_path) == {"set.key": b"mine"}
 
 
 def test_every_case_is_answered_with_its_own_library(fresh: Path):

@@ -42,6 +42,20 @@ def test_a_table_has_one_writer_too(here: Hdcal, calibrated, tmp_path: Path):
     assert (tmp_path / "readings.csv").read_text().endswith("0.1,20\n")
 
 
+def test_an_interruption_after_the_end_says_what_is_written(
+    here: Hdcal, monkeypatch, tmp_path: Path
+):
+    def interrupted(*_) -> None:
+        assert (tmp_path / "run" / "audit.json").exists()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hdcal.report.terminal.terminal_lines", interrupted)
+    done = here("audit", "--out", "run")
+    assert done.returncode == 130 and not done.stdout
+    assert done.stderr.strip() == "hdcal: interrupted: run is written"
+    assert {path.name for path in tmp_path.iterdir()} == {"run"}
+
+
 def test_what_appears_meanwhile_is_kept_and_told(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):

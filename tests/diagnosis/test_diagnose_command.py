@@ -174,6 +174,27 @@ def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path
     assert diagnose(*asked, "--no-report", "--out", "all", "--force").returncode == 2
 
 
+def test_a_case_named_as_a_file_of_the_result_does_not_stop_the_others(
+    diagnose, cases, tmp_path: Path
+):
+    taken = [STAMP, "Refused.json"]
+    for name in taken:
+        (tmp_path / name).mkdir()
+        for file in ("data.csv", "gear.toml"):
+            (tmp_path / name / file).write_bytes((XB1 / file).read_bytes())
+    asked = [cases["none"], *taken]
+    done = diagnose(*asked, "--no-report", "--out", "all", "--json")
+    assert done.returncode == 2
+    assert names(tmp_path / "all") == {"none", "refused.json", STAMP}
+    said = json.loads(done.stdout)
+    assert list(said["cases"]) == ["none"] and list(said["refused"]) == taken
+    for name in taken:
+        words = f"is called '{name}', as is a file of the result"
+        assert said["refused"][name][0]["problem"] == words
+    # By itself it has no such neighbour.
+    assert diagnose(STAMP, "--no-report", "--out", "one").returncode == 0
+
+
 def test_where_every_case_is_refused_nothing_is_written(
     diagnose, cases, tmp_path: Path
 ):

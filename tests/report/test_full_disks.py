@@ -192,6 +192,30 @@ def test_a_folder_that_vanishes_is_told(tmp_path: Path):
     assert not any(tmp_path.iterdir())
 
 
+def test_a_missing_input_is_no_fault_of_the_result(tmp_path: Path):
+    missing = tmp_path / "data.csv"
+    with (
+        pytest.raises(FileNotFoundError, match=r"data\.csv"),
+        reserve_folder(tmp_path / "run") as target,
+        target.filled(),
+    ):
+        missing.read_bytes()
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_command_names_the_input_that_went_away(
+    here: Hdcal, monkeypatch, tmp_path: Path
+):
+    monkeypatch.setattr(
+        "hdcal.classical.audit.audit.audit", (tmp_path / "data.csv").read_bytes
+    )
+    done = here("audit", "--out", "run", "--json")
+    assert done.returncode == 1 and not any(tmp_path.iterdir())
+    words = "the system refused: No such file or directory: "
+    assert f"{words}{tmp_path / 'data.csv'}" in done.stderr
+    assert json.loads(done.stdout)["status"] == "error"
+
+
 def test_a_command_says_it_in_one_line(here: Hdcal, tmp_path: Path):
     asked = ["fit", XB1, "--out", "run"]
     for more in ([], ["--json"]):

@@ -1,6 +1,7 @@
 """Nothing is replaced or removed but what hdcal wrote, and nobody else writes."""
 
 import errno
+import json
 import os
 import platform
 import re
@@ -12,12 +13,18 @@ from pathlib import Path
 import pytest
 
 from hdcal.errors import InputError
+from hdcal.report.saving import disk
 from hdcal.report.saving import target as target_module
 from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving.leftovers import finish
 from hdcal.report.saving.reserve import reserve_file, reserve_folder
 from hdcal.report.saving.target import KeptBeside
 
 NEW = {STAMP, "summary.json"}
+NUMBERS = {
+    "schema": "hdcal.result/1",
+    "files": [{"file": 5, "bytes": 4, "sha256": "0"}],
+}
 
 
 def content(folder: Path) -> dict[str, bytes | None]:
@@ -59,6 +66,10 @@ FOREIGN: dict[str, tuple[Callable[[Path], object], str]] = {
         "'inner/verdict.json', which was edited",
     ),
     "an edited stamp": (edited(STAMP), f"'{STAMP}', which was edited"),
+    "a stamp of numbers": (
+        lambda run: (run / STAMP).write_text(json.dumps(NUMBERS)),
+        f"'{STAMP}', which was edited",
+    ),
     "a file that is now a link": (
         lambda run: (
             (run / "summary.json").rename(run.parent / "moved"),
@@ -185,6 +196,176 @@ def test_a_file_that_appears_or_is_edited_is_kept(tmp_path: Path):
     assert content(tmp_path) == there
 
 
+def test_what_a_file_holds_is_compared_in_bytes(tmp_path: Path):
+    target = tmp_path / "a.csv"
+    target.write_text("ä,b\n1,2\n", "utf-8")
+    with reserve_file(target, force=True, beginning="ä,b\n") as place:
+        place.write(b"new")
+    assert content(tmp_path) == {"a.csv": b"new"}
+
+
+def test_rows_added_to_a_table_meanwhile_are_kept(tmp_path: Path):
+    target = tmp_path / "a.csv"
+    target.write_text("bands\n1\n")
+    with (
+        pytest.raises(KeptBeside, match=r"was edited .* in 'a-2\.csv'"),
+        reserve_file(target, force=True, beginning="bands") as place,
+    ):
+        target.write_text("bands\n1\nmine\n")
+        place.write(b"bands\n2\n")
+    there = {"a.csv": b"bands\n1\nmine\n", "a-2.csv": b"bands\n2\n"}
+    assert content(tmp_path) == there
+
+
+@pytest.mark.parametrize("kind", ["rows", "folder", "result"])
+def test_a_table_edited_in_the_last_moment_is_kept(
+    kind: str, tmp_path: Path, monkeypatch
+):
+    target = tmp_path / "a.csv"
+    target.write_text("bands\n1\n")
+    exchange = target_module.exchange
+    kept: dict = {}
+
+    def late(one: Path, other: Path) -> bool:
+        if kind == "rows":
+            other.write_text("bands\n1\nmine\n")
+            kept["a-2.csv"] = other.read_bytes()
+        else:
+            other.unlink()
+            other.mkdir()
+            kept["a.csv-2"] = None
+        if kind == "result":
+            write(tmp_path / "run", "text")
+            other.rmdir()
+            (tmp_path / "run").rename(other)
+            kept.update({f"a.csv-2/{name}": v for name, v in content(other).items()})
+        return exchange(one, other)
+
+    monkeypatch.setattr(target_module, "exchange", late)
+    with (
+        pytest.raises(KeptBeside, match="what was there lies in 'a"),
+        reserve_file(target, force=True, beginning="bands") as place,
+    ):
+        place.write(b"bands\n2\n")
+    assert content(tmp_path) == {"a.csv": b"bands\n2\n", **kept}
+
+
+def test_a_target_that_goes_away_in_the_last_moment_is_made(
+    tmp_path: Path, monkeypatch
+):
+    exchange = target_module.exchange
+
+    def late(one: Path, other: Path) -> bool:
+        other.rename(tmp_path / "kept")
+        return exchange(one, other)
+
+    monkeypatch.setattr(target_module, "exchange", late)
+    write(tmp_path / "run", "text")
+    write(tmp_path / "run", "new", force=True)
+    assert (tmp_path / "run" / "summary.json").read_text() == "new"
+    assert (tmp_path / "kept" / "summary.json").read_text() == "text"
+    (tmp_path / "kept" / "a.csv").write_text("bands old")
+    (tmp_path / "kept" / "a.csv").rename(tmp_path / "a.csv")
+    (tmp_path / "kept").rename(tmp_path / "first")
+    with reserve_file(tmp_path / "a.csv", force=True, beginning="bands") as place:
+        place.write(b"bands new")
+    assert (tmp_path / "a.csv").read_bytes() == b"bands new"
+    assert (tmp_path / "kept").read_bytes() == b"bands old"
+    there = {path.name for path in tmp_path.iterdir()}
+    assert there == {"run", "first", "a.csv", "kept"}
+
+
+@pytest.mark.parametrize("moment", ["before", "after", "between"])
+def test_an_interruption_of_the_rename_learns_from_the_disk_what_is_written(
+    moment: str, tmp_path: Path, monkeypatch
+):
+    """It comes before or after two names are swapped, or between two renames."""
+    rename = disk._rename
+
+    def interrupted(one: Path, other: Path, flag: int) -> bool:
+        if moment == "between" and one.parent.name == "swapping":
+            return False
+        if moment == "after":
+            rename(one, other, flag)
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    write(tmp_path / "run", "text")
+    before = content(tmp_path)
+    with (
+        pytest.raises(KeyboardInterrupt) as raised,
+        reserve_folder(tmp_path / "run", force=True) as place,
+        place.filled() as building,
+    ):
+        (building / "summary.json").write_text("new")
+        monkeypatch.setattr(disk, "_rename", interrupted)
+    notes = getattr(raised.value, "__notes__", [])
+    if moment == "after":
+        assert notes == [f"{tmp_path / 'run'} is written"]
+        assert (tmp_path / "run" / "summary.json").read_text() == "new"
+    else:
+        assert not notes and content(tmp_path) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_an_older_result_that_resists_is_seen_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch
+):
+    write(tmp_path / "run", "text")
+    unlink = Path.unlink
+
+    def resisting(path: Path, *given) -> None:
+        if path.name == "summary.json":
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        unlink(path, *given)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", resisting)
+        write(tmp_path / "run", "new", force=True)
+    # A part of it is gone, and what is left is hidden until it can be removed.
+    seen = {path.name for path in tmp_path.iterdir()}
+    assert "run" in seen and len(seen) == 2
+    (hidden,) = tmp_path.glob(".hdcal-*-*")
+    assert not list(hidden.rglob("verdict.json")) and list(hidden.rglob(STAMP))
+    write(tmp_path / "other", "text")
+    assert {path.name for path in tmp_path.iterdir()} == {"run", "other"}
+    assert (tmp_path / "run" / "summary.json").read_text() == "new"
+
+
+def test_half_of_an_older_result_that_cannot_be_read_stays_hidden(
+    tmp_path: Path, monkeypatch
+):
+    working = tmp_path / ".hdcal-0123456789ab-0123456789ab"
+    write(tmp_path / "run", "text")
+    (working / "removing").mkdir(parents=True)
+    (tmp_path / "run").rename(working / "removing" / "run")
+
+    def unreadable(path: Path) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    with monkeypatch.context() as patch:
+        patch.setattr("hdcal.report.saving.contents.size_and_sha256", unreadable)
+        with pytest.raises(PermissionError):
+            finish(working)
+    assert [path.name for path in tmp_path.iterdir()] == [working.name]
+
+
+def test_an_older_result_is_read_once_more_and_not_twice(tmp_path: Path, monkeypatch):
+    from hdcal.report.saving import contents
+
+    write(tmp_path / "run", "text")
+    read, reads = contents.size_and_sha256, []
+
+    def counted(path: Path) -> tuple[int, str]:
+        reads.append(path.name)
+        return read(path)
+
+    monkeypatch.setattr(contents, "size_and_sha256", counted)
+    write(tmp_path / "run", "text", force=True)
+    # At the start, before the swap and after it, and once for the new one's stamp.
+    assert reads.count("summary.json") == 4
+
+
 def test_a_target_that_goes_away_is_made(tmp_path: Path):
     write(tmp_path / "run", "text")
     with (
@@ -238,6 +419,27 @@ def test_a_second_run_is_told_at_once_who_is_at_work(writer, tmp_path: Path):
     assert writer.returncode == 0
     assert {path.name for path in tmp_path.iterdir()} == {"link", "run", "other"}
     assert content(tmp_path / "run").keys() == NEW
+
+
+def test_a_lock_of_another_user_says_who_is_at_work(
+    writer, tmp_path: Path, monkeypatch
+):
+    open_ = os.open
+
+    def denied(path, flags: int, *given) -> int:
+        # As the kernel does where the file is another user's.
+        if str(path).endswith(".lock") and flags & os.O_RDWR:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return open_(path, flags, *given)
+
+    monkeypatch.setattr(os, "open", denied)
+    with pytest.raises(InputError) as raised:
+        reserve_folder(tmp_path / "run")
+    assert f"is being written by process {writer.pid} on" in str(raised.value)
+    writer.kill()
+    writer.wait()
+    with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
+        reserve_folder(tmp_path / "run")
 
 
 def test_the_lock_of_a_killed_run_is_recognised(writer, tmp_path: Path):

@@ -1,4 +1,4 @@
-"""AnswerFiles to a blind check on disk: one file each, then all of them frozen."""
+"""Answers to a blind check on disk: one file each, then all of them frozen."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -22,6 +22,7 @@ from hdcal.blind.scoring.scores import JUDGED, Scores, score
 from hdcal.blind.seal import Sealed, check_labels, unseal
 from hdcal.blind.sealed_set import RESTORE_OPENED, RESULT, SEALED, BlindSet, read_set
 from hdcal.blind.summary import scores_report
+from hdcal.errors import said_if_interrupted
 from hdcal.report.plain import as_json, printable
 from hdcal.report.saving.reserve import reserve_folder, write_whole
 from hdcal.report.saving.target import TargetFolder
@@ -102,7 +103,8 @@ def _open(
     if before is None:
         # Before any label reaches the disk: what is answered later is not blind.
         write_whole(found.opened, as_json(stamped(_record(found, hashes))))
-    write_report(report, target)
+    with said_if_interrupted(f"{found.opened} is written"):
+        write_report(report, target)
     when = None if before is None else printable(before["time"][:40])
     return OpenedSet(found.folder / RESULT, opening, report, when)
 

@@ -33,11 +33,11 @@ from hdcal.blind.seal import (
     seal,
 )
 from hdcal.data.versions import versions
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
 from hdcal.report.saving.reserve import reserve_file, reserve_folder
-from hdcal.report.saving.target import KeptBeside
+from hdcal.report.saving.target import TargetFile, TargetFolder
 
 SET, SEALED, GEAR, MATERIAL = "set.json", "sealed.bin", "gear.toml", "material.toml"
 CASES, RESULT = "cases", "result"
@@ -171,20 +171,22 @@ def write_set(
         force: whether an older set without answers may be replaced.
 
     Raises:
-        InputError: the target or the key exists, or the key would lie in the set.
+        InputError: the target or the key exists, or the key would lie in the set;
+            or one of them appeared meanwhile, and set or key lies beside it.
         NotWritable: the disk refused.
     """
     _check_key(key, target)
     secret = new_key()
     with (
+        Findings() as wrong,
         reserve_folder(target, force=force, unstamped=_plain_set) as folder,
         reserve_file(key) as file,
-        _removed_on_failure(key, secret),
+        _removed_without(folder, file, secret),
         folder.filled() as into,
     ):
         manifest = _fill(into, drawn, _encoded(gear), material, secret, mix, seed)
-        # No set is ever seen without its key.
-        file.write(secret + b"\n", 0o600)
+        # No set is ever seen without its key, which may have to go beside its place.
+        wrong.attempt(file.write, secret + b"\n", 0o600)
     return manifest
 
 
@@ -255,14 +257,15 @@ def _plain_set(folder: Path) -> list[str]:
 
 
 @contextmanager
-def _removed_on_failure(path: Path, secret: bytes) -> Iterator[None]:
+def _removed_without(
+    folder: TargetFolder, key: TargetFile, secret: bytes
+) -> Iterator[None]:
     """Remove a key where there is no set that it opens."""
     try:
         yield
-    except KeptBeside:
-        raise
     except BaseException:
-        if path.is_file() and path.read_bytes().strip() == secret:
+        path = None if folder.written is not None else key.written
+        if path is not None and path.read_bytes().strip() == secret:
             path.unlink()
         raise
 

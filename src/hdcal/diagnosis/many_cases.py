@@ -15,8 +15,12 @@ from hdcal.data.case import Case
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, Findings, HdcalError, InputError
+from hdcal.report.saving.contents import STAMP
 
 Refused = Mapping[str, tuple[Finding, ...]]
+# What lies beside the folders of many cases.
+REFUSED = "refused.json"
+_OWN_FILES = {STAMP, REFUSED}
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,9 @@ def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
         if case is not None and case.name.casefold() in found:
             words = f"a second case is called '{case.name}', as is its result"
             wrong.append(Finding(path, words, "Rename one, or run it by itself"))
+        if case is not None and len(paths) > 1 and case.name.casefold() in _OWN_FILES:
+            words = f"is called '{case.name}', as is a file of the result"
+            wrong.append(Finding(path, words, "Rename it, or run it by itself"))
         if wrong:
             refused[path] = (*refused.get(path, ()), *wrong)
         elif case is not None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.diagnosis.document import verdict_document
-from hdcal.diagnosis.many_cases import AskedCases, Refused
+from hdcal.diagnosis.many_cases import REFUSED, AskedCases, Refused
 from hdcal.diagnosis.words import count_words, verdict_word
 from hdcal.report.document import Document, Section, Table
 from hdcal.report.plain import as_json
@@ -43,7 +43,7 @@ def write_refused(refused: Refused, folder: Path) -> None:
         next_step=_MEND,
         cases=dict(refused),
     )
-    write_file(folder / "refused.json", as_json(answer).encode())
+    write_file(folder / REFUSED, as_json(answer).encode())
 
 
 def verdicts_answer(

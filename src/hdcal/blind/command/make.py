@@ -12,6 +12,7 @@ from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import count_type, force_option, json_option
+from hdcal.errors import said_if_interrupted
 
 # With fewer somebody could draw the cases of every seed and look which ones fit.
 _SEED_BITS = 128
@@ -49,13 +50,14 @@ def make(console: Console, source, out, key, force, **given) -> None:
     key = Path(os.path.realpath(out) + ".key" if key is None else key)
     content = _drawn(**given) if source is None else _measured(source, **given)
     manifest = write_set(out, key=key, force=force, **content)
-    console.result(f"commitment {manifest.commitment}")
-    words = f"{len(manifest.cases)} sealed: {out}; keep the key to them: {key}"
-    console.words(words)
-    if console.json:
-        next_step = f"Answer them: hdcal blind answer {out}"
-        said = {"headline": words, "next_step": next_step}
-        console.data(SetAnswer(status="ok", reasons=(), **said, **manifest.plain()))
+    with said_if_interrupted(f"{out} is written"):
+        console.result(f"commitment {manifest.commitment}")
+        words = f"{len(manifest.cases)} sealed: {out}; keep the key to them: {key}"
+        console.words(words)
+        if console.json:
+            next_step = f"Answer them: hdcal blind answer {out}"
+            said = {"headline": words, "next_step": next_step}
+            console.data(SetAnswer(status="ok", reasons=(), **said, **manifest.plain()))
 
 
 def _drawn(mix, cases, seed, program, **_) -> dict[str, Any]:

@@ -1,12 +1,17 @@
 """`hdcal blind open`: everything verified, the labels decrypted, the answers scored."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
+from hdcal.errors import said_if_interrupted
+
+if TYPE_CHECKING:
+    from hdcal.blind.open import OpenedSet
 
 
 @command("open", short_help="Verify everything, decrypt the labels, score.")
@@ -22,11 +27,18 @@ from hdcal.cli.options import json_option
 @click.pass_obj
 def open_(console: Console, folder, key, by) -> None:
     """Open DIR, score its frozen answers, and write DIR/result."""
-    from hdcal.blind.answer import ScoresAnswer
     from hdcal.blind.open import open_set
-    from hdcal.report.terminal import terminal_lines
 
     opened = open_set(folder, Path(key), tuple(dict.fromkeys(by)))
+    with said_if_interrupted(f"{opened.folder} is written"):
+        _tell(console, opened)
+
+
+def _tell(console: Console, opened: "OpenedSet") -> None:
+    """Print what was opened, and how the answers scored."""
+    from hdcal.blind.answer import ScoresAnswer
+    from hdcal.report.terminal import terminal_lines
+
     console.result(f"commitment {opened.opening.set_commitment}")
     for name, one in opened.opening.answers.items():
         console.result(f"answers {one.sha256} by '{name}'")

@@ -5,7 +5,7 @@ import json
 import os
 import re
 import stat
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -43,16 +43,28 @@ def seal(folder: Path) -> None:
         OSError: the disk refused.
     """
     below = list(_below(folder))
-    files = []
-    for path in below:
-        if not _is_folder(path):
-            size, sha256 = _read(path)
-            name = path.relative_to(folder).as_posix()
-            files.append({"file": name, "bytes": size, "sha256": sha256})
-    stamp = {"schema": SCHEMA, "version": _version(), "files": files}
-    write_file(folder / STAMP, as_json(stamp).encode())
+    known = {
+        path.relative_to(folder).as_posix(): size_and_sha256(path)
+        for path in below
+        if not _is_folder(path)
+    }
+    write_stamp(folder, known)
     for path in [*below, folder / STAMP, folder]:
         sync(path)
+
+
+def write_stamp(folder: Path, known: Mapping[str, tuple[int, str]]) -> None:
+    """Write size and SHA-256 of files, by their names, into a folder.
+
+    Raises:
+        OSError: the disk refused.
+    """
+    files = [
+        {"file": name, "bytes": size, "sha256": sha256}
+        for name, (size, sha256) in known.items()
+    ]
+    stamp = {"schema": SCHEMA, "version": _version(), "files": files}
+    write_file(folder / STAMP, as_json(stamp).encode())
 
 
 @cache
@@ -101,15 +113,31 @@ def result_entries(folder: Path, unstamped: Unstamped = older_result) -> list[Pa
         name = path.relative_to(folder).as_posix()
         if _is_folder(path) and path in parents:
             return path
-        if name not in known and not (path.name in _LITTER and _is_file(path)):
+        if name not in known and not (path.name in _LITTER and is_file(path)):
             words = f"holds '{printable(name)}', which hdcal did not write with it"
             raise Foreign(words)
-        if not _is_file(path) or known.get(name) not in (None, _read(path)):
+        if not is_file(path) or known.get(name) not in (None, size_and_sha256(path)):
             words = f"holds '{printable(name)}', which was edited since hdcal wrote it"
             raise Foreign(words)
         return path
 
     return list(_below(folder, checked))
+
+
+def check_file(file: Path, stamped: Path) -> None:
+    """Check that a file holds what a stamp says, under whatever name.
+
+    Args:
+        file: to look at.
+        stamped: folder with the stamp.
+
+    Raises:
+        Foreign: it does not, or there is no such stamp.
+        OSError: it cannot be read.
+    """
+    known = _stamped(stamped) or {}
+    if not is_file(file) or size_and_sha256(file) not in known.values():
+        raise Foreign("was edited while the result was made")
 
 
 def _stamped(folder: Path) -> dict[str, Any] | None:
@@ -118,18 +146,24 @@ def _stamped(folder: Path) -> dict[str, Any] | None:
     if not os.path.lexists(path):
         return None
     try:
-        data = json.loads(path.read_text("utf-8")) if _is_file(path) else {}
+        data = json.loads(path.read_text("utf-8")) if is_file(path) else {}
         if data["schema"] != SCHEMA:
             raise ValueError
         known = {one["file"]: (one["bytes"], one["sha256"]) for one in data["files"]}
+        if not all(isinstance(name, str) for name in known):
+            raise ValueError
     except (KeyError, TypeError, ValueError, RecursionError):
         words = f"holds '{STAMP}', which was edited since hdcal wrote it"
         raise Foreign(words) from None
     return known | {STAMP: None}
 
 
-def _read(path: Path) -> tuple[int, str]:
-    """Return size and SHA-256 of a file."""
+def size_and_sha256(path: Path) -> tuple[int, str]:
+    """Return size and SHA-256 of a file.
+
+    Raises:
+        OSError: it cannot be read.
+    """
     with open(path, "rb") as stream:
         sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
         return os.fstat(stream.fileno()).st_size, sha256
@@ -153,7 +187,7 @@ def _below(folder: Path, checked: Callable[[Path], Path] = Path) -> Iterator[Pat
 
 
 def _is_answer(path: Path) -> bool:
-    if not _ANSWER.fullmatch(path.name) or not _is_file(path):
+    if not _ANSWER.fullmatch(path.name) or not is_file(path):
         return False
     try:
         data = json.loads(path.read_text("utf-8"))
@@ -162,7 +196,12 @@ def _is_answer(path: Path) -> bool:
     return isinstance(data, dict) and str(data.get("schema")).startswith("hdcal.")
 
 
-def _is_file(path: Path) -> bool:
+def is_file(path: Path) -> bool:
+    """Tell whether a path is a file itself, and no link to one.
+
+    Raises:
+        OSError: it is not there.
+    """
     return stat.S_ISREG(path.lstat().st_mode)
 
 

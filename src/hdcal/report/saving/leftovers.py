@@ -7,8 +7,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from hdcal.report.saving.contents import (
+    STAMP,
     Foreign,
     Unstamped,
+    check_file,
     older_result,
     result_entries,
 )
@@ -17,7 +19,8 @@ from hdcal.report.saving.lock import Lock
 
 # A working folder of a process holds these, each under the target's own name:
 # the new result, nobody's loss; a result that changes places with it, never removed
-# unseen; and an older one that was seen to be hdcal's, being removed.
+# unseen; and an older one that was seen to be hdcal's, being removed. Where they are
+# files of their own, a stamp beside these folders says what they held.
 BUILDING, SWAPPING, REMOVING = "building", "swapping", "removing"
 _HIDDEN = re.compile(r"\.hdcal-([0-9a-f]{12})(\.lock|-[0-9a-f]{12})")
 
@@ -70,12 +73,14 @@ def finish(working: Path) -> None:
             with suppress(OSError):
                 path.rmdir()
         remove_result(left, older_result)
+    with suppress(FileNotFoundError):
+        (working / STAMP).unlink()
     for folder in (SWAPPING, REMOVING, ""):
         with suppress(FileNotFoundError):
             (working / folder).rmdir()
 
 
-def remove_result(aside: Path, unstamped: Unstamped) -> Path | None:
+def remove_result(aside: Path, unstamped: Unstamped) -> tuple[Path, str] | None:
     """Remove a replaced result, unless it holds anything that is not hdcal's.
 
     Args:
@@ -83,28 +88,42 @@ def remove_result(aside: Path, unstamped: Unstamped) -> Path | None:
         unstamped: tells what is hdcal's where there is no stamp.
 
     Returns:
-        Where it was put instead, beside its former place; None if it was removed.
+        Where it was put instead, beside its former place, and why; None if it was
+        removed.
 
     Raises:
-        OSError: the disk refused.
+        OSError: the disk refused; a part of it may be gone.
     """
     working = aside.parents[1]
+    leaving = working / REMOVING / aside.name
     try:
-        entries = result_entries(aside, unstamped)
-        if aside.parent.name == SWAPPING:
+        entries = _removable(aside, unstamped)
+        if aside != leaving:
             # From here on it is never brought back: it will not be whole.
-            (working / REMOVING).mkdir(exist_ok=True)
-            aside = aside.rename(working / REMOVING / aside.name)
-            entries = result_entries(aside, unstamped)
-        for path in entries:
-            if path.is_dir():
-                path.rmdir()
-            else:
-                path.unlink()
-        aside.rmdir()
-    except (Foreign, OSError):
-        return rename_beside(aside, working.parent / aside.name)
+            leaving.parent.mkdir(exist_ok=True)
+            aside.rename(leaving)
+    except (Foreign, OSError) as error:
+        if aside == leaving and isinstance(error, OSError):
+            raise  # of what was begun nothing is shown
+        why = str(error)
+        if isinstance(error, OSError):
+            why = f"could not be removed ({error.strerror or error})"
+        return rename_beside(aside, working.parent / aside.name), why
+    for path in [leaving / entry.relative_to(aside) for entry in [*entries, aside]]:
+        if path.is_dir():
+            path.rmdir()
+        else:
+            path.unlink()
     return None
+
+
+def _removable(aside: Path, unstamped: Unstamped) -> list[Path]:
+    """Return what lies below a replaced result, all of it seen to be hdcal's."""
+    working = aside.parents[1]
+    if not os.path.lexists(working / STAMP):
+        return result_entries(aside, unstamped)
+    check_file(aside, working)
+    return []
 
 
 def _entries(folder: Path) -> list[Path]:

@@ -48,7 +48,12 @@ class Lock:
         path = parent / f".hdcal-{key}.lock"
         while True:
             flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
-            lock = cls(path, key, os.open(path, flags, 0o666), True)
+            try:
+                lock = cls(path, key, os.open(path, flags, 0o666), True)
+            except PermissionError:
+                if _is_held(path):
+                    return None
+                raise
             try:
                 fcntl.flock(lock.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if lock.is_there():
@@ -97,3 +102,16 @@ class Lock:
             if self.is_there():
                 self.path.unlink()
         os.close(self.descriptor)
+
+
+def _is_held(path: Path) -> bool:
+    """Tell whether a process of another user holds a lock file."""
+    with suppress(OSError):
+        descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(descriptor)
+    return False

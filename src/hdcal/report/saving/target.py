@@ -5,12 +5,21 @@ import secrets
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
 from hdcal.errors import Finding, InputError, NotWritable
-from hdcal.report.saving.contents import Foreign, Unstamped, result_entries, seal
+from hdcal.report.saving.contents import (
+    Foreign,
+    Unstamped,
+    is_file,
+    older_result,
+    result_entries,
+    seal,
+    size_and_sha256,
+    write_stamp,
+)
 from hdcal.report.saving.disk import (
     exchange,
     rename_beside,
@@ -26,7 +35,7 @@ class KeptBeside(InputError):
     """The target appeared or was edited meanwhile; one of the two lies beside it."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Target(ABC):
     """A place that this process alone may write to, while it is used as a context.
 
@@ -35,18 +44,38 @@ class Target(ABC):
         path: where that is, links followed.
         lock: held until the context ends.
         existed: whether anything was there when it was reserved.
+        unstamped: tells what is hdcal's in a folder without a stamp.
     """
 
     name: str
     path: Path
     lock: Lock
     existed: bool
+    unstamped: Unstamped = older_result
+    _built: os.stat_result | None = field(default=None, init=False)
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, kind, error: BaseException | None, trace) -> None:
         self.lock.release()
+        if isinstance(error, KeyboardInterrupt) and self.written is not None:
+            error.add_note(f"{self.name} is written")
+
+    @property
+    def written(self) -> Path | None:
+        """Return where the result lies, at its place or beside it; None if nowhere.
+
+        The disk says so: an interruption may come in the moment of the rename.
+        """
+        if self._built is None:
+            return None
+        with suppress(OSError), os.scandir(self.path.parent) as entries:
+            for entry in entries:
+                found = entry.stat(follow_symlinks=False)
+                if os.path.samestat(found, self._built):
+                    return Path(entry.path)
+        return None
 
     @abstractmethod
     def check(self) -> None:
@@ -57,25 +86,20 @@ class Target(ABC):
             OSError: it cannot be read.
         """
 
-    @abstractmethod
-    def _replace(self, building: Path) -> Path | None:
-        """Put a new result in the place of an older one.
-
-        Returns:
-            Where the older one was put if it could not be removed.
-        """
-
     @contextmanager
     def _building(self) -> Iterator[Path]:
-        """Yield an empty hidden folder beside the target; at the end it is gone."""
+        """Yield a hidden name for the result; at the end nothing is left of it."""
         hidden = f".hdcal-{self.lock.key}-{secrets.token_hex(6)}"
         working = self.path.with_name(hidden)
         try:
             working.mkdir()
             (working / BUILDING).mkdir()
-            yield working / BUILDING
+            yield working / BUILDING / self.path.name
         except OSError as error:
-            raise not_writable(self.name, error) from error
+            # Whoever fills it may also read: what else is missing is not its fault.
+            if _is_about(error, working, self.path):
+                raise not_writable(self.name, error) from error
+            raise
         finally:
             # What resists is removed at the next start.
             with suppress(OSError):
@@ -83,13 +107,9 @@ class Target(ABC):
 
     def _publish(self, building: Path) -> None:
         """Give a finished result its name, or one beside it where that is taken."""
-        older = None
+        self._built = building.lstat()
         try:
-            if self.existed and os.path.lexists(self.path):
-                self.check()
-                older = self._replace(building)
-            else:
-                rename_new(building, self.path)
+            kept = self._give_name(building)
         except (FileExistsError, Foreign) as error:
             problem = "appeared while the result was made"
             if isinstance(error, Foreign):
@@ -99,9 +119,48 @@ class Target(ABC):
             problem += f", and was kept; the result lies beside it, in '{beside.name}'"
             raise self._kept(problem) from None
         self._confirm()
-        if older is not None:
-            problem = "was edited as the result took its place"
-            raise self._kept(f"{problem}; what was there lies in '{older.name}'")
+        if kept is not None:
+            beside, why = kept
+            problem = f"{why}; the result took its place"
+            raise self._kept(f"{problem}, and what was there lies in '{beside.name}'")
+
+    def _give_name(self, building: Path) -> tuple[Path, str] | None:
+        """Give a finished result its name.
+
+        Returns:
+            Where an older one was put that could not be removed, and why.
+        """
+        if self.existed:
+            with suppress(FileNotFoundError):  # then it went away
+                self.check()
+                return self._replace(building)
+        rename_new(building, self.path)
+        return None
+
+    def _replace(self, building: Path) -> tuple[Path, str] | None:
+        """Put a new result in the place of an older one, and remove that.
+
+        Raises:
+            FileNotFoundError: there is none any more; nothing has changed.
+        """
+        swapping = building.parents[1] / SWAPPING
+        swapping.mkdir()
+        aside = building.rename(swapping / self.path.name)
+        try:
+            swapped = exchange(aside, self.path)
+        except OSError:
+            aside.rename(building)  # there it is never taken for the older one
+            raise
+        if not swapped:
+            # If this process dies between the two, the next start brings it back.
+            aside.rename(building)
+            self.path.rename(aside)
+            rename_new(building, self.path)
+        self._confirm()
+        # What resists stays hidden, whole or not, and is removed at the next start.
+        with suppress(OSError):
+            return remove_result(aside, self.unstamped)
+        return None
 
     def _confirm(self) -> None:
         """Wait until the disk holds the new name."""
@@ -116,28 +175,22 @@ class Target(ABC):
         return KeptBeside([Finding(self.name, problem, "Compare the two")])
 
 
-@dataclass(frozen=True)
 class TargetFolder(Target):
-    """A place for a result folder.
-
-    Attributes:
-        unstamped: tells what is hdcal's in a folder without a stamp.
-    """
-
-    unstamped: Unstamped
+    """A place for a result folder."""
 
     @contextmanager
     def filled(self) -> Iterator[Path]:
         """Yield a hidden folder that takes the target's place when all went well.
 
         An older result stays until the new one is complete. Whatever goes wrong, an
-        interruption included, nothing is left behind.
+        interruption included, nothing is left behind that is not whole.
 
         Raises:
             KeptBeside: the target appeared or was edited meanwhile.
             NotWritable: the disk refused.
         """
         with self._building() as building:
+            building.mkdir()
             yield building
             seal(building)
             self._publish(building)
@@ -151,22 +204,8 @@ class TargetFolder(Target):
         """
         result_entries(self.path, self.unstamped)
 
-    def _replace(self, building: Path) -> Path | None:
-        swapping = building.with_name(SWAPPING)
-        swapping.mkdir()
-        aside = building.rename(swapping / self.path.name)
-        if not exchange(aside, self.path):
-            # If this process dies between the two, the next start brings it back.
-            aside.rename(building)
-            self.path.rename(aside)
-            rename_new(building, self.path)
-        self._confirm()
-        with suppress(OSError):  # then the next start removes it
-            return remove_result(aside, self.unstamped)
-        return None
 
-
-@dataclass(frozen=True)
+@dataclass(eq=False, kw_only=True)
 class TargetFile(Target):
     """A place for a file of its own.
 
@@ -175,6 +214,8 @@ class TargetFile(Target):
     """
 
     beginning: str
+    # Size and SHA-256 of the table that was there when the place was reserved.
+    _older: tuple[int, str] | None = field(default=None, init=False)
 
     def write(self, data: bytes, mode: int = 0o666) -> None:
         """Write the file whole, or not at all.
@@ -188,26 +229,43 @@ class TargetFile(Target):
             NotWritable: the disk refused.
         """
         with self._building() as building:
-            file = building / self.path.name
-            write_file(file, data, mode)
-            sync(file)
-            self._publish(file)
+            write_file(building, data, mode)
+            sync(building)
+            if self._older is not None:
+                # By this either is known after the swap.
+                both = {"older": self._older, "newer": size_and_sha256(building)}
+                write_stamp(building.parents[1], both)
+            self._publish(building)
 
     def check(self) -> None:
-        """Check that it begins as the tables of hdcal do.
+        """Check that it begins as the tables of hdcal do, and is as it was before.
 
         Raises:
-            Foreign: it does not.
+            Foreign: it does not, or is not.
             OSError: it cannot be read.
         """
-        if self.path.is_file():
-            with open(self.path, "rb") as table:
-                if table.read(len(self.beginning)) == self.beginning.encode():
-                    return
-        raise Foreign("is no table that hdcal wrote")
+        beginning = self.beginning.encode()
+        if not is_file(self.path) or _first(self.path, len(beginning)) != beginning:
+            raise Foreign("is no table that hdcal wrote")
+        found = size_and_sha256(self.path)
+        if self._older not in (None, found):
+            raise Foreign("was edited while the result was made")
+        self._older = found
 
-    def _replace(self, building: Path) -> None:
-        building.replace(self.path)
+
+def _first(path: Path, count: int) -> bytes:
+    with open(path, "rb") as stream:
+        return stream.read(count)
+
+
+def _is_about(error: OSError, *places: Path) -> bool:
+    """Tell whether an error is about something in one of some places.
+
+    One without a name is taken for it: so the system tells of a write.
+    """
+    given = (error.filename, error.filename2)
+    named = [Path(os.fsdecode(name)) for name in given if isinstance(name, str | bytes)]
+    return not named or any(p.is_relative_to(place) for p in named for place in places)
 
 
 def not_writable(name: str, error: OSError) -> NotWritable:
