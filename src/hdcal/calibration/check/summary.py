@@ -12,6 +12,7 @@ from hdcal.calibration.check.answer import (
 )
 from hdcal.calibration.check.document import HEADLINE
 from hdcal.data.case import Case
+from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 
 
@@ -47,7 +48,8 @@ def check_answer(case: Case) -> CheckAnswer:
 
 def _data(case: Case) -> CheckedData:
     records = case.records
-    rows = [int(np.count_nonzero(records.direction == sign)) for sign in (1, 0, -1)]
+    way = loading(np.asarray(records.deformation), np.asarray(records.direction))
+    rows = [int(np.count_nonzero(way == sign)) for sign in (1, 0, -1)]
     return CheckedData(
         rows=len(records.force),
         runs=case.run_labels,
