@@ -15,6 +15,7 @@ from hdcal.data.records import Records
 from hdcal.errors import Finding, Findings, quoted
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
+_BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 MOST_ROWS = 8  # listed in one note
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
@@ -63,6 +64,7 @@ def read_case(
         specimen_labels=measured.specimen.names,
         data_sha256=measured.columns.sha256,
         notes=(
+            *([_BESIDE] if gear is None and not folder else []),
             *_left_out(measured.columns),
             *_off_scale(measured, found),
             *_resets(measured, motion),

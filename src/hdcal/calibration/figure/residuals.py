@@ -109,5 +109,5 @@ def _draw(axes: Axes, x, values, groups) -> None:
         )
     reach = max(3.0, 1.1 * float(np.max(np.abs(values))))
     axes.set_ylim(-reach, reach)
-    place = {"transform": axes.get_yaxis_transform(), "fontsize": 8, "color": GREY}
-    axes.text(0.995, 1.9, "±2 sd", ha="right", va="top", **place)
+    # Above the panel: inside it, it would cover readings.
+    axes.set_title("grey: ±2 sd", loc="right", fontsize=8, color=GREY)
