@@ -146,6 +146,11 @@ def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Pat
     assert json.loads(as_json.stdout)["status"] == "error"
 
 
+def test_a_question_is_ended_by_its_own_mark(here: Hdcal):
+    done = here("calibrat", "x.csv")
+    assert done.stderr.rstrip().endswith("Did you mean 'calibrate'?")
+
+
 def test_an_unknown_effect_is_told_its_nearest(here: Hdcal, tmp_path: Path):
     done = here("calibrate", XB1, "--effect", "outlier")
     assert done.returncode == 2
