@@ -43,7 +43,7 @@ _REMEDY: Mapping[str, str] = {
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
-    "temperature": "Measure at a second temperature: only then do data speak of alpha.",
+    "temperature": "Measure at a second temperature: only then do data speak of α.",
     "unloading": "Unload too: without it friction and hysteresis cannot be seen.",
     "specimen": "Measure a second gear: one gear says nothing about the next one.",
 }
@@ -115,7 +115,7 @@ def _answers(found: CalibrationAnswer) -> Iterator[str]:
     )
     for driver, words in (
         ("data", "Decided by the data"),
-        ("prior", "Decided by the prior more than by these data"),
+        ("prior", "Not decided without the prior"),
     ):
         names = [
             label(name)

@@ -1,19 +1,15 @@
 """A document as one HTML page that needs nothing else and opens offline."""
 
 import base64
-import re
 from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
-from markupsafe import Markup, escape
 
 from hdcal.report.document import Document
 from hdcal.report.plain import printable
-
-_CODE = re.compile(r"`([^`]+)`")
 
 
 def html_page(document: Document, images: Mapping[str, bytes]) -> str:
@@ -56,13 +52,7 @@ def _template(name: str) -> Template:
         lstrip_blocks=True,
         finalize=lambda value: printable(value) if type(value) is str else value,
     )
-    environment.filters["prose"] = _prose
     return environment.get_template(name)
-
-
-def _prose(words: str) -> Markup:
-    """Return a sentence as HTML, what stands in backticks as code."""
-    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(printable(words)))))
 
 
 def _address(image: bytes) -> str:
