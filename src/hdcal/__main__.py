@@ -19,7 +19,7 @@ from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
-from hdcal.errors import Finding, HdcalError, InputError, NotUsable
+from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
@@ -101,7 +101,7 @@ def _run(arguments: list[str], console: Console) -> int:
     except click.UsageError as error:
         found = usage_error(error)
         # Click would repeat what was written, however long.
-        short = click.UsageError(f"{found.problem}.", error.ctx)
+        short = click.UsageError(ended(found.problem), error.ctx)
         console.findings([found], short.show)
         return BAD_INPUT
     except InputError as error:

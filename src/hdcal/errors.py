@@ -50,7 +50,13 @@ class Finding:
         if self.column is not None:
             where += f", column '{self.column}'"
         remedy = self.remedy[:1].upper() + self.remedy[1:]
-        return f"{where}: {self.problem}. {remedy}."
+        problem, remedy = (ended(text) for text in (self.problem, remedy))
+        return f"{where}: {problem} {remedy}"
+
+
+def ended(text: str) -> str:
+    """Return a sentence with its full stop; a question has its own mark."""
+    return text if text.endswith(("?", "!")) else f"{text}."
 
 
 def quoted(name: str) -> str:

@@ -79,6 +79,31 @@ def test_check_says_what_was_read(here: Hdcal):
     assert "14 loading" in words and "0.02 … 0.54 mm" in words
 
 
+@pytest.mark.parametrize(
+    ("scale", "reading", "plausible"),
+    [
+        (1.0, "radial", True),
+        (1.0, "diametral", True),
+        (0.1, "radial", False),
+        (0.05, "diametral", False),
+        (10.0, "radial", False),
+        (-1.0, "radial", False),
+    ],
+)
+def test_check_doubts_a_stiffness_of_another_unit(
+    here: Hdcal, case: Path, scale: float, reading: str, plausible: bool
+):
+    header, *rows = (case / "data.csv").read_text().splitlines()
+    read = [[float(cell) for cell in row.split(",")] for row in rows]
+    scaled = [f"{x},{scale * force}" for x, force in read]
+    (case / "data.csv").write_text("\n".join([header, *scaled]))
+    gear = (case / "gear.toml").read_text()
+    (case / "gear.toml").write_text(gear.replace('"radial"', f'"{reading}"'))
+    found = json.loads(here("check", case, "--json").stdout)
+    assert (found["headline"] == "The input is in order.") == plausible
+    assert any("wrong sign or unit" in note for note in found["notes"]) != plausible
+
+
 def test_bad_input_gives_every_finding_and_no_traceback(here: Hdcal, case: Path):
     rows = (case / "data.csv").read_text().splitlines()
     rows[3], rows[5] = "0.1,many", "inf,23.52"
@@ -144,6 +169,11 @@ def test_a_wrong_command_line_is_bad_input(arguments, here: Hdcal, tmp_path: Pat
     as_json = here(*arguments, "--json")
     assert as_json.returncode == 2
     assert json.loads(as_json.stdout)["status"] == "error"
+
+
+def test_a_question_is_ended_by_its_own_mark(here: Hdcal):
+    done = here("calibrat", "x.csv")
+    assert done.stderr.rstrip().endswith("Did you mean 'calibrate'?")
 
 
 def test_an_unknown_effect_is_told_its_nearest(here: Hdcal, tmp_path: Path):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hdcal.data.loading import derive_motion
+from hdcal.data.loading import derive_motion, loading, movement_words
 from hdcal.data.turning_points import resting, turning_points
 
 
@@ -147,3 +147,45 @@ def test_the_rate_through_noise():
 def test_equal_times_give_no_rate():
     found = motion([0, 1, 2, 3], time=[0, 0, 0, 0])
     assert found.rate.tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("deformation", "movement", "words"),
+    [
+        ([0.02, 0.2, 0.4, 0.2], [1, 1, 1, -1], "loading"),
+        ([-0.02, -0.2, -0.4, -0.2], [-1, -1, -1, 1], "unloading"),
+        # a zero that is a little off makes no test in tension
+        ([-0.01, 0.2, 0.4, 0.2], [1, 1, 1, -1], "loading"),
+        ([0.2, 0.3, -0.3, -0.2], [1, 1, -1, 1], "increasing deformation"),
+    ],
+)
+def test_loading_is_away_from_the_undeformed_gear(deformation, movement, words):
+    x = np.array(deformation)
+    assert loading(x, np.array(movement)).tolist() == [1, 1, 1, -1]
+    assert movement_words(x)[1] == words
+
+
+RAMP = np.linspace(0.02, 0.38, 10)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_new_ramp_is_no_unloading(sense):
+    found = motion(sense * np.tile(RAMP, 3))
+    assert found.resets == (10, 20)
+    assert found.features == {"cycles"}
+
+
+@pytest.mark.parametrize(
+    "deformation",
+    [
+        [*RAMP, *RAMP[::-1], *RAMP[1:]],
+        # as coarse on the way up as on the way down
+        [0.0, 0.4, 0.0, 0.4, 0.0, 0.4],
+        # one step back over less than half of the range
+        [*RAMP, *RAMP[6:]],
+    ],
+)
+def test_what_was_read_on_the_way_back_is_unloading(deformation):
+    found = motion(deformation)
+    assert found.resets == ()
+    assert "unloading" in found.features

@@ -173,6 +173,27 @@ def test_notes_name_what_was_left_out(folder):
     )
 
 
+def test_a_gear_file_that_was_not_named_is(folder):
+    rows = "".join(f"{i / 10},{i}\n" for i in range(6))
+    (folder / "readings.csv").write_text(f"deformation_mm,force_N\n{rows}")
+    (folder / "data.csv").write_text(f"deformation_mm,force_N\n{rows}")
+    beside = read_case(folder / "readings.csv")
+    assert beside.notes == ("the gear file is the gear.toml beside the data",)
+    assert read_case(folder / "readings.csv", folder / "gear.toml").notes == ()
+    assert read_case(folder).notes == ()
+
+
+def test_a_note_names_the_first_rows_of_new_ramps(folder):
+    ramp = "".join(f"{i / 20},{2 * i}\n" for i in range(1, 7))
+    case = read(folder, f"deformation_mm,force_N\n{ramp * 2}")
+    (note,) = case.notes
+    assert "(row 8)" in note and "`run`" in note
+    assert "unloading" not in case.records.known
+    assert case.records.direction[6] == -1
+    labelled = "".join(f"{row},{run}\n" for run in "ab" for row in ramp.splitlines())
+    assert read(folder, f"deformation_mm,force_N,run\n{labelled}").notes == ()
+
+
 def test_the_articles_table():
     from hdcal.data.resources import datasets_folder
 

@@ -224,3 +224,23 @@ def test_everything_wrong_is_said_at_once(given):
             tolerances={"wall": 1.0},
         )
     assert len(refused.value.findings) == 4
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_spring_that_is_named_can_stand_inside_the_gear(given, sense):
+    """Where any spring keeps the window, the softest named is one that can be built."""
+    draws = given(known(2000))
+    window = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
+    found = wave_generator(draws.gear, window, temperatures=[-20.0, 80.0])
+    told = generator_answer(found)
+    assert told.spring.softest_considered
+    radius = draws.gear.geometry.radius
+    assert abs(told.spring.interference_mm) < 0.25 * radius
+    assert sense * told.spring.interference_mm > 0.0
+    with pytest.raises(InputError) as refused:
+        wave_generator(draws.gear, window, rates=(1.0, 100.0))
+    (finding,) = refused.value.findings
+    assert finding.file == "rates" and "radius of 40 mm" in finding.problem
+    least = float(finding.remedy.split()[2])
+    again = wave_generator(draws.gear, window, rates=(least, 100.0))
+    assert again.chosen.rate == least

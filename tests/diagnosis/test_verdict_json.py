@@ -204,7 +204,7 @@ def test_of_many_pairs_of_one_shape_those_that_matter_are_named():
     ("statistic", "words"),
     [
         ("p_spread", "the departure is in their scatter"),
-        ("p_largest", "by 1.5 N on av"),
+        ("p_largest", "by 1.5 N rms (p"),
     ],
 )
 def test_a_gap_without_a_range_that_is_off(statistic: str, words: str):

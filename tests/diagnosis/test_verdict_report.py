@@ -24,6 +24,33 @@ def test_k_is_said_with_its_formula():
     )
 
 
+def test_k_is_said_with_what_it_is_fitted_beside():
+    words = page(named())
+    assert "It is fitted beside hysteresis; a calibration with other effects" in words
+    nothing = page(KINDS["none"]())
+    assert "It is fitted beside no effect" in nothing
+
+
+def test_where_nothing_is_suspected_no_run_is_proposed():
+    verdict = replace(KINDS["none"](), next_test=named().next_test)
+    found = verdict_answer(verdict)
+    assert found.next_step is None
+    assert not any("Next run" in words for words in found.answer)
+    words = page(verdict)
+    assert "None is proposed: no gap is seen." in words
+    assert "What to do next" not in words and "tells apart" not in words
+
+
+def test_what_stands_in_backticks_is_code_and_nothing_else_is():
+    words = page(replace(named(), next_test=(), no_run="see `a <b>` and <i>"))
+    assert "see <code>a &lt;b&gt;</code> and &lt;i&gt;." in words
+
+
+def test_an_effect_alone_is_told_from_one_with_its_pairs():
+    words = page(named())
+    assert "An effect stands here alone; the answer&#39;s percentage counts" in words
+
+
 def test_without_a_run_the_true_reason_stands():
     words = page(replace(named(), next_test=(), no_run="fewer than two are left"))
     assert "No run is proposed: fewer than two are left." in words

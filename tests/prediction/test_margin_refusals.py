@@ -67,6 +67,12 @@ def test_everything_bad_is_said_at_once(one):
     assert len(caught.value.findings) == 4
 
 
+def test_beside_a_wrong_deformation_no_force_is_blamed(one):
+    with pytest.raises(InputError) as refused:
+        hdcal.margin(one, 400.0, limit_force=100.0, given_force=80.0)
+    assert [finding.file for finding in refused.value.findings] == ["deformation"]
+
+
 def test_models_of_other_data_are_refused(one):
     other = replace(one, case=replace(one.case, data_sha256="1" * 64))
     with pytest.raises(InputError, match="same data"):

@@ -52,6 +52,13 @@ def test_what_is_no_reading_is_said(line, words):
         read_line(line)
 
 
+def test_what_is_no_reading_is_answered_by_one_that_is():
+    with pytest.raises(ValueError, match="such as") as refused:
+        read_line(b"0.02,4.05")
+    example = str(refused.value).partition("such as ")[2]
+    assert read_line(example.encode()) == {"deformation": 0.1, "force": 19.8}
+
+
 def test_a_reading_may_say_more():
     line = (
         b'{"deformation_mm": 0, "force_N": -1, "temperature_C": 20, "run": 3, "x": 1}'

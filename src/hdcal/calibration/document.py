@@ -1,6 +1,7 @@
 """A calibration in words: the only place of its sentences."""
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import THEORY_WORDS
@@ -23,7 +24,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.provenance import data_rows, provenance_rows
-from hdcal.report.words import estimate, label
+from hdcal.report.words import estimate, label, with_labels
 
 ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
@@ -42,7 +43,7 @@ _REMEDY: Mapping[str, str] = {
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
-    "temperature": "Measure at a second temperature: only then do data speak of alpha.",
+    "temperature": "Measure at a second temperature: only then do data speak of α.",
     "unloading": "Unload too: without it friction and hysteresis cannot be seen.",
     "specimen": "Measure a second gear: one gear says nothing about the next one.",
 }
@@ -75,6 +76,7 @@ def calibration_document(
 ) -> Document:
     """Return the report: pictures calibration, priors, residuals and sampler."""
     effects = ", ".join(found.effects).replace("_", " ")
+    said = partial(with_labels, names=found.parameters)
     return Document(
         name=posterior.case.gear.name,
         kind="calibration",
@@ -86,8 +88,8 @@ def calibration_document(
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[
-            *notices(("Remarks", found.flat_directions), tone="neutral"),
-            *notices(("To be aware of", found.warnings)),
+            *notices(("To be aware of", said(found.warnings))),
+            *notices(("Remarks", said(found.flat_directions)), tone="neutral"),
         ],
         sections=[
             _bands(found),
@@ -113,7 +115,7 @@ def _answers(found: CalibrationAnswer) -> Iterator[str]:
     )
     for driver, words in (
         ("data", "Decided by the data"),
-        ("prior", "Decided by the prior, not by these data"),
+        ("prior", "Not decided without the prior"),
     ):
         names = [
             label(name)
@@ -159,8 +161,7 @@ def _theories(found: CalibrationAnswer) -> Section:
         "Data identify the stiffness only, that is K times the theory's stiffness; the "
         "rows are one posterior seen through three formulas."
     )
-    note = Text(found.K_note.replace("`", ""))
-    return Section("K under each theory", [table, Text(one), note])
+    return Section("K under each theory", [table, Text(one), Text(found.K_note)])
 
 
 def _residuals(found: CalibrationAnswer) -> Section:

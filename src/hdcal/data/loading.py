@@ -22,6 +22,10 @@ LARGE_MOVE = 0.1
 CLEAR_RATIO = 1.5
 LEAST_REST = 0.02
 
+# One step back over this share of the range, twice as large as any before it, is where
+# the next ramp begins: nothing was read on the way, so no unloading was measured.
+RESET_STEP = 0.5
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -34,21 +38,66 @@ class Motion:
             +1 in a run that never moves; shape (n,).
         rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
         features: of `unloading`, `holds`, `rates`, `cycles` those present.
+        resets: rows reached by one step back over most of the range.
     """
 
     direction: np.ndarray
     sense: np.ndarray
     rate: np.ndarray
     features: frozenset[str]
+    resets: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Move:
-    """One movement between two reversals."""
+    """One movement between two reversals; row of the reset, if it is one."""
 
     sign: int
     travel: float
     speed: float
+    reset: int | None
+
+
+def loading_side(deformation: np.ndarray) -> int:
+    """Tell on which side of the undeformed gear it was tested.
+
+    Args:
+        deformation: as read [mm], shape (n,).
+
+    Returns:
+        +1 where it was pressed, -1 where it was pulled, 0 where both count: the
+        smaller reaches a share of the larger that counts as a movement.
+    """
+    ends = float(np.max(deformation)), float(-np.min(deformation))
+    if min(ends) > LARGE_MOVE * max(ends):
+        return 0
+    return 1 if ends[0] >= ends[1] else -1
+
+
+def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
+    """Tell loading, away from the undeformed gear, from unloading.
+
+    Args:
+        deformation: as read [mm], shape (n,).
+        movement: +1 it increased, 0 it was held, -1 it decreased, shape (n,).
+
+    Returns:
+        +1 loading, 0 holding, -1 unloading, in compression and in tension, shape (n,).
+    """
+    side = loading_side(deformation) or np.where(deformation < 0.0, -1, 1)
+    return np.asarray(movement) * side
+
+
+def movement_words(deformation: np.ndarray) -> dict[int, str]:
+    """Return what to call increasing (+1) and decreasing (-1) deformation.
+
+    Args:
+        deformation: of all rows, as read [mm], shape (n,).
+    """
+    side = loading_side(deformation)
+    if side == 0:
+        return {1: "increasing deformation", -1: "decreasing deformation"}
+    return {side: "loading", -side: "unloading"}
 
 
 def derive_motion(
@@ -75,7 +124,8 @@ def derive_motion(
     features = _features(moves, rate, span)
     if any(moves) and _rests(direction, run, time):
         features |= {"holds"}
-    return Motion(direction, sense, rate, features)
+    resets = [m.reset for run in moves for m in run if m.reset is not None]
+    return Motion(direction, sense, rate, features, tuple(sorted(resets)))
 
 
 def _one_run(
@@ -111,9 +161,22 @@ def _one_run(
             rate[rows[part][own]] = np.where(moving, sign * local, 0.0)[own]
             speed = _typical(local[moving])
         travel = float(rising[-1] - rising[0])
-        moves.append(_Move(sign, travel, speed))
+        reset = _reset(x, start, stop, span)
+        row = None if reset is None else int(rows[reset])
+        moves.append(_Move(sign, travel, speed, row))
         sign = -sign
     return moves
+
+
+def _reset(x: np.ndarray, start: int, stop: int, span: float) -> int | None:
+    """Return the row at which one movement jumps back, None where it does not."""
+    steps = np.abs(np.diff(x))
+    row = start + 1 + int(np.argmax(steps[start:stop]))
+    step = steps[row - 1]
+    back = abs(x[row]) < abs(x[row - 1])
+    before = steps[:start]
+    fine = before.size >= 3 and float(before[-3:].max()) <= 0.5 * step
+    return row if back and fine and step >= RESET_STEP * span else None
 
 
 def _speeds(
@@ -166,7 +229,7 @@ def _features(
     moves: list[list[_Move]], rate: np.ndarray, span: float
 ) -> frozenset[str]:
     large = [[m for m in run if m.travel >= LARGE_MOVE * span] for run in moves]
-    signs = {move.sign for run in large for move in run}
+    signs = {move.sign for run in large for move in run if move.reset is None}
     found = set()
     if signs == {1, -1}:
         found.add("unloading")

@@ -9,12 +9,14 @@ import numpy as np
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
 from hdcal.data.gear import read_gear
-from hdcal.data.loading import derive_motion
+from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
 from hdcal.errors import Finding, Findings, quoted
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
+_BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
+MOST_ROWS = 8  # listed in one note
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
 
@@ -53,21 +55,31 @@ def read_case(
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
+    motion = _motion(measured)
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
         gear=found,
-        records=_records(measured, found),
+        records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
         data_sha256=measured.columns.sha256,
-        notes=(*_left_out(measured.columns), *_off_scale(measured, found)),
+        notes=(
+            *([_BESIDE] if gear is None and not folder else []),
+            *_left_out(measured.columns),
+            *_off_scale(measured, found),
+            *_resets(measured, motion),
+        ),
     )
 
 
-def _records(measured: Measurements, gear: Gear) -> Records:
+def _motion(measured: Measurements) -> Motion:
+    values = measured.columns.values
+    return derive_motion(values["deformation"], measured.run.index, values.get("time"))
+
+
+def _records(measured: Measurements, gear: Gear, motion: Motion) -> Records:
     values, run = measured.columns.values, measured.run.index
     zeros = np.zeros(len(run))
-    motion = derive_motion(values["deformation"], run, values.get("time"))
     # NumPy arrays: JAX takes them when it computes, and reading starts no device
     return Records(
         deformation=values["deformation"],
@@ -128,6 +140,17 @@ def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:
         off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
         if off:
             yield f"{off} of {force.size} forces are not multiples of {step:g} N"
+
+
+def _resets(measured: Measurements, motion: Motion) -> Iterator[str]:
+    if motion.resets:
+        rows = [str(measured.columns.table.rows[row]) for row in motion.resets]
+        more = ", …" if len(rows) > MOST_ROWS else ""
+        yield (
+            f"the deformation goes back over most of its range in one step (row "
+            f"{', '.join(rows[:MOST_ROWS])}{more}), which counts as no measured "
+            "unloading. Where a new mounting begins there, say so in a column `run`"
+        )
 
 
 def _no_gear(data: Path) -> Finding:

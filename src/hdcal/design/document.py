@@ -156,12 +156,12 @@ def _by_temperature(found: GeneratorAnswer) -> Section:
         "inside",
     ]
     table = Table(["temperature", *numbers], rows, frozenset(numbers))
-    words = f"Median : {band(found)}; probabilities with one set point for all."
+    words = f"Median, below it {band(found)}; probabilities with one set point for all."
     return Section("By temperature", [table, Text(words, soft=True)])
 
 
 def _with_span(interval: Interval) -> str:
-    return " : ".join(estimate(interval))
+    return "\n".join(estimate(interval))
 
 
 def _candidates(found: InverseAnswer) -> Section:
@@ -183,7 +183,7 @@ def _candidates(found: InverseAnswer) -> Section:
         [[what, *_candidate(one, names)] for what, one in listed],
         frozenset(numbers),
     )
-    note = Text(f"Median : {band(found)}.", soft=True)
+    note = Text(f"Median, below it {band(found)}.", soft=True)
     return Section("Designs", [table, note])
 
 

@@ -62,7 +62,7 @@ def generator_words(found: GeneratorAnswer) -> Iterator[str]:
         f"with {middle} N ({percent(found.interval)} {_kind(found)} {span} N) at "
         f"{aim.temperature_C:g} °C."
     )
-    softest = "any spring does, down to the softest considered: "
+    softest = "any spring does, down to the softest that was considered: "
     if not spring.softest_considered:
         softest = "the softest spring that does it has "
     yield (

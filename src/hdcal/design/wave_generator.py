@@ -20,6 +20,9 @@ from hdcal.notebook import Shown
 
 # Default range of the spring rate, relative to the gear's own stiffness.
 RATE_RANGE = (0.01, 100.0)
+# A spring stands inside the gear and works over part of its own length: its free end
+# stands no farther from the undeformed gear than this share of the radius.
+MOST_TRAVEL = 0.25
 # Points of the window at which the force has to grow with deformation.
 _ALONG = 9
 
@@ -85,7 +88,7 @@ def wave_generator(
         tolerances: ± of sizes [mm] by name, see `next_gear`.
         setting_sd: sd of the set point as built [mm].
         rates: spring rates to look at [N/mm]; by default 0.01 to 100 times the
-            stiffness of the gear.
+            stiffness of the gear, without those too soft to stand inside it.
         seed: of scatter and setting.
 
     Returns:
@@ -93,7 +96,8 @@ def wave_generator(
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: bad input, or no spring rate meets the requirement.
+        InputError: bad input, or no spring rate meets the requirement, or the softest
+            that does is too soft to stand inside the gear.
     """
     draws = design_draws(source, seed=seed)
     levels = tuple(with_reference(draws, temperatures).tolist())
@@ -116,15 +120,20 @@ def _generator(
     along = np.linspace(*window, _ALONG)
     forces = asked.sense * gear.forces(asked.sense * along, levels)
     _check_growing(forces)
+    radius = float(draws.gear.geometry.radius)
+    least = float(np.max(forces[-1])) / max(MOST_TRAVEL * radius - window[1], window[1])
     if rates is None:
         middle = np.median(forces[_ALONG // 2]) / along[_ALONG // 2]
-        rates = (RATE_RANGE[0] * middle, RATE_RANGE[1] * middle)
+        low, high = (share * middle for share in RATE_RANGE)
+        rates = max(low, least), high
     scatter = np.random.default_rng([seed, 1]).normal(size=draws.size)
     error = asked.setting_sd_mm * scatter
     springs = judge_all(rates, window, forces, error)
     chosen = softest(springs, window, forces, error, asked.probability)
     if chosen is None:
         raise InputError([_unmet(springs, asked)])
+    if chosen.interference > MOST_TRAVEL * radius and chosen.rate < least:
+        raise InputError([_too_soft(chosen, asked, radius, least)])
     return WaveGenerator(
         draws,
         gear,
@@ -151,6 +160,17 @@ def _unmet(springs: list[Spring], asked: WindowAsked) -> Finding:
         each = f"{alone.rate:.4g} N/mm reaches {alone.adjusted:.4g}"
         remedy += f"; adjusted gear by gear, {each}"
     return Finding("window", words, remedy)
+
+
+def _too_soft(
+    spring: Spring, asked: WindowAsked, radius: float, least: float
+) -> Finding:
+    words = (
+        f"the softest spring that does it has {spring.rate:.4g} N/mm and would stand "
+        f"{asked.sense * spring.interference:.4g} mm from the undeformed gear, more "
+        f"than {MOST_TRAVEL:g} of its radius of {radius:g} mm"
+    )
+    return Finding("rates", words, f"Look at {least:.4g} N/mm and stiffer")
 
 
 def _check_growing(forces: np.ndarray) -> None:

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
+from hdcal.data.loading import movement_words
 from hdcal.data.records import Array, Records
 
 # A mean of fewer rows says little.
@@ -114,16 +115,17 @@ def _levels(name: str, values, unit: str) -> list[DeclaredCell]:
 
 
 def _directions(records: Records) -> list[DeclaredCell]:
+    words = movement_words(np.asarray(records.deformation))
     return [
         DeclaredCell(
             "direction",
-            word,
+            words[sense],
             np.nan,
             np.nan,
             "",
-            (np.asarray(records.sense) == sign).astype(float),
+            (np.asarray(records.sense) == sense).astype(float),
         )
-        for word, sign in (("loading", 1.0), ("unloading", -1.0))
+        for sense in (1, -1)
     ]
 
 

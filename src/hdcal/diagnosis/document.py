@@ -3,6 +3,7 @@
 from hdcal.data.case import Case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.sections import shrink_section, where_section, which_section
+from hdcal.diagnosis.words import nothing_suspected
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
     Document,
@@ -19,6 +20,7 @@ from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
     hypothesis,
+    label,
     number,
 )
 
@@ -72,6 +74,8 @@ def verdict_document(
 
 def _next_runs(found: VerdictAnswer) -> Section:
     heading = "Runs that would tell more, if the cause is in the library"
+    if nothing_suspected(found):
+        return Section(heading, [Text("None is proposed: no gap is seen.")])
     if not found.next_test:
         return Section(
             heading, [Text(f"No run is proposed: {found.next_test_reason}.")]
@@ -99,7 +103,8 @@ def _budget(found: VerdictAnswer) -> Section:
     middle, span = estimate(budget.K)
     words = (
         f"K by the {budget.formula} formula, at the prior's mean modulus, is {middle}, "
-        f"90 % interval {span}. {budget.note}"
+        f"90 % interval {span}. It is fitted beside {_fitted_beside(found)}; a "
+        f"calibration with other effects, or with none, gives another K. {budget.note}"
     )
     rows = [
         [
@@ -115,6 +120,12 @@ def _budget(found: VerdictAnswer) -> Section:
     columns = ["part of K", *numbers, "driven by", "what would tell it"]
     table = [Table(columns, rows, frozenset(numbers))] if rows else []
     return Section("Why K is not 1", [Text(words), *table])
+
+
+def _fitted_beside(found: VerdictAnswer) -> str:
+    """Say which effects were in the model when K was fitted."""
+    names = found.which.named
+    return " and ".join(map(label, names)) if names else "no effect"
 
 
 def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Section:

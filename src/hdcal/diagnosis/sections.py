@@ -118,7 +118,8 @@ def which_section(found: VerdictAnswer) -> Section:
     others = len(chances) - _MOST_ROWS
     rest = f"{others} less probable ones are in verdict.json. " if others > 0 else ""
     note = (
-        f"Bold: the fewest that make up 90 %. {rest}Log evidence in nats: three are a "
+        f"Bold: the fewest that make up 90 %. {rest}An effect stands here alone; the "
+        "answer's percentage counts its pairs too. Log evidence in nats: three are a "
         "factor of twenty."
     )
     caption = (

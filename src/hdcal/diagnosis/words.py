@@ -42,10 +42,15 @@ def headline(found: VerdictAnswer) -> str:
 
 def next_step(found: VerdictAnswer) -> str | None:
     """Return the run that would tell most, or None."""
-    if found.status != "ok" or not found.next_test:
+    if found.status != "ok" or not found.next_test or nothing_suspected(found):
         return None
     lead = "Next run" if found.which.verdict != "named" else "To be surer"
     return f"{lead}: {found.next_test[0].run.rstrip('.')}."
+
+
+def nothing_suspected(found: VerdictAnswer) -> bool:
+    """Tell whether no gap is seen, so that there is no cause to look for."""
+    return found.which.verdict == "none" and not found.gap.detected
 
 
 def answer(found: VerdictAnswer) -> list[str]:
@@ -249,7 +254,7 @@ def _nowhere(found: VerdictAnswer) -> str:
         )
     size = newton(found.gap.rms_N.median)
     return (
-        f"The readings depart from the model by {size} on average (p = {p}), but no "
+        f"The readings depart from the model by {size} rms (p = {p}), but no "
         "single range of them by enough to point at it."
     )
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.loading import loading
 from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
 from hdcal.report.words import number, with_unit
@@ -37,9 +38,8 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
         return with_unit(low if low == high else f"{low} … {high}", shown)
 
     moves = {"loading": 1, "holding": 0, "unloading": -1}
-    count = {
-        word: np.count_nonzero(records.direction == s) for word, s in moves.items()
-    }
+    way = loading(np.asarray(records.deformation), np.asarray(records.direction))
+    count = {word: np.count_nonzero(way == sign) for word, sign in moves.items()}
     warmth = ends(records.temperature, "°C")
     if "temperature" not in records.known:
         warmth += ", not measured: the reference temperature"

@@ -1,7 +1,8 @@
 """Numbers, priors and names in the form in which people read them."""
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
@@ -106,6 +107,19 @@ def label(name: str) -> str:
     if dot:
         return f"{effect}: {parameter}".replace("_", " ")
     return LABELS.get(name, name.replace("_", " "))
+
+
+def with_labels(sentences: Sequence[str], names: Iterable[str]) -> list[str]:
+    """Return sentences with parameters called what they are called on paper.
+
+    Args:
+        sentences: that hold names of parameters.
+        names: of all parameters that they may hold.
+    """
+    longest = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
+    name = re.compile(rf"(?<![\w./])(?:{longest})(?![\w.]\w|\w)")
+    told = (name.sub(lambda found: label(found[0]), words) for words in sentences)
+    return [words[:1].upper() + words[1:] for words in told]
 
 
 _HYPOTHESES = {"none": "no gap", "unknown": "something outside the library"}

@@ -9,6 +9,7 @@ from hdcal.tracking.tracker import SCHEMA, Tracker
 # A longer line is no reading; the rest of it is thrown away unread.
 _LONGEST = 1 << 16
 _ENCODER = json.JSONEncoder(allow_nan=False)
+_EXAMPLE = '{"deformation_mm": 0.1, "force_N": 19.8}'
 _NUMBERS = {"deformation_mm": "deformation", "force_N": "force"}
 _OPTIONAL = {"temperature_C": "temperature", "time_s": "time"}
 
@@ -52,9 +53,10 @@ def read_line(line: bytes) -> dict[str, Any]:
     try:
         plain = json.loads(line)
     except (ValueError, RecursionError):
-        raise ValueError("the line is no JSON") from None
+        words = "the line is no JSON; one reading is one line such as"
+        raise ValueError(f"{words} {_EXAMPLE}") from None
     if not isinstance(plain, dict):
-        raise ValueError('the line is no object such as {"deformation_mm": 0.1, …}')
+        raise ValueError(f"the line is no object such as {_EXAMPLE}")
     missing = [name for name in _NUMBERS if plain.get(name) is None]
     if missing:
         raise ValueError(f"{' and '.join(missing)} missing")

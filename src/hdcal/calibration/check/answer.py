@@ -24,7 +24,10 @@ class CheckedGear:
 
 @dataclass(frozen=True)
 class RowsByMovement:
-    """Number of rows by the movement that led to them."""
+    """Number of rows by the movement that led to them.
+
+    Loading is away from the undeformed gear, in compression and in tension.
+    """
 
     loading: Count
     holding: Count

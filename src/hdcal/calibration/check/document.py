@@ -6,6 +6,7 @@ from hdcal.calibration.check.answer import CheckAnswer, Ends
 from hdcal.report.document import Document, Facts, Section
 
 HEADLINE = "The input is in order."
+DOUBTFUL = "The input can be read, but the stiffness it shows is not plausible."
 _MOST_LISTED = 8
 
 

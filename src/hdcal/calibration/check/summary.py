@@ -10,14 +10,20 @@ from hdcal.calibration.check.answer import (
     Ends,
     RowsByMovement,
 )
-from hdcal.calibration.check.document import HEADLINE
+from hdcal.calibration.check.document import DOUBTFUL, HEADLINE
 from hdcal.data.case import Case
+from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
+from hdcal.physics.theory import THEORIES
+
+# Prior sds of log K within which 99.7 % of it lies.
+_FAR = 3.0
 
 
 def check_answer(case: Case) -> CheckAnswer:
     """Return what was understood of a case, ready for JSON."""
     gear, records = case.gear, case.records
+    doubt = _doubt(case)
     lacking = {
         name: tuple(sorted(effect.needs - records.known))
         for name, effect in EFFECTS.items()
@@ -25,7 +31,7 @@ def check_answer(case: Case) -> CheckAnswer:
     return CheckAnswer(
         status="ok",
         reasons=(),
-        headline=HEADLINE,
+        headline=DOUBTFUL if doubt else HEADLINE,
         next_step=None,
         case=case.name,
         gear=CheckedGear(
@@ -41,13 +47,34 @@ def check_answer(case: Case) -> CheckAnswer:
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
         ),
-        notes=case.notes,
+        notes=(*doubt, *case.notes),
+    )
+
+
+def _doubt(case: Case) -> tuple[str, ...]:
+    """Say so where a straight line through the readings has no plausible K."""
+    gear, records = case.gear, case.records
+    prior, modulus = gear.priors["K"], gear.priors["E0"].numbers[0]
+    if prior.family != "lognormal":
+        return ()
+    radial = np.asarray(records.deformation) / (2 if gear.reading == "diametral" else 1)
+    slope = float(np.polyfit(radial, np.asarray(records.force), 1)[0])
+    K = slope / float(THEORIES[gear.K_theory](gear.geometry, modulus))
+    median, log_sd = prior.numbers
+    low, high = (median * np.exp(side * _FAR * log_sd) for side in (-1.0, 1.0))
+    if low <= K <= high:
+        return ()
+    return (
+        f"a straight line through the readings makes K = {K:.3g}, expected {low:.3g} "
+        f"to {high:.3g}: a wrong sign or unit, reading (radial or diametral) or size "
+        "of the gear?",
     )
 
 
 def _data(case: Case) -> CheckedData:
     records = case.records
-    rows = [int(np.count_nonzero(records.direction == sign)) for sign in (1, 0, -1)]
+    way = loading(np.asarray(records.deformation), np.asarray(records.direction))
+    rows = [int(np.count_nonzero(way == sign)) for sign in (1, 0, -1)]
     return CheckedData(
         rows=len(records.force),
         runs=case.run_labels,

@@ -9,6 +9,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hdcal.data.loading import loading_side, movement_words
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
 from hdcal.prediction.bands.bands import Bands
@@ -26,6 +27,7 @@ from hdcal.report.canvas import (
 )
 
 _MARKS = {1: "^", -1: "v"}
+_DASHES = (0, (4, 2))
 _MOST_COLUMNS = 3
 
 
@@ -34,15 +36,18 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
     gear = posterior.case.gear
     levels = np.unique(bands.temperature_C)
     colours = temperature_colours(levels)
+    solid = "down" if loading_side(left.deformation) < 0 else "up"
     with style():
         figure, top, panels = _panels(len(levels))
         for rows in reversed(list(_curves(bands))):
             level = int(np.searchsorted(levels, bands.temperature_C[rows][0]))
             strength = 1.0 / np.sqrt(len(levels))
-            _draw_curve(top, bands, rows, colours[level], strength)
+            line = "-" if bands.direction[rows[0]] == solid else _DASHES
+            _draw_curve(top, bands, rows, colours[level], line, strength)
             # Around its own median unloading has the same bands as loading.
             if bands.direction[rows[0]] == bands.direction[0]:
-                _draw_curve(panels[level], bands, rows, colours[level], baseline=True)
+                of = panels[level], bands, rows, colours[level], line
+                _draw_curve(*of, baseline=True)
         distance = _distance(bands, left)
         nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
         for index, (axes, level) in enumerate(zip(panels, levels, strict=True)):
@@ -57,7 +62,7 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
         panels[0].set_ylabel("force − fit [N]")
         _limit(panels[0], bands, distance)
         figure.supxlabel(f"deformation as read ({gear.reading}) [mm]", fontsize=10)
-        _legend(top, bands, left, levels, colours)
+        _legend(top, bands, left, levels, colours, solid)
         if not posterior.usable:
             watermark(figure)
     return figure
@@ -103,12 +108,18 @@ def _curves(bands: Bands) -> Iterator[np.ndarray]:
 
 
 def _draw_curve(
-    axes: Axes, bands: Bands, rows, colour: str, weight=1.0, *, baseline: bool = False
+    axes: Axes,
+    bands: Bands,
+    rows,
+    colour: str,
+    line,
+    weight=1.0,
+    *,
+    baseline: bool = False,
 ) -> None:
     x = bands.deformation_mm[rows]
     zero = bands.physics_median_N[rows] if baseline else np.zeros(len(rows))
     tested = np.asarray(bands.tested[rows], dtype=bool)
-    dashes = (0, (4, 2)) if bands.direction[rows[0]] == "down" else "-"
     untested = beyond(tested)
     bands_here = [("new_measurement", 0.16), ("physics", 0.38)]
     if np.isfinite(bands.with_gap_median_N).any():
@@ -126,7 +137,7 @@ def _draw_curve(
                 x, low, high, where=untested, hatch="////", alpha=0.45, **edge
             )
     middle = bands.physics_median_N[rows] - zero
-    axes.plot(x, np.where(tested, middle, np.nan), color=colour, linestyle=dashes)
+    axes.plot(x, np.where(tested, middle, np.nan), color=colour, linestyle=line)
     axes.plot(x, np.where(untested, middle, np.nan), color=colour, linestyle=":")
     if len(bands_here) == 3:
         gap = bands.with_gap_median_N[rows] - zero
@@ -165,7 +176,9 @@ def _limit(axes: Axes, bands: Bands, distance: np.ndarray) -> None:
         axes.set_ylim(-reach, reach)
 
 
-def _legend(axes: Axes, bands: Bands, left: Residuals, levels, colours) -> None:
+def _legend(
+    axes: Axes, bands: Bands, left: Residuals, levels, colours, solid: str
+) -> None:
     main = colours[0] if len(colours) == 1 else GREY
     handles: list = []
     texts: list[str] = []
@@ -176,11 +189,11 @@ def _legend(axes: Axes, bands: Bands, left: Residuals, levels, colours) -> None:
 
     size = len(left.measured)
     both = len(np.unique(left.direction)) > 1
+    ways = movement_words(left.deformation)
     for sense, mark in _MARKS.items():
         if np.any(left.direction == sense):
-            word = "loading" if sense > 0 else "unloading"
             style_ = {"marker": mark, "linestyle": "", "color": main, "markersize": 5}
-            add(Line2D([], [], **style_), f"measured, {word}")
+            add(Line2D([], [], **style_), f"measured, {ways[sense]}")
     if size > MOST_POINTS:
         add(Patch(alpha=0.0), f"({MOST_POINTS} of {size} readings drawn)")
     line = Line2D([], [], color=main)
@@ -188,8 +201,8 @@ def _legend(axes: Axes, bands: Bands, left: Residuals, levels, colours) -> None:
         (Patch(color=main, alpha=0.55, linewidth=0), line), "force model, 95 % credible"
     )
     if both:
-        dashed = Line2D([], [], color=main, linestyle=(0, (4, 2)))
-        add(dashed, "force model, unloading")
+        dashed = Line2D([], [], color=main, linestyle=_DASHES)
+        add(dashed, f"force model, {ways[-1 if solid == 'up' else 1]}")
     if np.isfinite(bands.with_gap_median_N).any():
         line = Line2D([], [], color=main, linestyle="-.", linewidth=1.0)
         patch = Patch(color=main, alpha=0.35, linewidth=0)

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from hdcal.data.loading import movement_words
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
 from hdcal.report.canvas import (
@@ -74,11 +75,12 @@ def _groups(posterior: Posterior, left: Residuals) -> list[tuple]:
         kinds = [("", np.ones(len(warmth), dtype=bool), CYCLE[0])]
     groups = []
     both = len(np.unique(left.direction)) > 1
+    ways = movement_words(left.deformation)
     for words, rows, colour in kinds:
-        for sense, mark, way in ((1, "^", "loading"), (-1, "v", "unloading")):
+        for sense, mark in ((1, "^"), (-1, "v")):
             here = rows & (left.direction == sense)
             if here.any():
-                text = ", ".join(filter(None, (words, way if both else "")))
+                text = ", ".join(filter(None, (words, ways[sense] if both else "")))
                 groups.append((text, here, colour, mark))
     return groups
 
@@ -107,5 +109,5 @@ def _draw(axes: Axes, x, values, groups) -> None:
         )
     reach = max(3.0, 1.1 * float(np.max(np.abs(values))))
     axes.set_ylim(-reach, reach)
-    place = {"transform": axes.get_yaxis_transform(), "fontsize": 8, "color": GREY}
-    axes.text(0.995, 1.9, "±2 sd", ha="right", va="top", **place)
+    # Above the panel: inside it, it would cover readings.
+    axes.set_title("grey: ±2 sd", loc="right", fontsize=8, color=GREY)

@@ -26,8 +26,8 @@ def window_options(command: Callable) -> Callable:
             "--spring-rate",
             "rates",
             type=ENDS,
-            help="Spring rates to look at [N/mm] [default: 0.01 to 100 times the "
-            "gear].",
+            help="Spring rates to look at [N/mm] [default: those of springs that can "
+            "stand inside the gear, to 100 times its stiffness].",
         ),
         click.option(
             "--setting-sd",

@@ -54,17 +54,19 @@ def check_margin(
     shares = {n: v for n in names if (v := getattr(criteria, n)) is not None}
     limit, place = criteria.limit_force, f"{at:g} mm"
     forces = {"limit_force": limit, "given_force": request.given_force}
+    wrong = _check_deformation(cause, at)
     findings = [
-        *_check_deformation(cause, at),
+        *wrong,
         *_check_temperature(cause, temperature),
         *check_shares(**shares),
         *_check_rarity(shares, sum(min(c.size, MOST_DRAWS) for c in causes)),
         *implausible("seed", request.seed),
         *check_population(request.population, cause.problem),
         *check_tolerances(request.tolerances, gear.geometry, theory),
-        *_check_forces(cause, at, forces),
+        # Beside a deformation that is refused no force looks right.
+        *([] if wrong else _check_forces(cause, at, forces)),
     ]
-    if limit is not None:
+    if limit is not None and not wrong:
         findings += capacity_findings("limit_force", limit, sense, place)
     for name, known in (("quantity", QUANTITIES), ("direction", DIRECTIONS)):
         value = getattr(request, name)
