@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import time
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,54 @@ def one_long_text(file: h5py.File) -> None:
     text[:] = ["x" * 20_000] * 10_000
 
 
+def many_texts_in_an_attribute(file: h5py.File) -> None:
+    """Each may be the same long one: what HDF5 reads it reads whole."""
+    texts = np.full(1000, "x", object)
+    file["posterior"].attrs.create("x", texts, dtype=h5py.string_dtype())
+
+
+def long_attributes(file: h5py.File) -> None:
+    for index in range(68):
+        file["posterior"].attrs[f"x{index}"] = f"{index}" + "x" * (1 << 20)
+
+
+def texts_in_a_large_chunk(file: h5py.File) -> None:
+    """Unpacked anew for every text that is read, as it fits no cache."""
+    text = file.create_dataset(
+        "posterior/x",
+        (200,),
+        h5py.string_dtype(),
+        chunks=(1 << 20,),
+        maxshape=(None,),
+        compression="gzip",
+    )
+    text[0] = "a"
+
+
+def one_chunk_of_much_more(file: h5py.File) -> None:
+    """Eight numbers are declared; HDF5 unpacks all that is there."""
+    packed = zlib.compressobj(9)
+    zeros = b"".join(packed.compress(bytes(1 << 24)) for _ in range(8))
+    chunk = {"chunks": (8,), "compression": "gzip"}
+    held = file.create_dataset("posterior/x", (8,), "f8", **chunk)
+    held.id.write_direct_chunk((0,), zeros + packed.flush())
+
+
+def axes_of_many_scales(file: h5py.File) -> None:
+    scale = file["posterior/chain"].ref
+    many = np.empty(2, object)
+    many[:] = [np.array([scale] * 1000, h5py.ref_dtype)] * 2
+    kind = h5py.vlen_dtype(h5py.ref_dtype)
+    del file["posterior/K"].attrs["DIMENSION_LIST"]
+    file["posterior/K"].attrs.create("DIMENSION_LIST", many, dtype=kind)
+
+
+def texts_in_place_of_axes(file: h5py.File) -> None:
+    texts, kind = np.full(2, "x", object), h5py.string_dtype()
+    for name in ("DIMENSION_LIST", "REFERENCE_LIST"):
+        file["posterior"].attrs.create(name, texts, dtype=kind)
+
+
 def many_objects(file: h5py.File) -> None:
     for index in range(2_500):
         file.create_group(f"posterior/g{index}")
@@ -111,6 +160,12 @@ HOSTILE = [
     named_type,
     absurd_chunk,
     one_long_text,
+    many_texts_in_an_attribute,
+    long_attributes,
+    texts_in_a_large_chunk,
+    one_chunk_of_much_more,
+    axes_of_many_scales,
+    texts_in_place_of_axes,
     many_objects,
 ]
 
