@@ -6,6 +6,7 @@ import shutil
 import time
 import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,10 @@ import numpy as np
 import pytest
 from posteriors import batch
 
+from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import InputError
 from hdcal.inference import posterior_file
+from hdcal.inference.held import HeldCase, HeldModel, HeldSettings
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_file import open_tree
 
@@ -236,6 +239,16 @@ def beyond_every_rig(tree) -> None:
     tree["constant_data/deformation"].values[0] = 1e200
 
 
+def draws_beyond_every_rig(tree) -> None:
+    tree["posterior/deformation_offset"].values[0, 3] = 1e308
+
+
+def a_diagnosis_of_nothing(tree) -> None:
+    model = json.loads(tree.attrs["model"])
+    model["diagnoses"]["nothing"] = model["diagnoses"]["K"]
+    tree.attrs["model"] = json.dumps(model)
+
+
 def described(name: str, *path: str, value: object) -> Callable[[Any], None]:
     """Return what puts another value into an attribute's JSON."""
 
@@ -261,6 +274,60 @@ TYPES = [
     described("case", "gear", "geometry", "radius", value=[1.0]),
     described("case", "run_labels", value=7),
 ]
+NAN, HUGE = float("nan"), 1e300
+GEAR, GEOMETRY, MODEL = ("case", "gear"), ("case", "gear", "geometry"), ("model",)
+NUMBERS = [
+    *(described(*GEOMETRY, "radius", value=v) for v in (0.0, -1.0, NAN, HUGE)),
+    described(*GEOMETRY, "poisson", value=0.5),
+    # Each by itself can be, but not beside the others.
+    described(*GEOMETRY, "wall_thickness", value=41.0),
+    described(*GEOMETRY, "load_height", value=71.0),
+    *(described(*GEAR, "nominal_deformation", value=v) for v in (-1.0, 40.0, NAN)),
+    *(described(*GEAR, "reference_temperature", value=v) for v in (-300.0, NAN, HUGE)),
+    *(described(*GEAR, "force_resolution", value=v) for v in (-1.0, NAN, HUGE)),
+    *(described(*GEAR, "density", value=v) for v in (0.0, NAN)),
+    described(*GEAR, "priors", "K", "numbers", value=[-2.0, 0.4]),
+    described(*GEAR, "priors", "sigma", "numbers", value=[HUGE, 0.4]),
+    described(*GEAR, "priors", "E0", "numbers", value=[-2e5, 1.0]),
+    described(*GEAR, "scale_priors", "gap_sd", "numbers", value=[0.0]),
+    described(*MODEL, "priors", "K", "numbers", value=[NAN, 0.4]),
+    described(*MODEL, "priors", "K", "numbers", value=[2.0, -1.0]),
+    described(*MODEL, "priors", "E0", "numbers", value=[2e5, HUGE]),
+    *(described(*MODEL, "settings", "seed", value=v) for v in (-5, 10**40)),
+    *(described(*MODEL, "settings", "draws", value=v) for v in (0, 10**40)),
+    described(*MODEL, "settings", "chains", value=1),
+    described(*MODEL, "settings", "warmup", value=-1),
+    described(*MODEL, "settings", "seconds", value=-1.0),
+    described(*MODEL, "diagnoses", "K", "driven_by", value="nobody"),
+]
+
+
+@dataclass
+class Attributes:
+    """What `described` spoils of a tree."""
+
+    attrs: dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def attributes(file) -> dict[str, str]:
+    return {name: str(text) for name, text in open_tree(file).attrs.items()}
+
+
+def typed_attributes(attributes: dict[str, str]) -> None:
+    typed_text(HeldCase, attributes["case"])
+    typed(HeldSettings, typed_text(HeldModel, attributes["model"]).settings)
+
+
+@pytest.mark.parametrize("spoil", NUMBERS)
+def test_a_number_that_a_gear_file_may_not_hold_is_none_of_a_posterior(
+    attributes, spoil
+):
+    typed_attributes(attributes)
+    spoiled = Attributes(dict(attributes))
+    spoil(spoiled)
+    with pytest.raises(ValueError):
+        typed_attributes(spoiled.attrs)
 
 
 def test_what_hdcal_wrote_is_read(file):
@@ -271,6 +338,11 @@ def test_what_hdcal_wrote_is_read(file):
     "spoil",
     [
         *TYPES,
+        described(*GEOMETRY, "radius", value=NAN),
+        described(*MODEL, "priors", "K", "numbers", value=[NAN, 0.4]),
+        described(*MODEL, "settings", "seed", value=-5),
+        a_diagnosis_of_nothing,
+        draws_beyond_every_rig,
         other_shape,
         a_label_too_few,
         nothing_deformed,

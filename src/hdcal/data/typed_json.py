@@ -6,6 +6,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
+from hdcal.data.plausible import range_of
+
 T = TypeVar("T")
 
 # Of dataclasses, as `__pydantic_config__`: no other fields, no text for a number.
@@ -19,6 +21,20 @@ Share = Annotated[float, Field(ge=0.0, le=1.001)]  # a sum may pass 1 by roundin
 Size = Annotated[float, Field(ge=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0, le=10**12)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
+def within(quantity: str) -> Any:
+    """Return the constraint of a field to the range of a quantity; NaN is out.
+
+    Args:
+        quantity: a key of `RANGES` or `NAMES`.
+    """
+    known = range_of(quantity)
+    # A whole number is always finite.
+    finite = {} if isinstance(known.low, int) else {"allow_inf_nan": False}
+    if known.inner:
+        return Field(gt=known.low, lt=known.high, **finite)
+    return Field(ge=known.low, le=known.high, **finite)
 
 
 def parse_json(text: bytes) -> Any:

@@ -182,6 +182,9 @@ def check_draws(tree: xr.DataTree, sites: Mapping[str, tuple[int, ...]]) -> None
             raise ValueError(f"{name} has another shape")
         if one.dtype.kind not in "biuf" or not np.isfinite(one).all():
             raise ValueError(f"{name} is not finite")
+        # The widest range there is: chains that failed go far.
+        if implausible(name, one.to_numpy(), "effect"):
+            raise ValueError(f"{name} is beyond every rig")
 
 
 def check_rows(rows: Mapping[str, np.ndarray], runs: int, specimens: int) -> None:
