@@ -16,6 +16,7 @@ from hdcal.inference import compress, density, integrated
 from hdcal.inference import values as of_draw
 from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.likelihood import log_probability
+from hdcal.inference.member_counts import check_member_counts, integrated_kinds
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.model import model
 from hdcal.inference.problem import build_problem
@@ -429,6 +430,28 @@ def test_too_many_members_are_refused(
     records = labelled(many, 1, known=known, runs=runs, specimens=specimens)
     with pytest.raises(InputError, match=words):
         build_problem(case_of(records, gear, resolution=resolution), SHIPPED)
+
+
+@pytest.mark.parametrize(
+    ("linear", "counts", "order"),
+    [
+        ({"run", "specimen"}, {"run": 600, "specimen": 600}, ("run", "specimen")),
+        ({"run", "discrepancy"}, {"run": 600, "specimen": 700}, ("run",)),
+        (
+            {"run", "specimen", "discrepancy"},
+            {"discrepancy": 2000, "run": 600, "specimen": 900},
+            ("specimen", "run", "discrepancy"),
+        ),
+    ],
+)
+def test_what_is_eliminated_is_decided_in_one_place(linear, counts, order):
+    integrated = integrated_kinds(counts, frozenset(linear))
+    assert integrated == order
+    with pytest.raises(InputError) as error:
+        check_member_counts("case", counts, integrated)
+    (found,) = error.value.findings
+    other = ({"run", "specimen"} - {order[0]}).pop()
+    assert found.problem.startswith(f"{counts[other]} {other}s are too many")
 
 
 def test_runs_by_the_thousand_are_integrated_out(loading, gear):
