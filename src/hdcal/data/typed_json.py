@@ -24,17 +24,15 @@ Number = Annotated[float, Field(ge=-1e12, le=1e12)]
 
 
 def within(quantity: str) -> Any:
-    """Return the constraint of a field to the range of a quantity; NaN is out.
+    """Return the constraint of a field to the range of a quantity.
 
     Args:
         quantity: a key of `RANGES` or `NAMES`.
     """
     known = range_of(quantity)
-    # A whole number is always finite.
-    finite = {} if isinstance(known.low, int) else {"allow_inf_nan": False}
     if known.inner:
-        return Field(gt=known.low, lt=known.high, **finite)
-    return Field(ge=known.low, le=known.high, **finite)
+        return Field(gt=known.low, lt=known.high)
+    return Field(ge=known.low, le=known.high)
 
 
 def parse_json(text: bytes) -> Any:

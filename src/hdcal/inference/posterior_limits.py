@@ -149,7 +149,7 @@ def _check_scales(found: h5py.Group | h5py.Dataset, held) -> None:
     axes = (found.ndim,) if isinstance(found, h5py.Dataset) else ()
     if kind is None or h5py.check_ref_dtype(kind) is None or held.shape != axes:
         raise ValueError("holds axes of a type that no posterior has")
-    if any(len(scales) != 1 for scales in found.attrs[_SCALES]):
+    if any(len(scales) != 1 for scales in np.asarray(found.attrs[_SCALES])):
         raise ValueError("holds several scales for one axis")
 
 
