@@ -288,7 +288,9 @@ def options(command: click.Command) -> Iterator[tuple[str, click.Parameter]]:
     for option in command.params:
         kind = option.type
         number = isinstance(kind, Parsed | click.types.IntParamType)
-        number |= isinstance(kind, click.types.FloatParamType | click.IntRange)
+        number |= isinstance(kind, click.types.FloatParamType)
+        # A second check would be said before all others, and alone.
+        assert not isinstance(kind, click.IntRange | click.FloatRange)
         if number:
             yield f"{command.name} {option.opts[0]}", option
 

@@ -16,7 +16,7 @@ from sealing import by_library, key_of, sealed_set
 
 from hdcal.blind.answer import FrozenAnswer, ScoresAnswer
 from hdcal.blind.answering import answer_set
-from hdcal.blind.canonical import stamped
+from hdcal.blind.canonical import with_digest
 from hdcal.blind.diagnosers import DIAGNOSERS, fingerprint
 from hdcal.blind.label import CaseAnswer
 from hdcal.blind.seal import unseal
@@ -42,7 +42,7 @@ def change(path: Path, **changed) -> None:
     """Change an object on disk, and stamp it as its writer would."""
     data = json.loads(path.read_text("utf-8"))
     plain = {k: v for k, v in {**data, **changed}.items() if k != "sha256"}
-    path.write_text(json.dumps(stamped(plain)))
+    path.write_text(json.dumps(with_digest(plain)))
 
 
 @pytest.fixture

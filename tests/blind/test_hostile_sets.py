@@ -16,7 +16,7 @@ from mutations import damaged_bytes, damaged_data, damaged_text
 from sealing import key_of, sealed_set
 
 from hdcal.blind.answering import answer_set
-from hdcal.blind.canonical import canonical, digest, stamped
+from hdcal.blind.canonical import canonical, digest, with_digest
 from hdcal.blind.diagnosers import DIAGNOSERS
 from hdcal.blind.seal import seal, unseal
 from hdcal.errors import InputError
@@ -78,7 +78,7 @@ def rewrite(folder: Path, **changed) -> None:
     for path in (*folder.glob("answers-*.json"), *folder.glob("answers-*/*.json")):
         data = {**json.loads(path.read_text()), "set_commitment": plain["commitment"]}
         del data["sha256"]
-        path.write_text(json.dumps(stamped(data)))
+        path.write_text(json.dumps(with_digest(data)))
 
 
 def commitment_of(plain: dict) -> str:
@@ -368,7 +368,7 @@ def test_answers_of_other_types_are_refused(blind, frozen: Path, kind: str):
     data = json.loads(path.read_text())
     data["answers"][0] |= ODD_ANSWERS[kind]
     del data["sha256"]
-    path.write_text(json.dumps(stamped(data)))
+    path.write_text(json.dumps(with_digest(data)))
     refused(blind, OPEN, frozen.parent, "holds no answer to the case 'c01'")
 
 
@@ -436,7 +436,7 @@ def spoil_at_random(folder: Path, rng: random.Random) -> None:
         return
     data = damaged_data(data, rng)
     data.pop("sha256", None)
-    path.write_text(json.dumps(data if path.name == "set.json" else stamped(data)))
+    path.write_text(json.dumps(data if path.name == "set.json" else with_digest(data)))
 
 
 def test_random_damage_is_a_finding_or_does_no_harm(

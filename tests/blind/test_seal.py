@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sealing import label
 
-from hdcal.blind.canonical import Broken, canonical, digest, is_stamped, stamped
+from hdcal.blind.canonical import Broken, canonical, digest, digest_agrees, with_digest
 from hdcal.blind.label import Label
 from hdcal.blind.manifest import Entry, Manifest, check_names
 from hdcal.blind.seal import (
@@ -52,10 +52,10 @@ def test_there_is_one_canonical_form():
 
 
 def test_a_stamp_shows_every_change():
-    data = stamped({"a": 1, "b": [1.5]})
-    assert is_stamped(data) and is_stamped(json.loads(json.dumps(data)))
+    data = with_digest({"a": 1, "b": [1.5]})
+    assert digest_agrees(data) and digest_agrees(json.loads(json.dumps(data)))
     for changed in ({**data, "a": 2}, {**data, "c": 0}, {"b": [1.5]}):
-        assert not is_stamped(changed)
+        assert not digest_agrees(changed)
 
 
 def test_a_commitment_is_that_of_salt_label_and_data():

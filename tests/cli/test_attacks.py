@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-from attacks import ATTACKS, make_targets, standard_input
+from attacks import ATTACKS, make_targets, standard_input, without_a_force
 from commands import Hdcal
 
 INPUTS = int(os.environ.get("HDCAL_ATTACKS", "100000"))
@@ -47,6 +47,8 @@ def wrong(here: Hdcal, kind: str, seed: int, targets: Path) -> str | None:
         and bool(new)
         and kind != "set",
     }
+    if kind == "posterior" and done.returncode == 0:
+        reasons["a band without numbers"] = without_a_force(done.stdout)
     found = [reason for reason, so in reasons.items() if so]
     return f"{kind} {seed}: {found} {arguments} {said[-500:]}" if found else None
 

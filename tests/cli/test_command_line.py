@@ -221,6 +221,24 @@ def test_a_reader_that_goes_away_is_no_error(asked):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has such a device")
+@pytest.mark.parametrize(
+    ("asked", "code"),
+    [(["effects", "--json"], 0), (["effects", "none", "--json"], 2)],
+)
+@pytest.mark.parametrize("gone", ["reader", "disk"])
+def test_words_that_reach_nobody_take_no_result_along(asked, code, gone):
+    if gone == "disk":
+        write = os.open("/dev/full", os.O_WRONLY)
+    else:
+        read, write = os.pipe()
+        os.close(read)
+    done = subprocess.run([*MAIN, *asked], stdout=subprocess.PIPE, stderr=write)
+    os.close(write)
+    assert done.returncode == code
+    assert json.loads(done.stdout)["status"] == ("ok" if code == 0 else "error")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has such a device")
 @pytest.mark.parametrize("asked", ["effects", "--help"])
 def test_output_that_cannot_be_written_is_one_line(asked):
     with Path("/dev/full").open("w") as full:

@@ -47,7 +47,7 @@ from hdcal.inference.sample import check_settings
         ),
         (
             ["respond", "--force", "step", "--mass-kg", "-1"],
-            "--mass-kg: -0.001 N·s²/mm does not lie",
+            "--mass-kg: -1 kg does not lie between 1e-12 and 1000000000 kg:",
         ),
         (["respond", "--force", "step", "--amplitude", "0"], "--amplitude: 0 drives"),
     ],
@@ -71,6 +71,21 @@ def test_calibrate_speaks_of_its_options(here: Hdcal, asked, words):
     done = here("calibrate", XB1, *asked)
     assert done.returncode == 2, done.stderr
     assert f"hdcal: {words}" in " ".join(done.stderr.split())
+
+
+@pytest.mark.parametrize(
+    ("command", "asked"),
+    [
+        ("calibrate", ["--chains", "1", "--draws", "1", "--seed", "99999999999"]),
+        ("diagnose", ["--jobs", "0", "--seed", "-1", "--library", "minus:none"]),
+    ],
+)
+def test_every_number_that_cannot_be_is_said_at_once(here: Hdcal, command, asked):
+    done = here(command, "no-case", *asked)
+    assert done.returncode == 2
+    for option in (*asked[::2], "no-case"):
+        assert f"hdcal: {option}" in done.stderr, option
+    assert "its unit" not in done.stderr
 
 
 def test_the_library_speaks_of_its_parameters():

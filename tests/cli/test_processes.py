@@ -13,6 +13,23 @@ WORK = (
     "import time; from hdcal.cli.processes import run_all\n"
     "if __name__ == '__main__': run_all(time.sleep, [(100,), (100,)], 2)"
 )
+FAILING = """
+import multiprocessing, time
+from hdcal.cli.processes import run_all
+
+def fail(text):
+    raise ValueError(text)
+
+if __name__ == "__main__":
+    own = multiprocessing.get_context("spawn").Process(target=time.sleep, args=(100,))
+    own.start()
+    try:
+        run_all(fail, [("a",), ("b",)], 2)
+    except ValueError:
+        own.join(2)
+        print(own.is_alive(), len(multiprocessing.active_children()))
+    own.kill()
+"""
 SLOW = """
 import pathlib, time
 import hdcal.data.reading as reading
@@ -45,6 +62,13 @@ def test_workers_do_not_outlive_a_killed_command(tmp_path: Path):
         command.kill()
     _, alive = psutil.wait_procs(workers, timeout=20)
     assert len(workers) == 3 and not alive
+
+
+def test_work_that_fails_ends_its_workers_and_nobody_else(tmp_path: Path):
+    script = tmp_path / "work.py"
+    script.write_text(FAILING)
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True)
+    assert done.stdout == "True 1\n", done.stderr
 
 
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])

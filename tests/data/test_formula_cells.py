@@ -17,10 +17,26 @@ FORMULAS = [
     "+cmd|' /C calc'!A0",
     "-2+3",
     "@SUM(1)",
-    "\t=1",
-    "\r=1",
+    "＝1+1",
+    "＋1+x",
+    "－x",
+    "＠SUM(1)",
 ]
-TEXTS = [*FORMULAS, *(f"'{text}" for text in FORMULAS), *(f"''{t}" for t in FORMULAS)]
+# A spreadsheet may take another character for the end of a cell than the one that was
+# written, quoted or not.
+WITHIN = {
+    "\t=1": "'\t'=1",
+    "\r=1": "'\r'=1",
+    "x;=1+1": "x;'=1+1",
+    "x\t=1+2": "x\t'=1+2",
+    "x,@SUM(1);-a": "x,'@SUM(1);'-a",
+    "x|＝1": "x|'＝1",
+    "x;'=1": "x;''=1",
+    "1;-2;=3": "1;-2;'=3",
+    "x; =1": "x; =1",
+}
+RUNNING = [*FORMULAS, *WITHIN]
+TEXTS = [*RUNNING, *(f"'{text}" for text in RUNNING), *(f"''{t}" for t in RUNNING)]
 HARMLESS = ["1", "-1", "+2.5e3", "a=b", "", "'tis", "up", "40CrNiMoA", "−1"]
 
 
@@ -35,7 +51,15 @@ def test_no_formula_begins_a_cell(text: str):
 @pytest.mark.parametrize("end", ["\r", "\n"])
 def test_no_formula_begins_a_line_within_a_cell(end: str):
     table = columns_csv({"label": np.array([f"a{end}=1+1"], object)})
-    assert table == f'label\n"a{end}=1+1"\n'
+    assert table == f'label\n"a{end}\'=1+1"\n'
+
+
+@pytest.mark.parametrize("text", WITHIN)
+def test_no_formula_begins_a_cell_of_another_separator(text: str):
+    assert without_formula(text) == WITHIN[text]
+    table = columns_csv({"label": np.array([text, "a"], object), text: np.ones(2)})
+    header, first, _ = csv.reader(io.StringIO(table, newline=""))
+    assert (header[1], first[0]) == (WITHIN[text], WITHIN[text])
 
 
 @pytest.mark.parametrize("text", HARMLESS)

@@ -4,7 +4,9 @@ import json
 import os
 import shutil
 import time
+import zlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,10 @@ import numpy as np
 import pytest
 from posteriors import batch
 
+from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import InputError
 from hdcal.inference import posterior_file
+from hdcal.inference.held import HeldCase, HeldModel, HeldSettings
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_file import open_tree
 
@@ -91,6 +95,54 @@ def one_long_text(file: h5py.File) -> None:
     text[:] = ["x" * 20_000] * 10_000
 
 
+def many_texts_in_an_attribute(file: h5py.File) -> None:
+    """Each may be the same long one: what HDF5 reads it reads whole."""
+    texts = np.full(1000, "x", object)
+    file["posterior"].attrs.create("x", texts, dtype=h5py.string_dtype())
+
+
+def long_attributes(file: h5py.File) -> None:
+    for index in range(68):
+        file["posterior"].attrs[f"x{index}"] = f"{index}" + "x" * (1 << 20)
+
+
+def texts_in_a_large_chunk(file: h5py.File) -> None:
+    """Unpacked anew for every text that is read, as it fits no cache."""
+    text = file.create_dataset(
+        "posterior/x",
+        (200,),
+        h5py.string_dtype(),
+        chunks=(1 << 20,),
+        maxshape=(None,),
+        compression="gzip",
+    )
+    text[0] = "a"
+
+
+def one_chunk_of_much_more(file: h5py.File) -> None:
+    """Eight numbers are declared; HDF5 unpacks all that is there."""
+    packed = zlib.compressobj(9)
+    zeros = b"".join(packed.compress(bytes(1 << 24)) for _ in range(8))
+    chunk = {"chunks": (8,), "compression": "gzip"}
+    held = file.create_dataset("posterior/x", (8,), "f8", **chunk)
+    held.id.write_direct_chunk((0,), zeros + packed.flush())
+
+
+def axes_of_many_scales(file: h5py.File) -> None:
+    scale = file["posterior/chain"].ref
+    many = np.empty(2, object)
+    many[:] = [np.array([scale] * 1000, h5py.ref_dtype)] * 2
+    kind = h5py.vlen_dtype(h5py.ref_dtype)
+    del file["posterior/K"].attrs["DIMENSION_LIST"]
+    file["posterior/K"].attrs.create("DIMENSION_LIST", many, dtype=kind)
+
+
+def texts_in_place_of_axes(file: h5py.File) -> None:
+    texts, kind = np.full(2, "x", object), h5py.string_dtype()
+    for name in ("DIMENSION_LIST", "REFERENCE_LIST"):
+        file["posterior"].attrs.create(name, texts, dtype=kind)
+
+
 def many_objects(file: h5py.File) -> None:
     for index in range(2_500):
         file.create_group(f"posterior/g{index}")
@@ -111,6 +163,12 @@ HOSTILE = [
     named_type,
     absurd_chunk,
     one_long_text,
+    many_texts_in_an_attribute,
+    long_attributes,
+    texts_in_a_large_chunk,
+    one_chunk_of_much_more,
+    axes_of_many_scales,
+    texts_in_place_of_axes,
     many_objects,
 ]
 
@@ -181,6 +239,16 @@ def beyond_every_rig(tree) -> None:
     tree["constant_data/deformation"].values[0] = 1e200
 
 
+def draws_beyond_every_rig(tree) -> None:
+    tree["posterior/deformation_offset"].values[0, 3] = 1e308
+
+
+def a_diagnosis_of_nothing(tree) -> None:
+    model = json.loads(tree.attrs["model"])
+    model["diagnoses"]["nothing"] = model["diagnoses"]["K"]
+    tree.attrs["model"] = json.dumps(model)
+
+
 def described(name: str, *path: str, value: object) -> Callable[[Any], None]:
     """Return what puts another value into an attribute's JSON."""
 
@@ -206,6 +274,60 @@ TYPES = [
     described("case", "gear", "geometry", "radius", value=[1.0]),
     described("case", "run_labels", value=7),
 ]
+NAN, HUGE = float("nan"), 1e300
+GEAR, GEOMETRY, MODEL = ("case", "gear"), ("case", "gear", "geometry"), ("model",)
+NUMBERS = [
+    *(described(*GEOMETRY, "radius", value=v) for v in (0.0, -1.0, NAN, HUGE)),
+    described(*GEOMETRY, "poisson", value=0.5),
+    # Each by itself can be, but not beside the others.
+    described(*GEOMETRY, "wall_thickness", value=41.0),
+    described(*GEOMETRY, "load_height", value=71.0),
+    *(described(*GEAR, "nominal_deformation", value=v) for v in (-1.0, 40.0, NAN)),
+    *(described(*GEAR, "reference_temperature", value=v) for v in (-300.0, NAN, HUGE)),
+    *(described(*GEAR, "force_resolution", value=v) for v in (-1.0, NAN, HUGE)),
+    *(described(*GEAR, "density", value=v) for v in (0.0, NAN)),
+    described(*GEAR, "priors", "K", "numbers", value=[-2.0, 0.4]),
+    described(*GEAR, "priors", "sigma", "numbers", value=[HUGE, 0.4]),
+    described(*GEAR, "priors", "E0", "numbers", value=[-2e5, 1.0]),
+    described(*GEAR, "scale_priors", "gap_sd", "numbers", value=[0.0]),
+    described(*MODEL, "priors", "K", "numbers", value=[NAN, 0.4]),
+    described(*MODEL, "priors", "K", "numbers", value=[2.0, -1.0]),
+    described(*MODEL, "priors", "E0", "numbers", value=[2e5, HUGE]),
+    *(described(*MODEL, "settings", "seed", value=v) for v in (-5, 10**40)),
+    *(described(*MODEL, "settings", "draws", value=v) for v in (0, 10**40)),
+    described(*MODEL, "settings", "chains", value=1),
+    described(*MODEL, "settings", "warmup", value=-1),
+    described(*MODEL, "settings", "seconds", value=-1.0),
+    described(*MODEL, "diagnoses", "K", "driven_by", value="nobody"),
+]
+
+
+@dataclass
+class Attributes:
+    """What `described` spoils of a tree."""
+
+    attrs: dict[str, str]
+
+
+@pytest.fixture(scope="module")
+def attributes(file) -> dict[str, str]:
+    return {name: str(text) for name, text in open_tree(file).attrs.items()}
+
+
+def typed_attributes(attributes: dict[str, str]) -> None:
+    typed_text(HeldCase, attributes["case"])
+    typed(HeldSettings, typed_text(HeldModel, attributes["model"]).settings)
+
+
+@pytest.mark.parametrize("spoil", NUMBERS)
+def test_a_number_that_a_gear_file_may_not_hold_is_none_of_a_posterior(
+    attributes, spoil
+):
+    typed_attributes(attributes)
+    spoiled = Attributes(dict(attributes))
+    spoil(spoiled)
+    with pytest.raises(ValueError):
+        typed_attributes(spoiled.attrs)
 
 
 def test_what_hdcal_wrote_is_read(file):
@@ -216,6 +338,11 @@ def test_what_hdcal_wrote_is_read(file):
     "spoil",
     [
         *TYPES,
+        described(*GEOMETRY, "radius", value=NAN),
+        described(*MODEL, "priors", "K", "numbers", value=[NAN, 0.4]),
+        described(*MODEL, "settings", "seed", value=-5),
+        a_diagnosis_of_nothing,
+        draws_beyond_every_rig,
         other_shape,
         a_label_too_few,
         nothing_deformed,

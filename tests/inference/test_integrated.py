@@ -16,6 +16,7 @@ from hdcal.inference import compress, density, integrated
 from hdcal.inference import values as of_draw
 from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.likelihood import log_probability
+from hdcal.inference.member_counts import check_member_counts, integrated_kinds
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.model import model
 from hdcal.inference.problem import build_problem
@@ -224,6 +225,39 @@ def test_draws_are_conditional(rows, weights, members):
     assert np.max(np.abs(spread)) < bound * np.sqrt(2.0)
 
 
+@pytest.mark.usefixtures("loading")  # which is in double precision
+@pytest.mark.parametrize("eliminated", [True, False])
+@pytest.mark.parametrize("spread", [1.0, 1e4, 1e7])
+def test_members_that_spread_far_keep_their_digits(spread, eliminated):
+    """Balanced one-way layout: groups and residuals are independent sums of squares."""
+    members, rows, sd = 6, 4, 1e-1
+    rng = np.random.default_rng(0)
+    wide = np.asarray(contrasts(members)) @ rng.normal(size=members - 1)
+    residual = spread * sd * np.repeat(wide, rows) + sd * rng.normal(
+        size=members * rows
+    )
+    index = np.repeat(np.arange(members), rows)
+    grouped = Grouped(index, np.ones(len(index)), np.array(spread * sd), members)
+    count = members if eliminated else 0
+    linear = Linear(
+        residual=residual,
+        design=np.zeros((len(index), 0)) if count else np.asarray(grouped.columns()),
+        sd=np.full(len(index), sd),
+        scale=np.zeros(0) if count else np.full(members - 1, spread * sd),
+        log_volume=len(index) * np.log(sd),
+        count=len(index),
+        grouped=grouped if count else None,
+    )
+    means = residual.reshape(members, rows).mean(axis=1)
+    within = np.sum((residual - np.repeat(means, rows)) ** 2)
+    between = rows * np.sum((means - means.mean()) ** 2)
+    wide = sd**2 * (1.0 + rows * spread**2)
+    squares = (within + len(index) * means.mean() ** 2) / sd**2 + between / wide
+    volume = (members - 1) * np.log(wide / sd**2) + 2.0 * linear.log_volume
+    exact = -0.5 * (squares + volume + len(index) * np.log(2.0 * np.pi))
+    assert float(linear.log_likelihood()) == pytest.approx(exact, abs=1e-5)
+
+
 def test_contrasts_are_deviations():
     for count in (2, 3, 7):
         basis = np.asarray(contrasts(count))
@@ -396,6 +430,28 @@ def test_too_many_members_are_refused(
     records = labelled(many, 1, known=known, runs=runs, specimens=specimens)
     with pytest.raises(InputError, match=words):
         build_problem(case_of(records, gear, resolution=resolution), SHIPPED)
+
+
+@pytest.mark.parametrize(
+    ("linear", "counts", "order"),
+    [
+        ({"run", "specimen"}, {"run": 600, "specimen": 600}, ("run", "specimen")),
+        ({"run", "discrepancy"}, {"run": 600, "specimen": 700}, ("run",)),
+        (
+            {"run", "specimen", "discrepancy"},
+            {"discrepancy": 2000, "run": 600, "specimen": 900},
+            ("specimen", "run", "discrepancy"),
+        ),
+    ],
+)
+def test_what_is_eliminated_is_decided_in_one_place(linear, counts, order):
+    integrated = integrated_kinds(counts, frozenset(linear))
+    assert integrated == order
+    with pytest.raises(InputError) as error:
+        check_member_counts("case", counts, integrated)
+    (found,) = error.value.findings
+    other = ({"run", "specimen"} - {order[0]}).pop()
+    assert found.problem.startswith(f"{counts[other]} {other}s are too many")
 
 
 def test_runs_by_the_thousand_are_integrated_out(loading, gear):

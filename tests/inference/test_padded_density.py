@@ -174,7 +174,7 @@ def test_groups_of_no_rows_change_nothing():
         scale = np.abs(np.asarray(slope)).max()
         np.testing.assert_allclose(found[1][site], slope, rtol=0, atol=1e-11 * scale)
     # And without the runs integrated out.
-    single = dataclasses.replace(problem, integrated=frozenset())
+    single = dataclasses.replace(problem, integrated=())
     ends = [
         float(EXPAND(dataclasses.replace(single, blocks=part), values)[0])
         for part in (blocks, cut)

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 import h5py
 from commands import XB1
-from mutations import RAW, damaged_bytes, damaged_data, damaged_text
+from mutations import RAW, damaged_bytes, damaged_data, damaged_number, damaged_text
 from posteriors import single
 from sealing import sealed_set
 
@@ -198,7 +198,15 @@ def _spoil(rng: random.Random, tree: h5py.File, name: str) -> None:
             if key in texts:
                 plain = json.loads(str(tree.attrs[key]))
                 odd += [json.dumps(damaged_data(plain, rng)) for _ in range(40)]
+                odd += [damaged_number(plain, rng) for _ in range(40)]
             tree.attrs[key] = rng.choice(odd)
+
+
+def without_a_force(answer: str) -> bool:
+    """Say whether a prediction holds a band without its numbers."""
+    columns = json.loads(answer)["columns"]
+    bands = (name for name in columns if name.startswith(("physics", "new")))
+    return any(None in columns[name] for name in bands)
 
 
 def attack_set(rng: random.Random, targets: Path) -> list[str]:

@@ -13,6 +13,8 @@ RAW = [
     *("1e999", "NaN", "-Infinity", "9" * 6000, "[" * 900 + "]" * 900, "[" * 100_000),
     *('{"a":1,"a":2}', "tru", "'x'", '"\\ud800"'),
 ]
+# What no rig has, of the type that it should be.
+_ODD_NUMBERS = [float("nan"), float("inf"), 0, -1, -0.5, 1e-300, 1e300, -1e30, 10**40]
 _MARK = "@@raw@@"
 
 
@@ -61,6 +63,19 @@ def damaged_text(data: Any, rng: random.Random) -> str:
     parent, key = rng.choice(list(_places(found)))
     parent[key] = _MARK
     return json.dumps(found).replace(json.dumps(_MARK), rng.choice(RAW))
+
+
+def damaged_number(data: Any, rng: random.Random) -> str:
+    """Return the JSON of plain data in which one number is another."""
+    found = json.loads(json.dumps(data))
+    numbers = [
+        (parent, key)
+        for parent, key in _places(found)
+        if isinstance(parent[key], int | float) and not isinstance(parent[key], bool)
+    ]
+    parent, key = rng.choice(numbers)
+    parent[key] = rng.choice(_ODD_NUMBERS)
+    return json.dumps(found)
 
 
 def _places(data: Any) -> list[tuple[Any, Any]]:

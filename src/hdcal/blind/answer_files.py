@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hdcal.blind.canonical import is_stamped, stamped
+from hdcal.blind.canonical import digest_agrees, with_digest
 from hdcal.blind.files import LARGEST, LARGEST_ANSWER, read_json, refusal
 from hdcal.blind.label import CaseAnswer
 from hdcal.blind.manifest import Entry, is_name
@@ -87,7 +87,7 @@ class AnswerFiles:
         """
         path = self.path(entry.case)
         data = read_json(path, ANSWER_SCHEMA, _ASK_AGAIN, LARGEST_ANSWER)
-        if not is_stamped(data):
+        if not digest_agrees(data):
             raise refusal(path, "was edited: its hash does not fit", _ASK_AGAIN)
         bound = data.get("set_commitment"), data.get("csv_sha256"), data.get("by")
         if bound != (self.set.manifest.commitment, entry.sha256, self.by):
@@ -108,7 +108,7 @@ class AnswerFiles:
             "answer": as_plain(answer),
         }
         self.folder.mkdir(exist_ok=True)
-        write_whole(self.path(entry.case), as_json(stamped(data)))
+        write_whole(self.path(entry.case), as_json(with_digest(data)))
 
     def freeze(
         self,
@@ -130,7 +130,7 @@ class AnswerFiles:
         """
         self.kept(fingerprint)
         answers = [self.read(entry)["answer"] for entry in self.set.manifest.cases]
-        data = stamped(
+        data = with_digest(
             {
                 "schema": ANSWERS_SCHEMA,
                 "by": self.by,
@@ -159,7 +159,7 @@ class AnswerFiles:
         cases = self.set.manifest.cases
         most = min(LARGEST_ANSWER + _PER_CASE * len(cases), LARGEST)
         data = read_json(self.file, ANSWERS_SCHEMA, remedy, most)
-        if not is_stamped(data):
+        if not digest_agrees(data):
             words = "was edited: its hash does not fit"
             raise refusal(self.file, words, remedy)
         if data.get("set_commitment") != self.set.manifest.commitment:

@@ -36,12 +36,12 @@ def digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def stamped(data: Mapping[str, Any]) -> dict[str, Any]:
+def with_digest(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return plain data with the hash of it as `sha256`."""
     return {**data, "sha256": digest(canonical(data))}
 
 
-def is_stamped(data: Mapping[str, Any]) -> bool:
+def digest_agrees(data: Mapping[str, Any]) -> bool:
     """Tell whether `sha256` is the hash of everything else."""
     rest = {key: value for key, value in data.items() if key != "sha256"}
     return data.get("sha256") == digest(canonical(rest))

@@ -8,7 +8,7 @@ from typing import Any
 
 from hdcal.blind.answer import Opening, ScoredAnswers
 from hdcal.blind.answer_files import AnswerFiles, answering_names, frozen_names
-from hdcal.blind.canonical import Broken, is_stamped, stamped
+from hdcal.blind.canonical import Broken, digest_agrees, with_digest
 from hdcal.blind.closures import closures
 from hdcal.blind.files import (
     GET_AGAIN,
@@ -102,7 +102,7 @@ def _open(
     report = scores_report(scores, secret.labels, answers, others)
     if before is None:
         # Before any label reaches the disk: what is answered later is not blind.
-        write_whole(found.opened, as_json(stamped(_record(found, hashes))))
+        write_whole(found.opened, as_json(with_digest(_record(found, hashes))))
     with said_if_interrupted(f"{found.opened} is written"):
         write_report(report, target)
     when = None if before is None else printable(before["time"][:40])
@@ -130,7 +130,7 @@ def _read_opened(found: BlindSet) -> dict[str, Any] | None:
         return None
     data = read_json(path, OPENED_SCHEMA, remedy, LARGEST_ANSWER)
     whole = isinstance(data.get("answers"), dict) and isinstance(data.get("time"), str)
-    if not is_stamped(data) or not whole:
+    if not digest_agrees(data) or not whole:
         raise refusal(path, "was edited: its hash does not fit", remedy)
     if data.get("set_commitment") != found.manifest.commitment:
         raise refusal(path, "tells of another set", remedy)

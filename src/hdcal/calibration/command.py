@@ -42,12 +42,15 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
     from hdcal.cli.progress import progress_bar
+    from hdcal.inference.sample import check_settings
 
     with console.wrong as wrong:
         for name in ("effects", "with_gap") if dynamic else ():
             if settings.pop(name):
                 words = "does not go with --dynamic, whose model is linear"
                 wrong.append(Finding(name, words, "Leave it out"))
+        size = ("chains", "warmup", "draws", "seed")
+        wrong.attempt(check_settings, **{name: settings[name] for name in size})
         if settings.get("effects"):
             from hdcal.calibration.calibrate import choose_effects
 

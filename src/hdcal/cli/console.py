@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
@@ -161,7 +161,7 @@ class Console:
         """
         listed = list(findings)
         if show is not None:
-            show()
+            _to_error(show)
         for finding in listed if show is None else ():
             self.words(str(finding))
         if self.json:
@@ -177,32 +177,52 @@ class Console:
         """Print rich's tables and texts as the result for people."""
         from rich.console import Console as RichConsole
 
-        stream = sys.stderr if self.json else sys.stdout
+        terminal = (sys.stderr if self.json else sys.stdout).isatty()
         # Outside a terminal rich would guess 80 columns and break the tables.
-        width = None if stream.isatty() else 110
-        rich = RichConsole(file=stream, width=width, highlight=False, emoji=False)
-        with rich.capture() as caught:
-            rich.print(*parts, sep="\n")
-        lines = (line.rstrip() for line in caught.get().splitlines())
+        width = None if terminal else 110
+        # Not the stream itself: rich would write to it, and end the process by itself
+        # where that fails.
+        drawn = io.StringIO()
+        rich = RichConsole(
+            file=drawn,
+            force_terminal=terminal or None,
+            width=width,
+            highlight=False,
+            emoji=False,
+        )
+        rich.print(*parts, sep="\n")
+        lines = (line.rstrip() for line in drawn.getvalue().splitlines())
         self.result("\n".join(lines))
 
     def _print(self, text: str, *, to_error: bool) -> None:
+        if to_error:
+            _to_error(partial(print, text, file=sys.stderr, flush=True))
+            return
         try:
-            print(text, file=sys.stderr if to_error else sys.stdout, flush=True)
+            print(text, flush=True)
         except BrokenPipeError:
             self.unread = True
             discard_output()
-        except OSError:
-            # Where words cannot go, nobody can be told.
-            if not to_error:
-                raise
+
+
+def _to_error(show: Callable[[], None]) -> None:
+    """Show something on standard error, if anything can be shown there."""
+    try:
+        show()
+    except OSError:
+        # Where words cannot go, nobody can be told.
+        _discard(sys.stderr)
 
 
 def discard_output() -> None:
     """Send standard output nowhere, once nobody reads it any more."""
+    _discard(sys.stdout)
+
+
+def _discard(stream: TextIO) -> None:
     # Python would complain again when it flushes.
     with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def usage_error(error: click.UsageError) -> Finding:

@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 import click
 
+from hdcal.data.plausible import RANGES
 from hdcal.errors import Finding, Findings, InputError
 
 T = TypeVar("T")
-MOST_POINTS = 100_000
 _QUANTITY = re.compile(r"\s*(?P<number>[-+0-9.eE]+)\s*(?P<unit>\S.*)?")
 _KINDS = {"N": "a force", "mm": "a length", "MPa": "a stress", "N/mm": "a spring rate"}
 
@@ -130,7 +130,8 @@ def read_grid(text: str, option: str) -> list[float]:
         numbers = []
     if not numbers or not all(map(math.isfinite, numbers)):
         words = f"'{text}' is neither start:stop:count nor a list of numbers"
-        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, with at most {MOST_POINTS} points"
+        most = f"with at most {RANGES['points'].high} points"
+        remedy = f"Write it like 0:0.6:61 or 0.1,0.2, {most}"
         raise _refused(option, words, remedy)
     return numbers
 
@@ -141,7 +142,7 @@ def _range(text: str) -> list[float]:
 
 
 def _between(start: float, stop: float, count: int) -> list[float]:
-    if not 1 <= count <= MOST_POINTS:
+    if not 1 <= count <= RANGES["points"].high:
         raise ValueError(count)
     if count == 1:
         return [start]

@@ -15,18 +15,11 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
-from hdcal.data.plausible import range_of
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
-
-
-def count_type(name: str) -> click.IntRange:
-    """Return the type of an option whose whole number is refused before any work."""
-    known = range_of(name)
-    return click.IntRange(int(known.low), int(known.high))
 
 
 def repeated_option(
@@ -158,7 +151,6 @@ def seed_option(command: Callable) -> Callable:
     """Add --seed."""
     return click.option(
         "--seed",
-        type=count_type("seed"),
         default=0,
         show_default=True,
         help="The same seed gives the same result.",

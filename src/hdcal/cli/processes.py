@@ -50,6 +50,7 @@ def completed(
         for index, task in enumerate(tasks):
             yield index, work(*task)
         return
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
         min(jobs, len(tasks)),
         # A fork of a process in which JAX has begun hangs.
@@ -64,8 +65,8 @@ def completed(
     except BaseException:
         # Nobody waits for what others have begun.
         pool.shutdown(wait=False, cancel_futures=True)
-        for child in multiprocessing.active_children():
-            child.terminate()
+        for worker in set(multiprocessing.active_children()) - others:
+            worker.terminate()
         raise
 
 

@@ -1,24 +1,41 @@
 """Texts in tables that spreadsheets would run, written so that they do not.
 
 A leading apostrophe makes a spreadsheet show the rest as text. Reading takes it away.
+A spreadsheet may split cells at another character than the one that was written, and
+does not heed quotes within a cell then: every part that might become a cell is guarded.
 """
 
-_RUN = ("=", "+", "-", "@", "\t", "\r")
+import re
+
+_RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
+# These may be left out before what follows them.
+_BLANK = ("\t", "\r")
+_SEPARATORS = re.compile(r"([;,|\t\r\n])")
 
 
 def without_formula(text: str) -> str:
     """Return a text as it may stand in a cell; numbers are no formulas."""
+    parts = _SEPARATORS.split(text)
     # What has been guarded by somebody else gets an apostrophe more, and keeps its own.
-    if not text.lstrip("'").startswith(_RUN) or _is_number(text):
-        return text
-    return "'" + text
+    parts[::2] = [f"'{part}" if _runs(part) else part for part in parts[::2]]
+    guard = "'" if text.lstrip("'").startswith(_BLANK) else ""
+    return guard + "".join(parts)
 
 
 def with_formula(cell: str) -> str:
     """Return the text that `without_formula` made a cell of."""
-    if cell.startswith("'") and cell.lstrip("'").startswith(_RUN):
-        return cell[1:]
-    return cell
+    if cell.startswith("'") and cell.lstrip("'").startswith(_BLANK):
+        cell = cell[1:]
+    parts = _SEPARATORS.split(cell)
+    parts[::2] = [
+        part[1:] if part.startswith("'") and _runs(part) else part
+        for part in parts[::2]
+    ]
+    return "".join(parts)
+
+
+def _runs(part: str) -> bool:
+    return part.lstrip("'").startswith(_RUN) and not _is_number(part)
 
 
 def _is_number(text: str) -> bool:

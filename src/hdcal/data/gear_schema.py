@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -9,16 +10,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from hdcal.data.case import Theory
 from hdcal.data.plausible import implausible, range_of
 from hdcal.data.toml_file import TomlFile, did_you_mean
+from hdcal.data.typed_json import within
 from hdcal.errors import Finding, InputError
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
-def _within(name: str) -> Any:
-    return Field(ge=range_of(name).low, le=range_of(name).high)
-
-
-_Size = Annotated[float, _within("size")]
+_Size = Annotated[float, within("size")]
 
 
 class GearTable(BaseModel):
@@ -40,8 +38,8 @@ class MeasurementTable(BaseModel):
 
     model_config = _STRICT
     deformation: Literal["radial", "diametral"] = "radial"
-    reference_temperature_C: Annotated[float, _within("temperature")] = 20.0
-    force_resolution_N: Annotated[float, _within("force_resolution")] | None = None
+    reference_temperature_C: Annotated[float, within("temperature")] = 20.0
+    force_resolution_N: Annotated[float, within("force_resolution")] | None = None
 
 
 class GearFile(BaseModel):
@@ -111,22 +109,32 @@ def size_findings(toml: TomlFile) -> list[Finding]:
     if not isinstance(table, dict):
         return []
     size = {
-        name: value
+        name.removesuffix("_mm"): value
         for name, value in table.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
         if range_of("size").holds(value)
     }
-    radius = size.get("radius_mm", math.inf)
-    findings = []
-    rules = (
-        ("wall_thickness_mm", radius, "the wall is not thinner than the radius"),
-        ("nominal_deformation_mm", radius, "the deformation is not below the radius"),
-    )
-    for name, limit, words in rules:
-        if size.get(name, 0.0) >= limit:
-            findings.append(toml.finding(words, "Check both sizes", f"gear.{name}"))
-    if size.get("load_height_mm", 0.0) > size.get("length_mm", math.inf):
+    return [
+        toml.finding(words, remedy, f"gear.{name}_mm")
+        for name, words, remedy in size_faults(size)
+    ]
+
+
+def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
+    """Return which sizes cannot be beside the others: name, problem and remedy.
+
+    Args:
+        size: by name [mm]; any may be missing.
+    """
+    radius = size.get("radius", math.inf)
+    both = "Check both sizes"
+    faults = [
+        ("wall_thickness", "the wall is not thinner than the radius", both),
+        ("nominal_deformation", "the deformation is not below the radius", both),
+    ]
+    faults = [fault for fault in faults if size.get(fault[0], 0.0) >= radius]
+    if size.get("load_height", 0.0) > size.get("length", math.inf):
         words = "the load acts beyond the length of the gear"
         remedy = "Measure the load height from the closed base"
-        findings.append(toml.finding(words, remedy, "gear.load_height_mm"))
-    return findings
+        faults.append(("load_height", words, remedy))
+    return faults

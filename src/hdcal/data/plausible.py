@@ -18,6 +18,8 @@ class Range(NamedTuple):
         unit: of both; empty for counts and shares.
         why: what the ends stand for.
         inner: whether the ends themselves are out.
+        written: factor to the unit in which people write it, and that unit, where it
+            is another one.
     """
 
     low: float
@@ -25,6 +27,7 @@ class Range(NamedTuple):
     unit: str
     why: str
     inner: bool = False
+    written: tuple[float, str] | None = None
 
     def holds(self, number: float) -> bool:
         """Tell whether a number is one of this quantity; NaN is none."""
@@ -34,8 +37,17 @@ class Range(NamedTuple):
 
     def problem(self) -> str:
         """Return in words what is wrong with any other number."""
-        ends = f"{self.low:.15g} and {self.high:.15g} {self.unit}".rstrip()
+        factor, unit = self.written or (1, self.unit)
+        ends = f"{self.low * factor:.15g} and {self.high * factor:.15g} {unit}".rstrip()
         return f"does not lie between {ends}: {self.why}"
+
+    def shown(self, number: float) -> str:
+        """Return a number with its unit, as people write it."""
+        factor, unit = self.written or (1, self.unit)
+        try:
+            return f"{number * factor:.6g} {unit}".rstrip()
+        except OverflowError:
+            return f"a number of more than 300 digits {unit}".rstrip()
 
 
 _SCATTER = "from nothing to as large as the largest force"
@@ -57,7 +69,13 @@ RANGES = {
     "sigma": Range(1e-15, 1e9, "N", _SCATTER),
     "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
     "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
-    "mass": Range(1e-15, 1e6, "N·s²/mm", "from a nanogram to a million tonnes"),
+    "mass": Range(
+        1e-15,
+        1e6,
+        "N·s²/mm",
+        "from a nanogram to a million tonnes",
+        written=(1e3, "kg"),
+    ),
     "damping_ratio": Range(1e-9, 1e3, "", "from a bell to tar"),
     "initial_velocity": Range(-1e9, 1e9, "mm/s", "far beyond the speed of sound"),
     "deformation_sigma": Range(1e-15, 1e3, "mm", "from nothing to a metre"),
@@ -137,17 +155,10 @@ def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
     numbers = [] if given is None else _flat(given)
     for number in numbers:
         if not known.holds(number):
-            words = f"{_shown(number)} {known.unit}".rstrip()
-            remedy = "Check the number and its unit"
-            return [Finding(name, f"{words} {known.problem()}", remedy)]
+            words = f"{known.shown(number)} {known.problem()}"
+            unit = " and its unit" if known.unit else ""
+            return [Finding(name, words, f"Check the number{unit}")]
     return []
-
-
-def _shown(number: float) -> str:
-    try:
-        return f"{number:.6g}"
-    except OverflowError:
-        return "a number of more than 300 digits"
 
 
 def _flat(given: Any) -> list:

@@ -1,10 +1,11 @@
 """One entry of a prior table: family, numbers and unit, into code units."""
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
-from hdcal.data.plausible import RANGES, out_of_range, range_of
 from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior_checks import Fault, family_faults, range_faults, sign_faults
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.units import UnitError, to_code
 from hdcal.errors import Findings, InputError
@@ -12,15 +13,6 @@ from hdcal.errors import Findings, InputError
 # A modulus of 207 is meant in GPa, a thermal coefficient of 3 in 1e-4/K and a mass of
 # 0.03 in kg, so these are never read without their unit.
 _UNIT_NEEDED = {"E0": "GPa", "alpha": "1e-4/K", "mass": "kg"}
-_SIGNED = (
-    "alpha",
-    "force_offset",
-    "deformation_offset",
-    "cte",
-    "initial_deformation",
-    "initial_velocity",
-)
-_SIZES = ("sd", "log_sd", "median", "a", "b")
 _WORDS = ("family", "unit", "source", "note")
 
 
@@ -56,8 +48,10 @@ def read_prior(
         conversion = wrong.attempt(_conversion, entry, key, toml, unit)
     assert numbers is not None and conversion is not None
     scale, name = conversion
+    # Without a unit of its own it is a parameter of an effect.
+    parameter = "effect" if unit is None else key.rpartition(".")[2]
     if unit is not None:
-        _check_sign(family, numbers, key, toml)
+        _raise_faults(sign_faults(family, numbers, parameter), key, toml)
     if family == "beta" and scale != 1.0:
         words = "a beta prior lies between 0 and 1"
         raise toml.error(words, 'Write unit = "1"', f"{key}.unit")
@@ -68,7 +62,7 @@ def read_prior(
         number if size in ("log_sd", "a", "b") else number * scale
         for size, number in zip(FAMILIES[family], numbers, strict=True)
     )
-    _check_plausible(family, scaled, key, toml, own=unit is not None)
+    _raise_faults(range_faults(family, scaled, parameter), key, toml)
     return Prior(family, scaled, name, source)
 
 
@@ -85,19 +79,15 @@ def _numbers(entry: dict, family: str, key: str, toml: TomlFile) -> list[float]:
         if extra not in (*wanted, *_WORDS)
     ]
     numbers = [_finite(entry.get(size)) for size in wanted]
-    for size, number in zip(wanted, numbers, strict=True):
+    faults = {fault.number: fault for fault in family_faults(family, numbers)}
+    for size in wanted:
         if size not in entry:
-            words, remedy = f"a {family} prior needs '{size}'", f"Write {size} = …"
-        elif math.isnan(number):
-            words, remedy = "is not a finite number", "Write a plain number"
-        elif size in _SIZES and number <= 0.0:
-            words, remedy = f"{number:g} is not positive", "Write its size"
-        else:
-            continue
+            faults[size] = Fault(
+                size, f"a {family} prior needs '{size}'", f"Write {size} = …"
+            )
+    for size in filter(faults.__contains__, wanted):
+        _, words, remedy = faults[size]
         findings.append(toml.finding(words, remedy, f"{key}.{size}"))
-    if family == "uniform" and not findings and numbers[0] >= numbers[1]:
-        words = "low is not below high"
-        findings.append(toml.finding(words, "Exchange them", f"{key}.low"))
     if findings:
         raise InputError(findings)
     return numbers
@@ -137,39 +127,8 @@ def _conversion(
     return scale, name
 
 
-def _check_plausible(family: str, numbers, key: str, toml: TomlFile, own: bool):
-    """Refuse numbers in code units that no gear and no rig can have.
-
-    Args:
-        family: of the prior.
-        numbers: of the family.
-        key: dotted key.
-        toml: the file it stands in.
-        own: whether the key names a quantity; else it is a parameter of an effect.
-
-    Raises:
-        InputError: holds a finding for each of them.
-    """
-    known = range_of(key.rpartition(".")[2] if own else "effect")
-    widest = max(-known.low, known.high)
-    spread = known._replace(low=0.0, high=widest)
-    ranges = {"log_sd": RANGES["log_sd"], "a": RANGES["beta"], "b": RANGES["beta"]}
-    ranges |= {"sd": spread, "low": known._replace(low=min(known.low, 0.0))}
+def _raise_faults(faults: Iterable[Fault], key: str, toml: TomlFile) -> None:
     with Findings() as wrong:
-        for size, number in zip(FAMILIES[family], numbers, strict=True):
-            for found in out_of_range(size, number, ranges.get(size, known)):
-                place = f"{key}.{size}"
-                wrong.append(toml.finding(found.problem, found.remedy, place))
-
-
-def _check_sign(family: str, numbers: list[float], key: str, toml: TomlFile) -> None:
-    """A parameter that is positive by nature gets no prior centred below zero."""
-    name = key.rpartition(".")[2]
-    if family not in ("normal", "fixed", "uniform") or name in _SIGNED:
-        return
-    lowest = numbers[0]
-    if lowest > 0.0 or (family == "uniform" and lowest == 0.0):
-        return
-    size = FAMILIES[family][0]
-    words = f"{name} is positive, but {size} is {lowest:g}"
-    raise toml.error(words, "Write a positive number", f"{key}.{size}")
+        wrong += [
+            toml.finding(f.problem, f.remedy, f"{key}.{f.number}") for f in faults
+        ]

@@ -6,6 +6,8 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
+from hdcal.data.plausible import range_of
+
 T = TypeVar("T")
 
 # Of dataclasses, as `__pydantic_config__`: no other fields, no text for a number.
@@ -19,6 +21,18 @@ Share = Annotated[float, Field(ge=0.0, le=1.001)]  # a sum may pass 1 by roundin
 Size = Annotated[float, Field(ge=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0, le=10**12)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
+
+
+def within(quantity: str) -> Any:
+    """Return the constraint of a field to the range of a quantity.
+
+    Args:
+        quantity: a key of `RANGES` or `NAMES`.
+    """
+    known = range_of(quantity)
+    if known.inner:
+        return Field(gt=known.low, lt=known.high)
+    return Field(ge=known.low, le=known.high)
 
 
 def parse_json(text: bytes) -> Any:

@@ -277,5 +277,5 @@ def _bare_problem(gear: Gear) -> Problem:
         rounded=False,
         runs=0,
         specimens=0,
-        integrated=frozenset(),
+        integrated=(),
     )

@@ -6,7 +6,6 @@ from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
-    count_type,
     force_option,
     json_option,
     reading_options,
@@ -33,7 +32,6 @@ MANY = 20
 )
 @click.option(
     "--jobs",
-    type=count_type("jobs"),
     default=1,
     show_default=True,
     help="Processes to share many cases.",
@@ -53,12 +51,15 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
     Of one CASE the result is DIR itself, of several DIR/NAME each.
     """
     one_thread_for_algebra()
+    from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
     from hdcal.diagnosis.overview import document_and_answer, write_refused
     from hdcal.physics.registry import EFFECTS
 
     with console.wrong as wrong:
+        wrong += implausible("jobs", settings["jobs"])
+        wrong += implausible("seed", settings["seed"])
         wrong.attempt(choose_library, settings["library"], EFFECTS)
         asked = None
         if columns is not None:

@@ -1,11 +1,15 @@
 """What the attributes of a posterior file hold as JSON, typed: whoever wrote it."""
 
-from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field
+from typing import Annotated, Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
+from hdcal.data.gear_schema import size_faults
+from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
-from hdcal.data.typed_json import PART, RESULT
+from hdcal.data.prior_checks import family_faults, range_faults, sign_faults
+from hdcal.data.typed_json import PART, RESULT, STRICT, Size, within
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 
@@ -14,7 +18,7 @@ from hdcal.inference.diagnostics import Diagnosis
 class HeldPrior:
     """A prior, in code units."""
 
-    __pydantic_config__: ClassVar = RESULT
+    __pydantic_config__: ClassVar = STRICT
     family: str
     numbers: list[float]
     unit: str
@@ -24,24 +28,41 @@ class HeldPrior:
         known = FAMILIES.get(self.family)
         if known is None or len(self.numbers) != len(known):
             raise ValueError("is no prior of a family that is known")
+        wrong = family_faults(self.family, self.numbers)
+        # K is carried over to other theories, out of its own range perhaps.
+        if wrong or range_faults(self.family, self.numbers, "effect"):
+            raise ValueError("is a prior of numbers that none has")
 
 
 Priors = dict[str, HeldPrior]
+_Size = Annotated[float, within("size")]
+
+
+@dataclass(frozen=True)
+class HeldGeometry:
+    """Sizes of a gear [mm], as `Geometry` has them."""
+
+    __pydantic_config__: ClassVar = STRICT
+    wall_thickness: _Size
+    radius: _Size
+    length: _Size
+    load_height: _Size
+    poisson: Annotated[float, within("poisson")]
 
 
 @dataclass(frozen=True)
 class HeldGear:
-    """A gear; lengths in mm."""
+    """A gear; lengths in mm. Its numbers are those that a gear file may hold."""
 
-    __pydantic_config__: ClassVar = RESULT
+    __pydantic_config__: ClassVar = STRICT
     name: str
-    geometry: dict[str, float]
+    geometry: HeldGeometry
     material: str
     theory: Theory
     reading: Literal["radial", "diametral"]
-    reference_temperature: float
+    reference_temperature: Annotated[float, within("temperature")]
     force_resolution: float
-    nominal_deformation: float | None
+    nominal_deformation: _Size | None
     priors: Priors
     K_theory: Theory
     source: dict[str, Any]
@@ -49,7 +70,23 @@ class HeldGear:
     effect_priors: Priors
     # A file of before there were dynamics is as good as ever for the rest.
     dynamic_priors: Priors = field(default_factory=dict)
-    density: float | None = None
+    density: Annotated[float, within("density")] | None = None
+
+    def __post_init__(self) -> None:
+        step = self.force_resolution
+        if step != 0.0 and not range_of("force_resolution").holds(step):
+            raise ValueError("has a rounding step that no scale has")
+        size = asdict(self.geometry)
+        if self.nominal_deformation is not None:
+            size["nominal_deformation"] = self.nominal_deformation
+        if size_faults(size):
+            raise ValueError("has sizes that no gear has")
+        for name, prior in (
+            self.priors | self.scale_priors | self.dynamic_priors
+        ).items():
+            given = prior.family, prior.numbers, name
+            if sign_faults(*given) or range_faults(*given):
+                raise ValueError("has priors that no gear has")
 
 
 @dataclass(frozen=True)
@@ -71,11 +108,11 @@ class HeldSettings:
     """How it was sampled; a file says more than this."""
 
     __pydantic_config__: ClassVar = PART
-    seed: int
-    chains: int
-    warmup: int
-    draws: int
-    seconds: float
+    seed: Annotated[int, within("seed")]
+    chains: Annotated[int, within("chains")]
+    warmup: Annotated[int, within("warmup")]
+    draws: Annotated[int, within("draws")]
+    seconds: Size
     versions: dict[str, str]
     with_gap: bool = False
     kind: Literal["static", "dynamic"] = "static"
@@ -92,3 +129,15 @@ class HeldModel:
     settings: dict[str, Any]
     diagnoses: dict[str, Diagnosis]
     checks: list[Check]
+
+    def check_diagnoses(self, sites: Iterable[str]) -> None:
+        """Check that what has a diagnosis is a parameter.
+
+        Args:
+            sites: parameters of the model.
+
+        Raises:
+            ValueError: something else has one.
+        """
+        if not self.diagnoses.keys() <= self.priors.keys() & {*sites}:
+            raise ValueError("says how well something was sampled that is no parameter")

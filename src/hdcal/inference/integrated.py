@@ -39,12 +39,9 @@ def linear_part(problem: Problem, values: Values) -> Linear:
     return _linear_rows(problem, values)
 
 
-def _by_number(problem: Problem) -> list[str]:
+def _labelled(problem: Problem) -> list[str]:
     """Return the integrated kinds that are labels in the data, most members first."""
-    return sorted(
-        problem.integrated & MEMBER_SD.keys(),
-        key=lambda kind: (-getattr(problem, f"{kind}s"), kind),
-    )
+    return [kind for kind in problem.integrated if kind in MEMBER_SD]
 
 
 def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Grouped]:
@@ -63,7 +60,7 @@ def _grouped(problem: Problem, values: Values, labels, columns) -> dict[str, Gro
             values[MEMBER_SD[kind]],
             getattr(problem, f"{kind}s"),
         )
-        for kind in _by_number(problem)
+        for kind in _labelled(problem)
     }
 
 
@@ -140,7 +137,7 @@ def _(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
         return {}
     weights, members = linear_part(problem, values).draw(key)
     drawn, used = {}, 0
-    for place, kind in enumerate(_by_number(problem)):
+    for place, kind in enumerate(_labelled(problem)):
         if place > 0:
             count = getattr(problem, f"{kind}s")
             members = contrasts(count) @ weights[used : used + count - 1]

@@ -22,23 +22,42 @@ def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
     return {kind: count for kind, count in counts.items() if count}
 
 
+def integrated_kinds(
+    counts: Mapping[str, int], linear: frozenset[str]
+) -> tuple[str, ...]:
+    """Return the kinds of members to integrate out.
+
+    The first one is eliminated one by one, unless it is the discrepancy: of runs and
+    specimens the more numerous kind.
+
+    Args:
+        counts: from `member_counts`.
+        linear: kinds that enter a Gaussian likelihood linearly.
+    """
+    return tuple(
+        sorted(
+            counts.keys() & linear,
+            key=lambda kind: (kind == "discrepancy", -counts[kind], kind),
+        )
+    )
+
+
 def check_member_counts(
-    name: str, counts: Mapping[str, int], linear: frozenset[str]
+    name: str, counts: Mapping[str, int], integrated: tuple[str, ...]
 ) -> None:
     """Check that runs and specimens are not too many.
 
     Args:
         name: of the case.
         counts: from `member_counts`.
-        linear: kinds that enter a Gaussian likelihood linearly.
+        integrated: from `integrated_kinds`.
 
     Raises:
         InputError: they are.
     """
-    kinds = sorted(counts.keys() - {"discrepancy"}, key=lambda kind: counts[kind])
     findings = []
-    for place, kind in enumerate(kinds, start=1):
-        eliminated = kind in linear and place == len(kinds)
+    for kind in sorted(counts.keys() - {"discrepancy"}):
+        eliminated = kind in integrated[:1]
         most = _MOST_MEMBERS if eliminated else _MOST_DENSE
         if counts[kind] > most:
             words = f"{counts[kind]} {kind}s are too many for one calibration"

@@ -44,8 +44,11 @@ class Grouped(eqx.Module):
 
     def columns(self) -> Float[Array, "r k"]:
         """Return the contribution of each contrast between the members to each row."""
-        index = jnp.repeat(self.index, self._block)
-        return self.column[:, None] * contrasts(self.count)[index]
+        return self.column[:, None] * self.to_rows(contrasts(self.count))
+
+    def to_rows(self, members: Float[Array, " count ..."]) -> Float[Array, " r ..."]:
+        """Return the value of its member for each row."""
+        return jnp.repeat(members[self.index], self._block, axis=0)
 
     def sums(self, rows: Float[Array, " r ..."]) -> Float[Array, " count ..."]:
         """Return the sum over the rows of each member."""
@@ -53,27 +56,32 @@ class Grouped(eqx.Module):
         return jax.ops.segment_sum(blocks, self.index, self.count)
 
 
-class _Eliminated(eqx.Module):
-    """What members leave to the other weights; all in prior sds of the members.
+class _Remainder(eqx.Module):
+    """What is left of design and residual, its last column, without the members.
 
     Attributes:
-        precision: of each member when the other weights are known.
-        pull: of the readings on each member.
-        shared: information that each member shares with each other weight.
+        parts: rows whose inner products are those of readings without members: the
+            rows less what their members explain; the members that explain it, in
+            their prior sds; and the sum of these, which has to be zero.
+        precision: of each member when the weights are known.
     """
 
-    precision: Float[Array, " n"]
-    pull: Float[Array, " n"]
-    shared: Float[Array, "n m"]
+    parts: list[Float[Array, "_ m1"]]
+    precision: Float[Array, " n"] | None = None
 
     @property
-    def variance(self) -> Float[Array, ""]:
-        """Variance of the members' sum when the other weights are known."""
-        return jnp.sum(1.0 / self.precision)
+    def products(self) -> Float[Array, "m1 m1"]:
+        """Inner products of the columns."""
+        return sum((part.T @ part for part in self.parts), start=jnp.zeros(()))
 
-    def mean(self, weights: Float[Array, " m"]) -> Float[Array, " n"]:
-        """Return the mean of the members given the other weights, sum ignored."""
-        return (self.pull - self.shared @ weights) / self.precision
+    def distance(self, weights: Float[Array, " m"]) -> Float[Array, ""]:
+        """Return the squared distance of the residual from what the weights explain.
+
+        A sum of squares: the difference of two would lose its digits where members
+        or weights spread much wider than the noise.
+        """
+        left = (part @ jnp.append(-weights, 1.0) for part in self.parts)
+        return sum((jnp.sum(rows**2) for rows in left), start=jnp.zeros(()))
 
 
 class Linear(eqx.Module):
@@ -98,42 +106,35 @@ class Linear(eqx.Module):
 
     grouped: Grouped | None = None
 
-    def _eliminated(self, design, residual) -> _Eliminated | None:
-        if self.grouped is None:
-            return None
-        column = self.grouped.column * self.grouped.sd / self.sd
-        return _Eliminated(
-            1.0 + self.grouped.sums(column**2),
-            self.grouped.sums(column * residual),
-            self.grouped.sums(column[:, None] * design),
-        )
-
-    def _factor(self):
-        """Return the weights' factor and half solution, and what they do not enter."""
+    def _remainder(self) -> _Remainder:
         design = self.design * self.scale / self.sd[:, None]
-        residual = self.residual / self.sd
-        precision = jnp.eye(len(self.scale)) + design.T @ design
-        pull, rest = design.T @ residual, jnp.sum(residual**2)
-        members = self._eliminated(design, residual)
-        if members is not None:
-            share = members.shared.T / members.precision
-            total, slope = jnp.sum(members.mean(jnp.zeros(len(pull)))), share.sum(1)
-            variance = members.variance
-            precision += jnp.outer(slope, slope) / variance - share @ members.shared
-            pull += slope * total / variance - share @ members.pull
-            rest += total**2 / variance - jnp.sum(members.pull**2 / members.precision)
-            rest += jnp.sum(jnp.log(members.precision))
-            rest += jnp.log(variance / len(members.precision))
-        factor = jnp.linalg.cholesky(precision)
-        half = solve_triangular(factor, pull, lower=True)
-        return factor, half, rest, members
+        rows = jnp.column_stack([design, self.residual / self.sd])
+        if self.grouped is None:
+            return _Remainder([rows])
+        column = (self.grouped.column * self.grouped.sd / self.sd)[:, None]
+        precision = 1.0 + self.grouped.sums(column[:, 0] ** 2)
+        members = self.grouped.sums(column * rows) / precision[:, None]
+        left = rows - column * self.grouped.to_rows(members)
+        total = jnp.sum(members, axis=0, keepdims=True)
+        total /= jnp.sqrt(jnp.sum(1.0 / precision))
+        return _Remainder([left, members, total], precision)
+
+    def _solved(self):
+        """Return the remainder, the weights' factor and their mean."""
+        remainder = self._remainder()
+        products = remainder.products
+        factor = jnp.linalg.cholesky(jnp.eye(len(self.scale)) + products[:-1, :-1])
+        half = solve_triangular(factor, products[:-1, -1], lower=True)
+        return remainder, factor, solve_triangular(factor.T, half, lower=False)
 
     def log_likelihood(self) -> Float[Array, ""]:
         """Return log p(y) with weights and members integrated out."""
-        factor, half, rest, _ = self._factor()
+        remainder, factor, weights = self._solved()
+        volume = 2.0 * jnp.sum(jnp.log(jnp.diag(factor)))
+        if (precision := remainder.precision) is not None:
+            volume += jnp.sum(jnp.log(precision)) + jnp.log(jnp.mean(1.0 / precision))
         return -(
-            0.5 * (rest - jnp.sum(half**2))
-            + jnp.sum(jnp.log(jnp.diag(factor)))
+            0.5 * (remainder.distance(weights) + jnp.sum(weights**2) + volume)
             + self.log_volume
             + 0.5 * self.count * jnp.log(2.0 * jnp.pi)
         )
@@ -142,15 +143,17 @@ class Linear(eqx.Module):
         self, key: Key[Array, ""]
     ) -> tuple[Float[Array, " m"], Float[Array, " n"] | None]:
         """Draw weights and members from their distribution given y."""
-        factor, half, _, members = self._factor()
+        remainder, factor, mean = self._solved()
         of_weights, of_members = jax.random.split(key)
-        noise = jax.random.normal(of_weights, half.shape)
-        weights = solve_triangular(factor.T, half + noise, lower=False)
-        if self.grouped is None or members is None:
+        noise = jax.random.normal(of_weights, mean.shape)
+        weights = mean + solve_triangular(factor.T, noise, lower=False)
+        precision = remainder.precision
+        if self.grouped is None or precision is None:
             return self.scale * weights, None
-        noise = jax.random.normal(of_members, members.pull.shape)
-        free = members.mean(weights) + noise / jnp.sqrt(members.precision)
-        excess = jnp.sum(free) / members.variance / members.precision
+        noise = jax.random.normal(of_members, precision.shape)
+        free = remainder.parts[1] @ jnp.append(-weights, 1.0)
+        free += noise / jnp.sqrt(precision)
+        excess = jnp.sum(free) / jnp.sum(1.0 / precision) / precision
         return self.scale * weights, self.grouped.sd * (free - excess)
 
 

@@ -173,7 +173,9 @@ class Posterior(Shown):
                 tree["observed_data"].to_dataset()["force"],
             )
             chosen = _look_up(model.effects, effects, file)
-            check_draws(tree, cls.sites(case, chosen, settings.with_gap))
+            sites = cls.sites(case, chosen, settings.with_gap)
+            check_draws(tree, sites)
+            model.check_diagnoses(sites)
             return cls(
                 case=case,
                 theory=model.theory,

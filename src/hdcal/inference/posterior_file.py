@@ -95,7 +95,7 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     gear = {f.name: getattr(held.gear, f.name) for f in fields(HeldGear)}
     for table in _TABLES:
         gear[table] = restore_priors(gear[table])
-    gear["geometry"] = Geometry(**gear["geometry"])
+    gear["geometry"] = Geometry(**vars(held.gear.geometry))
     rows = {name: constant[name].to_numpy() for name in UNITS}
     rows["force"] = force.to_numpy()
     check_rows(rows, len(held.run_labels), len(held.specimen_labels))

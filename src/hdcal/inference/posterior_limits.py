@@ -19,8 +19,9 @@ _MOST_UNPACKED, _LEAST_LIMIT = 16, 64 << 20
 _LARGEST_CHUNK = 64 << 20
 _MOST_OBJECTS, _MOST_ATTRIBUTES, _MOST_TEXTS = 2_000, 500, 20_000
 _MOST_LETTERS = 64 << 20
-# How NetCDF names what HDF5 itself needs; they hold references.
-_OF_DIMENSIONS = frozenset({"DIMENSION_LIST", "REFERENCE_LIST"})
+# How NetCDF names what HDF5 itself needs; they hold references: the scale of each axis,
+# and the data that use a scale.
+_SCALES, _USERS = "DIMENSION_LIST", "REFERENCE_LIST"
 
 
 def check_container(path: Path) -> None:
@@ -38,7 +39,12 @@ def check_container(path: Path) -> None:
     limit = max(_MOST_UNPACKED * path.stat().st_size, _LEAST_LIMIT)
     with h5py.File(path, "r") as file:
         try:
-            size = sum(_declared(each) for each in _objects(file))
+            size = letters = 0
+            for found in _objects(file):
+                for more, texts in _declared(found):
+                    size, letters = size + more, letters + texts
+                    if letters > _MOST_LETTERS:
+                        raise ValueError("holds texts of an absurd length")
         except (KeyError, TypeError, ValueError, RuntimeError) as error:
             raise _refusal(path, str(error) or "holds what no posterior does") from None
     if size > limit:
@@ -75,35 +81,60 @@ def _objects(file: h5py.File) -> Iterator[h5py.Group | h5py.Dataset]:
                 yield found
 
 
-def _declared(found: h5py.Group | h5py.Dataset) -> int:
-    """Return how many bytes an object unpacks to.
+def _declared(found: h5py.Group | h5py.Dataset) -> Iterator[tuple[int, int]]:
+    """Yield how many bytes parts of an object unpack to, and how many letters.
 
     Raises:
         ValueError: a type or a chunk that no posterior has.
     """
     if len(found.attrs) > _MOST_ATTRIBUTES:
         raise ValueError(f"holds more than {_MOST_ATTRIBUTES} attributes in one place")
-    size = 0
     for name in found.attrs:
-        held = found.attrs.get_id(name)
-        if name not in _OF_DIMENSIONS:
-            _check_type(held.dtype)
-        count = int(np.prod(held.shape, dtype=object))
-        if count > _MOST_TEXTS:
-            raise ValueError(f"holds more than {_MOST_TEXTS} values in an attribute")
-        size += count * held.dtype.itemsize
-    if isinstance(found, h5py.Group):
-        return size
+        yield _attribute(found, name)
+    if not isinstance(found, h5py.Dataset):
+        return
     _check_type(found.dtype)
     if found.is_virtual or found.external:
         raise ValueError("keeps its data in another file")
-    chunk = np.prod(found.chunks or (0,), dtype=object) * found.dtype.itemsize
-    if chunk > _LARGEST_CHUNK:
+    if found.id.get_create_plist().get_nfilters():
+        # HDF5 unpacks a chunk to whatever its bytes make, and once for each access.
+        raise ValueError("holds data that are compressed")
+    chunk = np.prod(found.chunks or (0,), dtype=object)
+    if chunk * found.dtype.itemsize > _LARGEST_CHUNK:
         raise ValueError("is cut into chunks of an absurd size")
     count = int(np.prod(found.shape, dtype=object))
-    if found.dtype.kind == "O":
-        return size + _letters(found, count)
-    return size + count * found.dtype.itemsize
+    if found.dtype.kind != "O":
+        yield count * found.dtype.itemsize, 0
+        return
+    if count > _MOST_TEXTS:
+        raise ValueError(f"holds more than {_MOST_TEXTS} texts")
+    # One by one, as many may be one and the same long one.
+    for index in np.ndindex(found.shape):
+        yield 0, len(found[index])
+
+
+def _attribute(found: h5py.Group | h5py.Dataset, name: str) -> tuple[int, int]:
+    """Return how many bytes an attribute unpacks to, and how many letters.
+
+    Raises:
+        ValueError: it is none that a posterior has.
+    """
+    held = found.attrs.get_id(name)
+    count = int(np.prod(held.shape, dtype=object))
+    if count > _MOST_TEXTS:
+        raise ValueError(f"holds more than {_MOST_TEXTS} values in an attribute")
+    if name == _SCALES:
+        _check_scales(found, held)
+    elif name == _USERS:
+        _check_users(held.dtype)
+    else:
+        _check_type(held.dtype)
+        if held.dtype.kind == "O":
+            # HDF5 would read all of them at once, and each may be the same long one.
+            if count > 1:
+                raise ValueError("holds a list of texts in an attribute")
+            return 0, len(str(found.attrs[name]))
+    return count * held.dtype.itemsize, 0
 
 
 def _check_type(dtype: np.dtype) -> None:
@@ -112,16 +143,21 @@ def _check_type(dtype: np.dtype) -> None:
         raise ValueError("holds data of a type that no posterior has")
 
 
-def _letters(found: h5py.Dataset, count: int) -> int:
-    """Return the length of all texts; many may be one and the same long one."""
-    if count > _MOST_TEXTS:
-        raise ValueError(f"holds more than {_MOST_TEXTS} texts")
-    letters = 0
-    for index in np.ndindex(found.shape):
-        letters += len(found[index])
-        if letters > _MOST_LETTERS:
-            raise ValueError("holds texts of an absurd length")
-    return letters
+def _check_scales(found: h5py.Group | h5py.Dataset, held) -> None:
+    """Check that each axis of data has one scale."""
+    kind = h5py.check_vlen_dtype(held.dtype)
+    axes = (found.ndim,) if isinstance(found, h5py.Dataset) else ()
+    if kind is None or h5py.check_ref_dtype(kind) is None or held.shape != axes:
+        raise ValueError("holds axes of a type that no posterior has")
+    if any(len(scales) != 1 for scales in np.asarray(found.attrs[_SCALES])):
+        raise ValueError("holds several scales for one axis")
+
+
+def _check_users(dtype: np.dtype) -> None:
+    kinds = [dtype[name] for name in dtype.names or ()]
+    if len(kinds) != 2 or h5py.check_ref_dtype(kinds[0]) is None:
+        raise ValueError("holds a scale of a type that no posterior has")
+    _check_type(kinds[1])
 
 
 def check_draws(tree: xr.DataTree, sites: Mapping[str, tuple[int, ...]]) -> None:
@@ -146,6 +182,9 @@ def check_draws(tree: xr.DataTree, sites: Mapping[str, tuple[int, ...]]) -> None
             raise ValueError(f"{name} has another shape")
         if one.dtype.kind not in "biuf" or not np.isfinite(one).all():
             raise ValueError(f"{name} is not finite")
+        # The widest range there is: chains that failed go far.
+        if implausible(name, one.to_numpy(), "effect"):
+            raise ValueError(f"{name} is beyond every rig")
 
 
 def check_rows(rows: Mapping[str, np.ndarray], runs: int, specimens: int) -> None:

@@ -15,7 +15,11 @@ from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
 from hdcal.inference.distributions import scaled
-from hdcal.inference.member_counts import check_member_counts, member_counts
+from hdcal.inference.member_counts import (
+    check_member_counts,
+    integrated_kinds,
+    member_counts,
+)
 from hdcal.inference.padding import pad_records
 from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
@@ -54,7 +58,8 @@ class Problem(Sampled):
         rounded: exact rounding likelihood (else Sheppard's correction).
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
-        integrated: which of "run", "specimen", "discrepancy" are integrated out.
+        integrated: which of "run", "specimen", "discrepancy" are integrated out, as
+            `integrated_kinds` orders them.
         count: measured rows; `records` and `columns` have padding after them.
     """
 
@@ -71,7 +76,7 @@ class Problem(Sampled):
     rounded: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
-    integrated: frozenset[str] = eqx.field(static=True)
+    integrated: tuple[str, ...] = eqx.field(static=True)
     count: int = 0
 
     @property
@@ -217,8 +222,7 @@ def build_problem(
         InputError: an effect lacks its covariates or a prior, or bears no padding.
     """
     _check_needs(case, effects)
-    effects = without_scatter(effects)
-    theory = theory or case.gear.theory
+    effects, theory = without_scatter(effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
     check_padding(effects, records, reading)
@@ -228,7 +232,8 @@ def build_problem(
     columns = _columns(records, reading)
     rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
-    check_member_counts(case.name, members, linear)
+    integrated = integrated_kinds(members, linear)
+    check_member_counts(case.name, members, integrated)
     return Problem(
         priors=without_texts(priors),
         units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
@@ -240,7 +245,7 @@ def build_problem(
         rounded=rounded,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
-        integrated=linear & members.keys(),
+        integrated=integrated,
         **rows,
     )
 

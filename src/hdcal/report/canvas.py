@@ -29,7 +29,7 @@ _MARK_LENGTH = 7.1
 # Of a PNG; an SVG is always drawn in points.
 _DPI, _SVG_DPI = 160, 72
 # More points than this tell the eye nothing and make files of many megabytes.
-MOST_POINTS = 4000
+MOST_DRAWN = 4000
 
 # Where installed, these write what the default font lacks, such as Chinese.
 _FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
@@ -168,9 +168,9 @@ def beyond(tested: np.ndarray) -> np.ndarray:
 
 def thinned(size: int) -> np.ndarray:
     """Return the rows to draw: all of them, or an even-handed choice, in order."""
-    if size <= MOST_POINTS:
+    if size <= MOST_DRAWN:
         return np.arange(size)
-    chosen = np.random.default_rng(0).choice(size, MOST_POINTS, replace=False)
+    chosen = np.random.default_rng(0).choice(size, MOST_DRAWN, replace=False)
     return np.sort(chosen)
 
 

@@ -5,7 +5,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import count_type, json_option
+from hdcal.cli.options import json_option
 
 _INTERRUPTED = 130
 
@@ -14,7 +14,6 @@ _INTERRUPTED = 130
 @click.argument("folder", metavar="DIR")
 @click.option(
     "--jobs",
-    type=count_type("jobs"),
     default=1,
     show_default=True,
     help="Processes to share the cases.",

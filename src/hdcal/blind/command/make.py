@@ -11,7 +11,7 @@ from hdcal.blind.command.forms import check_forms
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import count_type, force_option, json_option
+from hdcal.cli.options import force_option, json_option
 from hdcal.errors import said_if_interrupted
 
 # With fewer somebody could draw the cases of every seed and look which ones fit.
@@ -25,9 +25,9 @@ _HELP = {
 
 
 @command(short_help="Make a set of sealed cases.")
-@click.option("--cases", type=count_type("cases"), help="How many to draw.")
+@click.option("--cases", type=int, help="How many to draw.")
 @click.option("--mix", metavar="NAME", help="What to draw them from.")
-@click.option("--seed", type=count_type("secret_seed"), help=_HELP["seed"])
+@click.option("--seed", type=int, help=_HELP["seed"])
 @click.option("--program", metavar="CSV", help=_HELP["program"])
 @click.option("--from", "source", metavar="CSV", help="Seal a measurement instead.")
 @click.option("--gear", metavar="GEAR.toml", help="Its gear file.")

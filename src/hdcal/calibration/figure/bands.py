@@ -16,7 +16,7 @@ from hdcal.prediction.bands.bands import Bands
 from hdcal.report.canvas import (
     DARK,
     GREY,
-    MOST_POINTS,
+    MOST_DRAWN,
     beyond,
     heading,
     plain,
@@ -194,8 +194,8 @@ def _legend(
         if np.any(left.direction == sense):
             style_ = {"marker": mark, "linestyle": "", "color": main, "markersize": 5}
             add(Line2D([], [], **style_), f"measured, {ways[sense]}")
-    if size > MOST_POINTS:
-        add(Patch(alpha=0.0), f"({MOST_POINTS} of {size} readings drawn)")
+    if size > MOST_DRAWN:
+        add(Patch(alpha=0.0), f"({MOST_DRAWN} of {size} readings drawn)")
     line = Line2D([], [], color=main)
     add(
         (Patch(color=main, alpha=0.55, linewidth=0), line), "force model, 95 % credible"
