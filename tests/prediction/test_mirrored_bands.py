@@ -44,6 +44,14 @@ def test_the_bands_are_mirrored(make, way):
     assert np.all(other.new_measurement_lo_N < other.new_measurement_hi_N)
 
 
+def test_by_default_the_gear_is_loaded():
+    known, at = friction(), np.array([0.0, 0.1, 0.4])
+    found, other = predict(known, at), predict(mirrored(known), -at)
+    assert set(found.direction) == {"up"} and set(other.direction) == {"down"}
+    check_mirrored(other, found)
+    assert other.tested[1:].all()
+
+
 def test_the_grid_of_a_result_folder_is_mirrored():
     known = with_leftover(200)
     gear = replace(known.case.gear, nominal_deformation=None)

@@ -162,6 +162,18 @@ def test_the_answer_is_mirrored(name: str):
         assert other.reached.lower_bound_mm < other.reached.upper_bound_mm < 0.0
 
 
+def test_what_was_not_tested_is_named():
+    pressed = single(size=SIZE)
+    for known, at, words in (
+        (pressed, -0.1, "loading in tension"),
+        (mirrored(pressed), 0.1, "loading in compression"),
+    ):
+        found = hdcal.margin(known, at, **QUICK)
+        assert any(f"{words} was not tested" in said for said in found.extrapolated)
+    found = hdcal.margin(pressed, 0.4, direction="down", **QUICK)
+    assert found.extrapolated[0].startswith("Extrapolated: unloading was not tested")
+
+
 @pytest.fixture(scope="module")
 def both_senses():
     """One gear that was pressed, and its mirror image that was pulled."""

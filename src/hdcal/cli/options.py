@@ -110,15 +110,18 @@ def force_option(command: Callable) -> Callable:
     return click.option("--force", is_flag=True, help=words)(command)
 
 
-def direction_option(help: str) -> Callable[[Callable], Callable]:
+def direction_option(
+    help: str, default: str | None = "up"
+) -> Callable[[Callable], Callable]:
     """Add --direction.
 
     Args:
         help: what up and down are.
+        default: without it.
     """
     ways = click.Choice(["up", "down"])
     return click.option(
-        "--direction", type=ways, default="up", show_default=True, help=help
+        "--direction", type=ways, default=default, show_default=True, help=help
     )
 
 

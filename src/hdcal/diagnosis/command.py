@@ -5,12 +5,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    force_option,
-    json_option,
-    reading_options,
-    seed_option,
-)
+from hdcal.cli.options import force_option, json_option, reading_options, seed_option
 
 # With more cases than this reports are made only when asked for.
 MANY = 20
@@ -81,6 +76,5 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
         if asked.many:
             write_refused(made[1].refused, folder)
     page = "report.html" if settings["report"] else "verdict.json"
-    opened = "" if asked.many else page
-    code = console.answer(*document_and_answer(*made), out, opened)
+    code = console.answer(*document_and_answer(*made), out, "" if asked.many else page)
     return 2 if made[1].refused else code

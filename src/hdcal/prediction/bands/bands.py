@@ -80,7 +80,7 @@ def predict(
     posterior: Models,
     deformation: Sequence[float] | np.ndarray,
     temperature: Sequence[float] | np.ndarray | None = None,
-    direction: Direction = "up",
+    direction: Direction | None = None,
     *,
     interval: float = 0.95,
     seed: int = 0,
@@ -95,7 +95,8 @@ def predict(
         temperature: of the specimen [°C], shape (t,); by default the tested one
             nearest to the reference.
         direction: of the movement, for effects that depend on it: up where the
-            deformation rises, as read and with its sign.
+            deformation rises, as read and with its sign; by default the one that
+            loads the gear.
         interval: probability inside the bands.
         seed: of the new measurements' noise.
         allow_failed: also for a posterior that failed; the rows then say so.
@@ -120,14 +121,14 @@ def _bands(
     causes: Sequence[Cause],
     along: np.ndarray,
     levels: np.ndarray,
-    direction: Direction,
+    direction: Direction | None,
     interval: float,
     seed: int,
 ) -> Bands:
     """Return the bands at every pair of deformation and temperature."""
     case = causes[0].posterior.case
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
-    sense = np.full(len(at), SENSE[direction])
+    sense = _senses(at, direction, case.records)
     known_sd = usual_sd(case.records)
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
     models = [(cause.problem, *with_untested(cause, seed)) for cause in causes]
@@ -142,13 +143,22 @@ def _bands(
     return Bands(
         at,
         warm,
-        np.full(len(at), direction),
+        np.where(sense > 0.0, "up", "down"),
         *physics,
         *with_gap,
         *new,
         tested=tested,
         usable=np.full(len(at), usable),
     )
+
+
+def _senses(at: np.ndarray, direction: Direction | None, records: Records):
+    """Return the sense of the movement of each row, +1 where the deformation rises."""
+    if direction is not None:
+        return np.full(len(at), SENSE[direction])
+    # A gear at rest is loaded as the tested one was.
+    tested = np.min(records.deformation) + np.max(records.deformation)
+    return np.where(np.where(at == 0.0, tested, at) < 0.0, -1.0, 1.0)
 
 
 def _quantiles(causes: Sequence[Cause], models, records: Records, tails, seed: int):
@@ -190,7 +200,7 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
         find("temperature", "is empty", "give numbers in °C")
     else:
         findings += temperature_findings(gear, cause.values, temperature)
-    if direction not in DIRECTIONS:
+    if direction not in (None, *DIRECTIONS):
         find("direction", f"'{direction}' is unknown", "use up or down")
     findings += implausible("interval", interval) + implausible("seed", seed)
     if findings:

@@ -26,7 +26,9 @@ _BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
     type=NUMBERS,
     help="Temperatures [°C]: 20,60 [default: the reference one].",
 )
-@direction_option("Of the movement: deformation rising or falling.")
+@direction_option(
+    "Of the movement: deformation rising or falling [default: loading].", default=None
+)
 @click.option(
     "--out",
     metavar="FILE.csv",

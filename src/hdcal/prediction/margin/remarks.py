@@ -72,6 +72,8 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
+        if not low < at < high and (at < 0.0) != (low + high < 0.0):
+            word += " in tension" if at < 0.0 else " in compression"
         yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
     if not temperature_is_tested(records, temperature).all():
         yield _untested_temperature(force, temperature)
