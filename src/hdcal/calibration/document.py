@@ -6,6 +6,7 @@ from functools import partial
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import THEORY_WORDS
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
 from hdcal.inference.residuals import Residuals
 from hdcal.report.document import (
     Document,
@@ -40,6 +41,9 @@ _REMEDY: Mapping[str, str] = {
     "temperature x deformation": "Check the prior of alpha for this material.",
     "time": "Try the effect charge_leakage, and repeat the first point at the end.",
     "order": "Repeat the first point at the end: it tells drift from stiffness.",
+    NEIGHBOURS: "Repeat the ramp in other mountings: their scatter tells what "
+    "neighbours that err alike hide.",
+    SCATTER: "Try the effect heteroscedastic_noise.",
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
@@ -66,7 +70,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
             "still fails, look at the data and leave effects out."
         ]
     known = posterior.case.records.known
-    steps = [_REMEDY[shape.name] for shape in left.structure]
+    steps = [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))
 

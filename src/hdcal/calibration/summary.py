@@ -42,12 +42,13 @@ def calibration_answer(
     steps = tuple(next_steps(posterior, left))
     stiffness = credible_interval(posterior.draws["stiffness"])
     entries = posterior_entries(posterior, headline(stiffness), steps)
-    entries["warnings"] += tuple(shape.words for shape in left.structure)
+    found = *left.structure, *left.noise
+    entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(
         **entries,
         K_by_theory=K_by_theory(posterior),
         K_note=ARTICLE_NOTE,
-        residuals=tuple(ResidualShape(**vars(shape)) for shape in left.structure),
+        residuals=tuple(ResidualShape(**vars(shape)) for shape in found),
         next_steps=steps,
         effects=tuple(effect.name for effect in posterior.effects),
         with_gap=bool(posterior.settings["with_gap"]),

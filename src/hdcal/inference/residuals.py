@@ -1,6 +1,6 @@
 """What the calibrated model leaves over, and whether it has a shape."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +11,7 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.linearisation import Linearisation, linearise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
     Structure,
     Whitened,
@@ -38,6 +39,7 @@ class Residuals:
         residual: measured − fitted [N].
         standardised: residual over the noise sd [-].
         structure: shapes that noise would rarely show.
+        noise: in which ways the rest is no independent noise of one size.
     """
 
     deformation: np.ndarray
@@ -49,6 +51,7 @@ class Residuals:
     residual: np.ndarray
     standardised: np.ndarray
     structure: tuple[Structure, ...]
+    noise: tuple[Structure, ...]
 
 
 def residuals(posterior: Posterior) -> Residuals:
@@ -61,6 +64,11 @@ def residuals(posterior: Posterior) -> Residuals:
     residual = np.asarray(records.force) - fitted
     centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
     near = linearise(problem, centre, records)
+    whitened = _whiten(posterior, centre, near, residual)
+    structure = find_structure(whitened, near.sd)
+    shapes = [whitened.shapes[shape.name][0] for shape in structure]
+    rest = replace(whitened, absorbed=np.column_stack([whitened.absorbed, *shapes]))
+    coarse = float(problem.step) > float(np.median(near.sd))
     return Residuals(
         deformation=np.asarray(records.deformation),
         temperature=np.asarray(records.temperature),
@@ -70,7 +78,8 @@ def residuals(posterior: Posterior) -> Residuals:
         fitted=fitted,
         residual=residual,
         standardised=residual / near.sd,
-        structure=find_structure(_whiten(posterior, centre, near, residual), near.sd),
+        structure=structure,
+        noise=noise_faults(rest, records, near.sd, rounded=coarse),
     )
 
 
@@ -112,19 +121,23 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     )
 
 
-def misfits(posterior: Posterior) -> tuple[str, ...]:
-    """Return a warning for each shape that a straight model left in the residuals.
+def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
+    """Return a warning for all that the model left in the residuals.
 
-    For answers that take the model's shape for right. With a leftover discrepancy in
-    the model there is none to warn of.
+    For answers that take the model for right. With a leftover discrepancy in it there
+    is no shape to warn of.
 
     Args:
         posterior: from `calibrate`.
+        shapes: whether to warn of them.
     """
-    if posterior.problem.discrepancy is not None:
-        return ()
-    return tuple(
-        "This takes the model's shape for right, but its residuals have one. "
-        f"{shape.words.rstrip('.')}. Diagnose, or calibrate with a gap."
-        for shape in residuals(posterior).structure
+    left = residuals(posterior)
+    shapes = shapes and posterior.problem.discrepancy is None
+    return (
+        *(
+            "This takes the model's shape for right, but its residuals have one. "
+            f"{shape.words.rstrip('.')}. Diagnose, or calibrate with a gap."
+            for shape in (left.structure if shapes else ())
+        ),
+        *(fault.words for fault in left.noise),
     )

@@ -128,8 +128,8 @@ def remarks(
     """
     first = _main(forces)
     said = [*_signs(levels, first.sense), *_of_population(first)]
-    if all(force.cause.problem.discrepancy is None for force in forces):
-        said += misfits(first.cause.posterior)
+    straight = all(force.cause.problem.discrepancy is None for force in forces)
+    said += misfits(first.cause.posterior, shapes=straight)
     used = sum(force.cause.size for force in forces)
     risk = worst.exceedance
     rare = risk is not None and risk.probability < 1.0 / used

@@ -1,0 +1,126 @@
+"""Whether residuals are noise as the model has it: independent, and alike at any force.
+
+Tested on what the model and every shape that was found leave.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from hdcal.data.records import Records
+from hdcal.inference.residual_shapes import FALSE_ALARM, Structure, Whitened
+
+# Fewer rows say nothing of their noise.
+_LEAST_ROWS = 12
+NEIGHBOURS, SCATTER = "neighbours", "scatter"
+# Name, p value, size [N], words.
+_Test = tuple[str, float, float, str]
+
+
+@dataclass(frozen=True)
+class _Left:
+    """What is left of the rows, in noise sds.
+
+    Attributes:
+        error: with the rows of the priors below those of the data, (n + p,).
+        basis: orthonormal, of all that was absorbed, (n + p, q).
+    """
+
+    error: np.ndarray
+    basis: np.ndarray
+
+    @property
+    def free(self) -> int:
+        """Degrees of freedom."""
+        return len(self.error) - self.basis.shape[1]
+
+
+def noise_faults(
+    data: Whitened, records: Records, sd: np.ndarray, *, rounded: bool
+) -> tuple[Structure, ...]:
+    """Find out in which ways residuals are no independent noise of one size.
+
+    Args:
+        data: residuals and what was absorbed, shapes that were found included.
+        records: the rows.
+        sd: noise sd of each row [N].
+        rounded: whether steps of the reading are wider than its noise; neighbours
+            are then alike without any correlation.
+
+    Returns:
+        What was found, at a family-wise error of `FALSE_ALARM`.
+    """
+    if len(sd) < _LEAST_ROWS:
+        return ()
+    left, strength, _ = np.linalg.svd(data.absorbed, full_matrices=False)
+    basis = left[:, strength > 1e-8 * strength[0]]
+    error = data.residual - basis @ (basis.T @ data.residual)
+    rest = _Left(error, basis)
+    tests = [_scatter(rest, records, sd)]
+    if not rounded and np.any(np.diff(np.asarray(records.run)) == 0):
+        tests.append(_neighbours(rest, records, sd))
+    return tuple(
+        Structure(name, min(1.0, p * len(tests)), size, words)
+        for name, p, size, words in tests
+        if p * len(tests) <= FALSE_ALARM
+    )
+
+
+def _neighbours(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
+    """Test whether neighbouring rows of a run err alike.
+
+    The ratio of quadratic forms has its exact mean and variance under independence,
+    as in Durbin and Watson, Biometrika 37 (1950).
+    """
+    size = len(sd)
+    pair = np.append(np.diff(np.asarray(records.run)) == 0, False)
+    pair = np.pad(pair, (0, len(rest.error) - size))
+
+    def shifted(table: np.ndarray) -> np.ndarray:
+        """Return half the row after and half the row before, within runs."""
+        after = np.where(pair[:, None], np.roll(table, -1, axis=0), 0.0)
+        before = np.roll(np.where(pair[:, None], table, 0.0), 1, axis=0)
+        return 0.5 * (after + before)
+
+    moved, free, pairs = shifted(rest.basis), rest.free, int(pair.sum())
+    held = rest.basis.T @ moved
+    trace = -float(np.trace(held))
+    square = 0.5 * pairs - 2.0 * float(np.sum(moved**2)) + float(np.sum(held**2))
+    ratio = float(rest.error @ shifted(rest.error[:, None])[:, 0])
+    ratio /= float(rest.error @ rest.error)
+    mean = trace / free
+    variance = 2.0 * (free * square - trace**2) / (free**2 * (free + 2.0))
+    p = float(stats.norm.sf((ratio - mean) / np.sqrt(variance)))
+    alike = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
+    times = np.sqrt((1.0 + alike) / (1.0 - alike))
+    rms = float(np.sqrt(np.mean((rest.error[:size] * sd) ** 2)))
+    words = (
+        f"Neighbouring readings err alike (correlation {alike:.2f}): the intervals of "
+        f"stiffness and mean force are some {times:.1f} times too narrow."
+    )
+    return NEIGHBOURS, p, alike * rms, words
+
+
+def _scatter(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
+    """Test whether readings scatter more the farther the gear is deformed.
+
+    The test is that of Koenker, Journal of Econometrics 17 (1981).
+    """
+    size, far = len(sd), np.abs(np.asarray(records.deformation))
+    kept = 1.0 - np.sum(rest.basis[:size] ** 2, axis=1)
+    square = rest.error[:size] ** 2 / np.maximum(kept, 1e-6)
+    off, left = far - far.mean(), square - square.mean()
+    scale = np.sqrt((off @ off) * (left @ left))
+    tied = float(off @ left) / scale if scale > 0.0 else 0.0
+    p = float(stats.norm.sf(np.sqrt(size) * tied))
+    thirds = np.quantile(far, [1 / 3, 2 / 3])
+    near, farther = (
+        float(np.sqrt(np.mean(square[rows] * sd[rows] ** 2)))
+        for rows in (far <= thirds[0], far >= thirds[1])
+    )
+    words = (
+        f"Readings scatter more at larger forces ({near:.2g} N in the lower third, "
+        f"{farther:.2g} N in the upper one): bounds at large forces are too low."
+    )
+    return SCATTER, p, farther - near, words

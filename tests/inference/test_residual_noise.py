@@ -1,0 +1,114 @@
+"""Noise that is correlated or grows is said; independent noise of one size is not."""
+
+import numpy as np
+import pytest
+from posteriors import regressed
+from rigs import make_records
+from scipy import stats
+
+import hdcal
+from hdcal.calibration.summary import calibration_answer
+from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER, noise_faults
+from hdcal.inference.residual_shapes import FALSE_ALARM, Whitened
+from hdcal.inference.residuals import residuals
+
+ROWS = 60
+X = np.linspace(0.02, 0.54, ROWS)
+
+
+def correlated(rho: float, rng, rows: int = ROWS, run=None) -> np.ndarray:
+    """Return a first-order autoregression of sd 1, starting anew in each run."""
+    noise, found = rng.normal(size=rows), np.zeros(rows)
+    run = np.zeros(rows, int) if run is None else run
+    for row in range(rows):
+        begins = row == 0 or run[row] != run[row - 1]
+        before = 0.0 if begins else rho * found[row - 1]
+        found[row] = before + noise[row] * (1.0 if begins else np.sqrt(1.0 - rho**2))
+    return found
+
+
+def faults(error: np.ndarray, *, run=None, rounded: bool = False) -> list[str]:
+    """Return what is said of errors beside which a line was absorbed."""
+    records = make_records(X, **({} if run is None else {"run": run}))
+    absorbed = np.column_stack([np.ones(len(error)), X])
+    data = Whitened(error, absorbed, {})
+    found = noise_faults(data, records, np.ones(len(error)), rounded=rounded)
+    return [fault.name for fault in found]
+
+
+def test_independent_noise_raises_few_false_alarms():
+    rng = np.random.default_rng(1)
+    alarms = sum(bool(faults(rng.normal(size=ROWS))) for _ in range(2000))
+    assert stats.binomtest(alarms, 2000, FALSE_ALARM, "greater").pvalue > 1e-3
+
+
+def test_the_moments_are_those_of_independent_noise():
+    """p of the neighbours is uniform where nothing is wrong, in many short runs too."""
+    rng, run = np.random.default_rng(2), np.repeat(np.arange(12), 5)
+    records = make_records(X, run=run)
+    own = (run[:, None] == np.arange(12)).astype(float)
+    absorbed = np.column_stack([own, X])
+    low = 0
+    for _ in range(2000):
+        data = Whitened(rng.normal(size=ROWS), absorbed, {})
+        found = noise_faults(data, records, np.ones(ROWS), rounded=False)
+        low += any(fault.name == NEIGHBOURS for fault in found)
+    assert stats.binomtest(low, 2000, 0.5 * FALSE_ALARM, "greater").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("run", [None, np.repeat(np.arange(3), 20)])
+def test_correlated_noise_is_found(run):
+    rng = np.random.default_rng(3)
+    hits = [faults(correlated(0.6, rng, run=run), run=run) for _ in range(200)]
+    assert np.mean([NEIGHBOURS in hit for hit in hits]) >= 0.9
+    # Runs one after the other are no neighbours.
+    apart = np.arange(ROWS)
+    assert NEIGHBOURS not in faults(correlated(0.9, rng), run=apart)
+
+
+def test_steps_wider_than_the_noise_are_no_correlation():
+    rng = np.random.default_rng(4)
+    assert NEIGHBOURS not in faults(correlated(0.9, rng), rounded=True)
+
+
+def test_noise_in_proportion_to_the_force_is_found():
+    rng = np.random.default_rng(5)
+    x = np.tile(X, 3)
+    records = make_records(x)
+    absorbed = np.column_stack([np.ones(len(x)), x])
+    hits = 0
+    for _ in range(100):
+        data = Whitened(rng.normal(size=len(x)) * x / x.mean(), absorbed, {})
+        found = noise_faults(data, records, np.ones(len(x)), rounded=False)
+        hits += any(fault.name == SCATTER for fault in found)
+    assert hits >= 95
+
+
+def test_the_factor_is_that_of_the_intervals():
+    """Stated beside what least squares under the true covariance would say."""
+    rng, factors = np.random.default_rng(6), []
+    lag = np.abs(np.arange(ROWS)[:, None] - np.arange(ROWS))
+    columns = np.column_stack([np.ones(ROWS), X])
+    plain = np.linalg.inv(columns.T @ columns)
+    true = plain @ columns.T @ 0.6**lag @ columns @ plain
+    expected = np.sqrt(true[1, 1] / plain[1, 1])
+    for _ in range(20):
+        posterior = regressed(X, 200.0 * X + 0.5 * correlated(0.6, rng), rng, 400)
+        factors += [
+            float(fault.words.split("some ")[1].split(" times")[0])
+            for fault in residuals(posterior).noise
+            if fault.name == NEIGHBOURS
+        ]
+    assert len(factors) >= 15
+    assert np.median(factors) == pytest.approx(expected, rel=0.25)
+
+
+def test_every_answer_says_so():
+    rng = np.random.default_rng(7)
+    posterior = regressed(X, 200.0 * X + 0.5 * correlated(0.8, rng), rng, 400)
+    found = hdcal.margin(posterior, 0.4, sensitivities=False)
+    assert any("Neighbouring readings err alike" in said for said in found.remarks)
+    answer = calibration_answer(posterior)
+    assert any("Neighbouring readings err alike" in said for said in answer.warnings)
+    assert NEIGHBOURS in [shape.name for shape in answer.residuals]
+    assert any("other mountings" in step for step in answer.next_steps)
