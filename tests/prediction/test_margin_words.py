@@ -1,9 +1,11 @@
 """A margin says first whether the capacity does."""
 
+from dataclasses import replace
 from html import unescape
 
+import numpy as np
 import pytest
-from posteriors import single
+from posteriors import batch, single
 
 import hdcal
 from hdcal.prediction.margin.sentences import answer, chance, headline
@@ -40,6 +42,35 @@ def test_the_surer_capacity_is_never_the_smaller_one(posterior):
     (said,) = (words for words in answer(found) if words.startswith("To hold"))
     assert f"{level.capacity_median_N:.1f} N is as likely as not to do" in said
     assert f"{level.capacity_N:.1f} N does with 95 % confidence" in said
+
+
+def test_far_outside_no_bound_is_called_sure():
+    gears = batch(6, 400)
+    near, far = (hdcal.margin(gears, at, limit_force=400.0) for at in (0.6, 0.9))
+    assert near.beyond_tested == pytest.approx(0.06 / 0.52)
+    assert far.beyond_tested == pytest.approx(0.36 / 0.52)
+    assert (near.basis, far.basis) == ("A-basis", "")
+    assumed = "if nothing but the assumed bend"
+    assert assumed in headline(far) and assumed not in headline(near)
+    assert "test there before you rely on it" in far.extrapolated[0]
+    assert "rely on it" not in near.extrapolated[0]
+    inside = hdcal.margin(gears, 0.4, limit_force=400.0)
+    assert inside.beyond_tested == 0.0 and assumed not in headline(inside)
+
+
+def test_a_zero_that_only_the_prior_knows_is_named(posterior):
+    diagnoses = dict(posterior.diagnoses)
+    diagnoses["force_offset"] = replace(diagnoses["force_offset"], driven_by="prior")
+    known = replace(posterior, diagnoses=diagnoses)
+    sd = np.std(posterior.draws["force_offset"])
+    words = f"known to {sd:.2g} N (sd)"
+    found = hdcal.margin(known, 0.4, quantity="load", sensitivities=False)
+    assert any(words in said for said in found.remarks)
+    for other in (
+        hdcal.margin(posterior, 0.4, quantity="load", sensitivities=False),
+        hdcal.margin(known, 0.4, sensitivities=False),
+    ):
+        assert not any(words in said for said in other.remarks)
 
 
 def test_a_notebook_shows_the_answer(posterior):

@@ -67,6 +67,13 @@ class Conditions(eqx.Module):
         return self.loading * farthest
 
 
+def beyond_tested(where: Conditions) -> float:
+    """Return how far a deformation lies outside the tested range, as a share of it."""
+    at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
+    beyond = max(low - at, at - high, 0.0)
+    return beyond / (high - low) if beyond > NEAR_MM else 0.0
+
+
 def usual_temperature(case: Case) -> float:
     """Return the tested temperature nearest to the reference [°C]."""
     tested = case.records.temperature

@@ -8,6 +8,7 @@ from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
 from hdcal.prediction.engine.conditions import (
     SENSE,
     Direction,
+    beyond_tested,
     is_tested,
 )
 from hdcal.prediction.engine.forces import Quantity
@@ -31,7 +32,7 @@ from hdcal.prediction.margin.remarks import (
     remarks,
 )
 from hdcal.prediction.margin.request import Criteria, MarginRequest
-from hdcal.prediction.margin.result import Level, Margin
+from hdcal.prediction.margin.result import FAR, Level, Margin
 from hdcal.prediction.margin.variance_shares import variance_shares
 from hdcal.prediction.tolerance_factors import BASES
 
@@ -105,6 +106,7 @@ def _margin(
     check_sign(levels, request, criteria, sense)
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
+    beyond = beyond_tested(forces[0].conditions)
     reached, slopes, shares = None, (), ()
     if request.given_force is not None:
         reached = deformation_reached(there, request.given_force, criteria)
@@ -119,7 +121,7 @@ def _margin(
         quantity=request.quantity,
         population=whose,
         population_words=population_words(whose, main.problem),
-        basis=_basis(whose, criteria),
+        basis="" if beyond > FAR else _basis(whose, criteria),
         content=criteria.content,
         confidence=criteria.confidence,
         required_probability=criteria.required,
@@ -131,6 +133,7 @@ def _margin(
         models=model_bounds(forces, draws, criteria),
         gradients=slopes,
         shares=shares,
+        beyond_tested=beyond,
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )

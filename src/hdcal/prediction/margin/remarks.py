@@ -6,16 +6,22 @@ import numpy as np
 
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
-from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
+from hdcal.prediction.engine.conditions import beyond_tested, temperature_is_tested
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.engine.population_force import PopulationForce, bend_sd
 from hdcal.prediction.margin.request import Criteria
-from hdcal.prediction.margin.result import Level
+from hdcal.prediction.margin.result import FAR, Level
 
 _LOAD = (
     "The load on the gear: without the gauge's zero, its errors and its noise. "
     "A leftover discrepancy counts as the gear's."
+)
+_ZERO = (
+    "What the gauge shows without a load rests on its prior, not on these data: it is "
+    "known to {sd:.2g} N (sd) and makes a load uncertain over some {both:.2g} N. Read "
+    "the gauge with the gear out of contact, and state that zero as the prior of the "
+    "force offset."
 )
 _LOAD_OF_MOUNTINGS = (
     "Mountings differ by the gauge's zero, which is no load: here they are alike."
@@ -39,6 +45,10 @@ _AGAINST = (
 _NORMAL_TAILS = (
     "Such rare cases rest on the normal tails of noise and scatter, which no test of "
     "this size has seen."
+)
+_FAR_OUT = (
+    " So far out a bound rests on that assumption, and its confidence with it: test "
+    "there before you rely on it."
 )
 # A content beyond this only the normal law tells.
 _TAIL = 0.9999
@@ -64,11 +74,12 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
     cause, where = force.cause, force.conditions
     records = cause.posterior.case.records
     at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
-    if max(low - at, at - high) > NEAR_MM:
+    beyond = beyond_tested(where)
+    if beyond > 0.0:
         yield (
             f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
             f"the tested {low:g} … {high:g} mm. A bend that these rows need not show "
-            f"may bring {bend_sd(force):.2g} N (sd) there."
+            f"may bring {bend_sd(force):.2g} N (sd) there." + _FAR_OUT * (beyond > FAR)
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
@@ -155,6 +166,7 @@ def _of_population(force: PopulationForce) -> Iterator[str]:
     whose, problem = force.whose, force.cause.problem
     if whose.quantity == "load":
         yield _LOAD
+        yield from _zero_by_prior(force)
         if whose.population == "mountings":
             yield _LOAD_OF_MOUNTINGS
     for name, what, count in (
@@ -170,6 +182,14 @@ def _of_population(force: PopulationForce) -> Iterator[str]:
     if force.tolerances:
         gears = whose.population == "specimens"
         yield _TOLERANCES_OF_GEARS if gears else _TOLERANCES_ALONE
+
+
+def _zero_by_prior(force: PopulationForce) -> Iterator[str]:
+    """Say how much of the load's width the prior of the gauge's zero makes."""
+    cause = force.cause
+    if cause.driver("force_offset") == "prior":
+        sd = float(np.std(cause.values["force_offset"]))
+        yield _ZERO.format(sd=sd, both=4.0 * sd)
 
 
 def population_words(population: Population, problem: Problem) -> str:

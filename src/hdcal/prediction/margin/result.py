@@ -20,6 +20,8 @@ INTERVAL = 0.95
 Chance = Annotated[float, Promise(minimum=0, maximum=1)]
 Fraction = Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
 Size = Annotated[float, Promise(minimum=0)]
+# Beyond the tested range by more than this share of it a bound rests on an assumption.
+FAR = 0.2
 # One whose ends are all known.
 Span = Annotated[Interval, Promise(additionalProperties={"type": "number"})]
 
@@ -128,6 +130,8 @@ class Margin(Shown):
         models: each model's own bounds, if there are several.
         gradients: of the bound that is the larger one in size.
         shares: of the variance of one future member's force.
+        beyond_tested: how far the deformation lies outside the tested range, as a
+            share of that range.
         extrapolated: what lies outside the data, in sentences.
         remarks: what else to know, in sentences.
     """
@@ -150,5 +154,6 @@ class Margin(Shown):
     models: tuple[ModelBound, ...]
     gradients: tuple[Gradient, ...]
     shares: tuple[VarianceShare, ...]
+    beyond_tested: Size
     extrapolated: Sentences
     remarks: Sentences

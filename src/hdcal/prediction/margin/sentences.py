@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from hdcal.prediction.margin.result import (
+    FAR,
     Exceedance,
     Level,
     Margin,
@@ -187,7 +188,11 @@ def _enough(found: Margin, limit: float) -> str:
     sure = _percent(found.confidence)
     given = f"A capacity of {limit:g} N{in_tension(found)}"
     if limit >= level.capacity_N:
-        return f"{given} is enough for {share}, with {sure} confidence."
+        far = ", if nothing but the assumed bend comes in beyond what was tested"
+        return (
+            f"{given} is enough for {share}, with {sure} confidence"
+            f"{far * (found.beyond_tested > FAR)}."
+        )
     if limit >= level.capacity_median_N:
         return (
             f"{given} is more likely than not enough for {share}, but not with {sure} "
