@@ -272,6 +272,7 @@ TYPES = [
     described("model", "checks", value=[{"name": "x"}]),
     described("case", "gear", "reference_temperature", value="warm"),
     described("case", "gear", "geometry", "radius", value=[1.0]),
+    described("case", "gear", "priors", value={}),
     described("case", "run_labels", value=7),
 ]
 NAN, HUGE = float("nan"), 1e300

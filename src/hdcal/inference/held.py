@@ -81,6 +81,9 @@ class HeldGear:
             size["nominal_deformation"] = self.nominal_deformation
         if size_faults(size):
             raise ValueError("has sizes that no gear has")
+        # Whose values are computed anew for another theory.
+        if "K" not in self.priors:
+            raise ValueError("has no prior of K")
         for name, prior in (
             self.priors | self.scale_priors | self.dynamic_priors
         ).items():
