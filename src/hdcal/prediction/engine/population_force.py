@@ -222,9 +222,11 @@ def member_force(
     )
     warmth = jnp.full(len(along), conditions.temperature)
     records = grid_records(path, warmth, way, conditions.known_sd)
-    zero, moved = conditions.untested.drift(
-        value, conditions.temperature, conditions.loading
-    )
+    zero = moved = 0.0
+    if quantity == "reading":
+        zero, moved = conditions.untested.drift(
+            value, conditions.temperature, conditions.loading
+        )
     mean, noise = force_of(
         problem,
         value,

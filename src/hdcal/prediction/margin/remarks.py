@@ -112,15 +112,16 @@ def _rig_drift(force: PopulationForce) -> str:
     """Say what the rig may do at untested temperatures."""
     untested, stiff = force.conditions.untested, force.cause.values["stiffness"]
     (_, zero), (_, frame) = untested.zero, untested.frame
-    reading = force.whose.quantity == "reading" and zero > 0.0
-    moves = (
-        frame * float(np.median(stiff)) / force.cause.problem.reading.radial_per_read
-    )
-    parts = [f"{zero:.2g} N per kelvin by the zero of its gauge"] * reading
+    radial = force.cause.problem.reading.radial_per_read
+    moves = frame * float(np.median(stiff)) / radial
+    parts = [f"{zero:.2g} N per kelvin by the zero of its gauge"] * (zero > 0.0)
     parts += [f"{moves:.2g} N per kelvin by the length of its frame"] * (moves > 0.0)
-    if not parts:
+    if force.whose.quantity == "load" or not parts:
         return ""
-    return f" The rig may drift too, by its priors (sd) {' and '.join(parts)}."
+    return (
+        f" The rig may drift too, by its priors (sd) {' and '.join(parts)}; the load "
+        "on the gear has no part in that."
+    )
 
 
 def remarks(

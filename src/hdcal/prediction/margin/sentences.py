@@ -33,6 +33,8 @@ _INPUTS = {
 }
 # Rarer than this nobody can say; the words then say so.
 _RAREST = 1e-12
+# A share from here on is as good as all.
+_NEARLY_ALL = 0.999
 
 
 def member_word(found: Margin) -> str:
@@ -54,7 +56,7 @@ def chance(probability: float) -> str:
     """Return a probability; never one that nobody can know."""
     if probability < _RAREST:
         return f"less than {_RAREST:.0e}"
-    if probability > 0.999:
+    if probability > _NEARLY_ALL:
         return "more than 99.9 %"
     if probability > 0.99:
         return f"{100.0 * probability:.1f} %"
@@ -213,8 +215,12 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
         f"β = {index(risk.beta)}. The share of {_many(found)} that do lies "
         f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
-        f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
-        f"{index(risk.beta_at_confidence)}."
+        + (
+            f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
+            f"{index(risk.beta_at_confidence)}."
+            if risk.at_confidence < _NEARLY_ALL
+            else f"at {sure} confidence it may be all of them."
+        )
     )
     if risk.probability > risk.hi:
         yield (

@@ -156,10 +156,8 @@ def _inputs(forces: Sequence[PopulationForce]) -> dict[str, Driver]:
     if not where.low <= where.deformation <= where.high:
         found["leftover"] = "prior"
     untested = where.untested
-    if float(untested.kelvins(where.temperature)):
+    if whose.quantity == "reading" and float(untested.kelvins(where.temperature)):
         drifts = {"zero_drift": untested.zero[1], "frame": untested.frame[1]}
-        if whose.quantity == "load":
-            del drifts["zero_drift"]
         found |= {name: "prior" for name, sd in drifts.items() if sd > 0.0}
     return found
 
