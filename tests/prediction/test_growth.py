@@ -87,6 +87,15 @@ def test_an_outlier_is_no_bend():
     assert straight < 0.5 * bent
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-200])
+def test_readings_without_noise_have_hardly_a_bend(noise: float):
+    x, rng = np.linspace(0.02, 0.54, 20), np.random.default_rng(8)
+    posterior = regressed(x, 200.0 * x, rng, 200, sigma=noise)
+    found = hdcal.predict(posterior, [0.9])
+    assert found.physics_lo_N[0] == pytest.approx(180.0, abs=0.5)
+    assert found.physics_hi_N[0] == pytest.approx(180.0, abs=0.5)
+
+
 ENDS = ("lo", "hi")
 
 

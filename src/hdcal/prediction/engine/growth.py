@@ -30,8 +30,8 @@ _KNOTS = 48
 _SIZES, _ORDINARY = np.geomspace(1e-3, 3.0, 14), 0.1
 # Noise over what the line leaves: a bend that is there is part of that.
 _NOISES = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.15])
-# The least noise over the change of force: readings may have been computed.
-_LEAST_NOISE = 1e-6
+# The least noise over the change of force, and the least such change [N].
+_LEAST_NOISE, _LEAST = 1e-6, 1e-9
 # Beyond the tested range the bend comes in over this part of it.
 _FADE = 0.1
 _POWERS = np.arange(3)[:, None, None]
@@ -137,6 +137,10 @@ def fit_growth(cause: Cause, end: float, far: float) -> FittedGrowth:
         for column in _left(cause.problem, middle, pad_records(records))
     )
     place = (np.asarray(records.deformation) - far) / (end - far)
+    # Readings may have been computed, and a file may say that they have no noise.
+    change = max(abs(float(middle["stiffness"]) * (end - far)), _LEAST)
+    precision = np.nan_to_num(precision, nan=np.inf)
+    precision = np.minimum(precision, (_LEAST_NOISE * change) ** -2)
     weight = precision / precision.mean()
     knots, total, mean, within = _knots(place, weight, error)
     lines, root = np.stack([np.ones(_KNOTS), knots], axis=1), np.sqrt(total)
@@ -149,7 +153,6 @@ def fit_growth(cause: Cause, end: float, far: float) -> FittedGrowth:
     line = np.pad(line, ((0, 1), (0, 0)))
     left = cross - line @ covariance
     growth = Growth(end, far, left @ seen.T, (cross + left) @ line.T, strength, found)
-    change = abs(float(middle["stiffness"]) * (end - far))
     free = max(int(np.count_nonzero(total)) - 2, 0)
     used = slice(_KNOTS - free, None)
     pairs, chances = _sizes(strength[used], found[used], within, len(error), change)
