@@ -9,7 +9,12 @@ import numpy as np
 from scipy import stats
 
 from hdcal.data.records import Records
-from hdcal.inference.residual_shapes import FALSE_ALARM, Structure, Whitened
+from hdcal.inference.residual_shapes import (
+    FALSE_ALARM,
+    Structure,
+    Whitened,
+    orthonormal,
+)
 
 # Fewer rows say nothing of their noise.
 _LEAST_ROWS = 12
@@ -53,8 +58,7 @@ def noise_faults(
     """
     if len(sd) < _LEAST_ROWS:
         return ()
-    left, strength, _ = np.linalg.svd(data.absorbed, full_matrices=False)
-    basis = left[:, strength > 1e-8 * strength[0]]
+    basis = orthonormal(data.absorbed)
     error = data.residual - basis @ (basis.T @ data.residual)
     rest = _Left(error, basis)
     tests = [_scatter(rest, records, sd)]

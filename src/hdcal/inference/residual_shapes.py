@@ -110,10 +110,11 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
     shapes, absorbed = dict(data.shapes), data.absorbed
     found: list[Structure] = []
     while shapes:
+        basis = orthonormal(absorbed)
         tests = [
             (*test, name)
             for name, (column, _, _) in shapes.items()
-            if (test := _test(data.residual, column, absorbed)) is not None
+            if (test := _test(data.residual, column, basis)) is not None
         ]
         if not tests:
             break
@@ -129,17 +130,26 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
     return tuple(found)
 
 
-def _test(residual, column, absorbed):
+def orthonormal(absorbed: np.ndarray) -> np.ndarray:
+    """Return orthonormal columns that span those that are absorbed, (n, q)."""
+    scale = np.linalg.norm(absorbed, axis=0)
+    columns = absorbed[:, scale > 0.0] / scale[scale > 0.0]
+    left, strength, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, strength > 1e-8 * strength[0]]
+
+
+def _test(residual, column, left):
     """Test one column; None when the model absorbs it or too few rows are left.
+
+    Args:
+        residual: in noise sds, shape (n,).
+        column: likewise.
+        left: from `orthonormal`.
 
     Returns:
         p value, coefficient of the unit-length remainder, and that remainder.
     """
     size = np.linalg.norm(column)
-    scale = np.linalg.norm(absorbed, axis=0)
-    basis = absorbed[:, scale > 0.0] / scale[scale > 0.0]
-    left, strength, _ = np.linalg.svd(basis, full_matrices=False)
-    left = left[:, strength > 1e-8 * strength[0]]
     error, column = (part - left @ (left.T @ part) for part in (residual, column))
     free = len(error) - left.shape[1] - 1
     norm = np.linalg.norm(column)
