@@ -9,7 +9,7 @@ from pulled_further import OF_TIME, all_pulled_further
 import hdcal
 from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
 from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.growth import Growth, fit_growth
+from hdcal.prediction.engine.growth import Growth, fit_growths
 from hdcal.prediction.margin.margin import Margin
 
 QUICK = {"sensitivities": False}
@@ -31,7 +31,8 @@ def test_the_bend_is_that_of_a_dense_process(turned: bool):
     left = rng.normal(0.0, 0.5, 20) + 3.0 * (x / 0.52) ** 3
     (cause,) = causes_of(regressed(x, 200.0 * x + left, rng))
     ends = (0.02, 0.52) if turned else (0.52, 0.02)
-    growth = fit_growth(cause, *ends).growth
+    below, above = fit_growths(cause)
+    growth = (below if turned else above).growth
     asked = np.array([0.52, 0.6, 0.9]) if not turned else np.array([0.02, -0.1, -0.4])
     mean, sd = LAW(growth, asked, 7.0, 0.6)
 

@@ -34,8 +34,6 @@ class Conditions(eqx.Module):
         deformation: as read [mm].
         temperature: of the specimen [°C].
         known_sd: stated sd of a reading [N].
-        low: end of the tested deformation [mm].
-        high: other end [mm].
         untested: what is not known beyond the tested conditions.
         scale: stiffness over that of the calibrated gear [-]: other sizes, modulus, K.
         strata: of the stiffness within the tolerances of the sizes.
@@ -46,13 +44,21 @@ class Conditions(eqx.Module):
     deformation: Float[Array, ""] | float
     temperature: Float[Array, ""] | float
     known_sd: Float[Array, ""] | float
-    low: Float[Array, ""] | float
-    high: Float[Array, ""] | float
     untested: Untested
     scale: Float[Array, ""] | float
     strata: StiffnessStrata
     loading: Float[Array, ""] | float
     down: bool = eqx.field(static=True)
+
+    @property
+    def low(self) -> Float[Array, ""] | float:
+        """Low end of the tested deformation [mm]."""
+        return self.untested.below.end
+
+    @property
+    def high(self) -> Float[Array, ""] | float:
+        """Its high end [mm]."""
+        return self.untested.above.end
 
     @property
     def movement(self) -> Float[Array, ""] | float:

@@ -122,13 +122,11 @@ class FittedGrowth:
         return self.pairs[rows]
 
 
-def fit_growth(cause: Cause, end: float, far: float) -> FittedGrowth:
-    """Fit the bend beyond one end of the tested deformation.
+def fit_growths(cause: Cause) -> tuple[FittedGrowth, FittedGrowth]:
+    """Fit the bends below and above the tested deformation.
 
     Args:
         cause: whose model leaves something of the tested rows.
-        end: the end [mm].
-        far: the other one [mm].
     """
     records = cause.posterior.case.records
     middle = {n: v.mean(axis=0) for n, v in cause.values.items() if n != "gap_weights"}
@@ -136,12 +134,19 @@ def fit_growth(cause: Cause, end: float, far: float) -> FittedGrowth:
         np.asarray(column)[: len(records.force)]
         for column in _left(cause.problem, middle, pad_records(records))
     )
-    place = (np.asarray(records.deformation) - far) / (end - far)
+    deformation = np.asarray(records.deformation)
+    low, high = float(deformation.min()), float(deformation.max())
     # Readings may have been computed, and a file may say that they have no noise.
-    change = max(abs(float(middle["stiffness"]) * (end - far)), _LEAST)
+    change = max(abs(float(middle["stiffness"]) * (high - low)), _LEAST)
     precision = np.nan_to_num(precision, nan=np.inf)
     precision = np.minimum(precision, (_LEAST_NOISE * change) ** -2)
-    weight = precision / precision.mean()
+    rows = deformation, precision / precision.mean(), error, change
+    return _fitted(low, high, *rows), _fitted(high, low, *rows)
+
+
+def _fitted(end: float, far: float, deformation, weight, error, change) -> FittedGrowth:
+    """Fit the bend beyond one end to what is left of the rows [N]."""
+    place = (deformation - far) / (end - far)
     knots, total, mean, within = _knots(place, weight, error)
     lines, root = np.stack([np.ones(_KNOTS), knots], axis=1), np.sqrt(total)
     line = np.linalg.pinv(root[:, None] * lines) * root

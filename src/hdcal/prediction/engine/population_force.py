@@ -126,8 +126,6 @@ def population_force(
             deformation=float(deformation),
             temperature=usual_temperature(case),
             known_sd=usual_sd(records),
-            low=float(records.deformation.min()),
-            high=float(records.deformation.max()),
             untested=untested,
             scale=1.0,
             strata=tolerance_strata(case.gear.geometry, widths, cause.posterior.theory),

@@ -19,7 +19,7 @@ from hdcal.inference.values import Values
 from hdcal.physics.effects.thermal_expansion import ThermalExpansion
 from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
-from hdcal.prediction.engine.growth import Growth, fit_growth
+from hdcal.prediction.engine.growth import Growth, fit_growths
 
 # Sites of a draw beside those of the posterior: size of the bend and its noise beyond
 # each end, and standard normal scores of the bend, the zero and the frame.
@@ -134,8 +134,7 @@ def untested_of(cause: Cause, levels: np.ndarray) -> tuple[Untested, dict]:
         levels: from `spread_evenly`, (draw, SITES).
     """
     records = cause.posterior.case.records
-    low, high = float(records.deformation.min()), float(records.deformation.max())
-    below, above = fit_growth(cause, low, high), fit_growth(cause, high, low)
+    below, above = fit_growths(cause)
     known = {effect.name for effect in cause.posterior.effects}
     priors = {**effect_priors(), **cause.posterior.case.gear.effect_priors}
     zero, frame = (
