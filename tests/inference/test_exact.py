@@ -30,6 +30,7 @@ def conjugate_case(rows: int):
         deformation_offset=Prior("fixed", (0.0,)),
         force_offset=Prior("normal", OFFSET),
         sigma=Prior("lognormal", SIGMA),
+        noise_correlation=Prior("fixed", (0.0,)),
     )
     return make_case(make_records(deformation, force), gear)
 

@@ -10,7 +10,12 @@ from numpyro.handlers import seed, trace
 from scipy import stats
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.priors import effect_priors, material_priors, rig_priors
+from hdcal.data.priors import (
+    SCALE_UNITS,
+    effect_priors,
+    material_priors,
+    rig_priors,
+)
 from hdcal.errors import InputError
 from hdcal.inference import compress, density, integrated
 from hdcal.inference import values as of_draw
@@ -20,6 +25,7 @@ from hdcal.inference.member_counts import check_member_counts, integrated_kinds
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.model import model
 from hdcal.inference.problem import build_problem
+from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import (
     Base,
     linear_coefficients,
@@ -52,7 +58,6 @@ def case_of(records, gear, *, resolution=0.0):
     material = material_priors("40CrNiMoA")
     rig = rig_priors()
     names = ("K", "force_offset", "deformation_offset", "sigma")
-    scales = ("run_offset_sd", "specimen_sd", "gap_sd", "gap_length")
     priors = {name: rig[name] for name in names}
     priors |= {name: material[name] for name in ("E0", "alpha")}
     return Case(
@@ -67,7 +72,7 @@ def case_of(records, gear, *, resolution=0.0):
             resolution,
             None,
             priors,
-            scale_priors={name: rig[name] for name in scales},
+            scale_priors={name: rig[name] for name in SCALE_UNITS},
         ),
         records=records,
         run_labels=tuple(map(str, range(int(records.run.max()) + 1))),
@@ -85,6 +90,7 @@ def random_values(seed):
         "force_offset": rng.normal(0.0, 3.0),
         "deformation_offset": rng.normal(0.0, 0.01),
         "sigma": rng.uniform(0.3, 2.0),
+        "noise_correlation": rng.uniform(0.1, 0.9),
         "run_offset_sd": rng.uniform(0.5, 4.0),
         "specimen_sd": rng.uniform(0.02, 0.2),
         "gap_sd": rng.uniform(0.5, 4.0),
@@ -115,13 +121,9 @@ def test_compressed_is_row_by_row(loading, rows, runs, specimens, sds, seed, rea
     def base(run, specimen):
         return Base(slope[specimen], alpha, zero, offset[run], sigma)
 
-    distinct, group = compress.group_rows(
-        records.run, records.specimen, records.force_sd
-    )
-    np.testing.assert_array_equal(
-        distinct[group],
-        np.stack([records.run, records.specimen, records.force_sd], axis=1),
-    )
+    keys = records.run, records.specimen, records.force_sd, records.force_sd
+    distinct, group = compress.group_rows(*keys)
+    np.testing.assert_array_equal(distinct[group], np.stack(keys, axis=1))
     columns = linear_columns(records, reading)
     blocks = compress.compress(columns, records.force, distinct, group)
     assert blocks.count.sum() == rows
@@ -130,7 +132,7 @@ def test_compressed_is_row_by_row(loading, rows, runs, specimens, sds, seed, rea
     assert (blocks.count[len(distinct) :] == 0.0).all()
     coefficients = linear_coefficients(base(blocks.run, blocks.specimen), reading)
     coefficients = jnp.broadcast_to(coefficients, (len(blocks.count), 4))
-    found = compress.log_likelihood(blocks, coefficients, sigma, step)
+    found = compress.log_likelihood(blocks, coefficients, sigma, step, 0.0)
 
     own = base(records.run, records.specimen)
     mean, noise = predict_reading(own, (), records, reading)
@@ -144,13 +146,20 @@ def test_a_compressed_problem_is_its_rows(loading, gear):
     problem = build_problem(case_of(records, gear), SHIPPED)
     assert problem.records is None
     values = random_values(1)
-    rows = dataclasses.replace(problem, records=records, blocks=None)
+    rows = rows_form(problem, case_of(records, gear))
     mean, noise = predict_rows(rows, values, records, None)
-    slow = log_probability(records.force, mean, noise, 0.0, rounded=False).sum()
-    assert float(log_likelihood(problem, values)) == pytest.approx(
-        float(slow), rel=1e-11
-    )
-    assert float(log_likelihood(rows, values)) == pytest.approx(float(slow), rel=1e-11)
+    slow = stats.multivariate_normal(
+        mean, noise_covariance(records, noise.sd[0], values["noise_correlation"])
+    ).logpdf(records.force)
+    assert float(log_likelihood(problem, values)) == pytest.approx(slow, rel=1e-11)
+    assert float(log_likelihood(rows, values)) == pytest.approx(slow, rel=1e-11)
+    # Independent noise is a correlation of none, and another density.
+    plain = log_probability(records.force, mean, noise, 0.0, rounded=False).sum()
+    independent = {**values, "noise_correlation": 0.0}
+    for form in (problem, rows):
+        found = float(log_likelihood(form, independent))
+        assert found == pytest.approx(float(plain), rel=1e-11)
+    assert abs(float(plain) - slow) > 1.0
 
 
 # --- integrating out ---------------------------------------------------------------
@@ -267,12 +276,23 @@ def test_contrasts_are_deviations():
         np.testing.assert_allclose(basis @ basis.T, centring, atol=1e-14)
 
 
+def noise_covariance(records, sd, correlation):
+    """The covariance of a first-order autoregression within each run [N²]."""
+    sd = np.asarray(sd)
+    run = np.asarray(records.run) + 1000 * np.asarray(records.specimen)
+    place = np.array([np.sum(run[:row] == run[row]) for row in range(len(run))])
+    apart = np.abs(place[:, None] - place)
+    alike = np.where(run[:, None] == run, correlation**apart, 0.0)
+    return alike * np.outer(sd, sd)
+
+
 def dense_log_likelihood(problem, case, values):
     """The dense normal density of all readings, members in the covariance."""
     records = case.records
     mean, noise = predict_rows(problem, values, records, None)
     rows = len(records.force)
-    covariance = np.diag(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    total = np.sqrt(np.asarray(noise.sd[0]) ** 2 + problem.step**2 / 12.0)
+    covariance = noise_covariance(records, total, values["noise_correlation"])
     if "run" in problem.integrated:
         centring = np.eye(problem.runs) - 1.0 / problem.runs
         covariance += (
@@ -324,7 +344,11 @@ def rows_form(problem, case):
     if problem.discrepancy is not None:
         columns = problem.discrepancy.columns(case.records.deformation)
     return dataclasses.replace(
-        problem, records=case.records, blocks=None, columns=columns
+        problem,
+        records=case.records,
+        blocks=None,
+        columns=columns,
+        before=previous_rows(case.records),
     )
 
 
@@ -403,7 +427,9 @@ def members_of(problem, drawn):
 def slow_given_members(problem, case, values, drawn):
     """Return the log density of all readings when the members are known."""
     rows = rows_form(problem, case)
-    given = pointwise(rows, {**values, **drawn}, case.records, rows.columns)
+    given = pointwise(
+        rows, {**values, **drawn}, case.records, rows.columns, rows.before
+    )
     return float(given.sum())
 
 
@@ -462,5 +488,5 @@ def test_runs_by_the_thousand_are_integrated_out(loading, gear):
     linear = jax.jit(integrated.linear_part)(problem, values)
     # No array has an entry for each pair of runs.
     largest = max(leaf.size for leaf in jax.tree.leaves(linear))
-    assert largest <= 2_000 * 5
+    assert largest <= 2_000 * 15
     assert np.isfinite(log_likelihood(problem, values))

@@ -23,6 +23,7 @@ from hdcal.inference.integrated import draw_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.padding import bucket_size
 from hdcal.inference.problem import build_problem, without_scatter
+from hdcal.inference.serial_correlation import previous_rows
 from hdcal.inference.values import predict_rows
 from hdcal.physics.registry import EFFECTS
 
@@ -72,8 +73,9 @@ def bare(problem, case):
     columns = None
     if problem.discrepancy is not None:
         columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
+    before = previous_rows(case.records) if problem.correlated else None
     return dataclasses.replace(
-        problem, records=case.records, columns=columns, blocks=None
+        problem, records=case.records, columns=columns, blocks=None, before=before
     )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from posteriors import regressed
-from rigs import make_records
+from rigs import autoregression, make_records
 from scipy import stats
 
 import hdcal
@@ -18,13 +18,8 @@ X = np.linspace(0.02, 0.54, ROWS)
 
 def correlated(rho: float, rng, rows: int = ROWS, run=None) -> np.ndarray:
     """Return a first-order autoregression of sd 1, starting anew in each run."""
-    noise, found = rng.normal(size=rows), np.zeros(rows)
     run = np.zeros(rows, int) if run is None else run
-    for row in range(rows):
-        begins = row == 0 or run[row] != run[row - 1]
-        before = 0.0 if begins else rho * found[row - 1]
-        found[row] = before + noise[row] * (1.0 if begins else np.sqrt(1.0 - rho**2))
-    return found
+    return autoregression(rng.normal(size=rows), run, rho)
 
 
 def faults(error: np.ndarray, *, run=None, rounded: bool = False) -> list[str]:

@@ -14,7 +14,8 @@ from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import build_problem, problem_priors
+from hdcal.inference.problem import build_problem, correlates, problem_priors
+from hdcal.inference.serial_correlation import CORRELATION
 
 CHAINS = 2
 DRIFTS = ("thermal_zero_drift", "thermal_expansion")
@@ -27,6 +28,8 @@ def written_posterior(
     """Return a usable posterior with these draws [draw, …] in two chains."""
     chosen = choose_effects(effects)
     priors = problem_priors(case, chosen, effect_priors(), case.gear.theory)
+    if correlates(case, chosen, with_gap=with_gap):
+        draws = {CORRELATION: np.zeros(len(draws["K"])), **draws}
     shaped = {
         name: np.asarray(v, float).reshape(CHAINS, -1, *np.shape(v)[1:])
         for name, v in draws.items()

@@ -6,18 +6,24 @@ import jax
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.priors import effect_priors, material_priors, rig_priors
+from hdcal.data.priors import (
+    SCALE_UNITS,
+    effect_priors,
+    material_priors,
+    rig_priors,
+)
 from hdcal.data.records import Geometry, Records
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
+from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import POSITIVE, build_effects, member_base
 from hdcal.physics.chain import predict_reading
+from hdcal.physics.effect import Noise
 
 BASE = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
-SCALES = ("run_offset_sd", "specimen_sd", "gap_sd", "gap_length")
 
 
 def make_gear(*, resolution=0.0, reading="radial", theory="ring", **priors) -> Gear:
@@ -33,7 +39,7 @@ def make_gear(*, resolution=0.0, reading="radial", theory="ring", **priors) -> G
         force_resolution=resolution,
         nominal_deformation=0.4,
         priors={name: table[name] for name in BASE},
-        scale_priors={name: table[name] for name in SCALES},
+        scale_priors={name: table[name] for name in SCALE_UNITS},
     )
 
 
@@ -124,11 +130,32 @@ def draw_truth(problem, key) -> dict:
     return values
 
 
+def autoregression(score, run, correlation: float) -> np.ndarray:
+    """Return first-order autoregressions of sd 1, anew in each run.
+
+    Args:
+        score: independent and of sd 1, shape (n,).
+        run: index of the run; rows of a run follow one another.
+        correlation: of neighbours.
+    """
+    found = np.array(score)
+    for row in range(1, len(found)):
+        if run[row] == run[row - 1]:
+            new = np.sqrt(1.0 - correlation**2) * found[row]
+            found[row] = correlation * found[row - 1] + new
+    return found
+
+
 def simulate(problem, case: Case, truth: dict, key) -> Case:
     """Return the case with readings drawn from the model with these parameters."""
     base = member_base(problem, truth)
     effects = build_effects(problem, truth)
     mean, noise = predict_reading(base, effects, case.records, problem.reading)
+    if problem.correlated:
+        correlation = truth.get(CORRELATION, 0.0)
+        score = np.asarray(jax.random.normal(key, mean.shape))
+        mean = mean + noise.sd[0] * autoregression(score, case.records.run, correlation)
+        noise = Noise(noise.log_weight, 1e-12 * noise.sd)
     force = np.asarray(draw_reading(key, mean, noise, case.gear.force_resolution))
     return replace(case, records=replace(case.records, force=force))
 

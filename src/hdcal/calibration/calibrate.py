@@ -12,7 +12,7 @@ from hdcal.data.priors import effect_priors
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
-from hdcal.inference.checks import rounding_check
+from hdcal.inference.checks import correlation_check, rounding_check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
@@ -177,7 +177,10 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
             for name, slope in near.slopes.items()
         },
         mixed=_other_quantities(problem, found),
-        checks=[rounding_check(float(problem.step), problem.rounded, sigma)],
+        checks=[
+            rounding_check(float(problem.step), problem.rounded, sigma),
+            correlation_check(found.values),
+        ],
     )
 
 

@@ -157,7 +157,14 @@ def _headers(
 
 def _quoted_cells(line: str, separator: str) -> int:
     """Number of cells; -1 for an open quotation mark, which would go on below."""
-    return -1 if line.count('"') % 2 else len(_cells(line, separator))
+    reader = csv.reader([line, ""], delimiter=separator)
+    try:
+        cells = len(next(reader, []))
+    except csv.Error:  # a cell longer than the csv module will hold
+        cells = len(line.split(separator))
+    # An open cell takes the empty line below along.
+    open_ended = reader.line_num > 1 or line.count('"') % 2
+    return -1 if open_ended else cells
 
 
 def _misfit(cells: int, wanted: int, separator: str) -> tuple[str, str]:

@@ -1,12 +1,13 @@
 """Read the gear file: sizes, how it was measured, and what is believed of it."""
 
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
 from hdcal.data.case import Gear, Theory
 from hdcal.data.gear_schema import GearFile, check_schema, size_findings
-from hdcal.data.prior import Prior
+from hdcal.data.prior import Prior, scaled
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.priors import (
     DYNAMIC_UNITS,
@@ -23,6 +24,10 @@ from hdcal.data.priors import (
 from hdcal.data.records import Geometry
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
+
+# Full scale for which shipped priors in newtons are written [N], and which these are.
+FULL_SCALE = 100.0
+IN_NEWTONS = ("force_offset", "sigma", "run_offset_sd", "gap_sd")
 
 
 def read_gear(
@@ -93,6 +98,28 @@ def _assemble(
         dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
     )
+
+
+def at_full_scale(gear: Gear, full_scale: float) -> Gear:
+    """Return a gear whose shipped priors in newtons are those of its own rig.
+
+    They are written for a full scale of `FULL_SCALE`; what the gear file itself
+    states stays.
+
+    Args:
+        gear: from `read_gear`.
+        full_scale: largest force that is read [N]; nothing changes at none.
+    """
+    if not full_scale > 0.0:
+        return gear
+    stated = gear.source.get("priors", {})
+
+    def own(table: dict[str, Prior]) -> dict[str, Prior]:
+        shipped = [name for name in IN_NEWTONS if name in table and name not in stated]
+        ratio = full_scale / FULL_SCALE
+        return table | {name: scaled(table[name], ratio) for name in shipped}
+
+    return replace(gear, priors=own(gear.priors), scale_priors=own(gear.scale_priors))
 
 
 def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Prior]:

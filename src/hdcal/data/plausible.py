@@ -67,6 +67,7 @@ RANGES = {
     "E0": Range(1e-6, 1e7, "MPa", _STEEL),
     "alpha": Range(-1.0, 1.0, "1/K", "nothing loses all of its stiffness in a kelvin"),
     "sigma": Range(1e-15, 1e9, "N", _SCATTER),
+    "correlation": Range(0.0, 1.0, "", "from independent to all alike"),
     "specimen_sd": Range(1e-9, 1e3, "", "a thousand times the stiffness itself"),
     "gap_length": Range(1e-6, 1e6, "", "a millionth to a million times the range"),
     "mass": Range(
@@ -123,6 +124,7 @@ NAMES = {
     "nominal_deformation": "size",
     **dict.fromkeys(("content", "confidence", "required_probability"), "share"),
     **dict.fromkeys(("probability", "interval"), "share"),
+    "noise_correlation": "correlation",
     "tolerances": "tolerance",
     "rates": "rate",
     "degrees": "degree",

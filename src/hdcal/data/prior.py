@@ -28,3 +28,19 @@ class Prior(eqx.Module):
     numbers: tuple[Float[Array, ""] | float, ...]
     unit: str = eqx.field(static=True, default="")
     source: str = eqx.field(static=True, default="")
+
+
+def scaled(prior: Prior, factor) -> Prior:
+    """Return the prior of factor × parameter (factor > 0).
+
+    Raises:
+        ValueError: a beta prior has no scale.
+    """
+    if prior.family == "beta":
+        raise ValueError("a beta prior cannot be rescaled")
+    # A logarithm's spread does not change with the unit.
+    numbers = tuple(
+        number if size == "log_sd" else number * factor
+        for size, number in zip(FAMILIES[prior.family], prior.numbers, strict=True)
+    )
+    return Prior(prior.family, numbers, prior.unit, prior.source)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.prior import FAMILIES, Prior, scaled
 from hdcal.data.prior_checks import Fault, family_faults, range_faults, sign_faults
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.units import UnitError, to_code
@@ -57,13 +57,10 @@ def read_prior(
         raise toml.error(words, 'Write unit = "1"', f"{key}.unit")
     said = [str(entry[word]) for word in ("source", "note") if word in entry]
     source = ". ".join(said) or f"given in {Path(toml.file).name}"
-    # a logarithm's spread does not change with the unit
-    scaled = tuple(
-        number if size in ("log_sd", "a", "b") else number * scale
-        for size, number in zip(FAMILIES[family], numbers, strict=True)
-    )
-    _raise_faults(range_faults(family, scaled, parameter), key, toml)
-    return Prior(family, scaled, name, source)
+    prior = Prior(family, tuple(numbers), name, source)
+    prior = prior if scale == 1.0 else scaled(prior, scale)
+    _raise_faults(range_faults(family, prior.numbers, parameter), key, toml)
+    return prior
 
 
 def _numbers(entry: dict, family: str, key: str, toml: TomlFile) -> list[float]:

@@ -26,6 +26,7 @@ SCALE_UNITS = {
     "specimen_sd": "1",
     "gap_sd": "N",
     "gap_length": "1",
+    "noise_correlation": "1",
 }
 # A gear file may speak of these; `mass` takes the place of the shipped mass_ratio.
 DYNAMIC_UNITS = {

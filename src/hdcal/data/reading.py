@@ -8,7 +8,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
-from hdcal.data.gear import read_gear
+from hdcal.data.gear import at_full_scale, read_gear
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
@@ -56,9 +56,12 @@ def read_case(
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
+    # One reading in a hundred may be wild.
+    sizes = np.abs(measured.columns.values["force"])
+    full_scale = float(np.quantile(sizes, 0.99, method="higher"))
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
-        gear=found,
+        gear=at_full_scale(found, full_scale),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,

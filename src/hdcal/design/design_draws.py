@@ -14,6 +14,7 @@ import numpy as np
 
 from hdcal.data.case import Gear, Theory
 from hdcal.data.plausible import implausible
+from hdcal.data.prior import scaled
 from hdcal.data.priors import (
     MATERIAL_UNITS,
     Prior,
@@ -24,7 +25,7 @@ from hdcal.data.priors import (
 from hdcal.data.records import Geometry, Records
 from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.distributions import frozen, scaled
+from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits

@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
+from hdcal.inference import serial_correlation
+
 # AR(1) coefficients of the noise within a run that are integrated over; more would
 # explain slow physics as noise.
 CORRELATIONS = (0.0, 0.2, 0.4, 0.6)
@@ -43,20 +45,15 @@ def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndar
         columns: with the rows along their first axis.
         correlation: AR(1) coefficient of the noise within a run.
     """
-    trailing = (1,) * (columns.ndim - 1)
-    scaled = columns * rows.weight.reshape(-1, *trailing)
-    lagged = (scaled - correlation * scaled[rows.before]) / np.sqrt(
-        1.0 - correlation**2
-    )
-    return np.where((rows.before < 0).reshape(-1, *trailing), scaled, lagged)
+    scaled = columns * rows.weight.reshape(-1, *(1,) * (columns.ndim - 1))
+    return serial_correlation.whiten(scaled, rows.before, correlation)
 
 
 def log_det_whitening(rows: LinearRows, correlation: float) -> float:
     """Return log |d whitened / d reading|."""
     following = np.sum(rows.before >= 0)
-    return float(
-        np.sum(np.log(rows.weight)) - 0.5 * following * np.log(1.0 - correlation**2)
-    )
+    volume = serial_correlation.log_volume(following, correlation)
+    return float(np.sum(np.log(rows.weight)) - volume)
 
 
 def log_det_projection(rows: LinearRows, correlation: float) -> float:

@@ -12,12 +12,12 @@ from hdcal.evidence.effect_curves import base_reading
 from hdcal.evidence.linear_rows import CORRELATIONS, LinearRows
 from hdcal.evidence.row_features import (
     place_in_run,
-    previous_rows,
     scale_to_unit,
     take_rows,
 )
 from hdcal.inference.distributions import frozen
 from hdcal.inference.problem import case_reading, pilot_noise, problem_priors
+from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.theory import THEORIES
 
@@ -91,7 +91,7 @@ def prepare(
         base=columns,
         # Columns are in units of the prior sd of their coefficients.
         precision=np.full(columns.shape[1], noise_sd**2),
-        before=previous_rows(np.asarray(records.run)),
+        before=previous_rows(records),
         weight=1.0 / relative,
         correlations=np.array(CORRELATIONS),
         tolerance=tolerance_functions(records),

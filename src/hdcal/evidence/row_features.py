@@ -11,12 +11,6 @@ def take_rows(records: Records, rows) -> Records:
     return jax.tree.map(lambda column: np.asarray(column)[rows], records)
 
 
-def previous_rows(run: np.ndarray) -> np.ndarray:
-    """Return the index of the row before in the same run, −1 for a run's first."""
-    before = np.arange(len(run)) - 1
-    return np.where(np.diff(run, prepend=run[0] - 1) != 0, -1, before)
-
-
 def scale_to_unit(values) -> np.ndarray:
     """Return values scaled to −1 … 1; zeros where they are all the same."""
     values = np.asarray(values, float)

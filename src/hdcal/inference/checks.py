@@ -15,6 +15,7 @@ from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import Mixing
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
+from hdcal.inference.serial_correlation import CORRELATION
 
 MAX_RHAT = 1.01
 ESS_PER_CHAIN = 100
@@ -24,8 +25,10 @@ MAX_SATURATED = 0.01
 COARSEST_STEP = 1.5
 # Two-sided tail probability of three standard deviations.
 CONFLICT_TAIL = 0.0027
-# Scatter of nothing is an ordinary answer, not a bound that is in the way.
-SCATTER = frozenset({"run_offset_sd", "specimen_sd", "gap_sd"})
+# Nothing of these is an ordinary answer, not a bound that is in the way.
+ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
+# Correlation above which, with 95 % probability, it is told [-].
+_TOLD_CORRELATION = 0.1
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,21 @@ def _check(name: str, passed: bool, words: str) -> Check:
     return Check(name, "passed" if passed else "failed", words)
 
 
+def correlation_check(draws: Mapping[str, np.ndarray]) -> Check:
+    """Say that neighbouring readings err alike, where the data show it.
+
+    Args:
+        draws: by parameter.
+    """
+    name = "neighbouring readings err independently"
+    found = draws.get(CORRELATION, np.zeros(1))
+    low, middle, high = np.quantile(found, [0.05, 0.5, 0.95])
+    if low < _TOLD_CORRELATION:
+        return Check(name, "passed", "no correlation of neighbours is seen")
+    words = f"their correlation is {middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
+    return Check(name, "note", f"{words}, and every interval allows for it")
+
+
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     """Fail a result whose noise is too small for Sheppard's correction.
 
@@ -165,7 +183,7 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
     name = "no parameter at a bound"
     piled = []
     for parameter, values in draws.items():
-        if parameter in SCATTER:
+        if parameter in ORDINARY_AT_ZERO:
             continue
         low, high = bounds(priors[parameter])
         flat = values.reshape(-1)

@@ -3,8 +3,10 @@
 Within one run, one specimen and one known sd the rows y ~ N(X c, σ²) say no more
 than the triangular factor of [X y] and their number:
 ‖y − X c‖² = ‖R (c, −1)‖².
+Where neighbours err alike, so do rows and the rows before them, kept side by side.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -15,6 +17,7 @@ from jaxtyping import Float, Int
 from hdcal.data.records import Array, Records
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import append_zeros, bucket_size, pad_records
+from hdcal.inference.serial_correlation import log_volume, previous_rows
 
 # Up to this many rows of triangular factors cost little, whatever they replace.
 _MANY_FACTOR_ROWS = 10_000
@@ -24,63 +27,120 @@ class CompressedRows(eqx.Module):
     """Triangular factors, one for each group of rows that share their noise.
 
     Attributes:
-        factor: R of [X y].
+        factor: R of [X y]; before `whitened`, of rows that follow no other one.
         count: number of rows [-].
         known_sd: stated measurement sd [N].
+        sd_before: stated measurement sd of the row before, where there is one [N].
         run: run index.
         specimen: specimen index.
+        pairs: R of [X y X' y'] with X' and y' those of the row before, or None
+            where neighbours do not err alike.
+        following: number of rows that follow another one [-].
     """
 
-    factor: Float[Array, "g p p"]
+    factor: Float[Array, "g r p"]
     count: Float[Array, " g"]
     known_sd: Float[Array, " g"]
+    sd_before: Float[Array, " g"]
     run: Int[Array, " g"]
     specimen: Int[Array, " g"]
+    pairs: Float[Array, "g q q"] | None
+    following: Float[Array, " g"]
+
+    def variance(self, sigma, step) -> Float[Array, " g"]:
+        """Return the variance of a reading [N²].
+
+        Args:
+            sigma: noise sd before rounding [N].
+            step: rounding step [N]; Sheppard's correction adds step²/12, exact to
+                2 exp(−2π²σ²/step²).
+        """
+        return sigma**2 + self.known_sd**2 + step**2 / 12.0
+
+    def whitened(self, correlation, sigma, step) -> "CompressedRows":
+        """Return factors of rows in which the noise is independent.
+
+        Args:
+            correlation: of neighbouring rows [-].
+            sigma: noise sd before rounding [N].
+            step: rounding step [N].
+        """
+        if self.pairs is None:
+            return self
+        now, before = jnp.split(self.pairs, 2, axis=-1)
+        earlier = replace(self, known_sd=self.sd_before).variance(sigma, step)
+        ratio = jnp.sqrt(self.variance(sigma, step) / earlier)[:, None, None]
+        white = (now - correlation * ratio * before) / jnp.sqrt(1.0 - correlation**2)
+        factor = jnp.concatenate([self.factor, white], axis=1)
+        return replace(self, factor=factor, pairs=None)
 
 
-def group_rows(run, specimen, known_sd) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct (run, specimen, sd) and the group of each row."""
-    keys = np.stack([run, specimen, known_sd], axis=1).astype(float)
+def group_rows(run, specimen, *known_sd) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distinct (run, specimen, sd, …) and the group of each row."""
+    keys = np.stack([run, specimen, *known_sd], axis=1).astype(float)
     if (keys == keys[0]).all():
         return keys[:1], np.zeros(len(keys), dtype=int)
     distinct, group = np.unique(keys, axis=0, return_inverse=True)
     return distinct, group.reshape(-1)
 
 
-def compress(columns, force, distinct, group) -> CompressedRows:
-    """Reduce rows to one triangular factor per group.
+def compress(columns, force, distinct, group, before=None) -> CompressedRows:
+    """Reduce rows to one triangular factor per group, or two.
 
     Args:
         columns: X, shape (n, p).
         force: readings y [N], shape (n,).
-        distinct: (run, specimen, known sd) of each group, shape (g, 3).
+        distinct: run, specimen, known sd and that of the row before, of each group,
+            shape (g, 4).
         group: group index of each row, shape (n,).
+        before: index of the row before each, −1 for none; None where neighbours do
+            not err alike.
 
     Returns:
-        One factor per group. Where a stated sd tells rows apart, their number is any
-        number: groups of no rows then fill up the bucket.
+        The factors of each group. Where a stated sd tells rows apart, their number is
+        any number: groups of no rows then fill up the bucket.
     """
-    table = np.column_stack([columns, force])
+    table, size = np.column_stack([columns, force]), len(distinct)
+    alone = np.full(len(group), before is None)
+    pairs, following = None, np.zeros(size)
+    if before is not None:
+        alone = before < 0
+        both = np.hstack([table[~alone], table[before[~alone]]])
+        pairs = _factors(both, group[~alone], size)
+        following = np.bincount(group[~alone], minlength=size).astype(float)
+    rows = CompressedRows(
+        _factors(table[alone], group[alone], size),
+        np.bincount(group, minlength=size).astype(float),
+        distinct[:, 2],
+        distinct[:, 3],
+        distinct[:, 0].astype(int),
+        distinct[:, 1].astype(int),
+        pairs,
+        following,
+    )
+    same_sd = (distinct[:, 2] == distinct[0, 2]).all()
+    return rows if same_sd else append_zeros(rows, bucket_size(size))
+
+
+def _factors(table: np.ndarray, group: np.ndarray, size: int) -> np.ndarray:
+    """Return the triangular factor of each group's rows, zeros below few rows."""
     width = table.shape[1]
-    factors = np.zeros((len(distinct), width, width))
-    count = np.bincount(group, minlength=len(distinct))
+    factors = np.zeros((size, width, width))
+    count = np.bincount(group, minlength=size)
     table = table[np.argsort(group, kind="stable")]
     for index, rows in enumerate(np.split(table, np.cumsum(count)[:-1])):
         factor = np.linalg.qr(rows, mode="r")
         factors[index, : len(factor)] = factor
-    rows = CompressedRows(
-        factors,
-        count.astype(float),
-        distinct[:, 2],
-        distinct[:, 0].astype(int),
-        distinct[:, 1].astype(int),
-    )
-    same_sd = (distinct[:, 2] == distinct[0, 2]).all()
-    return rows if same_sd else append_zeros(rows, bucket_size(len(distinct)))
+    return factors
 
 
 def keep_or_compress(
-    records: Records, base_columns, discrepancy: Discrepancy | None, *, keep: bool
+    records: Records,
+    base_columns,
+    discrepancy: Discrepancy | None,
+    *,
+    keep: bool,
+    correlated: bool,
 ) -> dict[str, Any]:
     """Return the fields of a problem that hold its rows, kept or compressed.
 
@@ -89,30 +149,39 @@ def keep_or_compress(
         base_columns: of the base model, shape (n, 4).
         discrepancy: of the problem, or None.
         keep: whether the rows must be kept.
+        correlated: whether neighbours within a run may err alike.
     """
     padded, count = pad_records(records), len(records.force)
     columns = discrepancy_columns(discrepancy, padded.deformation)
+    before = previous_rows(records) if correlated else None
+    kept = {"records": None, "columns": None, "before": None, "blocks": None}
     if not keep:
         own = [] if columns is None else [columns[:count]]
-        blocks = _compress_if_smaller(records, np.hstack([base_columns, *own]))
-        if blocks is not None:
-            return {"records": None, "columns": None, "blocks": blocks, "count": count}
-    return {"records": padded, "columns": columns, "blocks": None, "count": count}
+        design = np.hstack([base_columns, *own])
+        kept["blocks"] = _compress_if_smaller(records, design, before)
+    if kept["blocks"] is None:
+        if before is not None:
+            padding = (0, len(padded.force) - count)
+            before = np.pad(before, padding, constant_values=-1)
+        kept |= {"records": padded, "columns": columns, "before": before}
+    return kept | {"count": count}
 
 
-def _compress_if_smaller(records: Records, design) -> CompressedRows | None:
+def _compress_if_smaller(records: Records, design, before) -> CompressedRows | None:
     """Return the rows compressed, or None where that would be no smaller."""
-    distinct, group = group_rows(records.run, records.specimen, records.force_sd)
+    own = np.asarray(records.force_sd)
+    earlier = own if before is None else np.where(before < 0, own, own[before])
+    distinct, group = group_rows(records.run, records.specimen, own, earlier)
     # One factor per row (an sd of its own in each) would be larger than the rows.
     factor_rows = len(distinct) * (design.shape[1] + 1)
     if factor_rows > max(len(design), _MANY_FACTOR_ROWS):
         return None
-    return compress(design, records.force, distinct, group)
+    return compress(design, records.force, distinct, group, before)
 
 
 def residual(
     blocks: CompressedRows, coefficients: Float[Array, "g p"]
-) -> Float[Array, "g p+1"]:
+) -> Float[Array, "g r"]:
     """Return y − X c of each block in its rotated rows [N]."""
     target = blocks.factor[..., -1]
     fitted = jnp.einsum("gij,gj->gi", blocks.factor[..., :-1], coefficients)
@@ -120,19 +189,19 @@ def residual(
 
 
 def log_likelihood(
-    blocks: CompressedRows, coefficients: Float[Array, "g p"], sigma, step
+    blocks: CompressedRows, coefficients: Float[Array, "g p"], sigma, step, correlation
 ) -> Float[Array, ""]:
     """Return the log likelihood of all rows of all blocks.
 
     Args:
-        blocks: the compressed data.
+        blocks: the compressed data, whitened.
         coefficients: c of each block [N per column].
         sigma: noise sd before rounding [N].
-        step: rounding step [N]; Sheppard's correction adds step²/12 to the variance,
-            exact to 2 exp(−2π²σ²/step²).
+        step: rounding step [N].
+        correlation: of neighbouring rows [-].
     """
-    variance = sigma**2 + blocks.known_sd**2 + step**2 / 12.0
+    variance = blocks.variance(sigma, step)
     squares = jnp.sum(residual(blocks, coefficients) ** 2, axis=-1)
     return -0.5 * jnp.sum(
         blocks.count * jnp.log(2.0 * jnp.pi * variance) + squares / variance
-    )
+    ) - log_volume(jnp.sum(blocks.following), correlation)

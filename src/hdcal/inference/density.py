@@ -15,22 +15,39 @@ from hdcal.inference.likelihood import log_probability
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import given_before
 from hdcal.inference.values import (
     POSITIVE,
     Values,
     block_coefficients,
+    correlation_of,
     predict_rows,
     with_rounding,
 )
+from hdcal.physics.effect import Noise
 
 
 def pointwise_log_likelihood(
-    problem: Problem, values: Values, records: Records, columns
+    problem: Problem, values: Values, records: Records, columns, before
 ) -> Float[Array, " n"]:
-    """Return the log likelihood of each row given all values [log 1/N]."""
+    """Return the log likelihood of each row given all values [log 1/N].
+
+    And given the rows before it in its run, where neighbours may err alike.
+
+    Args:
+        problem: structure.
+        values: parameters of one draw.
+        records: the rows.
+        columns: basis of the discrepancy at the rows, or None.
+        before: index of the row before each in its run, or None.
+    """
     mean, noise = predict_rows(problem, values, records, columns)
-    if not problem.rounded:
-        noise = with_rounding(noise, problem.step)
+    noise = with_rounding(noise, problem.step, rounded=problem.rounded)
+    if problem.correlated:
+        (sd,), correlation = noise.sd, correlation_of(values)
+        error = (records.force - mean) / sd
+        mean, sd = given_before(mean, sd, error, before, correlation)
+        noise = Noise(noise.log_weight, sd[None])
     return log_probability(
         records.force, mean, noise, problem.step, rounded=problem.rounded
     )
@@ -50,12 +67,13 @@ def _(problem: Problem, values: Values) -> Float[Array, ""]:
     if problem.integrated:
         return linear_part(problem, values).log_likelihood()
     if problem.blocks is not None:
-        coefficients = block_coefficients(problem, problem.blocks, values)
-        return compress.log_likelihood(
-            problem.blocks, coefficients, values["sigma"], problem.step
-        )
-    rows, columns = problem.rows, problem.columns
-    each = pointwise_log_likelihood(problem, values, rows, columns)
+        correlation = correlation_of(values)
+        noise = values["sigma"], problem.step
+        blocks = problem.blocks.whitened(correlation, *noise)
+        coefficients = block_coefficients(problem, blocks, values)
+        return compress.log_likelihood(blocks, coefficients, *noise, correlation)
+    rows = problem.rows, problem.columns, problem.before
+    each = pointwise_log_likelihood(problem, values, *rows)
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))
 
 

@@ -68,13 +68,3 @@ def moments(prior: Prior) -> tuple[float, float]:
         return float(prior.numbers[0]), 0.0
     law = frozen(prior)
     return float(law.mean()), float(law.std())
-
-
-def scaled(prior: Prior, factor) -> Prior:
-    """Return the prior of factor × parameter (factor > 0)."""
-    count = {"lognormal": 1, "beta": 0}.get(prior.family, len(prior.numbers))
-    if prior.family == "beta":
-        raise ValueError("a beta prior cannot be rescaled")
-    numbers = prior.numbers
-    moved = tuple(number * factor for number in numbers[:count])
-    return Prior(prior.family, moved + numbers[count:], prior.unit, prior.source)

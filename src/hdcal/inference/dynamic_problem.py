@@ -12,11 +12,10 @@ import numpyro
 from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear, Theory
-from hdcal.data.priors import Prior
+from hdcal.data.prior import Prior, scaled
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.distributions import scaled
 from hdcal.inference.model import model, sample_influence, sample_site
 from hdcal.inference.padding import measured, pad_records
 from hdcal.inference.problem import (

@@ -13,6 +13,7 @@ from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import log_volume, whiten
 from hdcal.inference.values import (
     CORE,
     MEMBER_SD,
@@ -20,6 +21,7 @@ from hdcal.inference.values import (
     ONE,
     Values,
     block_coefficients,
+    correlation_of,
     member_base,
     predict_rows,
     with_rounding,
@@ -85,18 +87,24 @@ def _linear_rows(problem: Problem, values: Values) -> Linear:
     mean, noise = predict_rows(problem, values, records, None)
     sd = with_rounding(noise, problem.step).sd[0]
     real = measured(len(sd), problem.count)
-    columns = {"run": jnp.where(real, 1.0, 0.0)}
-    discrepancy = problem.columns
-    if discrepancy is not None:
-        discrepancy = jnp.where(real[:, None], discrepancy, 0.0)
+    correlation, before = correlation_of(values), problem.before
+    following = 0 if before is None else jnp.sum(before >= 0)
+
+    def white(column):
+        """Return what a column is where the noise is independent and of sd 1."""
+        scaled = jnp.where(real, 1.0 / sd, 0.0) * column.T
+        return scaled.T if before is None else whiten(scaled.T, before, correlation)
+
+    columns, discrepancy = {"run": white(jnp.ones_like(sd))}, problem.columns
+    volume = jnp.sum(jnp.where(real, jnp.log(sd), 0.0))
     return _linear(
         problem,
         values,
         _grouped(problem, values, records, columns),
-        discrepancy,
-        residual=jnp.where(real, records.force - mean, 0.0),
-        sd=sd,
-        log_volume=jnp.sum(jnp.where(real, jnp.log(sd), 0.0)),
+        None if discrepancy is None else white(discrepancy),
+        residual=white(records.force - mean),
+        sd=jnp.ones_like(sd),
+        log_volume=volume + log_volume(following, correlation),
         count=problem.count,
     )
 
@@ -104,6 +112,9 @@ def _linear_rows(problem: Problem, values: Values) -> Linear:
 def _linear_blocks(
     problem: Problem, blocks: compress.CompressedRows, values: Values
 ) -> Linear:
+    correlation = correlation_of(values)
+    noise = values["sigma"], problem.step
+    blocks = blocks.whitened(correlation, *noise)
     groups, width = blocks.factor.shape[:2]
     base = member_base(problem, {**values, "force_offset": 0.0})
     slope = linear_coefficients(base, problem.reading)
@@ -111,7 +122,7 @@ def _linear_blocks(
         "run": blocks.factor[..., ONE],
         "specimen": blocks.factor[..., :CORE] @ slope,
     }
-    variance = values["sigma"] ** 2 + blocks.known_sd**2 + problem.step**2 / 12.0
+    variance = blocks.variance(*noise)
     residual = compress.residual(blocks, block_coefficients(problem, blocks, values))
     return _linear(
         problem,
@@ -120,7 +131,8 @@ def _linear_blocks(
         blocks.factor[..., CORE:-1].reshape(groups * width, -1),
         residual=residual.reshape(-1),
         sd=jnp.repeat(jnp.sqrt(variance), width),
-        log_volume=0.5 * jnp.sum(blocks.count * jnp.log(variance)),
+        log_volume=0.5 * jnp.sum(blocks.count * jnp.log(variance))
+        + log_volume(jnp.sum(blocks.following), correlation),
         count=jnp.sum(blocks.count),
     )
 

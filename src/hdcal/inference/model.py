@@ -18,6 +18,7 @@ from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import POSITIVE, stiffness
 from hdcal.physics.effect import parameters
 
@@ -106,6 +107,8 @@ def _(problem: Problem) -> None:
     values["K"] = sample_influence(priors["K"], values["E0"])
     for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
         values[name] = sample_site(name, priors[name])
+    if problem.correlated:
+        values[CORRELATION] = sample_site(CORRELATION, priors[CORRELATION])
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"

@@ -1,7 +1,6 @@
 """What a posterior file holds, collected in ArviZ' groups."""
 
 from collections.abc import Mapping
-from functools import partial
 
 import jax
 import numpy as np
@@ -15,6 +14,7 @@ from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
+from hdcal.inference.serial_correlation import previous_rows
 
 # Above this many numbers the log likelihood of every row and draw is not kept.
 _MOST_LOG_LIKELIHOODS = 8_000_000
@@ -83,15 +83,18 @@ def force_log_likelihood(
         return {TOTAL: densities(problem, draws.values)[1]}
     padded = pad_records(case.records)
     columns = discrepancy_columns(problem.discrepancy, padded.deformation)
-    each = _pointwise(problem, draws.values, padded, columns)
+    before = np.full(len(padded.force), -1)
+    before[:rows] = previous_rows(case.records)
+    each = _pointwise(problem, draws.values, padded, columns, before)
     return {"force": np.asarray(each)[..., :rows]}
 
 
 @jax.jit
-def _pointwise(problem, values, records, columns):
-    one = partial(pointwise_log_likelihood, problem)
-    inner = jax.vmap(one, in_axes=(0, None, None))
-    return jax.vmap(inner, in_axes=(0, None, None))(values, records, columns)
+def _pointwise(problem, values, records, columns, before):
+    def one(value):
+        return pointwise_log_likelihood(problem, value, records, columns, before)
+
+    return jax.vmap(jax.vmap(one))(values)
 
 
 def _sampler_statistics(draws: Draws) -> dict[str, np.ndarray]:

@@ -5,16 +5,16 @@ from collections.abc import Mapping, Sequence
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from hdcal.data.case import Case, Theory
-from hdcal.data.priors import Prior
+from hdcal.data.prior import Prior, scaled
+from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
-from hdcal.inference.distributions import scaled
 from hdcal.inference.member_counts import (
     check_member_counts,
     integrated_kinds,
@@ -23,20 +23,20 @@ from hdcal.inference.member_counts import (
 from hdcal.inference.padding import pad_records
 from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
-# Below this many rows the rounding likelihood is always exact: it is cheap there.
+# Up to this many rows the noise that a fit leaves is a rough number, and the exact
+# rounding likelihood is cheap.
 _FEW_ROWS = 500
 # Largest rounding step, in noise sds, for which Sheppard's correction is used: the
 # noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
 _FINE_STEP = 1.3
-
-# Steps below this many residual sds are no rounding: the exact form would only lose
-# digits in the difference of two nearly equal probabilities.
-_NO_STEP = 1e-3
+# The same where the noise sd is roughly known.
+_FINE_STEP_OF_FEW = 0.5
 
 _base_columns = jax.jit(linear_columns)
 
@@ -53,9 +53,12 @@ class Problem(Sampled):
         blocks: compressed rows, or None.
         columns: basis of the discrepancy at the padded rows, or None.
         discrepancy: the leftover one, or None.
+        before: index of the row before each padded row in its run, −1 for none; or
+            None where neighbours are not correlated or rows are compressed.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
+        correlated: whether neighbouring readings of a run may err alike.
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
         integrated: which of "run", "specimen", "discrepancy" are integrated out, as
@@ -71,9 +74,11 @@ class Problem(Sampled):
     blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
+    before: Int[Array, " n"] | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
+    correlated: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
@@ -132,7 +137,7 @@ def problem_priors(
     gear, effects = case.gear, without_scatter(effects)
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
     names = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
-    names += ["run_offset_sd", "specimen_sd", "gap_sd", "gap_length"]
+    names += [*SCALE_UNITS]
     names += [f"{effect.name}.{p}" for effect in effects for p in parameters(effect)]
     missing = [name for name in names if name not in table]
     if missing:
@@ -227,10 +232,16 @@ def build_problem(
     records, reading = case.records, case_reading(case)
     check_padding(effects, records, reading)
     noise_sd, members = pilot_noise(records), member_counts(case, with_gap)
-    rounded = _is_rounded(case, noise_sd, members)
+    rounded, correlated = _noise_form(case, effects, members, noise_sd)
     leftover = build_discrepancy(records.deformation) if with_gap else None
     columns = _columns(records, reading)
-    rows = keep_or_compress(records, columns, leftover, keep=rounded or bool(effects))
+    rows = keep_or_compress(
+        records,
+        columns,
+        leftover,
+        keep=rounded or bool(effects),
+        correlated=correlated,
+    )
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     integrated = integrated_kinds(members, linear)
     check_member_counts(case.name, members, integrated)
@@ -243,6 +254,7 @@ def build_problem(
         step=case.gear.force_resolution,
         effects=effects,
         rounded=rounded,
+        correlated=correlated,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=integrated,
@@ -264,11 +276,32 @@ def _columns(records: Records, reading: Reading) -> np.ndarray:
     return np.asarray(columns)[: len(records.force)]
 
 
-def _is_rounded(case: Case, noise_sd: float, members: Mapping[str, int]) -> bool:
-    """Return whether the exact rounding likelihood is needed, or cheap."""
-    step = case.gear.force_resolution
-    few = len(case.records.force) <= _FEW_ROWS and not members
-    return step > _FINE_STEP * noise_sd or (few and step > _NO_STEP * noise_sd)
+def correlates(
+    case: Case, effects: Sequence[type[Effect]], *, with_gap: bool = False
+) -> bool:
+    """Return whether the model of a case has a correlation of neighbouring readings.
+
+    Args:
+        case: records and gear.
+        effects: in the model.
+        with_gap: whether the leftover discrepancy is.
+    """
+    members = member_counts(case, with_gap)
+    return _noise_form(case, effects, members, pilot_noise(case.records))[1]
+
+
+def _noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, bool]:
+    """Return whether the noise needs its exact rounding, and may be correlated.
+
+    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
+    mixtures.
+    """
+    step, records = case.gear.force_resolution, case.records
+    few = len(records.force) <= _FEW_ROWS and not members
+    rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
+    one_normal = not any(effect.mixture for effect in effects)
+    neighbours = bool(np.any(previous_rows(records) >= 0))
+    return rounded, one_normal and neighbours and not rounded
 
 
 def case_reading(case: Case) -> Reading:

@@ -3,7 +3,7 @@
 Tested on what the model and every shape that was found leave.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -15,6 +15,7 @@ from hdcal.inference.residual_shapes import (
     Whitened,
     orthonormal,
 )
+from hdcal.inference.serial_correlation import previous_rows, whiten
 
 # Fewer rows say nothing of their noise.
 _LEAST_ROWS = 12
@@ -42,9 +43,14 @@ class _Left:
 
 
 def noise_faults(
-    data: Whitened, records: Records, sd: np.ndarray, *, rounded: bool
+    data: Whitened,
+    records: Records,
+    sd: np.ndarray,
+    *,
+    rounded: bool,
+    correlation: float = 0.0,
 ) -> tuple[Structure, ...]:
-    """Find out in which ways residuals are no independent noise of one size.
+    """Find out in which ways residuals are not the noise that the model has.
 
     Args:
         data: residuals and what was absorbed, shapes that were found included.
@@ -52,18 +58,18 @@ def noise_faults(
         sd: noise sd of each row [N].
         rounded: whether steps of the reading are wider than its noise; neighbours
             are then alike without any correlation.
+        correlation: of neighbouring readings in the model [-].
 
     Returns:
         What was found, at a family-wise error of `FALSE_ALARM`.
     """
     if len(sd) < _LEAST_ROWS:
         return ()
-    basis = orthonormal(data.absorbed)
-    error = data.residual - basis @ (basis.T @ data.residual)
-    rest = _Left(error, basis)
-    tests = [_scatter(rest, records, sd)]
-    if not rounded and np.any(np.diff(np.asarray(records.run)) == 0):
-        tests.append(_neighbours(rest, records, sd))
+    tests = [_scatter(_left(data), records, sd)]
+    before = previous_rows(records)
+    if not rounded and np.any(before >= 0):
+        rest = _left(_independent(data, before, correlation))
+        tests.append(_neighbours(rest, before, sd, correlation))
     return tuple(
         Structure(name, min(1.0, p * len(tests)), size, words)
         for name, p, size, words in tests
@@ -71,23 +77,40 @@ def noise_faults(
     )
 
 
-def _neighbours(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
-    """Test whether neighbouring rows of a run err alike.
+def _left(data: Whitened) -> _Left:
+    """Return what residuals leave beside all that was absorbed."""
+    basis = orthonormal(data.absorbed)
+    return _Left(data.residual - basis @ (basis.T @ data.residual), basis)
+
+
+def _independent(data: Whitened, before, correlation: float) -> Whitened:
+    """Return data as they are where the noise of the model is independent."""
+
+    def white(table: np.ndarray) -> np.ndarray:
+        rows = whiten(table[: len(before)], before, correlation)
+        return np.concatenate([rows, table[len(before) :]])
+
+    absorbed, residual = white(data.absorbed), white(data.residual)
+    return replace(data, absorbed=absorbed, residual=residual)
+
+
+def _neighbours(rest: _Left, before, sd: np.ndarray, correlation: float) -> _Test:
+    """Test whether neighbouring rows of a run err alike, beyond a known correlation.
 
     The ratio of quadratic forms has its exact mean and variance under independence,
     as in Durbin and Watson, Biometrika 37 (1950).
     """
-    size = len(sd)
-    pair = np.append(np.diff(np.asarray(records.run)) == 0, False)
-    pair = np.pad(pair, (0, len(rest.error) - size))
+    size, (follows,) = len(sd), np.nonzero(before >= 0)
+    followed = before[follows]
 
     def shifted(table: np.ndarray) -> np.ndarray:
         """Return half the row after and half the row before, within runs."""
-        after = np.where(pair[:, None], np.roll(table, -1, axis=0), 0.0)
-        before = np.roll(np.where(pair[:, None], table, 0.0), 1, axis=0)
-        return 0.5 * (after + before)
+        moved = np.zeros_like(table)
+        moved[followed] += 0.5 * table[follows]
+        moved[follows] += 0.5 * table[followed]
+        return moved
 
-    moved, free, pairs = shifted(rest.basis), rest.free, int(pair.sum())
+    moved, free, pairs = shifted(rest.basis), rest.free, len(follows)
     held = rest.basis.T @ moved
     trace = -float(np.trace(held))
     square = 0.5 * pairs - 2.0 * float(np.sum(moved**2)) + float(np.sum(held**2))
@@ -99,9 +122,10 @@ def _neighbours(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
     alike = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
     times = np.sqrt((1.0 + alike) / (1.0 - alike))
     rms = float(np.sqrt(np.mean((rest.error[:size] * sd) ** 2)))
+    beyond = f" beyond the model's {correlation:.2f}" if correlation >= 0.005 else ""
     words = (
-        f"Neighbouring readings err alike (correlation {alike:.2f}): the intervals of "
-        f"stiffness and mean force are some {times:.1f} times too narrow."
+        f"Neighbouring readings err alike (correlation {alike:.2f}{beyond}): the "
+        f"intervals of stiffness and mean force are some {times:.1f} times too narrow."
     )
     return NEIGHBOURS, p, alike * rms, words
 

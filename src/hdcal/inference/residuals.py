@@ -18,7 +18,7 @@ from hdcal.inference.residual_shapes import (
     find_structure,
     shapes_of,
 )
-from hdcal.inference.values import predict_rows
+from hdcal.inference.values import correlation_of, predict_rows
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
@@ -39,7 +39,7 @@ class Residuals:
         residual: measured − fitted [N].
         standardised: residual over the noise sd [-].
         structure: shapes that noise would rarely show.
-        noise: in which ways the rest is no independent noise of one size.
+        noise: in which ways the rest is not the noise that the model has.
     """
 
     deformation: np.ndarray
@@ -79,7 +79,13 @@ def residuals(posterior: Posterior) -> Residuals:
         residual=residual,
         standardised=residual / near.sd,
         structure=structure,
-        noise=noise_faults(rest, records, near.sd, rounded=coarse),
+        noise=noise_faults(
+            rest,
+            records,
+            near.sd,
+            rounded=coarse,
+            correlation=float(correlation_of(centre)),
+        ),
     )
 
 

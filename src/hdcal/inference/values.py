@@ -10,7 +10,8 @@ from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
 from hdcal.inference.member_counts import member_counts
-from hdcal.inference.problem import Problem, without_scatter
+from hdcal.inference.problem import Problem, correlates, without_scatter
+from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
@@ -28,6 +29,8 @@ MEMBERS = {
 MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
+# Least noise sd that rounded readings can tell from none, in steps.
+LEAST_NOISE = 0.1
 
 
 def site_shapes(
@@ -37,6 +40,8 @@ def site_shapes(
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     for effect in without_scatter(effects):
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
+    if correlates(case, effects, with_gap=with_gap):
+        names.append(CORRELATION)
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
     for kind, count in member_counts(case, with_gap).items():
         scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
@@ -48,6 +53,11 @@ def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
     """Return K·k_theory at T_ref, per mm as read [N/mm]."""
     radial = values["K"] * values["E0"] * problem.unit_stiffness
     return radial * problem.reading.radial_per_read
+
+
+def correlation_of(values: Values) -> Float[Array, ""] | float:
+    """Return the correlation of neighbouring readings; 0 where it has no site."""
+    return values.get(CORRELATION, 0.0)
 
 
 def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
@@ -103,9 +113,14 @@ def predict_rows(
     return mean, noise
 
 
-def with_rounding(noise: Noise, step) -> Noise:
-    """Add Sheppard's variance of the rounding to the noise."""
-    return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + step**2 / 12.0))
+def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
+    """Add Sheppard's variance of the rounding to the noise.
+
+    Where rounding has its exact likelihood, add the least noise that such readings
+    can tell from none: without any the likelihood has walls that no sampler passes.
+    """
+    variance = (LEAST_NOISE * step) ** 2 if rounded else step**2 / 12.0
+    return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + variance))
 
 
 def block_coefficients(

@@ -87,6 +87,7 @@ class Effect(eqx.Module):
         family: effects of one family look alike.
         symmetry: how the contribution answers to tension instead of compression,
             `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
+        mixture: whether a reading's noise becomes more than one normal.
         acts_at_once: whether it is a force or play of the gear itself that depends on
             deformation, speed and temperature of the moment only; `hdcal respond`
             takes such effects along and leaves others out.
@@ -97,6 +98,7 @@ class Effect(eqx.Module):
     family: AbstractClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
+    mixture: ClassVar[bool] = False
     acts_at_once: ClassVar[bool] = False
 
     @abstractmethod

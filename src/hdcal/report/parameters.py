@@ -26,6 +26,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "specimen_sd": ("1", 1.0),
     "gap_sd": ("N", 1.0),
     "gap_length": ("1", 1.0),
+    "noise_correlation": ("1", 1.0),
     "mass": ("kg", 1e3),
     "damping_ratio": ("1", 1.0),
     "initial_deformation": ("mm", 1.0),

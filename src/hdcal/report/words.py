@@ -17,6 +17,7 @@ LABELS = {
     "sigma": "reading noise σ",
     "run_offset_sd": "spread of zeros between runs",
     "specimen_sd": "spread of stiffness between gears",
+    "noise_correlation": "correlation of neighbouring readings",
     "gap_sd": "size of the leftover discrepancy",
     "gap_length": "length of the leftover discrepancy",
     "mass": "moved mass m",

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.data.priors import Prior
-from hdcal.inference.distributions import bounds, frozen, scaled
+from hdcal.data.prior import Prior, scaled
+from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import POSITIVE
 from hdcal.physics.chain import Base, Reading, linear_coefficients

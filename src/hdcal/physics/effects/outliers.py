@@ -23,6 +23,7 @@ class Outliers(Effect):
     stage: ClassVar[Stage] = "noise"
     family: ClassVar[str] = "noise"
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
+    mixture: ClassVar[bool] = True
 
     fraction: Float[Array, ""] | float = parameter(
         "1", "share of wild readings", typical=0.07, null=0.0

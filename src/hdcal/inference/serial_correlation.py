@@ -1,0 +1,61 @@
+"""Noise whose neighbours within a run err alike: autoregressive of first order.
+
+In noise sds e, z₁ = e₁ and zₜ = (eₜ − ρ eₜ₋₁) / √(1 − ρ²) are independent and of unit
+variance, whatever else is linear in the rows is whitened alike, and
+log |dz/de| = −½ m log(1 − ρ²) with m the rows that follow another one.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from hdcal.data.records import Array, Records
+
+# Its site in the model.
+CORRELATION = "noise_correlation"
+
+
+def previous_rows(records: Records) -> Int[np.ndarray, " n"]:
+    """Return the index of the row before in the same run, −1 for a run's first.
+
+    Runs may alternate. On another specimen a run is another one.
+    """
+    labels = np.asarray(records.run), np.asarray(records.specimen)
+    order = np.lexsort(labels)
+    same = np.all([np.diff(label[order]) == 0 for label in labels], axis=0)
+    before = np.full(len(order), -1)
+    before[order[1:][same]] = order[:-1][same]
+    return before
+
+
+def whiten(columns, before, correlation):
+    """Return columns of rows in which the noise is independent.
+
+    Args:
+        columns: in noise sds, rows along the first axis; NumPy's or JAX' own.
+        before: from `previous_rows`.
+        correlation: ρ, between −1 and 1.
+    """
+    follows = (before >= 0).reshape(-1, *(1,) * (columns.ndim - 1))
+    gain = (1.0 - correlation**2) ** -0.5
+    own = 1.0 + (gain - 1.0) * follows
+    return own * columns - (correlation * gain) * follows * columns[before]
+
+
+def log_volume(following, correlation) -> Float[Array, ""]:
+    """Return log |de/dz|, of as many rows as follow another one."""
+    return 0.5 * following * jnp.log1p(-(correlation**2))
+
+
+def given_before(mean, sd, error, before, correlation):
+    """Return mean and sd [N] of each row given the row before it.
+
+    Args:
+        mean: of each row [N], shape (n,).
+        sd: noise sd [N], shape (n,).
+        error: reading less its mean, in noise sds, shape (n,).
+        before: from `previous_rows`.
+        correlation: ρ, between −1 and 1.
+    """
+    tied = jnp.where(before >= 0, correlation, 0.0)
+    return mean + sd * tied * error[before], sd * jnp.sqrt(1.0 - tied**2)
