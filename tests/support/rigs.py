@@ -19,7 +19,7 @@ from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import POSITIVE, build_effects, member_base
+from hdcal.inference.values import POSITIVE, build_effects, member_base, with_rounding
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 
@@ -151,10 +151,12 @@ def simulate(problem, case: Case, truth: dict, key) -> Case:
     base = member_base(problem, truth)
     effects = build_effects(problem, truth)
     mean, noise = predict_reading(base, effects, case.records, problem.reading)
-    if problem.correlated:
-        correlation = truth.get(CORRELATION, 0.0)
+    if problem.rounded:
+        noise = with_rounding(noise, case.gear.force_resolution, rounded=True)
+    if problem.correlated and (correlation := truth.get(CORRELATION, 0.0)):
         score = np.asarray(jax.random.normal(key, mean.shape))
-        mean = mean + noise.sd[0] * autoregression(score, case.records.run, correlation)
+        error = autoregression(score, case.records.run, correlation)
+        mean = mean + noise.sd[0] * error
         noise = Noise(noise.log_weight, 1e-12 * noise.sd)
     force = np.asarray(draw_reading(key, mean, noise, case.gear.force_resolution))
     return replace(case, records=replace(case.records, force=force))
