@@ -13,8 +13,9 @@ from hdcal.data.versions import versions
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.noise_form import correlates
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import build_problem, correlates, problem_priors
+from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.serial_correlation import CORRELATION
 
 CHAINS = 2

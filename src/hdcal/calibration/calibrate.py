@@ -12,16 +12,18 @@ from hdcal.data.priors import effect_priors
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
-from hdcal.inference.checks import correlation_check, rounding_check
+from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
+from hdcal.inference.noise_form import noise_grows
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
 
@@ -116,6 +118,7 @@ def calibrate(
     effects: Sequence[str] = (),
     theory: Theory | None = None,
     with_gap: bool = False,
+    adapt_noise: bool = True,
     chains: int = 4,
     warmup: int = 1000,
     draws: int = 1000,
@@ -130,6 +133,8 @@ def calibrate(
         effects: names of effects to include.
         theory: overrides the gear's theory.
         with_gap: add a leftover discrepancy, orthogonal to the base model.
+        adapt_noise: let the noise grow with the force, as the effect
+            heteroscedastic_noise has it, where readings clearly do.
         chains: independent chains, two or more so that they can be compared.
         warmup: iterations of adaptation per chain.
         draws: draws kept per chain.
@@ -147,6 +152,8 @@ def calibrate(
     bound_executables()
     began = time.perf_counter()
     chosen = choose_effects(effects, registry)
+    if adapt_noise and not any(effect.stage == "noise" for effect in chosen):
+        chosen += (HeteroscedasticNoise,) if noise_grows(case) else ()
     check_effect_priors(case, registry)
     theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
@@ -180,6 +187,7 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(found.values),
+            growth_check(found.values),
         ],
     )
 

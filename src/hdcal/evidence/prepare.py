@@ -16,7 +16,8 @@ from hdcal.evidence.row_features import (
     take_rows,
 )
 from hdcal.inference.distributions import frozen
-from hdcal.inference.problem import case_reading, pilot_noise, problem_priors
+from hdcal.inference.noise_form import pilot_noise
+from hdcal.inference.problem import case_reading, problem_priors
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.theory import THEORIES

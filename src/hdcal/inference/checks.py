@@ -134,6 +134,20 @@ def correlation_check(draws: Mapping[str, np.ndarray]) -> Check:
     return Check(name, "note", f"{words}, and every interval allows for it")
 
 
+def growth_check(draws: Mapping[str, np.ndarray]) -> Check:
+    """Say that the noise was let grow with the force.
+
+    Args:
+        draws: by parameter.
+    """
+    name = "readings scatter alike at any force"
+    share = draws.get("heteroscedastic_noise.share")
+    if share is None:
+        return Check(name, "passed", "the noise is of one size in this model")
+    words = f"they scatter by {np.median(share):.1%} of the force, beside σ at no force"
+    return Check(name, "note", f"{words}; every interval allows for it")
+
+
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     """Fail a result whose noise is too small for Sheppard's correction.
 

@@ -20,23 +20,14 @@ from hdcal.inference.member_counts import (
     integrated_kinds,
     member_counts,
 )
+from hdcal.inference.noise_form import noise_form, pilot_noise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
-
-# Up to this many rows the noise that a fit leaves is a rough number, and the exact
-# rounding likelihood is cheap.
-_FEW_ROWS = 500
-# Largest rounding step, in noise sds, for which Sheppard's correction is used: the
-# noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
-_FINE_STEP = 1.3
-# The same where the noise sd is roughly known.
-_FINE_STEP_OF_FEW = 0.5
 
 _base_columns = jax.jit(linear_columns)
 
@@ -181,28 +172,6 @@ def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
         raise InputError(findings)
 
 
-def pilot_noise(records: Records) -> float:
-    """Return the noise sd left by a generous least-squares fit [N].
-
-    A cubic in deformation with a slope for each specimen, a step for the direction
-    and temperature terms, within runs. Generous, because too small a noise only
-    chooses the exact rounding likelihood, which is never wrong.
-    """
-    scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
-    rise = np.asarray(records.temperature) - np.mean(records.temperature)
-    own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
-    shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
-    table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
-    count = np.bincount(records.run)
-    means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
-    table = table - means[records.run]
-    design, force = table[:, :-1], table[:, -1]
-    beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
-    residual = force - design @ beta
-    free = max(len(force) - len(count) - int(rank), 1)
-    return float(np.sqrt(residual @ residual / free))
-
-
 def build_problem(
     case: Case,
     shipped: Mapping[str, Prior],
@@ -232,7 +201,7 @@ def build_problem(
     records, reading = case.records, case_reading(case)
     check_padding(effects, records, reading)
     noise_sd, members = pilot_noise(records), member_counts(case, with_gap)
-    rounded, correlated = _noise_form(case, effects, members, noise_sd)
+    rounded, correlated = noise_form(case, effects, members, noise_sd)
     leftover = build_discrepancy(records.deformation) if with_gap else None
     columns = _columns(records, reading)
     rows = keep_or_compress(
@@ -264,7 +233,7 @@ def build_problem(
 
 def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:
     """Return the kinds of members that enter a Gaussian likelihood linearly."""
-    if rounded or any(effect.stage == "noise" for effect in effects):
+    if rounded or any(effect.mixture for effect in effects):
         return frozenset()
     # Through an effect the force need not be linear in the stiffness.
     return frozenset({"run", "discrepancy", *(["specimen"] if compressed else [])})
@@ -274,34 +243,6 @@ def _columns(records: Records, reading: Reading) -> np.ndarray:
     """Return the columns of the base model at the measured rows, shape (n, 4)."""
     columns = _base_columns(pad_records(records), reading)
     return np.asarray(columns)[: len(records.force)]
-
-
-def correlates(
-    case: Case, effects: Sequence[type[Effect]], *, with_gap: bool = False
-) -> bool:
-    """Return whether the model of a case has a correlation of neighbouring readings.
-
-    Args:
-        case: records and gear.
-        effects: in the model.
-        with_gap: whether the leftover discrepancy is.
-    """
-    members = member_counts(case, with_gap)
-    return _noise_form(case, effects, members, pilot_noise(case.records))[1]
-
-
-def _noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, bool]:
-    """Return whether the noise needs its exact rounding, and may be correlated.
-
-    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
-    mixtures.
-    """
-    step, records = case.gear.force_resolution, case.records
-    few = len(records.force) <= _FEW_ROWS and not members
-    rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
-    one_normal = not any(effect.mixture for effect in effects)
-    neighbours = bool(np.any(previous_rows(records) >= 0))
-    return rounded, one_normal and neighbours and not rounded
 
 
 def case_reading(case: Case) -> Reading:

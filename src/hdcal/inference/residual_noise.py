@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 
 from hdcal.data.records import Records
+from hdcal.inference.noise_form import growth_p_value
 from hdcal.inference.residual_shapes import (
     FALSE_ALARM,
     Structure,
@@ -131,17 +132,11 @@ def _neighbours(rest: _Left, before, sd: np.ndarray, correlation: float) -> _Tes
 
 
 def _scatter(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
-    """Test whether readings scatter more the farther the gear is deformed.
-
-    The test is that of Koenker, Journal of Econometrics 17 (1981).
-    """
+    """Test whether readings scatter more the farther the gear is deformed."""
     size, far = len(sd), np.abs(np.asarray(records.deformation))
     kept = 1.0 - np.sum(rest.basis[:size] ** 2, axis=1)
     square = rest.error[:size] ** 2 / np.maximum(kept, 1e-6)
-    off, left = far - far.mean(), square - square.mean()
-    scale = np.sqrt((off @ off) * (left @ left))
-    tied = float(off @ left) / scale if scale > 0.0 else 0.0
-    p = float(stats.norm.sf(np.sqrt(size) * tied))
+    p = growth_p_value(square, far)
     thirds = np.quantile(far, [1 / 3, 2 / 3])
     near, farther = (
         float(np.sqrt(np.mean(square[rows] * sd[rows] ** 2)))

@@ -10,7 +10,8 @@ from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
 from hdcal.inference.member_counts import member_counts
-from hdcal.inference.problem import Problem, correlates, without_scatter
+from hdcal.inference.noise_form import correlates
+from hdcal.inference.problem import Problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters

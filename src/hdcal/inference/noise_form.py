@@ -1,0 +1,112 @@
+"""Which form the noise of a case has, decided by a pilot fit before any sampling."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+from hdcal.data.case import Case
+from hdcal.data.records import Records
+from hdcal.inference.member_counts import member_counts
+from hdcal.inference.serial_correlation import previous_rows
+from hdcal.physics.effect import Effect
+
+# Up to this many rows the noise that a fit leaves is a rough number, and the exact
+# rounding likelihood is cheap.
+_FEW_ROWS = 500
+# Largest rounding step, in noise sds, for which Sheppard's correction is used: the
+# noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
+_FINE_STEP = 1.3
+# The same where the noise sd is roughly known.
+_FINE_STEP_OF_FEW = 0.5
+# Fewer rows do not show how their noise depends on anything.
+_LEAST_ROWS = 12
+# Probability that noise of one size is said to grow.
+_FALSE_ALARM = 0.005
+
+
+def pilot_noise(records: Records) -> float:
+    """Return the noise sd left by a generous least-squares fit [N].
+
+    Generous, because too small a noise only chooses the exact rounding likelihood,
+    which is never wrong.
+    """
+    residual, free = _pilot(records)
+    return float(np.sqrt(residual @ residual / free))
+
+
+def _pilot(records: Records) -> tuple[np.ndarray, int]:
+    """Return residuals of a generous least-squares fit [N], and degrees of freedom.
+
+    A cubic in deformation with a slope for each specimen, a step for the direction
+    and temperature terms, within runs.
+    """
+    scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
+    rise = np.asarray(records.temperature) - np.mean(records.temperature)
+    own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
+    shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
+    table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
+    count = np.bincount(records.run)
+    means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
+    table = table - means[records.run]
+    design, force = table[:, :-1], table[:, -1]
+    beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
+    residual = force - design @ beta
+    return residual, max(len(force) - len(count) - int(rank), 1)
+
+
+def noise_grows(case: Case) -> bool:
+    """Return whether readings clearly scatter more the farther the gear is deformed.
+
+    Not asked where every row's sd is stated, nor below the steps of the reading.
+    """
+    records = case.records
+    residual, free = _pilot(records)
+    coarse = case.gear.force_resolution > np.sqrt(residual @ residual / free)
+    if len(residual) < _LEAST_ROWS or coarse or "force_sd" in records.known:
+        return False
+    return growth_p_value(residual**2, records.deformation) < _FALSE_ALARM
+
+
+def growth_p_value(square, deformation) -> float:
+    """Return how rarely squared errors of one size grow so much with deformation.
+
+    The test is that of Koenker, Journal of Econometrics 17 (1981).
+
+    Args:
+        square: of each row's error, shape (n,).
+        deformation: as read [mm], shape (n,).
+    """
+    far = np.abs(np.asarray(deformation))
+    off, left = far - far.mean(), square - square.mean()
+    scale = np.sqrt((off @ off) * (left @ left))
+    tied = float(off @ left) / scale if scale > 0.0 else 0.0
+    return float(stats.norm.sf(np.sqrt(len(far)) * tied))
+
+
+def correlates(
+    case: Case, effects: Sequence[type[Effect]], *, with_gap: bool = False
+) -> bool:
+    """Return whether the model of a case has a correlation of neighbouring readings.
+
+    Args:
+        case: records and gear.
+        effects: in the model.
+        with_gap: whether the leftover discrepancy is.
+    """
+    members = member_counts(case, with_gap)
+    return noise_form(case, effects, members, pilot_noise(case.records))[1]
+
+
+def noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, bool]:
+    """Return whether the noise needs its exact rounding, and may be correlated.
+
+    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
+    mixtures.
+    """
+    step, records = case.gear.force_resolution, case.records
+    few = len(records.force) <= _FEW_ROWS and not members
+    rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
+    one_normal = not any(effect.mixture for effect in effects)
+    neighbours = bool(np.any(previous_rows(records) >= 0))
+    return rounded, one_normal and neighbours and not rounded
