@@ -1,0 +1,124 @@
+"""Rare exceedances against their exact probability, and what they rest on."""
+
+import numpy as np
+import pytest
+from rigs import make_case, make_gear, make_records
+from scipy import stats
+
+from hdcal.calibration.calibrate import calibrate
+from hdcal.data.priors import Prior
+from hdcal.physics.theory import ring
+from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.population_force import population_force
+from hdcal.prediction.margin.rare import pooled_rare, rare
+
+MODULUS, AT = 207e3, 0.4
+K, OFFSET = (2.5, 0.5), (0.0, 5.0)
+SIGMAS = {
+    "Student's t": Prior("lognormal", (0.5, 1.2)),
+    "normal": Prior("fixed", (0.9,)),
+}
+LIMITS = {"Student's t": (85.0, 100.0, 130.0), "normal": (83.0, 85.0, 87.0)}
+
+pytestmark = pytest.mark.computes
+
+
+def conjugate_case(sigma: Prior, rows: int = 6):
+    """Return few rows; the law of a further reading is known in closed form."""
+    rng = np.random.default_rng(3)
+    deformation = np.linspace(0.02, 0.54, rows)
+    force = 205.0 * deformation - 3.0 + rng.normal(0.0, 0.9, rows)
+    gear = make_gear(
+        K=Prior("normal", K),
+        E0=Prior("fixed", (MODULUS,)),
+        alpha=Prior("fixed", (3e-4,)),
+        deformation_offset=Prior("fixed", (0.0,)),
+        force_offset=Prior("normal", OFFSET),
+        sigma=sigma,
+        noise_correlation=Prior("fixed", (0.0,)),
+    )
+    return make_case(make_records(deformation, force), gear)
+
+
+def exact(case, limit: float) -> float:
+    """Return the probability that a further reading exceeds a limit, by quadrature."""
+    records, sigma = case.records, case.gear.priors["sigma"]
+    unit = float(ring(case.gear.geometry, MODULUS))
+    design = np.column_stack([unit * records.deformation, np.ones(len(records.force))])
+    place = np.array([unit * AT, 1.0])
+    mean0, precision0 = np.array([K[0], OFFSET[0]]), np.diag([K[1], OFFSET[1]])
+    precision0 = np.linalg.inv(precision0**2)
+    if sigma.family == "fixed":
+        grid, prior = np.log(np.array(sigma.numbers)), np.zeros(1)
+    else:
+        grid = np.linspace(-6.0, 12.0, 6001)
+        prior = stats.norm.logpdf(grid, np.log(sigma.numbers[0]), sigma.numbers[1])
+    log_weight, tail = [], []
+    for log_sigma in grid:
+        variance = np.exp(2.0 * log_sigma)
+        precision = precision0 + design.T @ design / variance
+        covariance = np.linalg.inv(precision)
+        pull = precision0 @ mean0 + design.T @ records.force / variance
+        mean = covariance @ pull
+        fit = records.force @ records.force / variance - pull @ mean
+        _, volume = np.linalg.slogdet(precision)
+        log_weight.append(-0.5 * (fit + volume) - len(records.force) * log_sigma)
+        sd = np.sqrt(variance + place @ covariance @ place)
+        tail.append(stats.norm.sf((limit - place @ mean) / sd))
+    weight = np.exp(np.array(log_weight) + prior - np.max(log_weight + prior))
+    return float(weight @ np.array(tail) / weight.sum())
+
+
+def counted(force, limit: float) -> float:
+    """Return the mean over the sampler's draws."""
+    size = force.cause.values["K"].shape
+    return float(np.mean(np.asarray(force.along().above(np.full(size, limit)))))
+
+
+@pytest.mark.parametrize("law", SIGMAS)
+def test_tails_are_exact_however_far(law):
+    case = conjugate_case(SIGMAS[law])
+    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=300))
+    force = population_force(cause, AT, "readings")
+    for limit in LIMITS[law]:
+        found, true = rare(force, limit), exact(case, limit)
+        assert 1e-10 < true < 1e-2
+        error = abs(found.probability - true)
+        assert error < max(5.0 * found.relative_error, 0.01) * true
+        assert abs(np.log(found.probability / true)) < 0.05 * abs(np.log(true))
+        assert found.relative_error < 0.1
+    if law == "normal":
+        return
+    # The comparison can fail: a mean over draws does, where they are too few.
+    far = LIMITS[law][-1]
+    assert counted(force, far) < 1e-3 * exact(case, far)
+    # Six rows leave it to the prior of σ, and to the shape of the scatter.
+    assert found.without_prior > 3.0
+    assert found.heavy_tailed > 3.0
+
+
+def test_mountings_and_gaps_are_weighed_as_they_are_sampled():
+    """Where draws are enough for a mean, both say the same."""
+    rng, run = np.random.default_rng(5), np.repeat(np.arange(4), 10)
+    deformation = np.tile(np.linspace(0.02, 0.54, 10), 4)
+    force = 205.0 * deformation + rng.normal(0.0, 1.0, 4)[run]
+    force = force + rng.normal(0.0, 0.5, 40)
+    known = {"run", "runs"}
+    case = make_case(make_records(deformation, force, run=run, known=known))
+    (cause,) = causes_of(calibrate(case, with_gap=True, warmup=500, draws=1000))
+    expected = population_force(cause, AT, "mountings")
+    limit = float(np.quantile(np.asarray(expected.along().centre()), 0.9)) + 2.0
+    found, mean = rare(expected, limit), counted(expected, limit)
+    assert 0.005 < mean < 0.2
+    assert found.probability == pytest.approx(mean, rel=0.1)
+
+
+def test_causes_are_averaged():
+    case = conjugate_case(SIGMAS["normal"])
+    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=300))
+    force = population_force(cause, AT, "readings")
+    near, far = (rare(force, limit) for limit in (85.0, 87.0))
+    both = pooled_rare([(0.25, near), (0.75, far)])
+    mean = 0.25 * near.probability + 0.75 * far.probability
+    assert both.probability == pytest.approx(mean)
+    assert 0.0 < both.relative_error < 0.1
