@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from hdcal.data.case import Gear, Theory
+from hdcal.data.certificates import GAUGE_UNITS, certificate_priors
 from hdcal.data.gear_schema import GearFile, check_schema, size_findings
 from hdcal.data.prior import Prior
 from hdcal.data.prior_entry import read_prior
@@ -30,7 +31,8 @@ def read_gear(
 ) -> Gear:
     """Read a gear file and merge its priors.
 
-    Later ones win: shipped rig priors, the material's, those of the gear file.
+    Later ones win: shipped rig priors, the material's, those of certificates, those
+    of the gear file.
     An influence coefficient K in the file refers to the theory in the file, the
     shipped one to `ring`.
 
@@ -66,7 +68,8 @@ def _assemble(
 ) -> Gear:
     sizes, measurement = model.gear, model.measurement
     given, effects = own
-    merged = rig_priors() | facts | given
+    stated = certificate_priors(measurement.certificates)
+    merged = rig_priors() | facts | stated | given
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     geometry = Geometry(
         wall_thickness=sizes.wall_thickness_mm,
@@ -92,6 +95,7 @@ def _assemble(
         effect_priors=effects,
         dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
+        gauge_priors={name: stated[name] for name in GAUGE_UNITS if name in stated},
     )
 
 
