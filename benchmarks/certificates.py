@@ -10,17 +10,22 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from arviz_base import from_dict
 
-import hdcal
 from benchmarks.children import table
 from hdcal.data.case import Case, Gear
 from hdcal.data.gear import read_gear
+from hdcal.data.priors import effect_priors
 from hdcal.data.records import Records
+from hdcal.inference import laplace
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import build_problem, problem_priors
+from hdcal.inference.sample import sample
 from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.mixture import pooled
+from hdcal.prediction.engine.mixture import Mixture, pooled
 from hdcal.prediction.engine.population_force import population_force
 
 RIGS, AT = 300, 0.4
@@ -43,6 +48,7 @@ TOLD = "as stated"
 WRONG = "gains ignored"
 SILENT = "no certificate"
 QUANTITIES = ("load", "stiffness", "next reading")
+TAILS = np.array([0.025, 0.975])
 
 
 @cache
@@ -133,40 +139,52 @@ def made(seed: int) -> Rig:
     )
 
 
+def sampled(case: Case, seed: int) -> Posterior:
+    """Return short chains of a case: what `calibrate` draws, its checks left out."""
+    shipped, theory = effect_priors(), case.gear.theory
+    problem, key = build_problem(case, shipped), jax.random.key(seed)
+    size = {"chains": 2, "warmup": 300, "draws": 500}
+    draws = sample(problem, laplace.fit(problem), key, **size)
+    priors = problem_priors(case, (), shipped, theory)
+    tree = from_dict({"posterior": draws.values})
+    return Posterior(case, theory, (), priors, tree, {}, (), {"with_gap": False})
+
+
+@jax.jit
+def ends(mixture: Mixture):
+    """Return the ends of the 95 % interval of the next member [N]."""
+    size = mixture.mean.shape[0]
+    whole = pooled([(jnp.full(size, 1.0 / size), mixture)])
+    return whole.quantile(jnp.array(TAILS[0])), whole.quantile(jnp.array(TAILS[1]))
+
+
 def intervals(posterior: Posterior) -> dict[str, np.ndarray]:
     """Return 95 % intervals of load, stiffness and the next reading."""
-    (cause,) = causes_of(posterior, allow_failed=True)
-    ends = np.array([0.025, 0.975])
+    (cause,) = causes_of(posterior)
 
     def at(quantity):
         asked = population_force(cause, AT, "readings", quantity=quantity)
         there = asked.at(posterior.case.gear.reference_temperature)
         return there.mixture()
 
-    load, reading = at("load"), at("reading")
-    even = np.full(cause.size, 1.0 / cause.size)
-    whole = pooled([(even, reading)])
     return {
-        "load": np.quantile(np.asarray(load.centre()), ends),
-        "stiffness": np.quantile(cause.values["stiffness"], ends),
-        "next reading": np.array([float(whole.quantile(jnp.array(p))) for p in ends]),
+        "load": np.quantile(np.asarray(at("load").mean[:, 0]), TAILS),
+        "stiffness": np.quantile(cause.values["stiffness"], TAILS),
+        "next reading": np.array(ends(at("reading"))),
     }
 
 
 def answered(seed: int, contender: str) -> np.ndarray:
-    """Return whether each interval holds the truth, how wide it is, and the ESS."""
+    """Return whether each interval holds the truth, and its width over the truth."""
     rig = made(seed)
     case = replace(rig.case, gear=gears()[contender])
-    size = {"chains": 2, "warmup": 300, "draws": 500}
-    posterior = hdcal.calibrate(case, seed=seed, **size)
-    found = intervals(posterior)
+    found = intervals(sampled(case, seed))
     truth = dict(
         zip(QUANTITIES, (rig.load, rig.stiffness, rig.next_reading), strict=True)
     )
     held = [found[q][0] <= truth[q] <= found[q][1] for q in QUANTITIES]
     wide = [float(np.ptp(found[q]) / abs(truth[q])) for q in QUANTITIES]
-    least = min(one.ess_bulk for one in posterior.diagnoses.values())
-    return np.array([*held, *wide, least])
+    return np.array([*held, *wide])
 
 
 def coverage(contender: str, seeds: range) -> np.ndarray:
@@ -181,6 +199,5 @@ def main(repeats: int = 5, rigs: int = RIGS) -> None:
         found = coverage(name, range(10_000, 10_000 + rigs))
         held, wide = found[:, :3].mean(axis=0), np.median(found[:, 3:6], axis=0)
         cells = [f"{h:.1%} (± {w / 2:.2%})" for h, w in zip(held, wide, strict=True)]
-        rows.append((name, rigs, *cells, f"{np.median(found[:, 6]):.0f}"))
-    heading = ("gear file", "rigs", *QUANTITIES, "least ESS of 1000, median")
-    table(heading, rows)
+        rows.append((name, rigs, *cells))
+    table(("gear file", "rigs", *QUANTITIES), rows)

@@ -123,6 +123,11 @@ BAD = {
     "not finite": ("expanded_percent = nan", f"{HERE}.expanded_percent", "finite"),
     "text": ('expanded_N = "1"', f"{HERE}.expanded_N", "number"),
     "true": ("expanded_N = true", f"{HERE}.expanded_N", "number"),
+    "huge class": (
+        f"iso376_class = 1{'0' * 400}",
+        f"{HERE}.iso376_class",
+        "unknown choice",
+    ),
     "true class": ("iso376_class = true", f"{HERE}.iso376_class", ""),
 }
 

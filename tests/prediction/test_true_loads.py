@@ -163,7 +163,7 @@ def short(hits: np.ndarray, share: float = 0.95) -> float:
 
 
 def test_a_slice_of_coverage():
-    hits = {name: coverage(name, range(25))[:, :3] for name in (TOLD, WRONG)}
+    hits = {name: coverage(name, range(20))[:, :3] for name in (TOLD, WRONG)}
     for column in range(len(QUANTITIES)):
         assert short(hits[TOLD][:, column]) > 1e-3
     # The same few rigs flag gains that are ignored, which no reading shows.

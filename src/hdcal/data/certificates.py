@@ -4,11 +4,12 @@ A gain is an error in proportion to the reading, a zero one that all readings sh
 Neither averages out over rows, and no row shows it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
+from hdcal.data.plausible import range_of
 from hdcal.data.prior import Prior
 from hdcal.data.priors import MODEL_UNITS
 from hdcal.data.typed_json import within
@@ -28,7 +29,7 @@ GAUGE_UNITS = {**dict.fromkeys(GAINS, "1"), "temperature_offset": "K"}
 
 _Percent = Annotated[float, within("expanded_percent")]
 # A class is a name, but 0.5 without quotation marks is meant as one.
-_Named = BeforeValidator(lambda x: f"{x:g}" if type(x) in (int, float) else x)
+_Named = BeforeValidator(lambda x: str(x) if type(x) in (int, float) else x)
 
 
 class GaugeCertificate(BaseModel):
@@ -90,6 +91,15 @@ _SOURCE = "certificate: "
 def is_stated(prior: Prior) -> bool:
     """Tell whether a prior is one that a certificate states."""
     return prior.family == "normal" and prior.source.startswith(_SOURCE)
+
+
+def can_state(site: str, family: str, numbers: Sequence[float]) -> bool:
+    """Tell whether a certificate can state a prior of a site, in code units."""
+    most = range_of("expanded_K").high
+    if site in GAINS:
+        most = 0.01 * range_of("expanded_percent").high
+    centred = family == "normal" and numbers[0] == 0.0
+    return site in GAUGE_UNITS and centred and 0.0 < numbers[1] <= most
 
 
 def certificate_faults(

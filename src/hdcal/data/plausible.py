@@ -64,8 +64,6 @@ RANGES = {
     "expanded_percent": Range(1e-6, 20.0, "%", "no gauge with a certificate is worse"),
     "expanded_K": Range(1e-6, 50.0, "K", "no gauge with a certificate is worse"),
     "k": Range(1.0, 5.0, "", "from a standard uncertainty to beyond every table"),
-    "gain": Range(-0.5, 0.5, "", "no gauge is wrong by half of its reading"),
-    "temperature_offset": Range(-50.0, 50.0, "K", "no thermometer is worse"),
     # the gear and what is believed of it
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
@@ -129,7 +127,6 @@ NAMES = {
     "nominal_deformation": "size",
     "expanded_N": "force_resolution",
     "expanded_mm": "deformation_sigma",
-    **dict.fromkeys(("force_gain", "deformation_gain"), "gain"),
     **dict.fromkeys(("content", "confidence", "required_probability"), "share"),
     **dict.fromkeys(("probability", "interval"), "share"),
     "tolerances": "tolerance",

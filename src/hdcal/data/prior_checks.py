@@ -14,9 +14,6 @@ _SIGNED = (
     "cte",
     "initial_deformation",
     "initial_velocity",
-    "force_gain",
-    "deformation_gain",
-    "temperature_offset",
 )
 _SIZES = ("sd", "log_sd", "median", "a", "b")
 

@@ -12,6 +12,7 @@ from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.prepare import log_moments
+from hdcal.inference.distributions import moments
 from hdcal.physics.theory import THEORIES
 from hdcal.report.parameters import Interval
 
@@ -142,4 +143,4 @@ def _causes(case: Case) -> list[tuple[str, float, float, str]]:
 def _gain_sd(gear: Gear) -> float:
     """Return the sd of the gauges' gains together: certificates', or what is usual."""
     stated = [gear.gauge_priors[name] for name in GAINS if name in gear.gauge_priors]
-    return float(np.hypot.reduce([p.numbers[1] for p in stated])) if stated else 0.005
+    return float(np.hypot.reduce([moments(p)[1] for p in stated])) if stated else 0.005

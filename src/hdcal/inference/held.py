@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
-from hdcal.data.certificates import GAUGE_UNITS
+from hdcal.data.certificates import can_state
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
@@ -86,11 +86,12 @@ class HeldGear:
         # Whose values are computed anew for another theory.
         if "K" not in self.priors:
             raise ValueError("has no prior of K")
-        # Which of the sites there are rests on these names.
-        if not self.gauge_priors.keys() <= GAUGE_UNITS.keys():
-            raise ValueError("has a certificate of what no gauge has")
-        tables = self.priors | self.scale_priors | self.dynamic_priors
-        for name, prior in (tables | self.gauge_priors).items():
+        for name, prior in self.gauge_priors.items():
+            if not can_state(name, prior.family, prior.numbers):
+                raise ValueError("has a certificate that no gauge has")
+        for name, prior in (
+            self.priors | self.scale_priors | self.dynamic_priors
+        ).items():
             given = prior.family, prior.numbers, name
             if sign_faults(*given) or range_faults(*given):
                 raise ValueError("has priors that no gear has")
