@@ -11,6 +11,7 @@ NAMES = (
     "tracking",
     "verdicts",
     "designs",
+    "certificates",
 )
 
 

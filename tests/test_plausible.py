@@ -88,6 +88,12 @@ def read_entries() -> Iterator[tuple[str, str, Callable]]:
     ]:
         name = key.rpartition(".")[2].rpartition("_")[0]
         yield NAMES.get(name, name), key, partial(gear_key, key)
+    stated = {"force": ("percent", "N"), "deformation": ("mm",), "temperature": ("K",)}
+    for gauge, units in stated.items():
+        table = f"measurement.{gauge}_calibration"
+        for name in ("k", *(f"expanded_{unit}" for unit in units)):
+            key = f"{table}.{name}"
+            yield NAMES.get(name, name), key, partial(gear_key, key)
     for name in STEEL:
         yield name, f"{name}.value", partial(material, name)
     for name in (

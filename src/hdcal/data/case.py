@@ -33,6 +33,8 @@ class Gear:
         dynamic_priors: of the moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.
         density: of the material [N·s²/mm⁴], None where its file says nothing of it.
+        gauge_priors: of the gauges' gains and the thermometer's offset, those that a
+            certificate states: keys of `GAUGE_UNITS`.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Gear:
     effect_priors: dict[str, Prior] = field(default_factory=dict)
     dynamic_priors: dict[str, Prior] = field(default_factory=dict)
     density: float | None = None
+    gauge_priors: dict[str, Prior] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, repr=False)

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from hdcal.data.case import Gear, Theory
+from hdcal.data.certificates import GAUGE_UNITS, certificate_priors
 from hdcal.data.gear_schema import GearFile, check_schema, size_findings
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.prior_entry import read_prior
@@ -35,7 +36,8 @@ def read_gear(
 ) -> Gear:
     """Read a gear file and merge its priors.
 
-    Later ones win: shipped rig priors, the material's, those of the gear file.
+    Later ones win: shipped rig priors, the material's, those of certificates, those
+    of the gear file.
     An influence coefficient K in the file refers to the theory in the file, the
     shipped one to `ring`.
 
@@ -71,7 +73,8 @@ def _assemble(
 ) -> Gear:
     sizes, measurement = model.gear, model.measurement
     given, effects = own
-    merged = rig_priors() | facts | given
+    stated = certificate_priors(measurement.certificates)
+    merged = rig_priors() | facts | stated | given
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     geometry = Geometry(
         wall_thickness=sizes.wall_thickness_mm,
@@ -97,14 +100,14 @@ def _assemble(
         effect_priors=effects,
         dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
+        gauge_priors={name: stated[name] for name in GAUGE_UNITS if name in stated},
     )
 
 
 def at_full_scale(gear: Gear, full_scale: float) -> Gear:
     """Return a gear whose shipped priors in newtons are those of its own rig.
 
-    They are written for a full scale of `FULL_SCALE`; what the gear file itself
-    states stays.
+    They are written for a full scale of `FULL_SCALE`; what the gear file states stays.
 
     Args:
         gear: from `read_gear`.
@@ -112,12 +115,14 @@ def at_full_scale(gear: Gear, full_scale: float) -> Gear:
     """
     if not full_scale > 0.0:
         return gear
-    stated = gear.source.get("priors", {})
+    shipped, ratio = rig_priors(), full_scale / FULL_SCALE
 
     def own(table: dict[str, Prior]) -> dict[str, Prior]:
-        shipped = [name for name in IN_NEWTONS if name in table and name not in stated]
-        ratio = full_scale / FULL_SCALE
-        return table | {name: scaled(table[name], ratio) for name in shipped}
+        return table | {
+            name: scaled(shipped[name], ratio)
+            for name in IN_NEWTONS
+            if name in table and table[name].source == shipped[name].source
+        }
 
     return replace(gear, priors=own(gear.priors), scale_priors=own(gear.scale_priors))
 

@@ -3,15 +3,22 @@
 import math
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from hdcal.data.case import Theory
-from hdcal.data.plausible import implausible, range_of
+from hdcal.data.certificates import (
+    DeformationCertificate,
+    ForceCertificate,
+    GaugeCertificate,
+    TemperatureCertificate,
+    certificate_faults,
+)
+from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.typed_json import within
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -40,6 +47,14 @@ class MeasurementTable(BaseModel):
     deformation: Literal["radial", "diametral"] = "radial"
     reference_temperature_C: Annotated[float, within("temperature")] = 20.0
     force_resolution_N: Annotated[float, within("force_resolution")] | None = None
+    force_calibration: ForceCertificate | None = None
+    deformation_calibration: DeformationCertificate | None = None
+    temperature_calibration: TemperatureCertificate | None = None
+
+    @property
+    def certificates(self) -> dict[str, GaugeCertificate]:
+        """The certificates that are there, by their keys."""
+        return {n: one for n, one in self if isinstance(one, GaugeCertificate)}
 
 
 class GearFile(BaseModel):
@@ -58,10 +73,14 @@ def check_schema(toml: TomlFile) -> GearFile:
         InputError: holds everything that is missing, unknown or of a wrong type.
     """
     try:
-        return GearFile.model_validate(toml.table)
+        found = GearFile.model_validate(toml.table)
     except ValidationError as error:
         findings = [_translate(dict(item), toml) for item in error.errors()]
         raise InputError(findings) from None
+    with Findings() as wrong:
+        for key, words, remedy in certificate_faults(found.measurement.certificates):
+            wrong.append(toml.finding(words, remedy, f"measurement.{key}"))
+    return found
 
 
 def _translate(error: dict, toml: TomlFile) -> Finding:
@@ -70,23 +89,32 @@ def _translate(error: dict, toml: TomlFile) -> Finding:
     kind, value = error["type"], error["input"]
     if kind == "extra_forbidden":
         *table, name = error["loc"]
-        model: Any = GearFile.model_fields[table[0]].annotation if table else GearFile
-        return toml.finding(
-            "unknown key", did_you_mean(name, list(model.model_fields)), key
-        )
+        known = list(_model_of(table).model_fields)
+        return toml.finding("unknown key", did_you_mean(name, known), key)
     if kind == "missing":
         return toml.finding("is missing", f"Add it: {_example(key)}", key)
     if kind == "literal_error":
         remedy = did_you_mean(
-            str(value), re.findall(r"'(\w+)'", error["ctx"]["expected"])
+            str(value), re.findall(r"'([^']+)'", error["ctx"]["expected"])
         )
         return toml.finding(f"unknown choice '{value}'", remedy, key)
     if kind in ("greater_than_equal", "less_than_equal"):
-        quantity = key.rpartition(".")[2].rpartition("_")[0]
+        name = key.rpartition(".")[2]
+        quantity = name if name in (*RANGES, *NAMES) else name.rpartition("_")[0]
         (found,) = implausible(key, value, quantity)
         return toml.finding(found.problem, found.remedy, key)
     words = error["msg"][:1].lower() + error["msg"][1:]
     return toml.finding(words, f"Write it like {_example(key)}", key)
+
+
+def _model_of(table: list[str]) -> Any:
+    """Return the model of a table of the gear file."""
+    model: Any = GearFile
+    for name in table:
+        kind = model.model_fields[name].annotation
+        # A table that may be missing is "this one, or nothing".
+        model = next(iter(get_args(kind)), kind)
+    return model
 
 
 def _example(key: str) -> str:
@@ -99,6 +127,9 @@ def _example(key: str) -> str:
         "material": 'material = "steel"',
         "theory": 'theory = "ring"',
         "deformation": 'deformation = "radial"',
+        "force_calibration": "force_calibration = { expanded_percent = 0.5, k = 2 }",
+        "deformation_calibration": "deformation_calibration = { expanded_mm = 0.002 }",
+        "temperature_calibration": "temperature_calibration = { expanded_K = 1.0 }",
     }
     return examples.get(name, f"{name} = … (a number)")
 

@@ -60,6 +60,10 @@ RANGES = {
     "time": Range(-1e12, 1e12, "s", "thirty thousand years"),
     "angle": Range(-1e9, 1e9, "rad", "a hundred million turns"),
     "force_sd": Range(0.0, 1e9, "N", _SCATTER),
+    # what a calibration certificate of a gauge states
+    "expanded_percent": Range(1e-6, 20.0, "%", "no gauge with a certificate is worse"),
+    "expanded_K": Range(1e-6, 50.0, "K", "no gauge with a certificate is worse"),
+    "k": Range(1.0, 5.0, "", "from a standard uncertainty to beyond every table"),
     # the gear and what is believed of it
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
@@ -122,6 +126,8 @@ NAMES = {
     **dict.fromkeys(("temperatures", "reference_temperature"), "temperature"),
     **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), "size"),
     "nominal_deformation": "size",
+    "expanded_N": "force_resolution",
+    "expanded_mm": "deformation_sigma",
     **dict.fromkeys(("content", "confidence", "required_probability"), "share"),
     **dict.fromkeys(("probability", "interval"), "share"),
     "noise_correlation": "correlation",

@@ -5,12 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.case import Case, Gear
+from hdcal.data.certificates import GAINS
 from hdcal.diagnosis.budget import Budget, BudgetPart
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.prepare import log_moments
+from hdcal.inference.distributions import moments
 from hdcal.physics.theory import THEORIES
 from hdcal.report.parameters import Interval
 
@@ -134,5 +136,11 @@ def _causes(case: Case) -> list[tuple[str, float, float, str]]:
             "measure the outer diameter and the wall",
         ),
         ("modulus", 0.0, modulus_sd, "test a strip of the same material"),
-        ("gauge gain", 0.0, 0.005, "load the sensor with known weights"),
+        ("gauge gain", 0.0, _gain_sd(case.gear), "load the sensor with known weights"),
     ]
+
+
+def _gain_sd(gear: Gear) -> float:
+    """Return the sd of the gauges' gains together: certificates', or what is usual."""
+    stated = [gear.gauge_priors[name] for name in GAINS if name in gear.gauge_priors]
+    return float(np.hypot.reduce([moments(p)[1] for p in stated])) if stated else 0.005

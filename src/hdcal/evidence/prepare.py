@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.certificates import GAINS
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
 from hdcal.evidence.effect_curves import base_reading
@@ -125,7 +127,10 @@ def _stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
         float(THEORIES[theory](case.gear.geometry, modulus))
         for theory in (case.gear.theory, "ring")
     )
-    return k_mean + float(np.log(nominal)), float(np.hypot(k_sd, e_sd)), nominal, ring
+    # The stiffness as read has the gains in it.
+    gains = [_moments(priors[name])[1] for name in GAINS if name in priors]
+    sd = float(reduce(np.hypot, [k_sd, e_sd, *gains]))
+    return k_mean + float(np.log(nominal)), sd, nominal, ring
 
 
 def _linearise(

@@ -181,7 +181,7 @@ def conflict_check(
             far.append(f"{parameter} = {median:.3g}, expected {low:.3g} to {high:.3g}")
     if not far:
         return Check(name, "passed", "every median lies within its prior's 99.7 %")
-    words = f"far outside what was expected before the data: {_list(far)}"
+    words = f"far outside what was expected before the data: {listed(far)}"
     remedy = "a wrong unit, reading (radial or diametral) or size of the gear?"
     return Check(name, "warning", f"{words}. {remedy}")
 
@@ -213,12 +213,13 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
     return Check(
         name,
         "warning",
-        f"{_list(piled)}: an effect at zero is not needed by these data, any other "
+        f"{listed(piled)}: an effect at zero is not needed by these data, any other "
         "bound cuts the answer off",
     )
 
 
-def _list(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
+    """Return names as a list in words."""
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 

@@ -23,7 +23,7 @@ class DynamicPosterior(Posterior):
     @staticmethod
     def sites(case, effects, with_gap) -> dict[str, tuple[int, ...]]:
         """Return the shape of each parameter that a draw holds."""
-        return dict.fromkeys(("E0", "K", *SITES), ())
+        return dict.fromkeys(("E0", "K", *case.gear.gauge_priors, *SITES), ())
 
     @cached_property
     def problem(self) -> Problem:

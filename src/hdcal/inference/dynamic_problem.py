@@ -16,7 +16,8 @@ from hdcal.data.prior import Prior, scaled
 from hdcal.data.records import Array
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.model import model, sample_influence, sample_site
+from hdcal.inference.gauges import where_read, with_gains
+from hdcal.inference.model import model, sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
 from hdcal.inference.problem import (
     case_reading,
@@ -88,10 +89,10 @@ def dynamic_site_priors(case: Case, theory: Theory) -> dict[str, Prior]:
         InputError: the moved mass has none.
     """
     gear = case.gear
-    table = {**gear.priors, **gear.dynamic_priors}
+    table = {**gear.priors, **gear.dynamic_priors, **gear.gauge_priors}
     table["mass"] = mass_prior(gear, case_reading(case).radial_per_read)
     table["K"] = influence_prior(case, theory)
-    return {name: table[name] for name in ("K", "E0", *SITES)}
+    return {name: table[name] for name in ("K", "E0", *gear.gauge_priors, *SITES)}
 
 
 def build_dynamic(case: Case, priors: Mapping[str, Prior], theory: Theory):
@@ -119,13 +120,13 @@ def build_dynamic(case: Case, priors: Mapping[str, Prior], theory: Theory):
 
 
 def oscillation(problem: DynamicProblem, values: Values) -> dict:
-    """Return stiffness, damping and frequency that belong to the sampled values.
+    """Return true stiffness, damping and frequency that belong to the sampled values.
 
     `stiffness` is at T_ref, `warm_stiffness` [N/mm] at the temperature of the test,
     as are `damping` [N·s/mm] and `natural_frequency` [Hz].
     """
     stiffness = values["K"] * values["E0"] * problem.unit_stiffness
-    warm = stiffness * (1.0 - values["alpha"] * problem.rise)
+    warm = where_read(values, stiffness) * (1.0 - values["alpha"] * problem.rise)
     damping = 2.0 * values["damping_ratio"] * jnp.sqrt(warm * values["mass"])
     return {
         "stiffness": stiffness,
@@ -140,9 +141,9 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
     own = oscillation(problem, values)
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
     states = linear_response(
-        values["mass"],
-        own["damping"],
-        own["warm_stiffness"],
+        with_gains(values, values["mass"]),
+        with_gains(values, own["damping"]),
+        with_gains(values, own["warm_stiffness"]),
         problem.time,
         problem.force,
         start,
@@ -166,8 +167,7 @@ def _(problem: DynamicProblem, values: Values) -> Float[Array, ""]:
 @model.register
 def _(problem: DynamicProblem) -> None:
     priors = problem.priors
-    values = {"E0": sample_site("E0", priors["E0"])}
-    values["K"] = sample_influence(priors["K"], values["E0"])
+    values = sample_stiffness(priors)
     values |= {name: sample_site(name, priors[name]) for name in SITES}
     for name, value in oscillation(problem, values).items():
         numpyro.deterministic(name, value)

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
+from hdcal.data.certificates import can_state
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
@@ -71,6 +72,7 @@ class HeldGear:
     # A file of before there were dynamics is as good as ever for the rest.
     dynamic_priors: Priors = field(default_factory=dict)
     density: Annotated[float, within("density")] | None = None
+    gauge_priors: Priors = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         step = self.force_resolution
@@ -84,6 +86,9 @@ class HeldGear:
         # Whose values are computed anew for another theory.
         if "K" not in self.priors:
             raise ValueError("has no prior of K")
+        for name, prior in self.gauge_priors.items():
+            if not can_state(name, prior.family, prior.numbers):
+                raise ValueError("has a certificate that no gauge has")
         for name, prior in (
             self.priors | self.scale_priors | self.dynamic_priors
         ).items():

@@ -7,6 +7,7 @@ from functools import partial
 import jax
 import numpy as np
 
+from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
 from hdcal.inference.discrepancy import discrepancy_columns, prior_sd
 from hdcal.inference.padding import pad_records
@@ -15,7 +16,7 @@ from hdcal.inference.values import predict_rows
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
 # parameter of an effect on the noise.
-_MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset")
+_MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
 _MOST_MEMBERS = 200
 
 

@@ -1,10 +1,11 @@
 """The NumPyro model: the force model with any set of effects.
 
-Stiffness identifies K·E₀ only, so that product is sampled, given E₀, under exactly
-the prior that K and E₀ imply; K follows from both. Sites whose names begin with
-"_" are coordinates of the sampler, not results.
+The stiffness as read identifies K·E₀ times the gauges' gains only, so that product is
+sampled, given the rest, under exactly the prior that all imply; K follows. Sites whose
+names begin with "_" are coordinates of the sampler, not results.
 """
 
+from collections.abc import Mapping
 from functools import singledispatch
 
 import jax.numpy as jnp
@@ -12,10 +13,12 @@ import numpyro
 import numpyro.distributions as dist
 from jax.nn import log_sigmoid, softplus
 
+from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
+from hdcal.inference.gauges import with_gains
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import CORRELATION
@@ -50,8 +53,17 @@ def _sample_amplitude(problem: Problem, name: str):
     return numpyro.deterministic(name, size)
 
 
-def sample_influence(prior: Prior, modulus):
-    """Sample K·E₀ under the prior of K, and return K."""
+def sample_stiffness(priors: Mapping[str, Prior]) -> dict:
+    """Sample E₀, what certificates state of the gauges, and K."""
+    values = {"E0": sample_site("E0", priors["E0"])}
+    stated = (name for name in GAUGE_UNITS if name in priors)
+    values |= {name: sample_site(name, priors[name]) for name in stated}
+    values["K"] = _sample_influence(priors["K"], with_gains(values, values["E0"]))
+    return values
+
+
+def _sample_influence(prior: Prior, modulus):
+    """Sample K·E₀, as read, under the prior of K, and return K."""
     if prior.family == "fixed":
         return sample_site("K", prior)
     of_K = distribution(prior)
@@ -72,11 +84,21 @@ def _sample_members(name: str, sd, count: int):
     return numpyro.deterministic(name, half * score)
 
 
+def _widen_zero(problem: Problem, values: dict) -> None:
+    """Add what the tested mountings add on average to the zero of the gauge itself."""
+    gauge, zero = distribution(problem.priors["force_offset"]), values["force_offset"]
+    of_mean = values["run_offset_sd"] / jnp.sqrt(problem.runs)
+    both = dist.Normal(gauge.mean, jnp.hypot(gauge.variance**0.5, of_mean))
+    numpyro.factor("_zero", both.log_prob(zero) - gauge.log_prob(zero))
+
+
 def _sample_structure(problem: Problem, values: dict) -> None:
     """Sample what belongs to runs, specimens and the discrepancy, and their scales."""
     integrated, priors = problem.integrated, problem.priors
     if problem.runs:
         values["run_offset_sd"] = sample_site("run_offset_sd", priors["run_offset_sd"])
+        if problem.zero_stated:
+            _widen_zero(problem, values)
         if "run" not in integrated:
             sd = values["run_offset_sd"]
             values["run_offset"] = _sample_members("run_offset", sd, problem.runs)
@@ -103,8 +125,7 @@ def model(problem: Sampled) -> None:
 @model.register
 def _(problem: Problem) -> None:
     priors = problem.priors
-    values = {"E0": sample_site("E0", priors["E0"])}
-    values["K"] = sample_influence(priors["K"], values["E0"])
+    values = sample_stiffness(priors)
     for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
         values[name] = sample_site(name, priors[name])
     if problem.correlated:

@@ -59,7 +59,13 @@ def restore_priors(held: Mapping[str, HeldPrior]) -> dict[str, Prior]:
     }
 
 
-_TABLES = ("priors", "scale_priors", "effect_priors", "dynamic_priors")
+_TABLES = (
+    "priors",
+    "scale_priors",
+    "effect_priors",
+    "dynamic_priors",
+    "gauge_priors",
+)
 
 
 def describe_case(case: Case) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.case import Case, Theory
+from hdcal.data.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records
@@ -55,6 +56,8 @@ class Problem(Sampled):
         integrated: which of "run", "specimen", "discrepancy" are integrated out, as
             `integrated_kinds` orders them.
         count: measured rows; `records` and `columns` have padding after them.
+        zero_stated: a certificate states the zero of the force gauge itself, to which
+            each mounting adds its own.
     """
 
     priors: dict[str, Prior]
@@ -74,6 +77,7 @@ class Problem(Sampled):
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
     count: int = 0
+    zero_stated: bool = eqx.field(static=True, default=False)
 
     @property
     def rows(self) -> Records:
@@ -127,8 +131,9 @@ def problem_priors(
     """
     gear, effects = case.gear, without_scatter(effects)
     table = {**shipped, **gear.effect_priors, **gear.scale_priors, **gear.priors}
+    table |= gear.gauge_priors
     names = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
-    names += [*SCALE_UNITS]
+    names += [*SCALE_UNITS, *gear.gauge_priors]
     names += [f"{effect.name}.{p}" for effect in effects for p in parameters(effect)]
     missing = [name for name in names if name not in table]
     if missing:
@@ -227,6 +232,7 @@ def build_problem(
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=integrated,
+        zero_stated=is_stated(case.gear.priors["force_offset"]),
         **rows,
     )
 

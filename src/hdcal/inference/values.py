@@ -9,6 +9,7 @@ from jaxtyping import Float
 from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
+from hdcal.inference.gauges import as_read
 from hdcal.inference.member_counts import member_counts
 from hdcal.inference.noise_form import correlates
 from hdcal.inference.problem import Problem, without_scatter
@@ -39,6 +40,7 @@ def site_shapes(
 ) -> dict[str, tuple[int, ...]]:
     """Return the shape of each parameter that a draw of the model holds."""
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
+    names += case.gear.gauge_priors
     for effect in without_scatter(effects):
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
     if correlates(case, effects, with_gap=with_gap):
@@ -51,7 +53,7 @@ def site_shapes(
 
 
 def stiffness(problem: Problem, values: Values) -> Float[Array, ""]:
-    """Return K·k_theory at T_ref, per mm as read [N/mm]."""
+    """Return K·k_theory at T_ref, per mm read without error [N/mm]."""
     radial = values["K"] * values["E0"] * problem.unit_stiffness
     return radial * problem.reading.radial_per_read
 
@@ -62,7 +64,7 @@ def correlation_of(values: Values) -> Float[Array, ""] | float:
 
 
 def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Base:
-    """Return the base parameters of given runs and specimens.
+    """Return the base parameters of given runs and specimens, as read.
 
     Deviations that are not among the values (integrated out) count as zero.
 
@@ -73,6 +75,7 @@ def member_base(problem: Problem, values: Values, run=None, specimen=None) -> Ba
         specimen: specimen indices, or None likewise.
     """
     scale, offset = values["K"] * values["E0"] * problem.unit_stiffness, 0.0
+    scale = as_read(values, scale)
     if specimen is not None and "specimen_deviation" in values:
         scale = scale * (1.0 + values["specimen_deviation"][specimen])
     if run is not None and "run_offset" in values:

@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.prior import Prior, scaled
 from hdcal.inference.distributions import bounds, frozen
+from hdcal.inference.gauges import as_read
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import POSITIVE
 from hdcal.physics.chain import Base, Reading, linear_coefficients
@@ -50,6 +51,7 @@ def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
     draws, problem = dict(posterior.draws), posterior.problem
     rng, size = np.random.default_rng(seed), len(draws["K"])
     stiffness = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
+    stiffness = as_read(draws, stiffness)
     if problem.specimens:
         sd = draws["specimen_sd"] * np.sqrt(1.0 + 1.0 / problem.specimens)
         stiffness = stiffness * (1.0 + sd * rng.standard_normal(size))

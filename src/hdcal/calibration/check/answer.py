@@ -23,6 +23,24 @@ class CheckedGear:
 
 
 @dataclass(frozen=True)
+class StatedError:
+    """What a calibration certificate states of a gauge, as the prior of a parameter.
+
+    Attributes:
+        standard_uncertainty: U/k.
+        unit: of it.
+        certificate: as it stands in the gear file.
+        words: what comes of it.
+    """
+
+    parameter: str
+    standard_uncertainty: float
+    unit: str
+    certificate: str
+    words: str
+
+
+@dataclass(frozen=True)
 class RowsByMovement:
     """Number of rows by the movement that led to them.
 
@@ -65,6 +83,7 @@ class CheckAnswer(Answer):
     schema: Literal["hdcal.check/1"] = "hdcal.check/1"
     case: str
     gear: CheckedGear
+    certificates: tuple[StatedError, ...]
     data: CheckedData
     effects: EffectsInReach
     notes: tuple[str, ...]

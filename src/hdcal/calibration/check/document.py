@@ -8,6 +8,25 @@ from hdcal.report.document import Document, Facts, Section
 HEADLINE = "The input is in order."
 DOUBTFUL = "The input can be read, but the stiffness it shows is not plausible."
 _MOST_LISTED = 8
+_GAIN = (
+    "the data cannot tell it from the stiffness, so it widens stiffness, K and the "
+    "load on a gear, not the next reading of this rig"
+)
+_ZERO = "it is the prior of that zero, which a load on the gear leaves out"
+STATED = {
+    "force_gain": _GAIN,
+    "deformation_gain": _GAIN,
+    "temperature_offset": (
+        "it shifts the temperature at which stiffness and loads hold, not that of the "
+        "next reading of this rig"
+    ),
+    "force_offset": _ZERO,
+    "deformation_offset": "it is the prior of that zero, which widens a load",
+}
+OWN_SCATTER = (
+    "force_sd is taken as scatter of its own in each row, which many rows average out, "
+    "and not as a gain: an error common to all rows is a force_calibration"
+)
 
 
 def check_document(found: CheckAnswer) -> Document:
@@ -32,6 +51,9 @@ def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
     way = f"{gear.deformation}, as read"
     yield "deformation", f"{_span(data.deformation_mm)} mm ({way})"
     yield "force", f"{_span(data.force_N)} N"
+    for one in found.certificates:
+        known = f"± {one.standard_uncertainty:.3g} {one.unit} (standard uncertainty)"
+        yield one.parameter, f"{known}, {one.certificate}: {one.words}"
     measured = "" if data.temperature_measured else " (not measured: the reference)"
     yield "temperature", f"{_span(data.temperature_C)} °C{measured}"
     moves = vars(data.direction).items()

@@ -9,12 +9,20 @@ from hdcal.calibration.check.answer import (
     EffectsInReach,
     Ends,
     RowsByMovement,
+    StatedError,
 )
-from hdcal.calibration.check.document import DOUBTFUL, HEADLINE
-from hdcal.data.case import Case
+from hdcal.calibration.check.document import (
+    DOUBTFUL,
+    HEADLINE,
+    OWN_SCATTER,
+    STATED,
+)
+from hdcal.data.case import Case, Gear
+from hdcal.data.certificates import ZEROS, is_stated
 from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
+from hdcal.report.parameters import UNITS
 
 # Prior sds of log K within which 99.7 % of it lies.
 _FAR = 3.0
@@ -42,13 +50,34 @@ def check_answer(case: Case) -> CheckAnswer:
             reference_temperature_C=gear.reference_temperature,
             force_resolution_N=gear.force_resolution or None,
         ),
+        certificates=_certificates(gear),
         data=_data(case),
         effects=EffectsInReach(
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
         ),
-        notes=(*doubt, *case.notes),
+        notes=(*doubt, *_scatter(case), *case.notes),
     )
+
+
+def _certificates(gear: Gear) -> tuple[StatedError, ...]:
+    """Say what comes of the certificates that the gear file states."""
+    priors = {name: gear.priors[name] for name in ZEROS} | gear.gauge_priors
+    return tuple(
+        StatedError(
+            name,
+            float(prior.numbers[1]) * UNITS[name][1],
+            UNITS[name][0],
+            prior.source,
+            STATED[name],
+        )
+        for name, prior in priors.items()
+        if is_stated(prior)
+    )
+
+
+def _scatter(case: Case) -> tuple[str, ...]:
+    return (OWN_SCATTER,) if "force_sd" in case.records.known else ()
 
 
 def _doubt(case: Case) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.inference.gauges import acting, shown
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values, build_effects, member_base
 from hdcal.physics.chain import predict_reading
@@ -67,15 +68,16 @@ def force_of(
     Args:
         problem: structure.
         values: parameters of one draw.
-        records: from `grid_records`.
+        records: from `grid_records`; for a load or a gear in true terms, without
+            the gauges' gains and the thermometer's offset.
         factor: stiffness relative to the tested gear's [-]: another geometry, or
             another specimen.
         zero: of another mounting, or of a warmer gauge, from that of the tested
             ones [N].
         moved: radial deformation that a warmer frame gains [mm].
         quantity: `reading` includes the zero of the force and the effects of the
-            sensor; `load` leaves them out; `gear` also leaves out the zero of the
-            deformation and the compliance of the rig.
+            sensor; `load` leaves them out, and the gauge's gain; `gear` also leaves
+            out the zero of the deformation and the compliance of the rig.
 
     Returns:
         Mean force [N], and the noise of a reading of it.
@@ -95,7 +97,12 @@ def force_of(
     if quantity == "gear":
         nothing = jnp.zeros_like(base.deformation_offset)
         base = replace(base, deformation_offset=nothing)
-    return predict_reading(base, effects, records, problem.reading)
+    if quantity == "reading":
+        return predict_reading(base, effects, records, problem.reading)
+    at, warm = shown(values, records.deformation, records.temperature)
+    records = replace(records, deformation=at, temperature=warm)
+    force, noise = predict_reading(base, effects, records, problem.reading)
+    return acting(values, force), noise
 
 
 @jax.jit
@@ -133,11 +140,12 @@ def gear_forces(
 
     def of_draw(value, own):
         force, _ = force_of(problem, value, records, factor=own, quantity="gear")
-        place = as_read + value["deformation_offset"]
         if problem.discrepancy is None:
             return force
+        place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
         # Beyond the tested range the fit simply goes on.
-        return force + own * (problem.discrepancy.columns(place) @ value["gap_weights"])
+        leftover = problem.discrepancy.columns(place) @ value["gap_weights"]
+        return force + own * acting(value, leftover)
 
     factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
     return jax.vmap(of_draw, out_axes=1)(values, factor)

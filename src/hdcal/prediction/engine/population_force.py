@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.inference.gauges import acting, shown
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.causes import Cause
@@ -189,7 +190,7 @@ def member_mixture(
     # What is drawn about zero is drawn along the sense of loading.
     score = conditions.loading * value[SCORES][1]
     shift = zero * score / np.sqrt(max(mountings, 1))
-    shift = shift + leftover(problem, value, conditions)
+    shift = shift + leftover(problem, value, whose.quantity, conditions)
     variance = noise**2 + zero**2 + (slope**2 * width2)[:, None]
     # The root of zero has no derivative.
     spread = jnp.sqrt(variance + 1e-24)
@@ -252,8 +253,13 @@ def bend_sd(force: PopulationForce) -> float:
     return float(np.sqrt(np.mean(sd**2) + np.var(mean)))
 
 
-def leftover(problem: Problem, value: Values, conditions: Conditions):
+def leftover(
+    problem: Problem, value: Values, quantity: Quantity, conditions: Conditions
+):
     """Return the leftover discrepancy of one draw at the deformation asked for [N]."""
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)
+    if quantity == "load":
+        at, _ = shown(value, at, 0.0)
     bend, fitted = conditions.untested.leftover(problem, value, at, conditions.loading)
-    return (bend + fitted)[0]
+    left = (bend + fitted)[0]
+    return acting(value, left) if quantity == "load" else left

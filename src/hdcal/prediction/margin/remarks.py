@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from hdcal.inference.checks import listed
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
 from hdcal.prediction.engine.conditions import beyond_tested, temperature_is_tested
@@ -16,6 +17,19 @@ from hdcal.prediction.margin.result import FAR, Level
 _LOAD = (
     "The load on the gear: without the gauge's zero, its errors and its noise. "
     "A leftover discrepancy counts as the gear's."
+)
+_GAUGES = {
+    "force_gain": "the force gauge",
+    "deformation_gain": "the displacement gauge",
+    "temperature_offset": "the thermometer",
+}
+_CERTIFIED = (
+    "The load is that at a true deformation and temperature: the certificates of "
+    "{which} widen it, and not a reading."
+)
+_NOT_CERTIFIED = (
+    "The gear file states no calibration certificate of the gauges, so their gains "
+    "count as exact in a load."
 )
 _ZERO = (
     "What the gauge shows without a load rests on its prior, not on these data: it is "
@@ -167,6 +181,9 @@ def _of_population(force: PopulationForce) -> Iterator[str]:
     whose, problem = force.whose, force.cause.problem
     if whose.quantity == "load":
         yield _LOAD
+        known = force.cause.posterior.case.gear.gauge_priors
+        which = [_GAUGES[name] for name in known]
+        yield _CERTIFIED.format(which=listed(which)) if which else _NOT_CERTIFIED
         yield from _zero_by_prior(force)
         if whose.population == "mountings":
             yield _LOAD_OF_MOUNTINGS

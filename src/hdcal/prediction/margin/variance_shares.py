@@ -76,7 +76,7 @@ def _member_forces(problem, values, whose, conditions, factor, level):
         )
         law = Mixture(jnp.exp(log_weight), jnp.zeros_like(sd), sd)
         noise = law.quantile(level) if whose.quantity == "reading" else 0.0
-        force = force + leftover(problem, value, conditions)
+        force = force + leftover(problem, value, whose.quantity, conditions)
         return conditions.loading * force + noise
 
     return jax.vmap(one)(values, factor, level)
