@@ -37,7 +37,7 @@ radius_mm = 40.0
 length_mm = 70.0
 material = "40CrNiMoA"
 """
-# A class 1 rig: half-widths at k = 2.
+# Expanded uncertainties, k = 2.
 STATED = """
 [measurement]
 force_calibration = { expanded_percent = 1.0, expanded_N = 0.2 }
