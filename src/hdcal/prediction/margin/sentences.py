@@ -169,6 +169,11 @@ def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
 
 
+def capital(text: str) -> str:
+    """Return a sentence with its first letter capital."""
+    return text[:1].upper() + text[1:]
+
+
 def _capacity(found: Margin) -> Iterator[str]:
     level, sure = found.worst, _percent(found.confidence)
     if level.exceedance is not None:
