@@ -8,7 +8,7 @@ from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED
 from hdcal.prediction.margin.budget_words import component_label, stated_words
 from hdcal.prediction.margin.document import budget_table
-from hdcal.prediction.margin.sentences import capital, member_word
+from hdcal.prediction.margin.sentences import capital, measurand
 from hdcal.report.document import Block, Document, Facts, Section, Sentences, Text
 from hdcal.report.html import html_page
 from hdcal.report.provenance import data_rows, gear_rows
@@ -51,7 +51,7 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
         kind="certificate",
         subtitle="Calibration of a model from measurements. No accreditation, such as "
         "that of ISO/IEC 17025, is claimed by it.",
-        headline=f"One future {member_word(found)} at {found.deformation_mm:g} mm: "
+        headline=f"{capital(measurand(found))} at {found.deformation_mm:g} mm: "
         f"{stated_words(found)}",
         sections=[
             Section("What was measured, and with what", [_measured(posterior)]),

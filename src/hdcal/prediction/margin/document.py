@@ -9,13 +9,14 @@ from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
     answer,
     bound_name,
+    capital,
     chance,
     headline,
     in_tension,
     index,
     input_label,
     larger_bound,
-    member_word,
+    measurand,
     newtons,
     next_steps,
 )
@@ -195,7 +196,7 @@ def _sensitivities(found: Margin) -> Section:
 
 
 def _budget_section(found: Margin) -> Section:
-    first = f"One future {member_word(found)}: {stated_words(found)}"
+    first = f"{capital(measurand(found))}: {stated_words(found)}"
     assert found.linear_check is not None
     notes = [Text(found.linear_check.words, soft=True), Text(_TOGETHER, soft=True)]
     blocks = [Text(first), budget_table(found), *notes]

@@ -42,6 +42,14 @@ def member_word(found: Margin) -> str:
     return _MEMBER[found.population]
 
 
+def measurand(found: Margin) -> str:
+    """Return what the stated estimate and uncertainty are of."""
+    if found.quantity == "reading":
+        return f"one future {member_word(found)}"
+    gears = found.population == "specimens"
+    return "the load on one future gear" if gears else "the load on the gear"
+
+
 def input_label(name: str) -> str:
     """Return what an input of a gradient or share is called."""
     return _INPUTS.get(name.removesuffix("_mm"), name)
