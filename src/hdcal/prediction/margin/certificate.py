@@ -15,6 +15,7 @@ from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import hypothesis
 
 FILE, TEMPLATE = "certificate.html", "certificate.html.j2"
+_UNTESTED = "What was not tested, and what the result rests on"
 # Letters of a name in the title; the whole of it stands below.
 _LONGEST = 60
 _METHOD = (
@@ -58,7 +59,7 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
             Section("Conditions and method", [_asked(found)]),
             Section("Uncertainty budget", _budget(found)),
             *_decision(found),
-            Section("What was not tested", [Sentences(list(_untested(found)))]),
+            Section(_UNTESTED, [Sentences(list(_untested(found)))]),
         ],
         provenance=[("date of issue", issued.isoformat()), ("signature", "")],
     )
