@@ -19,7 +19,7 @@ from hdcal.prediction.engine.causes import ORIGIN, read_models
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.report.answer import json_schema
 
-FILES = {"margin.json", "report.html", "hdcal-result.json"} | {
+FILES = {"margin.json", "budget.csv", "report.html", "hdcal-result.json"} | {
     f"{name}.{kind}" for name in ("margin", "tornado") for kind in ("svg", "png")
 }
 ASK = ["--deformation", "0.4"]

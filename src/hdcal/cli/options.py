@@ -132,6 +132,21 @@ def start_options(command: Callable) -> Callable:
     return click.argument("run", metavar="RUN", required=False)(option(command))
 
 
+def decision_options(command: Callable) -> Callable:
+    """Add --limit-force and --rule."""
+    words = "Capacity of the actuator [N]: its size, in compression and in tension."
+    limit = click.option("--limit-force", type=float, help=words)
+    rules = click.Choice(["guarded", "simple"])
+    words = "Decision about it, by the expanded uncertainty or not [default: guarded]."
+    return limit(click.option("--rule", type=rules, help=words)(command))
+
+
+def certificate_option(command: Callable) -> Callable:
+    """Add --certificate."""
+    words = "Also write a certificate to sign, one A4 page."
+    return click.option("--certificate", is_flag=True, help=words)(command)
+
+
 def material_option(help: str) -> Callable[[Callable], Callable]:
     """Add --material."""
     return repeated_option(
@@ -164,6 +179,18 @@ def is_given(name: str) -> bool:
     """Tell whether a parameter stands on the command line, readable or not."""
     source = click.get_current_context().get_parameter_source(name)
     return source is ParameterSource.COMMANDLINE
+
+
+def needs_folder(name: str, given: bool, out: str | None) -> list[Finding]:
+    """Return a finding where a parameter was given that needs a result folder.
+
+    Args:
+        name: of the parameter.
+        given: whether it was.
+        out: the folder, or None.
+    """
+    words, remedy = "is written into a result folder", "Give `out` too"
+    return [Finding(name, words, remedy)] if given and out is None else []
 
 
 def without_meaning(names: Sequence[str], mode: str) -> list[Finding]:

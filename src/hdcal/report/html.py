@@ -12,19 +12,22 @@ from hdcal.report.document import Document
 from hdcal.report.plain import printable
 
 
-def html_page(document: Document, images: Mapping[str, bytes]) -> str:
+def html_page(
+    document: Document, images: Mapping[str, bytes], template: str = "page.html.j2"
+) -> str:
     """Return a document as the text of an HTML file.
 
     Args:
         document: what to show; its texts may come from anywhere.
         images: SVG files drawn by hdcal, by the names of the document's pictures.
+        template: of the page.
 
     Raises:
         KeyError: a picture has no drawing.
     """
     pictures = {name: _address(image) for name, image in images.items()}
     style = files("hdcal.report").joinpath("templates/style.css").read_text("utf-8")
-    return _template("page.html.j2").render(
+    return _template(template).render(
         document=document, images=pictures, style=style, policy=_policy(style)
     )
 

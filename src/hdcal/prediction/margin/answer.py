@@ -40,7 +40,7 @@ class MarginAnswer(Margin, Answer):
 
     RULES: ClassVar[tuple[dict, ...]] = (*Answer.RULES, _BASIS_RULE)
 
-    schema: Literal["hdcal.margin/1"] = "hdcal.margin/1"
+    schema: Literal["hdcal.margin/2"] = "hdcal.margin/2"
     status: Literal["ok"] = "ok"
     answer: Sentences
     shares_note: Words

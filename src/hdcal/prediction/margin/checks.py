@@ -19,6 +19,7 @@ from hdcal.prediction.engine.population_force import MOST_DRAWS
 from hdcal.prediction.engine.sizes import check_tolerances
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
+from hdcal.prediction.margin.stated import RULES
 from hdcal.prediction.tolerance_factors import check_shares
 
 # A force this many times larger or smaller than the one needed is a slip of the unit.
@@ -68,11 +69,7 @@ def check_margin(
     ]
     if limit is not None and not wrong:
         findings += capacity_findings("limit_force", limit, sense, place)
-    for name, known in (("quantity", QUANTITIES), ("direction", DIRECTIONS)):
-        value = getattr(request, name)
-        if value not in known:
-            remedy = f"Use {' or '.join(known)}"
-            findings.append(Finding(name, f"'{value}' is unknown", remedy))
+    findings += _check_choices(request, criteria)
     if findings:
         raise InputError(findings)
 
@@ -119,6 +116,22 @@ def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
         words = f"{deformation:g} mm on a radius of {radius:g} mm"
         return [Finding("deformation", words, "Give it in mm")]
     return []
+
+
+def _check_choices(request: MarginRequest, criteria: Criteria) -> list[Finding]:
+    rule, findings = criteria.rule, []
+    for name, value, known in (
+        ("quantity", request.quantity, QUANTITIES),
+        ("direction", request.direction, DIRECTIONS),
+        ("rule", "guarded" if rule is None else rule, RULES),
+    ):
+        if value not in known:
+            remedy = f"Use {' or '.join(known)}"
+            findings.append(Finding(name, f"'{value}' is unknown", remedy))
+    if rule is not None and criteria.limit_force is None:
+        words, remedy = "decides nothing without a limit", "Give `limit_force` too"
+        findings.append(Finding("rule", words, remedy))
+    return findings
 
 
 def _check_temperature(cause: Cause, temperature) -> list[Finding]:

@@ -1,5 +1,7 @@
 """`hdcal margin`: the force that a deformation needs, and the margin to it."""
 
+from datetime import date
+
 import click
 
 from hdcal.cli import options
@@ -17,11 +19,7 @@ from hdcal.cli.option_types import WINDOW
 @click.option(
     "--deformation", type=float, required=True, help="Deformation as read [mm]."
 )
-@click.option(
-    "--limit-force",
-    type=float,
-    help="Capacity of the actuator [N]: its size, in compression and in tension.",
-)
+@options.decision_options
 @click.option(
     "--given-force",
     type=float,
@@ -57,8 +55,9 @@ from hdcal.cli.option_types import WINDOW
 @options.seed_option
 @options.folder_options("Write a result folder with a report.")
 @options.json_option
+@options.certificate_option
 @click.pass_obj
-def margin(console: Console, run, out, force, **asked):
+def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force needed at a deformation, from RUN.
 
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
@@ -72,7 +71,9 @@ def margin(console: Console, run, out, force, **asked):
     with console.wrong as wrong:
         models = wrong.attempt(read_models, run) or []
         console.reserve_folder(out, force)
+        wrong += options.needs_folder("certificate", certificate, out)
     found = bounds_of(models, **asked)
     posterior = max(models, key=lambda model: model[0])[1]
-    told = margin_report(found, posterior, console.command, seed=asked["seed"])
-    return console.report(told)
+    signed = date.today() if certificate else None
+    how = {"seed": asked["seed"], "certificate": signed}
+    return console.report(margin_report(found, posterior, console.command, **how))

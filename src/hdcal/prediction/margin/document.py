@@ -4,16 +4,19 @@ from dataclasses import replace
 
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
+from hdcal.prediction.margin.budget_words import stated_words
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
     answer,
     bound_name,
+    capital,
     chance,
     headline,
     in_tension,
     index,
     input_label,
     larger_bound,
+    measurand,
     newtons,
     next_steps,
 )
@@ -30,6 +33,13 @@ from hdcal.report.parameters import Interval
 from hdcal.report.provenance import gear_rows
 from hdcal.report.words import estimate, hypothesis, number
 
+# A component with less of the variance than this is not shown by itself.
+_SMALL = 1e-3
+_TOGETHER = (
+    "“Calibration” is stiffness, zeros, effects and leftover together, with their "
+    "covariances; of K and E0 only the product matters. What the data say nothing of "
+    "has a row of its own, with all that hangs on it."
+)
 CALIBRATION_SHARE = (
     "“Calibration” is stiffness, zeros, effects and leftover together: the data tie "
     "them to each other, so that they have no shares of their own; of K and E0 only "
@@ -44,8 +54,12 @@ def margin_document(found: Margin) -> Document:
     sections = [_bounds(found)]
     if found.models:
         sections.append(_causes(found))
-    if found.shares:
-        sections.append(_sensitivities(found))
+    if found.budget:
+        sections += [_budget_section(found), _sensitivities(found)]
+    if found.decision is not None:
+        rule = Text(found.decision.rule_words, soft=True)
+        blocks = [Text(found.decision.words), rule]
+        sections.append(Section("Decision", blocks, brief=True))
     return Document(
         name="Margin",
         kind="margin",
@@ -159,7 +173,7 @@ def _sensitivities(found: Margin) -> Section:
     larger = larger_bound(found)
     shown = Picture(
         "tornado",
-        "Shares of the variance, and the change of the bound for one per cent",
+        "Shares of the budget, and the change of the bound for one per cent",
         "Left: shares of the variance of one future member's force, all at "
         f"{found.worst.temperature_C} °C. Right: change of the {larger} bound when an "
         "input grows by one per cent.",
@@ -178,5 +192,54 @@ def _sensitivities(found: Margin) -> Section:
         for slope in found.gradients
     ]
     table = Table(["input", "at", "", *numbers[1:]], rows, frozenset(numbers))
-    note = Text(CALIBRATION_SHARE, soft=True)
-    return Section("What the bound hangs on", [shown, note, table])
+    return Section("What the bound hangs on", [shown, table])
+
+
+def _budget_section(found: Margin) -> Section:
+    first = f"{capital(measurand(found))}: {stated_words(found)}"
+    assert found.linear_check is not None
+    notes = [Text(found.linear_check.words, soft=True), Text(_TOGETHER, soft=True)]
+    blocks = [Text(first), budget_table(found), *notes]
+    return Section("Uncertainty budget", blocks, brief=True)
+
+
+def budget_table(found: Margin, *, brief: bool = False) -> Table:
+    """Return the uncertainty budget.
+
+    Args:
+        found: the margin, with a budget.
+        brief: without what would halve each row.
+    """
+    numbers = ["u", "N per unit", "N", "share"]
+    columns = ["component", "type", "distribution", "u", "unit", *numbers[1:]]
+    large = [line for line in found.budget if line.share >= _SMALL]
+    small = [line for line in found.budget if line.share < _SMALL]
+    rows = [
+        [
+            line.component,
+            line.type,
+            line.distribution,
+            f"{line.standard_uncertainty:.3g}",
+            line.unit,
+            f"{line.sensitivity_N_per_unit:.4g}",
+            f"{line.contribution_N:.3g}",
+            f"{100.0 * line.share:.1f} %",
+            line.halved_by,
+        ]
+        for line in large
+    ]
+    if small:
+        rest = sum(line.contribution_N**2 for line in small) ** 0.5
+        words = f"{len(small)} smaller ones together"
+        share = f"{100.0 * sum(line.share for line in small):.2f} %"
+        rows.append([words, *[""] * 5, f"{rest:.3g}", share, ""])
+    assert found.linear_check is not None
+    whole = f"{found.linear_check.standard_uncertainty_N:.3g}"
+    rows.append(["combined", *[""] * 5, whole, "100 %", ""])
+    return Table(
+        columns if brief else [*columns, "halved by"],
+        [row[: len(columns)] if brief else row for row in rows],
+        frozenset(numbers),
+        spare=frozenset({"distribution"}),
+        strong=frozenset({len(rows) - 1}),
+    )

@@ -13,11 +13,10 @@ from hdcal.prediction.margin.sentences import (
     larger_bound,
     member_word,
 )
+from hdcal.prediction.margin.stated import BudgetLine
 from hdcal.report.canvas import (
     BLUE,
     DARK,
-    GREEN,
-    GREY,
     ORANGE,
     RED,
     heading,
@@ -27,18 +26,16 @@ from hdcal.report.canvas import (
     style,
 )
 
-_DRIVEN = {"data": BLUE, "prior": ORANGE, "given": GREEN}
-_DRIVEN_WORDS = {
-    "data": "from the data",
-    "prior": "from the prior only",
-    "given": "from the tolerances given",
-}
+_TYPES = {"A": BLUE, "B": ORANGE}
+_TYPE_WORDS = {"A": "A: from the readings", "B": "B: from elsewhere"}
+# Rows of the budget below this share say nothing, nor do more than so many.
+_SMALL, _MOST_ROWS = 1e-3, 8
 
 
 def margin_figures(found: Margin, name: str) -> dict[str, Figure]:
-    """Return the figures of a margin by name; without shares there is no tornado."""
+    """Return the figures of a margin by name; without a budget there is no tornado."""
     drawn = {"margin": margin_figure(found, name)}
-    return drawn | ({"tornado": tornado_figure(found)} if found.shares else {})
+    return drawn | ({"tornado": tornado_figure(found)} if found.budget else {})
 
 
 def margin_figure(found: Margin, name: str) -> Figure:
@@ -143,35 +140,37 @@ def _draw_window(axes: Axes, found: Margin) -> None:
 
 
 def tornado_figure(found: Margin) -> Figure:
-    """Draw the shares of the variance, and how far one per cent moves the bound."""
-    rows = max(len(found.shares), len(found.gradients))
+    """Draw the shares of the budget, and how far one per cent moves the bound."""
+    rows = max(len(_large(found)), len(found.gradients))
     with style():
-        figure = Figure(figsize=(7.6, 1.5 + 0.34 * rows), layout="constrained")
+        figure = Figure(figsize=(8.8, 1.5 + 0.34 * rows), layout="constrained")
         left, right = figure.subplots(1, 2)
         _draw_shares(left, found)
         _draw_gradients(right, found)
     return figure
 
 
+def _large(found: Margin) -> list[BudgetLine]:
+    """Return the rows of the budget that can be seen."""
+    return [line for line in found.budget if line.share >= _SMALL][:_MOST_ROWS]
+
+
 def _draw_shares(axes: Axes, found: Margin) -> None:
-    heading(axes, f"What one {member_word(found)} scatters by")
-    ranked = sorted(found.shares, key=lambda share: -share.total)
-    for place, share in enumerate(ranked):
-        colour = _DRIVEN[share.driven_by]
-        total, first = (min(max(s, 0.0), 1.0) for s in (share.total, share.first))
-        axes.barh(place, total, 0.66, color=colour, alpha=0.35)
-        axes.barh(place, first, 0.66, color=colour)
-        note(axes, f"{100.0 * total:.0f} %", (total, place), (3, 0), va="center")
-    name_rows(axes, [input_label(share.name) for share in ranked])
+    heading(axes, f"What makes one {member_word(found)} uncertain")
+    ranked = _large(found)
+    for place, line in enumerate(ranked):
+        axes.barh(place, line.share, 0.66, color=_TYPES[line.type])
+        words = f"{100.0 * line.share:.0f} %"
+        note(axes, words, (line.share, place), (3, 0), va="center")
+    name_rows(axes, [line.component for line in ranked])
     axes.set_ylim(len(ranked) - 0.4, -0.6)
     axes.set_xlim(0.0, 1.18)
     axes.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
-    axes.set_xlabel("share of the variance (Sobol)")
-    seen = dict.fromkeys(share.driven_by for share in ranked)
-    handles = [Patch(color=_DRIVEN[d], linewidth=0) for d in seen]
-    handles.append(Patch(color=GREY, alpha=0.35, linewidth=0))
-    texts = [*(_DRIVEN_WORDS[d] for d in seen), "pale: with interactions"]
-    axes.legend(handles, texts, loc="lower right", fontsize=7.5)
+    axes.set_xlabel("share of the variance (budget)")
+    seen = dict.fromkeys(line.type for line in ranked)
+    handles = [Patch(color=_TYPES[type_], linewidth=0) for type_ in seen]
+    words = [_TYPE_WORDS[type_] for type_ in seen]
+    axes.legend(handles, words, loc="lower right", fontsize=7.5)
 
 
 def _draw_gradients(axes: Axes, found: Margin) -> None:

@@ -24,7 +24,11 @@ from hdcal.prediction.margin.bounds import (
     worst_level,
 )
 from hdcal.prediction.margin.checks import check_margin, check_sign
-from hdcal.prediction.margin.deformation_reached import deformation_reached
+from hdcal.prediction.margin.decision import decision
+from hdcal.prediction.margin.deformation_reached import (
+    DeformationReached,
+    deformation_reached,
+)
 from hdcal.prediction.margin.gradients import gradients
 from hdcal.prediction.margin.remarks import (
     extrapolations,
@@ -33,6 +37,8 @@ from hdcal.prediction.margin.remarks import (
 )
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import FAR, Level, Margin
+from hdcal.prediction.margin.stated import Rule
+from hdcal.prediction.margin.uncertainty import stated_uncertainty
 from hdcal.prediction.margin.variance_shares import variance_shares
 from hdcal.prediction.tolerance_factors import BASES
 
@@ -53,6 +59,7 @@ def margin(
     tolerances: Mapping[str, float] | None = None,
     sensitivities: bool = True,
     seed: int = 0,
+    rule: Rule | None = None,
 ) -> Margin:
     """Return the force needed at a deformation, with bounds, and the margin to it.
 
@@ -61,8 +68,7 @@ def margin(
         deformation: as read [mm].
         temperature: of the specimen [°C]; of several the worst counts. By default
             the tested one nearest to the reference.
-        limit_force: capacity [N] whose exceedance is asked for: its size, along the
-            sense of loading, or with the sign of the force.
+        limit_force: capacity [N], a size along the sense of loading, or with its sign.
         given_force: force [N] whose deformation is asked for, with its sign.
         content: share of the population within each one-sided bound.
         confidence: of each bound.
@@ -71,8 +77,9 @@ def margin(
         quantity: `reading` of the rig's gauge, or `load` on the gear.
         direction: up to load, away from the unloaded gear; down to unload.
         tolerances: ± by wall_thickness_mm, radius_mm, length_mm, load_height_mm.
-        sensitivities: with gradients and shares of the variance.
+        sensitivities: with gradients, the budget and shares of the variance.
         seed: of what the data leave open about the population's centre.
+        rule: of the decision about the limit, guarded (by default) or simple.
 
     Returns:
         Bounds by temperature and over all of them; every interval says its kind.
@@ -84,7 +91,7 @@ def margin(
     sizes = {name: float(width) for name, width in (tolerances or {}).items()}
     about = direction, sizes, population, quantity, given_force, seed
     request = MarginRequest(deformation, temperature, *about)
-    criteria = Criteria(content, confidence, required_probability, limit_force)
+    criteria = Criteria(content, confidence, required_probability, limit_force, rule)
     return _margin(causes_of(models), request, criteria, sensitivities)
 
 
@@ -107,14 +114,14 @@ def _margin(
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
     beyond = beyond_tested(forces[0].conditions)
-    reached, slopes, shares = None, (), ()
-    if request.given_force is not None:
-        reached = deformation_reached(there, request.given_force, criteria)
+    slopes, shares = (), ()
     if sensitivities:
         upper = draws.table["upper"][list(warm).index(worst.temperature_C)]
         slopes = gradients(there, upper, criteria)
         shares = variance_shares(there, request.seed)
+    stated = stated_uncertainty(there, worst, with_budget=sensitivities)
     return Margin(
+        **vars(stated),
         deformation_mm=float(request.deformation),
         direction=request.direction,
         loading_sense=sense,
@@ -129,7 +136,9 @@ def _margin(
         tolerances_mm=request.tolerances,
         levels=levels,
         worst=worst,
-        reached=reached,
+        reached=_reached(there, request, criteria),
+        decision=decision(stated, worst, criteria, sense, whose),
+        causes=_named(causes),
         models=model_bounds(forces, draws, criteria),
         gradients=slopes,
         shares=shares,
@@ -137,6 +146,23 @@ def _margin(
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )
+
+
+def _named(causes: Sequence[Cause]) -> dict[str, float]:
+    """Return the probability of each hypothesis; models may be of the same."""
+    found: dict[str, float] = {}
+    for cause in causes:
+        found[cause.name] = found.get(cause.name, 0.0) + cause.probability
+    return found
+
+
+def _reached(
+    forces: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
+) -> DeformationReached | None:
+    """Return the deformation that the given force reaches, if there is one."""
+    if request.given_force is None:
+        return None
+    return deformation_reached(forces, request.given_force, criteria)
 
 
 def _forces(

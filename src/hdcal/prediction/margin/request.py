@@ -9,6 +9,7 @@ from hdcal.data.case import Case
 from hdcal.prediction.engine.conditions import Direction, usual_temperature
 from hdcal.prediction.engine.forces import Quantity
 from hdcal.prediction.engine.population import Population
+from hdcal.prediction.margin.stated import Rule
 
 
 @dataclass(frozen=True)
@@ -20,12 +21,14 @@ class Criteria:
         confidence: of each bound.
         required_probability: that a capacity is to meet; None for the content.
         limit_force: capacity [N], or None; once it is checked, its size.
+        rule: of the decision about it, or None for guarded.
     """
 
     content: float
     confidence: float
     required_probability: float | None
     limit_force: float | None
+    rule: Rule | None = None
 
     @property
     def required(self) -> float:

@@ -11,15 +11,14 @@ from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.margin.deformation_reached import DeformationReached
 from hdcal.prediction.margin.gradients import Gradient
+from hdcal.prediction.margin.stated import Chance, Decision, Size, StatedUncertainty
 from hdcal.prediction.margin.variance_shares import VarianceShare
 from hdcal.prediction.tolerance_factors import BASES
 from hdcal.report.answer import Promise, Real, Sentences, Words
 from hdcal.report.parameters import Interval
 
 INTERVAL = 0.95
-Chance = Annotated[float, Promise(minimum=0, maximum=1)]
 Fraction = Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
-Size = Annotated[float, Promise(minimum=0)]
 # Beyond the tested range by more than this share of it a bound rests on an assumption.
 FAR = 0.2
 # One whose ends are all known.
@@ -106,8 +105,8 @@ def sizes_needed(of: Level | ModelBound, sense: LoadingSense) -> tuple[float, fl
     return ends_along(of.lower_bound_N, of.upper_bound_N, sense)
 
 
-@dataclass(frozen=True)
-class Margin(Shown):
+@dataclass(frozen=True, kw_only=True)
+class Margin(StatedUncertainty, Shown):
     """The force needed at a deformation, and the margin of a capacity.
 
     Attributes:
@@ -127,6 +126,8 @@ class Margin(Shown):
         levels: one per temperature.
         worst: over all temperatures at once.
         reached: deformation reached by a given force, or None.
+        decision: whether the force keeps the limit, or None without one.
+        causes: what was averaged over, with its probability.
         models: each model's own bounds, if there are several.
         gradients: of the bound that is the larger one in size.
         shares: of the variance of one future member's force.
@@ -151,6 +152,8 @@ class Margin(Shown):
     levels: Annotated[tuple[Level, ...], Promise(minItems=1)]
     worst: Level
     reached: DeformationReached | None
+    decision: Decision | None
+    causes: Mapping[str, Chance]
     models: tuple[ModelBound, ...]
     gradients: tuple[Gradient, ...]
     shares: tuple[VarianceShare, ...]

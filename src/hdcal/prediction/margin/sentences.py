@@ -42,6 +42,14 @@ def member_word(found: Margin) -> str:
     return _MEMBER[found.population]
 
 
+def measurand(found: Margin) -> str:
+    """Return what the stated estimate and uncertainty are of."""
+    if found.quantity == "reading":
+        return f"one future {member_word(found)}"
+    gears = found.population == "specimens"
+    return "the load on one future gear" if gears else "the load on the gear"
+
+
 def input_label(name: str) -> str:
     """Return what an input of a gradient or share is called."""
     return _INPUTS.get(name.removesuffix("_mm"), name)
@@ -167,6 +175,11 @@ def _force(found: Margin) -> Iterator[str]:
 
 def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
+
+
+def capital(text: str) -> str:
+    """Return a sentence with its first letter capital."""
+    return text[:1].upper() + text[1:]
 
 
 def _capacity(found: Margin) -> Iterator[str]:

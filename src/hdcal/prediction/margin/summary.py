@@ -1,11 +1,18 @@
 """A margin as an answer, and all that its result folder holds."""
 
+from dataclasses import fields
+from datetime import date
+
+import numpy as np
+
 from hdcal.data.versions import versions
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
+from hdcal.prediction.margin.certificate import FILE, certificate_page
 from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
+from hdcal.prediction.margin.stated import BudgetLine
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report
 
@@ -41,10 +48,32 @@ def margin_answer(
     )
 
 
+def budget_columns(found: Margin) -> dict[str, np.ndarray]:
+    """Return the columns of budget.csv."""
+    names = [field.name for field in fields(BudgetLine)]
+    return {n: np.array([getattr(line, n) for line in found.budget]) for n in names}
+
+
 def margin_report(
-    found: Margin, posterior: Posterior, command: str = "", *, seed: int = 0
+    found: Margin,
+    posterior: Posterior,
+    command: str = "",
+    *,
+    seed: int = 0,
+    certificate: date | None = None,
 ) -> Report[MarginAnswer]:
-    """Return all that `hdcal margin` leaves behind."""
+    """Return all that `hdcal margin` leaves behind.
+
+    Args:
+        found: the margin.
+        posterior: of the likeliest cause.
+        command: that made it.
+        seed: likewise.
+        certificate: date of issue of a certificate, or None without one.
+
+    Raises:
+        NotUsable: a certificate of a calibration that failed its checks.
+    """
 
     def figures():
         from hdcal.prediction.margin.figure import margin_figures
@@ -53,4 +82,10 @@ def margin_report(
 
     answer = margin_answer(found, posterior, seed=seed)
     document = whole_document(answer, posterior, command)
-    return Report(document, answer, "margin.json", figures)
+    others = []
+    if certificate is not None:
+        page = certificate_page(answer, posterior, certificate)
+        others.append((FILE, page.encode("utf-8", "xmlcharrefreplace")))
+    tables = {"budget.csv": budget_columns(found)} if found.budget else {}
+    made = {"tables": lambda: tables, "others": lambda: others}
+    return Report(document, answer, "margin.json", figures, **made)

@@ -1,0 +1,93 @@
+"""The decision whether a force keeps a limit.
+
+Rules as ISO/IEC 17025:2017, 7.8.6, ILAC-G8:09/2019 and JCGM 106:2012 have them.
+"""
+
+import numpy as np
+
+from hdcal.prediction.budget.risk import global_false_accept
+from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
+from hdcal.prediction.engine.population import Population
+from hdcal.prediction.margin.budget_words import (
+    GEAR,
+    component_label,
+    decision_words,
+    rule_words,
+)
+from hdcal.prediction.margin.request import Criteria
+from hdcal.prediction.margin.result import Level
+from hdcal.prediction.margin.stated import Decision, Rule, StatedUncertainty, Statement
+
+
+def decide(
+    rule: Rule, limit: float, estimate: float, low: float, high: float
+) -> tuple[Statement, float]:
+    """Return statement and guard band of a rule.
+
+    Args:
+        rule: guarded accepts an estimate only if the whole coverage interval keeps the
+            limit, and rejects it only if none of it does; simple looks at the estimate
+            alone.
+        limit: that must not be exceeded.
+        estimate: y.
+        low: lower end of the coverage interval.
+        high: upper end.
+    """
+    least, most = (low, high) if rule == "guarded" else (estimate, estimate)
+    statement: Statement = "undecided"
+    if most <= limit:
+        statement = "conforms"
+    elif least > limit:
+        statement = "does not conform"
+    return statement, most - estimate
+
+
+def decision(
+    stated: StatedUncertainty,
+    worst: Level,
+    criteria: Criteria,
+    sense: LoadingSense,
+    population: Population,
+) -> Decision | None:
+    """Return the decision about a force; without a limit there is none.
+
+    Args:
+        stated: its estimate and uncertainty.
+        worst: how probable it is that it exceeds the limit.
+        criteria: with the limit, a size, and the rule.
+        sense: of loading.
+        population: whose force; of gears there is a global risk too.
+    """
+    limit, risk = criteria.limit_force, worst.exceedance
+    if limit is None or risk is None:
+        return None
+    rule, estimate = criteria.rule or "guarded", sense * stated.estimate_N
+    low, high = ends_along(stated.coverage_lo_N, stated.coverage_hi_N, sense)
+    statement, guard = decide(rule, limit, estimate, low, high)
+    most = limit - guard
+    overall = None
+    if population == "specimens" and stated.budget:
+        sds = _production_and_measurement(stated)
+        overall = global_false_accept(estimate, *sds, limit, most)
+    wrong = risk.probability
+    return Decision(
+        rule=rule,
+        limit_N=limit,
+        guard_band_N=guard,
+        acceptance_limit_N=most,
+        statement=statement,
+        probability_of_conformity=1.0 - wrong,
+        false_accept_risk=wrong,
+        global_false_accept_risk=overall,
+        rule_words=rule_words(rule, limit, guard),
+        words=decision_words(estimate, limit, guard, statement, wrong, overall),
+    )
+
+
+def _production_and_measurement(stated: StatedUncertainty) -> tuple[float, float]:
+    """Return the sd between gears, and that of all else [N]."""
+    own = [line.component == component_label(GEAR) for line in stated.budget]
+    squares = np.array([line.contribution_N**2 for line in stated.budget])
+    production = float(squares[own].sum())
+    rest = max(float(squares.sum()) - production, 0.0)
+    return production**0.5, rest**0.5
