@@ -133,8 +133,7 @@ def calibrate(
         effects: names of effects to include.
         theory: overrides the gear's theory.
         with_gap: add a leftover discrepancy, orthogonal to the base model.
-        adapt_noise: let the noise grow with the force, as the effect
-            heteroscedastic_noise has it, where readings clearly do.
+        adapt_noise: let the noise grow with the force where it clearly does.
         chains: independent chains, two or more so that they can be compared.
         warmup: iterations of adaptation per chain.
         draws: draws kept per chain.
@@ -151,22 +150,28 @@ def calibrate(
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     began = time.perf_counter()
-    chosen = choose_effects(effects, registry)
-    if adapt_noise and not any(effect.stage == "noise" for effect in chosen):
-        chosen += (HeteroscedasticNoise,) if noise_grows(case) else ()
+    chosen = _chosen(case, choose_effects(effects, registry), adapt_noise)
     check_effect_priors(case, registry)
     theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
-    whitening = laplace.fit(problem)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, whitening, of_draws, progress=progress, **size)
+    found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
     settings["seconds"] = round(time.perf_counter() - began, 3)
     return Posterior(case, theory, chosen, priors, *parts, settings)
+
+
+def _chosen(
+    case: Case, effects: tuple[type[Effect], ...], adapt_noise: bool
+) -> tuple[type[Effect], ...]:
+    """Return the effects, with noise that grows where it does and none is of noise."""
+    spoken_of = any(effect.stage == "noise" for effect in effects)
+    grows = adapt_noise and not spoken_of and noise_grows(case)
+    return (*effects, HeteroscedasticNoise) if grows else effects
 
 
 def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:

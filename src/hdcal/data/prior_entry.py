@@ -59,7 +59,9 @@ def read_prior(
     source = ". ".join(said) or f"given in {Path(toml.file).name}"
     prior = Prior(family, tuple(numbers), name, source)
     prior = prior if scale == 1.0 else scaled(prior, scale)
-    _raise_faults(range_faults(family, prior.numbers, parameter), key, toml)
+    _raise_faults(
+        range_faults(family, [*map(float, prior.numbers)], parameter), key, toml
+    )
     return prior
 
 

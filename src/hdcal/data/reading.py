@@ -56,12 +56,9 @@ def read_case(
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
-    # One reading in a hundred may be wild.
-    sizes = np.abs(measured.columns.values["force"])
-    full_scale = float(np.quantile(sizes, 0.99, method="higher"))
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
-        gear=at_full_scale(found, full_scale),
+        gear=at_full_scale(found, _full_scale(measured)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
@@ -73,6 +70,12 @@ def read_case(
             *_resets(measured, motion),
         ),
     )
+
+
+def _full_scale(measured: Measurements) -> float:
+    """Return the largest force read [N]; one reading in a hundred may be wild."""
+    sizes = np.abs(measured.columns.values["force"])
+    return float(np.quantile(sizes, 0.99, method="higher"))
 
 
 def _motion(measured: Measurements) -> Motion:

@@ -138,7 +138,6 @@ def keep_or_compress(
     records: Records,
     base_columns,
     discrepancy: Discrepancy | None,
-    *,
     keep: bool,
     correlated: bool,
 ) -> dict[str, Any]:
@@ -154,7 +153,7 @@ def keep_or_compress(
     padded, count = pad_records(records), len(records.force)
     columns = discrepancy_columns(discrepancy, padded.deformation)
     before = previous_rows(records) if correlated else None
-    kept = {"records": None, "columns": None, "before": None, "blocks": None}
+    kept: dict[str, Any] = dict.fromkeys(("records", "columns", "before", "blocks"))
     if not keep:
         own = [] if columns is None else [columns[:count]]
         design = np.hstack([base_columns, *own])

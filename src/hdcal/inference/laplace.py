@@ -50,6 +50,12 @@ def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
+def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
+    """Return the parameters at an unconstrained position, coordinates left out."""
+    values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
+    return {name: v for name, v in values.items() if not name.startswith("_")}
+
+
 def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return the potential whose minimum is a typical place, not only the mode.
 

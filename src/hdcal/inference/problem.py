@@ -45,17 +45,17 @@ class Problem(Sampled):
         blocks: compressed rows, or None.
         columns: basis of the discrepancy at the padded rows, or None.
         discrepancy: the leftover one, or None.
-        before: index of the row before each padded row in its run, −1 for none; or
-            None where neighbours are not correlated or rows are compressed.
         step: rounding step [N], 0 = none.
         effects: the effect classes of the hypothesis, those of scatter left out.
         rounded: exact rounding likelihood (else Sheppard's correction).
-        correlated: whether neighbouring readings of a run may err alike.
         runs: number of runs with an offset of their own, 0 = none.
         specimens: number of specimens with a stiffness of their own, 0 = none.
         integrated: which of "run", "specimen", "discrepancy" are integrated out, as
             `integrated_kinds` orders them.
         count: measured rows; `records` and `columns` have padding after them.
+        before: index of the row before each padded row in its run, −1 for none; or
+            None where neighbours are not correlated or rows are compressed.
+        correlated: whether neighbouring readings of a run may err alike.
         zero_stated: a certificate states the zero of the force gauge itself, to which
             each mounting adds its own.
     """
@@ -68,15 +68,15 @@ class Problem(Sampled):
     blocks: CompressedRows | None
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
-    before: Int[Array, " n"] | None
     step: Float[Array, ""] | float
     effects: tuple[type[Effect], ...] = eqx.field(static=True)
     rounded: bool = eqx.field(static=True)
-    correlated: bool = eqx.field(static=True)
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
     count: int = 0
+    before: Int[Array, " n"] | None = None
+    correlated: bool = eqx.field(static=True, default=False)
     zero_stated: bool = eqx.field(static=True, default=False)
 
     @property
@@ -185,9 +185,7 @@ def build_problem(
     theory: Theory | None = None,
     with_gap: bool = False,
 ) -> Problem:
-    """Turn a case into an inference problem.
-
-    Rows are compressed unless an effect bends the chain or the rounding is coarse.
+    """Turn a case into a problem, its rows compressed but for effects and rounding.
 
     Args:
         case: records and gear.
@@ -208,14 +206,8 @@ def build_problem(
     noise_sd, members = pilot_noise(records), member_counts(case, with_gap)
     rounded, correlated = noise_form(case, effects, members, noise_sd)
     leftover = build_discrepancy(records.deformation) if with_gap else None
-    columns = _columns(records, reading)
-    rows = keep_or_compress(
-        records,
-        columns,
-        leftover,
-        keep=rounded or bool(effects),
-        correlated=correlated,
-    )
+    columns, keep = _columns(records, reading), rounded or bool(effects)
+    rows = keep_or_compress(records, columns, leftover, keep, correlated)
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
     integrated = integrated_kinds(members, linear)
     check_member_counts(case.name, members, integrated)

@@ -14,14 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Key
 from numpyro.infer.hmc import hmc
-from numpyro.infer.util import constrain_fn
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
 from hdcal.errors import Findings
 from hdcal.inference.integrated import draw_members
-from hdcal.inference.laplace import Whitening, potential
-from hdcal.inference.model import model
+from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
 
 # Called with (iterations done, iterations in all).
@@ -114,10 +112,7 @@ def _advance(problem, whitening, states, target, warmup, length):
 def _constrain(problem, whitening, standard, keys):
     def one(drawn):
         e, key = drawn
-        values = constrain_fn(
-            model, (problem,), {}, whitening.position(e), return_deterministic=True
-        )
-        named = {name: v for name, v in values.items() if not name.startswith("_")}
+        named = values_at(problem, whitening.position(e))
         return named | draw_members(problem, named, key)
 
     # One draw after the other: side by side members by the thousand fill the memory.

@@ -17,7 +17,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
-from numpyro.infer.util import constrain_fn
 from scipy import optimize, stats
 from scipy.special import ndtri
 
@@ -25,7 +24,6 @@ from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import draw_members
-from hdcal.inference.model import model
 from hdcal.prediction.engine.population_force import (
     SCORES,
     PopulationForce,
@@ -75,11 +73,7 @@ class _Target(eqx.Module):
 
     def terms(self, point: Float[Array, " d"], sites: dict, key):
         """Return log tails, normal and heavy, and the log prior of σ's logarithm."""
-        place = self.whitening.position(point)
-        every = constrain_fn(
-            model, (self.problem,), {}, place, return_deterministic=True
-        )
-        named = {name: v for name, v in every.items() if not name.startswith("_")}
+        named = laplace.values_at(self.problem, self.whitening.position(point))
         value = named | draw_members(self.problem, named, key) | sites
         weight, mean, sd = member_mixture(
             self.problem, value, self.whose, self.conditions
@@ -139,14 +133,34 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         seed: of the points.
     """
     problem = force.cause.problem
-    whitening = laplace.fit(problem)
-    rng, size = np.random.default_rng(seed), len(whitening.factor)
     levels = spread_evenly(2 * _POINTS, 2 + SITES, seed)
     untested, sites = untested_of(force.cause, levels[:, 2:])
     sites = {**sites, SCORES: ndtri(levels[:, :2])}
     where = replace(force.conditions, untested=untested)
+    whitening = laplace.fit(problem)
     target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit, float))
+    points, log_law = _points(target, sites, np.random.default_rng(seed))
+    keys = jax.random.split(jax.random.key(seed), len(points))
+    found = _weigh(target, points, sites, keys)
+    normal, heavy, of_sigma, density = map(np.asarray, found)
+    weight = np.where(np.isfinite(density), density, -np.inf) - log_law
+    weight, above = np.exp(weight - weight.max()), np.exp(normal)
+    share = _ratio(weight, above)
+    error = np.linalg.norm(weight * (above - share)) / weight.sum()
+    # Without its prior σ would be as likely on any scale.
+    free = weight * np.exp(of_sigma.min() - of_sigma)
+    return Rare(
+        probability=share,
+        relative_error=float(error / share),
+        without_prior=_ratio(free, above) / share,
+        heavy_tailed=_ratio(weight, np.exp(heavy)) / share,
+    )
+
+
+def _points(target: _Target, sites: dict, rng) -> tuple[np.ndarray, np.ndarray]:
+    """Return whitened points about both places, and the log density of their law."""
     even = {name: np.median(column, axis=0) for name, column in sites.items()}
+    size = len(target.whitening.factor)
     found = optimize.minimize(
         lambda x: tuple(map(np.asarray, _towards(target, x, even))),
         np.zeros(size),
@@ -154,34 +168,15 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         method="BFGS",
         options={"maxiter": 200, "gtol": 1e-3},
     )
-    spread = np.asarray(found.hess_inv)
-    laws = [
-        stats.multivariate_t(np.zeros(size), _SPREAD**2 * np.eye(size), _FREE),
-        stats.multivariate_t(found.x, _SPREAD**2 * (spread + spread.T) / 2.0, _FREE),
+    spread = 0.5 * (found.hess_inv + found.hess_inv.T)
+    laws: list[Any] = [
+        stats.multivariate_t(place, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
+        for place, shape in ((np.zeros(size), np.eye(size)), (found.x, spread))
     ]
-    points = np.concatenate(
-        [np.reshape(law.rvs(_POINTS, random_state=rng), (-1, size)) for law in laws]
-    )
-    # Sites are spread evenly over both halves.
-    order = rng.permutation(len(points))
-    points = points[order]
-    keys = jax.random.split(jax.random.key(seed), len(points))
-    normal, heavy, of_sigma, density = map(
-        np.asarray, _weigh(target, points, sites, keys)
-    )
-    own = np.logaddexp(*(np.atleast_1d(law.logpdf(points)) for law in laws))
-    weight = np.where(np.isfinite(density), density, -np.inf) - own
-    weight = np.exp(weight - weight.max())
-    share = _ratio(weight, np.exp(normal))
-    error = weight * (np.exp(normal) - share)
-    # Without its prior σ would be as likely on any scale.
-    free = weight * np.exp(-(of_sigma - of_sigma.max()))
-    return Rare(
-        probability=share,
-        relative_error=float(np.linalg.norm(error) / weight.sum() / share),
-        without_prior=_ratio(free, np.exp(normal)) / share,
-        heavy_tailed=_ratio(weight, np.exp(heavy)) / share,
-    )
+    drawn = [np.reshape(law.rvs(_POINTS, random_state=rng), (-1, size)) for law in laws]
+    # What is open is spread evenly over both places.
+    points = rng.permutation(np.concatenate(drawn))
+    return points, np.logaddexp(*(np.atleast_1d(law.logpdf(points)) for law in laws))
 
 
 def _ratio(weight: np.ndarray, values: np.ndarray) -> float:
