@@ -23,6 +23,8 @@ SENSE = {"up": 1.0, "down": -1.0}
 NEAR_K, NEAR_MM = 1.0, 1e-9
 # Temperatures of one answer; each is a row of it.
 MOST_LEVELS = 1_000
+# A force this many times larger or smaller than the usual is a slip of the unit.
+_OFF = 100.0
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
 
@@ -116,6 +118,23 @@ def temperature_is_tested(records: Records, temperature) -> np.ndarray:
 def _within(values, measured, slack: float) -> np.ndarray:
     low, high = np.min(measured), np.max(measured)
     return (values >= low - slack) & (values <= high + slack)
+
+
+def slip_findings(
+    name: str, force: float, usual: float, deformation: float
+) -> list[Finding]:
+    """Return a finding where a force can only be a slip of the unit.
+
+    Args:
+        name: of the parameter.
+        force: as given, of either sign [N].
+        usual: what the deformation takes, a size [N].
+        deformation: as given [mm].
+    """
+    if not usual > 0.0 or usual / _OFF < abs(force) < usual * _OFF:
+        return []
+    words = f"{force:g} N, where {deformation:g} mm takes about {usual:.3g} N"
+    return [Finding(name, words, "Give it in N")]
 
 
 def level_findings(temperature: np.ndarray, name: str) -> list[Finding]:

@@ -10,6 +10,7 @@ from hdcal.prediction.engine.causes import Cause, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
     level_findings,
+    slip_findings,
     temperature_findings,
 )
 from hdcal.prediction.engine.forces import QUANTITIES
@@ -21,8 +22,6 @@ from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
 from hdcal.prediction.tolerance_factors import check_shares
 
-# A force this many times larger or smaller than the one needed is a slip of the unit.
-_OFF = 100.0
 # Draws that must lie beyond a bound: fewer do not say where it is.
 _BEYOND = 10
 # The normal law is no guide to shares rarer than this.
@@ -145,7 +144,7 @@ def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:
 
 
 def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
-    scale = abs(float(np.median(cause.values["stiffness"])) * deformation)
+    usual = abs(float(np.median(cause.values["stiffness"])) * deformation)
     findings = []
     for name, force in forces.items():
         if force is None:
@@ -155,7 +154,6 @@ def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
         elif force == 0.0:
             words = f"{force:g} N is no force"
             findings.append(Finding(name, words, "Give a number of N"))
-        elif scale > 0.0 and not scale / _OFF < abs(force) < scale * _OFF:
-            words = f"{force:g} N, where {deformation:g} mm takes about {scale:.3g} N"
-            findings.append(Finding(name, words, "Give it in N"))
+        else:
+            findings += slip_findings(name, force, usual, deformation)
     return findings

@@ -4,7 +4,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
+from hdcal.prediction.engine.causes import (
+    Cause,
+    Models,
+    causes_of,
+    chances_of,
+    likeliest,
+    weight_left_out,
+)
 from hdcal.prediction.engine.conditions import (
     SENSE,
     Direction,
@@ -131,6 +138,8 @@ def _margin(
         worst=worst,
         reached=reached,
         models=model_bounds(forces, draws, criteria),
+        causes=chances_of(causes),
+        weight_left_out=weight_left_out(causes),
         gradients=slopes,
         shares=shares,
         beyond_tested=beyond,
