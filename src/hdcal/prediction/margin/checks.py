@@ -20,6 +20,7 @@ from hdcal.prediction.engine.population_force import MOST_DRAWS
 from hdcal.prediction.engine.sizes import check_tolerances
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
+from hdcal.prediction.margin.temperatures import MOST_TEMPERATURES
 from hdcal.prediction.tolerance_factors import check_shares
 
 # Draws that must lie beyond a bound: fewer do not say where it is.
@@ -121,7 +122,9 @@ def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
 
 
 def _check_temperature(cause: Cause, temperature) -> list[Finding]:
-    return level_findings(temperature, "temperature") or temperature_findings(
+    name = "temperature"
+    many = level_findings(temperature, name, MOST_TEMPERATURES)
+    return many or temperature_findings(
         cause.posterior.case.gear, cause.values, temperature
     )
 
