@@ -1,4 +1,4 @@
-"""Readings at untested conditions: their bands are wide, and little is learned there."""
+"""Readings at untested conditions: their bands are wide, and they teach little."""
 
 from dataclasses import replace
 
