@@ -157,6 +157,8 @@ def test_the_solver_keeps_what_it_has_when_it_cannot_do_better():
         (WALL, {"limit_force": -1.0}, "-1 N is no limit of the force at 0.4 mm"),
         (WALL, {"limit_force": 0.0}, "0 is no limit"),
         (WALL, {"limit_force": np.nan}, "nan N does not lie between"),
+        (WALL, {"limit_force": 120_000.0}, "takes about 70.2 N. Give it in N"),
+        (WALL, {"limit_force": 0.06}, "takes about 70.2 N. Give it in N"),
         (WALL, {"limit_stress": 0.0}, "0 MPa does not lie between"),
         (WALL, {"deformation": 50.0}, "50 mm on a radius of 40 mm"),
         (WALL, {"probability": 0.0}, "does not lie between 0 and 1"),

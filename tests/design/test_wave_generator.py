@@ -159,7 +159,8 @@ def test_the_adjusting_range_is_that_of_the_gears(given):
     assert high == pytest.approx(np.quantile(own, 0.995), rel=1e-9)
     force, more = told.adjusted.preload_N
     assert more / force == pytest.approx(np.exp(2 * 2.576 * 0.05), rel=0.02)
-    assert told.adjusted.probability == 1.0
+    # All of them; that none will ever be outside nobody knows.
+    assert told.adjusted.probability == 1.0 - 0.5 / 20_000
     rest = told.set_point.force_N.median
     assert rest == pytest.approx(0.4 * np.median(stiffness))
 

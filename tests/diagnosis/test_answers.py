@@ -12,9 +12,11 @@ from hdcal.data.prior import Prior
 from hdcal.diagnosis import detection, next_run
 from hdcal.diagnosis import diagnose as module
 from hdcal.diagnosis.candidate_runs import candidate_runs
+from hdcal.diagnosis.refit import Refits
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.evidence.residual_test import residual_test
 from hdcal.evidence.row_means import average_rows
+from hdcal.inference.hypotheses import LeftOut
 from hdcal.physics.registry import EFFECTS
 
 CURVED = {"progressive_stiffening": {"slope": 0.1}}
@@ -135,14 +137,16 @@ def test_the_rows_of_a_mean_are_told(monkeypatch):
     assert len(verdict.where.records.force) < 180 == len(verdict.case.records.force)
 
 
-def test_members_left_out_of_the_bands_are_told_only_with_bands():
-    which = SimpleNamespace(verdict="ambiguous", set=("a", "b", "c", "d"))
+def test_hypotheses_left_out_of_the_bands_are_told_only_with_bands():
     found = SimpleNamespace(accounted=())
 
-    def notes(*refitted: str) -> str:
-        fits = {name: (0.3, SimpleNamespace(usable=True)) for name in refitted}
-        return " ".join(module._notes(found, which, fits, 1))
+    def notes(left: LeftOut | None, *failed: str) -> str:
+        fits = Refits({}, left, dict.fromkeys(failed))
+        return " ".join(module._notes(found, fits, 1))
 
-    assert "likeliest members" not in notes()
-    assert "likeliest members" in notes("a", "b", "c")
-    assert "likeliest members" not in notes("a+b", "c", "d")
+    assert notes(None) == ""
+    assert notes(LeftOut(0.004, "a")) == ""
+    told = notes(LeftOut(0.07, "unknown"), "a")
+    assert "7 % of the probability lies on hypotheses that were not calib" in told
+    assert "counts as something outside the library" in told
+    assert "the calibration with a failed its checks" in told

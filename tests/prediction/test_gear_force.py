@@ -17,7 +17,7 @@ from hdcal.design.study.study import force_quantiles, general_quantiles, is_line
 from hdcal.errors import InputError
 from hdcal.physics.effects.hysteresis import Hysteresis
 from hdcal.physics.effects.rig_compliance import RigCompliance
-from hdcal.prediction.engine.forces import gear_forces
+from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import stiffness_ratio
 
 SHARES = np.array([0.5, 0.025, 0.975])
@@ -174,9 +174,17 @@ def test_the_nominal_deformation_is_the_gears_own():
 def test_a_cause_that_is_not_settled_is_told():
     posterior = single(size=100)
     assert design_draws(posterior).misfits == ()
-    origin = {"hypothesis": "contact_onset", "probabilities": {"contact_onset": 0.6}}
+    origin = {"hypothesis": "contact_onset", "probabilities": {"contact_onset": 1.0}}
     settled = {**posterior.settings, "diagnosis": origin}
+    settled |= {"left_out": {"probability": 0.0, "counted_as": "contact_onset"}}
     assert design_draws(replace(posterior, settings=settled)).misfits == ()
+    settled |= {"left_out": {"probability": 0.08, "counted_as": "contact_onset"}}
+    (words,) = design_draws(replace(posterior, settings=settled)).misfits
+    assert "8 % of the probability" in words and "counts as contact onset" in words
+    # Of an older diagnosis nobody knows what it left out.
+    older = {**posterior.settings, "diagnosis": origin}
+    (words,) = design_draws(replace(posterior, settings=older)).misfits
+    assert "rests on contact onset alone" in words
     origin = {**origin, "probabilities": {"contact_onset": 0.6, "none": 0.4}}
     open_one = {**posterior.settings, "diagnosis": origin}
     (words,) = design_draws(replace(posterior, settings=open_one)).misfits

@@ -9,13 +9,14 @@ import h5py
 import jsonschema
 import pytest
 from commands import Hdcal
-from posteriors import batch, single, stiffer
+from posteriors import batch, beside, single, stiffer
 from schema_checks import obeys
 from verdicts import ambiguous, failed
 
 from hdcal.diagnosis.summary import write_verdict
+from hdcal.inference.hypotheses import ORIGIN
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.engine.causes import ORIGIN, read_models
+from hdcal.prediction.engine.causes import read_models
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.report.answer import json_schema
 
@@ -23,6 +24,7 @@ FILES = {"margin.json", "budget.csv", "report.html", "hdcal-result.json"} | {
     f"{name}.{kind}" for name in ("margin", "tornado") for kind in ("svg", "png")
 }
 ASK = ["--deformation", "0.4"]
+NAMES = ("progressive_stiffening", "seating_slack")
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +36,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     single(size=400).save(place / "one" / "posterior.nc")
     gears = batch(6, 400)
     gears.save(place / "six" / "posterior.nc")
-    models = {"progressive_stiffening": (0.6, gears)}
-    models |= {"seating_slack": (0.4, stiffer(gears, 1.05))}
+    first, second = NAMES
+    models = {first: (0.6, beside(gears, first))}
+    models |= {second: (0.4, beside(stiffer(gears, 1.05), second))}
     for name, kept in (("ambiguous", 2), ("named", 1)):
         chosen = dict(list(models.items())[:kept])
         verdict = replace(ambiguous(), posteriors=chosen)
@@ -150,7 +153,7 @@ def test_an_unsettled_diagnosis_is_averaged_over(here: Hdcal, runs: Path):
     assert "average over the causes" in done.stderr
     verdict = json.loads((runs / "ambiguous" / "verdict.json").read_text())
     assert [refit["file"] for refit in verdict["refits"]] == [
-        "posterior.nc",
+        "posterior-progressive_stiffening.nc",
         "posterior-seating_slack.nc",
     ]
     settled = json.loads(here("margin", runs / "named", *ASK, "--json").stdout)
@@ -195,7 +198,7 @@ def edit_draw(folder: Path) -> None:
 
 
 def swap_models(folder: Path) -> None:
-    first, second = folder / "posterior.nc", folder / "posterior-seating_slack.nc"
+    first, second = (folder / f"posterior-{name}.nc" for name in NAMES)
     one, two = first.read_bytes(), second.read_bytes()
     first.write_bytes(two)
     second.write_bytes(one)
@@ -240,9 +243,25 @@ def test_a_folder_that_was_changed_is_refused(here: Hdcal, runs, tmp_path, damag
 
 
 def test_the_models_know_what_they_belong_to(runs: Path):
-    origin = Posterior.load(runs / "ambiguous").settings[ORIGIN]
-    assert origin["hypothesis"] == "progressive_stiffening"
-    assert origin["probabilities"]["seating_slack"] == 0.4
+    folder = runs / "ambiguous"
+    for name in NAMES:
+        origin = Posterior.load(folder / f"posterior-{name}.nc").settings[ORIGIN]
+        assert origin["hypothesis"] == name
+        assert origin["probabilities"]["seating_slack"] == 0.4
+    assert Posterior.load(folder).settings[ORIGIN]["hypothesis"] is None
+
+
+def test_the_mixture_alone_says_what_the_models_say(here: Hdcal, runs: Path):
+    folder = runs / "ambiguous"
+    whole, mixed = (
+        json.loads(here("margin", run, *ASK, "--json").stdout)
+        for run in (folder, folder / "posterior.nc")
+    )
+    assert (
+        whole["causes"] == mixed["causes"] == dict(zip(NAMES, (0.6, 0.4), strict=True))
+    )
+    for name in ("lower_bound_N", "upper_bound_N", "capacity_N"):
+        assert mixed["worst"][name] == pytest.approx(whole["worst"][name], rel=0.02)
 
 
 BAD = {

@@ -17,6 +17,8 @@ from hdcal.inference.noise_form import correlates
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.physics.effect import parameters
+from hdcal.physics.registry import EFFECTS
 
 CHAINS = 2
 DRIFTS = ("thermal_zero_drift", "thermal_expansion")
@@ -186,6 +188,16 @@ def with_leftover(size: int = 2000) -> Posterior:
         "gap_weights": rng.normal(0.0, 0.5, (size, 20)) / (1.0 + np.arange(20.0)) ** 2,
     }
     return written_posterior(case, draws, with_gap=True)
+
+
+def beside(posterior: Posterior, name: str) -> Posterior:
+    """Return the same beside an effect that changes nothing."""
+    draws, spec = posterior.draws, parameters(EFFECTS[name])
+    idle = {
+        f"{name}.{n}": np.full(len(draws["K"]), p.typical if p.null is None else p.null)
+        for n, p in spec.items()
+    }
+    return written_posterior(posterior.case, {**draws, **idle}, effects=[name])
 
 
 def stiffer(posterior: Posterior, factor: float) -> Posterior:

@@ -27,12 +27,14 @@ class PulledFurther:
         force: likewise, with noise [N].
         at: beyond them [mm].
         truth: reading there without noise [N].
+        zero: what is read without a load; the rest of a reading is the gear's [N].
     """
 
     deformation: np.ndarray
     force: np.ndarray
     at: float
     truth: float
+    zero: float
 
 
 def _ramp(deformation) -> History:
@@ -76,7 +78,8 @@ def pulled_further(
         return None
     full = rig.readings([active])
     noise = rig.sigma * rng.normal(size=rows)
-    return PulledFurther(measured, full[:rows] + noise, FULL, float(full[-1]))
+    told = measured, full[:rows] + noise, FULL, float(full[-1]), rig.zero
+    return PulledFurther(*told)
 
 
 def _sized(

@@ -54,7 +54,7 @@ def onset() -> Posterior:
 
 def stream(count: int, seed: int = 1):
     rng = np.random.default_rng(seed)
-    w = rng.uniform(0.0, 0.54, count)
+    w = rng.uniform(0.02, 0.54, count)
     force = 194.0 * (w + 0.3 * np.maximum(0.0, w - 0.25))
     return w, force + rng.normal(0.0, 0.8, count)
 

@@ -6,7 +6,6 @@ that its stiffness is that of the tested gear times a ratio of two formulas.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Literal
 
 import jax
@@ -16,15 +15,13 @@ from hdcal.data.case import Gear, Theory
 from hdcal.data.plausible import implausible
 from hdcal.data.prior import scaled
 from hdcal.data.priors import (
-    MATERIAL_UNITS,
     Prior,
     material_names,
     material_priors,
-    read_priors,
 )
 from hdcal.data.records import Geometry, Records
-from hdcal.data.toml_file import did_you_mean
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.design.materials import read_material
+from hdcal.errors import Findings
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -32,9 +29,15 @@ from hdcal.inference.residuals import misfits
 from hdcal.inference.values import Values
 from hdcal.physics.chain import Reading
 from hdcal.physics.theory import THEORIES
-from hdcal.prediction.engine.causes import ORIGIN, causes_of, sample_prior
+from hdcal.prediction.engine.causes import (
+    averaging_words,
+    causes_of,
+    likeliest,
+    sample_prior,
+)
+from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
+from hdcal.prediction.engine.untested import Untested
 
-_FACTS = ("E0", "alpha", "poisson")
 CARRIED = (
     "K is carried over from {gear} to other sizes. That holds for gears of the same "
     "proportions of teeth, end and wall; the farther away, the less."
@@ -63,7 +66,10 @@ class DesignDraws:
         material: its name.
         kind: whether the draws are a posterior's or a prior's.
         records: the tested rows, or None.
-        misfits: warnings of shapes that the calibrated model leaves over.
+        misfits: warnings: of what the causes leave open, and of shapes that the
+            calibrated model leaves over.
+        untested: what is not known beyond the tested conditions, for each cause; None
+            where no gear was tested.
     """
 
     gear: Gear
@@ -75,6 +81,7 @@ class DesignDraws:
     kind: Literal["posterior", "prior"]
     records: Records | None
     misfits: tuple[str, ...] = ()
+    untested: Untested | None = None
 
     @property
     def size(self) -> int:
@@ -140,6 +147,33 @@ class DesignDraws:
             words.append("The leftover discrepancy is taken to grow with stiffness.")
         return words
 
+    def usual_force(self, deformation: float) -> float:
+        """Return about what a radial deformation [mm] of the gear takes [N]."""
+        stiffness = self.values["K"] * self.values["E0"] * self.problem.unit_stiffness
+        return abs(float(np.median(stiffness)) * deformation)
+
+    def within_tested(self, deformation: np.ndarray) -> np.ndarray:
+        """Tell where no bend grows: between rest and the ends of the tested range.
+
+        Args:
+            deformation: radial, of the gear [mm].
+        """
+        if self.records is None:
+            return np.ones(np.shape(deformation), dtype=bool)
+        read = np.asarray(deformation) / self.problem.reading.radial_per_read
+        zero, tested = self.values["deformation_offset"], self.records.deformation
+        low, high = min(0.0, np.min(tested)), max(0.0, np.max(tested))
+        return (read + np.min(zero) >= low) & (read + np.max(zero) <= high)
+
+    def bend_sd(self, deformation: float) -> float:
+        """Return the sd of what untested deformation may add to the force [N]."""
+        place = np.array([deformation]), np.array([self.gear.reference_temperature])
+        whole, straight = (
+            np.asarray(gear_forces(self.problem, self.values, *place, 1.0, untested))
+            for untested in (self.untested, None)
+        )
+        return float(np.std(whole - straight))
+
     def of_material(self, name: str, seed: int = 0) -> "DesignDraws":
         """Return the draws of the same gear made of another material.
 
@@ -158,7 +192,8 @@ class DesignDraws:
             site: sample_prior(facts[site], site, key, self.size)
             for site, key in zip(("E0", "alpha"), keys, strict=True)
         }
-        values = {**self.values, **new}
+        stiffer = new["E0"] / np.asarray(self.values["E0"])
+        values = {**self.values, **new, MODULUS: stiffer}
         return replace(self, values=values, facts=facts, material=name)
 
 
@@ -179,7 +214,7 @@ def design_draws(
     with Findings() as wrong:
         wrong += implausible("seed", seed)
     if isinstance(source, Posterior):
-        return _calibrated(source)
+        return _calibrated(source, seed)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
     keys = jax.random.split(jax.random.key(seed), len(priors))
@@ -199,54 +234,21 @@ def design_draws(
     )
 
 
-def _calibrated(posterior: Posterior) -> DesignDraws:
-    (cause,) = causes_of(posterior)
-    gear = posterior.case.gear
+def _calibrated(posterior: Posterior, seed: int) -> DesignDraws:
+    causes, gear = causes_of(posterior), posterior.case.gear
+    values, untested = gear_values(posterior, seed)
+    main = likeliest(causes).posterior
     return DesignDraws(
         gear=gear,
         theory=posterior.theory,
-        problem=cause.problem,
-        values=cause.values,
+        problem=posterior.problem,
+        values=values,
         facts=_own_facts(gear),
         material=gear.material,
         kind="posterior",
         records=posterior.case.records,
-        misfits=(*_unsettled(posterior), *misfits(posterior)),
-    )
-
-
-def read_material(name: str) -> dict[str, Prior]:
-    """Return the facts of a material.
-
-    Args:
-        name: a shipped one, or the path of a .toml file.
-
-    Raises:
-        InputError: there is none, or the file lacks something.
-    """
-    if not name.endswith(".toml"):
-        if name not in material_names():
-            words = f"unknown material '{name}'"
-            remedy = did_you_mean(name, material_names(), "Shipped are")
-            raise InputError([Finding("materials", words, remedy)])
-        return material_priors(name)
-    facts = read_priors(Path(name), MATERIAL_UNITS, name)
-    lacking = [need for need in _FACTS if need not in facts]
-    if lacking:
-        words = f"the material says nothing of {' and '.join(lacking)}"
-        raise InputError([Finding(name, words, "Write a table for each")])
-    return facts
-
-
-def _unsettled(posterior: Posterior) -> tuple[str, ...]:
-    """Return a warning where a diagnosis left other causes open."""
-    origin = posterior.settings.get(ORIGIN)
-    if not isinstance(origin, dict) or len(origin["probabilities"]) < 2:
-        return ()
-    used = str(origin["hypothesis"]).replace("_", " ")
-    return (
-        f"The diagnosis did not settle the cause of the gap: this rests on {used} "
-        "alone. `hdcal margin` averages over all causes.",
+        misfits=(*averaging_words(causes), *misfits(main)),
+        untested=untested,
     )
 
 

@@ -40,6 +40,7 @@ from hdcal.design.sizes import (
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
+from hdcal.prediction.engine.conditions import slip_findings
 from hdcal.prediction.engine.loading_sense import capacity_findings
 from hdcal.prediction.engine.sizes import SIZES
 
@@ -200,6 +201,9 @@ def _findings(
         wrong = implausible(name, value)
         if value == 0.0 and not wrong:
             wrong = [Finding(name, "0 is no limit", f"Give it in {unit}")]
+        elif name == "limit_force" and not wrong:
+            at = asked.deformation_mm
+            wrong = slip_findings(name, limit_force, draws.usual_force(at), at)
         findings += wrong
     findings += probability_findings(draws, asked.probability)
     if any(name not in SIZES for name in vary):

@@ -88,6 +88,7 @@ def next_gear(
         tested=draws.gear.geometry,
         deviation=deviation,
         shifts=shifts,
+        untested=draws.untested,
         theory=draws.theory,
     )
     return NextGear(gears, _words(draws, tested, tolerances))

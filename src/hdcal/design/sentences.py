@@ -16,7 +16,13 @@ from hdcal.design.design_draws import DesignDraws
 from hdcal.prediction.engine.conditions import NEAR_K, NEAR_MM
 from hdcal.prediction.engine.loading_sense import ends_along, interval_along
 from hdcal.prediction.engine.sizes import SIZES
+from hdcal.prediction.margin.result import FAR
 from hdcal.report.words import estimate, number, percent
+
+_FAR_OUT = (
+    " So far out the answer rests on how fast such a bend may grow: test there before "
+    "you rely on it."
+)
 
 
 def as_known(found: DesignAnswer, sentence: str) -> str:
@@ -186,8 +192,9 @@ def _warmth(levels: Sequence[float]) -> str:
 
 
 def _chance(entry: ChosenSpring | CandidateAnswer) -> str:
-    error = entry.standard_error
-    return _share(entry.probability) + (f" ± {error:.2g}" if error else "")
+    told = _share(entry.probability)
+    bounded = told.startswith(("above", "below"))
+    return told if bounded else f"{told} ± {entry.standard_error:.2g}"
 
 
 def _share(value: float) -> str:
@@ -203,21 +210,40 @@ def beyond_tested(
     """Say which deformations and temperatures no reading covers, in words."""
     if basis.records is None:
         return []
-    ratio = basis.problem.reading.radial_per_read
-    radial, told = basis.records.deformation * ratio, []
-    for name, values, measured, slack, unit in (
-        ("deformation", deformation, radial, NEAR_MM, "mm"),
-        ("temperature", temperature, basis.records.temperature, NEAR_K, "°C"),
-    ):
-        low, high = float(np.min(measured)), float(np.max(measured))
-        if np.min(values) < low - slack or np.max(values) > high + slack:
-            asked = " … ".join(f"{v:g}" for v in sorted({values.min(), values.max()}))
-            seen = f"{low:g}" if low == high else f"{low:g} … {high:g}"
-            told.append(
-                f"Extrapolated: {name} {asked} {unit}, tested were {seen} {unit}. The "
-                "band assumes that the model goes on holding."
-            )
+    ratio, told = basis.problem.reading.radial_per_read, []
+    radial = np.asarray(basis.records.deformation * ratio)
+    if words := _outside("deformation", deformation, radial, NEAR_MM, "mm"):
+        told.append(words + _bend(basis, deformation, radial))
+    warm = basis.records.temperature
+    if words := _outside("temperature", temperature, warm, NEAR_K, "°C"):
+        told.append(
+            f"{words} Young's modulus carries it, linearly; a product has no rig that "
+            "would drift."
+        )
     return told
+
+
+def _outside(name: str, values, measured, slack: float, unit: str) -> str:
+    low, high = float(np.min(measured)), float(np.max(measured))
+    if np.min(values) >= low - slack and np.max(values) <= high + slack:
+        return ""
+    asked = " … ".join(f"{v:g}" for v in sorted({values.min(), values.max()}))
+    seen = f"{low:g}" if low == high else f"{low:g} … {high:g}"
+    return f"Extrapolated: {name} {asked} {unit}, tested were {seen} {unit}."
+
+
+def _bend(basis: DesignDraws, deformation: np.ndarray, measured: np.ndarray) -> str:
+    """Say what may grow beyond the tested deformation, and how far that carries."""
+    if basis.within_tested(deformation).all():
+        return " Between there and the free shape the model goes on holding."
+    low, high = float(np.min(measured)), float(np.max(measured))
+    beyond = np.maximum(low - deformation, deformation - high)
+    at = float(deformation[np.argmax(beyond)])
+    words = (
+        " A bend that these rows need not show may bring "
+        f"{basis.bend_sd(at):.2g} N (sd) at {at:g} mm; the intervals hold it."
+    )
+    return words + _FAR_OUT * bool(beyond.max() > FAR * (high - low))
 
 
 def far_from_tested(basis: DesignDraws, sizes: Mapping[str, np.ndarray]) -> list[str]:

@@ -64,9 +64,13 @@ def in_words(found: D, headline: str, words: Iterable[str]) -> D:
     return replace(found, headline=headline, next_step=step, answer=tuple(words))
 
 
-def _error(probability: float, draws: int) -> float:
-    """Return the standard error of a probability that was counted among draws."""
-    return float(np.sqrt(probability * (1.0 - probability) / draws))
+def _counted(share: float, draws: int) -> tuple[float, float]:
+    """Return a probability that was counted among draws, and its standard error.
+
+    That all draws do it does not make it certain: half a draw is left in doubt.
+    """
+    share = float(np.clip(share, 0.5 / draws, 1.0 - 0.5 / draws))
+    return share, float(np.sqrt(share * (1.0 - share) / draws))
 
 
 def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
@@ -81,13 +85,7 @@ def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
         force_N=tuple(_forces(found, level) for level in levels),
         at_temperature=tuple(_kept(found, level) for level in levels),
         adjusted=_adjusted(found),
-        curve=SpringCurve(
-            rate_N_per_mm=tuple(one.rate for one in found.springs),
-            common=tuple(one.together for one in found.springs),
-            zero_backlash=tuple(one.no_backlash for one in found.springs),
-            no_jam=tuple(one.no_jam for one in found.springs),
-            adjusted=tuple(one.adjusted for one in found.springs),
-        ),
+        curve=_curve(found),
         stress=_window_stress(found),
         assumptions=tuple(found.basis.assumptions),
         warnings=found.warnings,
@@ -109,23 +107,34 @@ def generator_report(
     return Report(generator_document(answer, command), answer, _FILE, figures)
 
 
+def _curve(found: WaveGenerator) -> SpringCurve:
+    counted = (
+        tuple(
+            _counted(getattr(one, name), found.basis.size)[0] for one in found.springs
+        )
+        for name in ("together", "no_backlash", "no_jam", "adjusted")
+    )
+    return SpringCurve(tuple(one.rate for one in found.springs), *counted)
+
+
 def _signed(ends: np.ndarray, found: WaveGenerator) -> tuple[float, float]:
     low, high = ends.tolist()
     return ends_along(low, high, found.asked.sense)
 
 
 def _spring(found: WaveGenerator) -> ChosenSpring:
-    spring, sense = found.chosen, found.asked.sense
+    spring, sense, size = found.chosen, found.asked.sense, found.basis.size
+    probability, error = _counted(spring.together, size)
     own = sense * np.median(found.forces[1, _reference(found)]) / _middle(found)
     return ChosenSpring(
         rate_N_per_mm=spring.rate,
         softest_considered=spring.rate == found.springs[0].rate,
         rate_over_gear=spring.rate / float(own),
         interference_mm=sense * spring.interference,
-        probability=spring.together,
-        standard_error=_error(spring.together, found.basis.size),
-        zero_backlash=spring.no_backlash,
-        no_jam=spring.no_jam,
+        probability=probability,
+        standard_error=error,
+        zero_backlash=_counted(spring.no_backlash, size)[0],
+        no_jam=_counted(spring.no_jam, size)[0],
     )
 
 
@@ -159,12 +168,9 @@ def _forces(found: WaveGenerator, level: int) -> WindowForces:
 def _kept(found: WaveGenerator, level: int) -> WindowKept:
     low, high = found.intervals(level)
     x = found.chosen.interference + found.error
-    return WindowKept(
-        temperature_C=found.asked.temperature_C[level],
-        zero_backlash=float(np.mean(x >= low)),
-        no_jam=float(np.mean(x <= high)),
-        inside=float(np.mean((x >= low) & (x <= high))),
-    )
+    kept = x >= low, x <= high, (x >= low) & (x <= high)
+    shares = (_counted(float(np.mean(each)), len(x))[0] for each in kept)
+    return WindowKept(found.asked.temperature_C[level], *shares)
 
 
 def _adjusted(found: WaveGenerator) -> GearByGear:
@@ -177,7 +183,7 @@ def _adjusted(found: WaveGenerator) -> GearByGear:
     reach = np.quantile(own, ends)
     load = found.chosen.rate * (reach - found.asked.sense * _middle(found))
     return GearByGear(
-        probability=found.chosen.adjusted,
+        probability=_counted(found.chosen.adjusted, found.basis.size)[0],
         share_of_gears=found.asked.probability,
         interference_mm=_signed(reach, found),
         preload_N=_signed(load, found),
@@ -242,14 +248,15 @@ def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAns
 
 def _candidate(one: Candidate, sense: LoadingSense) -> CandidateAnswer:
     span = credible_interval(sense * one.forces)
+    probability, error = _counted(one.kept, len(one.forces))
     return CandidateAnswer(
         material=one.basis.material,
         sizes_mm={name.removesuffix("_mm"): v for name, v in one.sizes.items()},
         met=one.met,
         change=one.change,
         force_N=CandidateForce(**vars(span), kept=sense * one.force),
-        probability=one.kept,
-        standard_error=_error(one.kept, len(one.forces)),
+        probability=probability,
+        standard_error=error,
         **_stress(one.basis, one.stresses),
         utilisation_kept=one.utilisation,
     )

@@ -13,6 +13,7 @@ from hdcal.diagnosis.verdict import (
     Which,
 )
 from hdcal.errors import Finding
+from hdcal.inference.hypotheses import LeftOut
 from hdcal.report.answer import (
     Answer,
     Count,
@@ -112,6 +113,7 @@ class VerdictAnswer(Answer):
     next_test_reason: str
     budget: Budget
     refits: tuple[Refit, ...]
+    left_out: LeftOut | None = None
     library: tuple[EffectName, ...]
     notes: tuple[str, ...]
     seed: Count

@@ -12,7 +12,14 @@ from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
 from hdcal.diagnosis.model_posterior import ModelPosterior, model_posterior
 from hdcal.diagnosis.next_run import rank_runs
-from hdcal.diagnosis.refit import Refits, failure_reasons, refit, with_sampled_size
+from hdcal.diagnosis.refit import (
+    MOST_LEFT_OUT,
+    NOTHING,
+    Refits,
+    failure_reasons,
+    refit,
+    with_sampled_size,
+)
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
 from hdcal.diagnosis.which import identify_cause
@@ -24,6 +31,7 @@ from hdcal.evidence.row_means import average_rows
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
+from hdcal.report.words import hypothesis, percent
 
 # Changes of the stiffness, and of the log of the noise, that move no evidence much.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
@@ -62,7 +70,8 @@ def diagnose(
     found = detect_gap(evidence, posterior, averaged, rng)
     which = identify_cause(evidence, found.posterior, found.detected, library, rng)
     closed = _closure(evidence, which, found, rng)
-    fits = {} if quick else refit(case, which, found.posterior, library, seed, progress)
+    asked = found.posterior, library, seed, progress
+    fits = NOTHING if quick else refit(case, *asked)
     runs, no_run = rank_runs(evidence, found.posterior, library, rng)
     return Verdict(
         case=case,
@@ -72,9 +81,10 @@ def diagnose(
         shrink=closed,
         next_test=runs,
         budget=stiffness_budget(evidence, case, which.named),
-        posteriors={n: fit for n, fit in fits.items() if fit[1].usable},
+        posteriors=dict(fits.models),
+        left_out=fits.left_out,
         library=tuple(library),
-        notes=tuple(_notes(evidence, which, fits, group)),
+        notes=tuple(_notes(evidence, fits, group)),
         reasons=failure_reasons(fits),
         averaged_rows=group,
         no_run=no_run,
@@ -147,19 +157,22 @@ def _closure(
     return closure(evidence, which.named, members, found.basis, found.correlation, rng)
 
 
-def _notes(evidence: CaseEvidence, which: Which, fits: Refits, group: int) -> list[str]:
+def _notes(evidence: CaseEvidence, fits: Refits, group: int) -> list[str]:
     notes = [
         f"{name} is accounted for by the gear file's force_resolution_N"
         for name in evidence.accounted
     ]
     notes += [
         f"the calibration with {name} failed its checks and is left out of the bands"
-        for name, (_, fit) in fits.items()
-        if not fit.usable
+        for name in fits.failed
     ]
-    dropped = {*which.set} - {part for name in fits for part in name.split("+")}
-    if fits and dropped and which.verdict == "ambiguous":
-        notes.append("only the likeliest members of the set are in the bands")
+    left = fits.left_out
+    if left is not None and left.probability >= 0.5 * MOST_LEFT_OUT:
+        notes.append(
+            f"{percent(left.probability)} of the probability lies on hypotheses that "
+            f"were not calibrated; in the bands it counts as "
+            f"{hypothesis(left.counted_as)}"
+        )
     if group > 1:
         notes.append(
             f"means of {group} neighbouring rows were diagnosed, not single rows; the "

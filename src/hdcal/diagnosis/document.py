@@ -22,6 +22,7 @@ from hdcal.report.words import (
     hypothesis,
     label,
     number,
+    percent,
 )
 
 _FAILED = (
@@ -135,10 +136,7 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
         return Section(heading, [Text(f"None was sampled{why}.")])
     name, posterior = refit
     bad = "" if posterior.usable else " This fit failed its checks; do not use it."
-    words = (
-        f"Calibrated again with {hypothesis(name)}. All draws are in posterior.nc, the "
-        f"numbers of the bands in bands.csv.{bad}"
-    )
+    words = f"Calibrated again with {hypothesis(name)}.{bad} {_kept(found)}"
     caption = (
         "Dark band: where the corrected model lies with 95 % probability. Light band: "
         "where one new reading lies with 95 % probability. Hatched and dotted: outside "
@@ -153,6 +151,22 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
         Text(note, soft=True),
     ]
     return Section(heading, blocks)
+
+
+def _kept(found: VerdictAnswer) -> str:
+    """Say where the draws are, and what the bands average over."""
+    numbers = "the numbers of the bands in bands.csv."
+    if len(found.refits) < 2:
+        return f"All draws are in posterior.nc, {numbers}"
+    listed = ", ".join(
+        f"{hypothesis(refit.hypothesis)} ({percent(refit.probability)}, {refit.file})"
+        for refit in found.refits
+    )
+    return (
+        f"The bands average over {listed}. Draws of all, each with its hypothesis and "
+        f"as many as it is probable, are in posterior.nc, {numbers} Below, the most "
+        "probable one."
+    )
 
 
 def _provenance(

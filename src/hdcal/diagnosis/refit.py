@@ -1,61 +1,126 @@
-"""The corrected model by NUTS: of the name, or of each member of the set."""
+"""The hypotheses that are left by NUTS, each with the probability that it carries.
 
-from collections.abc import Mapping
-from dataclasses import replace
+Every hypothesis of 5 % and more is calibrated, whatever the verdict. What is left out
+is not shared out among them: where it is more than 2 %, the plain model with a leftover
+discrepancy is calibrated too and carries it, as it bends wherever the data let it;
+below that the widest model does, the one that knows the stiffness least.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.case import Case
 from hdcal.diagnosis.model_posterior import ModelPosterior
 from hdcal.diagnosis.verdict import Which
 from hdcal.diagnosis.where import interval
-from hdcal.evidence.case_evidence import NONE, UNKNOWN
+from hdcal.evidence.case_evidence import UNKNOWN
+from hdcal.inference.hypotheses import LeftOut, parts_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 
-# Members of the set that are calibrated for the bands, and their least probability.
-_MOST_REFITS, _LEAST_SHARE = 3, 0.05
+# Least probability of a hypothesis that is calibrated; more than the second is not left
+# to a model of something else.
+LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
 
-# Probability and posterior by hypothesis.
-Refits = Mapping[str, tuple[float, Posterior]]
+
+@dataclass(frozen=True)
+class Refits:
+    """Calibrated hypotheses.
+
+    Attributes:
+        models: probability and posterior by hypothesis, of those that may be used;
+            `none` for the plain model, `unknown` for that with a leftover gap. The
+            probabilities sum to 1.
+        left_out: what has no model among these; None without any.
+        failed: calibrations that failed their checks.
+    """
+
+    models: Mapping[str, tuple[float, Posterior]]
+    left_out: LeftOut | None
+    failed: Mapping[str, Posterior]
+
+    @property
+    def likeliest(self) -> str | None:
+        """Name of the most probable one."""
+        return max(self.models, key=lambda name: self.models[name][0], default=None)
+
+
+NOTHING = Refits({}, None, {})
 
 
 def refit(
     case: Case,
-    which: Which,
     posterior: ModelPosterior,
     library: dict[str, type[Effect]],
     seed: int,
     progress: Progress | None,
 ) -> Refits:
-    """Calibrate the corrected model by NUTS: the name, or each member of the set.
+    """Calibrate every hypothesis that is probable enough by NUTS.
 
-    Returns:
-        Probability and posterior by hypothesis; `none` for the plain model and
-        `unknown` for the plain model with a leftover gap.
+    Args:
+        case: data and gear.
+        posterior: over hypotheses.
+        library: effects by name.
+        seed: of the sampler.
+        progress: of it.
     """
-    if which.verdict in ("none", "unknown"):
-        chosen = {which.verdict: 1.0}
-    elif which.verdict == "named" and which.effect:
-        chosen = {"+".join(sorted(which.named)): 1.0}
-    else:
-        share = sorted(posterior.probabilities.items(), key=lambda item: -item[1])
-        kept = [item for item in share if item[1] >= _LEAST_SHARE][:_MOST_REFITS]
-        total = sum(probability for _, probability in kept)
-        chosen = {name: probability / total for name, probability in kept}
-    result = {}
-    for name, share in chosen.items():
-        effects = () if name in (NONE, UNKNOWN) else tuple(name.split("+"))
-        calibrated = calibrate(
+
+    def calibrated(name: str) -> Posterior:
+        own = parts_of(name)
+        return calibrate(
             case,
-            effects=effects,
-            with_gap=name == UNKNOWN,
+            effects=tuple(sorted(own - {UNKNOWN})),
+            with_gap=UNKNOWN in own,
+            adapt_noise=False,
             seed=seed,
             registry=library,
             progress=progress,
         )
-        result[name] = (share, calibrated)
-    return result
+
+    return weighed(posterior.probabilities, calibrated)
+
+
+def weighed(
+    probabilities: Mapping[str, float], calibrated: Callable[[str], Posterior]
+) -> Refits:
+    """Return the hypotheses that are kept, with what they carry.
+
+    Args:
+        probabilities: of all hypotheses, sum 1.
+        calibrated: returns the posterior of one.
+    """
+    ranked = sorted(probabilities, key=lambda name: -probabilities[name])
+    chosen = [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
+    fits = {name: calibrated(name) for name in chosen}
+    if _missing(probabilities, fits) > MOST_LEFT_OUT and UNKNOWN not in fits:
+        fits[UNKNOWN] = calibrated(UNKNOWN)
+    usable = {name: fit for name, fit in fits.items() if fit.usable}
+    failed = {name: fit for name, fit in fits.items() if not fit.usable}
+    if not usable:
+        return Refits({}, None, failed)
+    missing, carrier = _missing(probabilities, fits), _widest(usable)
+    models = {
+        name: (probabilities[name] + missing * (name == carrier), fit)
+        for name, fit in usable.items()
+    }
+    return Refits(models, LeftOut(missing, carrier), failed)
+
+
+def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):
+    """Return the probability without a model that may be used."""
+    return max(
+        1.0 - sum(probabilities[n] for n, fit in fits.items() if fit.usable), 0.0
+    )
+
+
+def _widest(fits: Mapping[str, Posterior]) -> str:
+    if UNKNOWN in fits:
+        return UNKNOWN
+    return max(fits, key=lambda name: float(np.std(fits[name].draws["stiffness"])))
 
 
 def with_sampled_size(which: Which, fits: Refits) -> Which:
@@ -64,22 +129,21 @@ def with_sampled_size(which: Which, fits: Refits) -> Which:
     There the zero of the deformation is inferred too, about which the closed form
     only expands.
     """
-    size = which.amplitude
-    likeliest = max(fits, key=lambda name: fits[name][0], default=None)
+    size, likeliest = which.amplitude, fits.likeliest
     if size is None or likeliest is None or size.effect not in likeliest.split("+"):
         return which
-    _, posterior = fits[likeliest]
+    _, posterior = fits.models[likeliest]
     draws = posterior.draws.get(f"{size.effect}.{size.parameter}")
-    if draws is None or not posterior.usable:
+    if draws is None:
         return which
     return replace(which, amplitude=replace(size, **vars(interval(draws))))
 
 
 def failure_reasons(fits: Refits) -> tuple[str, ...]:
     """Say why nothing may be used: every calibration failed."""
-    if any(fit.usable for _, fit in fits.values()):
+    if fits.models:
         return ()
     return tuple(
         f"the calibration with {name} failed its checks: " + "; ".join(fit.reasons)
-        for name, (_, fit) in fits.items()
+        for name, fit in fits.failed.items()
     )

@@ -1,7 +1,7 @@
 """A verdict as its JSON answer, and all that its result folder holds."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
 
@@ -10,10 +10,11 @@ from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAns
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
+from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN
+from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
-from hdcal.prediction.engine.causes import ORIGIN
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
 
@@ -44,6 +45,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
             Refit(name, verdict.posteriors[name][0], file)
             for name, file in member_files(verdict).items()
         ),
+        left_out=verdict.left_out,
         library=verdict.library,
         notes=verdict.notes,
         seed=verdict.seed,
@@ -123,10 +125,11 @@ def write_verdict(
 
 
 def member_files(verdict: Verdict) -> dict[str, str]:
-    """Return the file of each calibrated hypothesis, of the likeliest the usual one."""
+    """Return the file of each calibrated hypothesis; of a single one the usual one."""
     ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
-    files = {name: f"posterior-{name}.nc" for name in ranked}
-    return files | dict.fromkeys(ranked[:1], FILE_NAME)
+    if len(ranked) == 1:
+        return {ranked[0]: FILE_NAME}
+    return {name: f"posterior-{name}.nc" for name in ranked}
 
 
 def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
@@ -139,10 +142,19 @@ def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
 
 
 def _models(verdict: Verdict) -> Iterator[tuple[str, bytes]]:
-    """Yield the file of every calibrated model, each with the probabilities of all."""
+    """Yield the file of every calibrated model, and of several their mixture."""
     chances = {name: share for name, (share, _) in verdict.posteriors.items()}
-    for name, file in member_files(verdict).items():
+    left = {} if verdict.left_out is None else {LEFT_OUT: asdict(verdict.left_out)}
+
+    def known(name: str) -> Posterior:
         posterior = verdict.posteriors[name][1]
         origin = {"hypothesis": name, "probabilities": chances}
-        settings = {**posterior.settings, ORIGIN: origin}
-        yield file, replace(posterior, settings=settings).to_netcdf()
+        return replace(
+            posterior, settings={**posterior.settings, ORIGIN: origin, **left}
+        )
+
+    for name, file in member_files(verdict).items():
+        yield file, known(name).to_netcdf()
+    if len(chances) > 1:
+        models = {name: (share, known(name)) for name, share in chances.items()}
+        yield FILE_NAME, mixed_posterior(models).to_netcdf()

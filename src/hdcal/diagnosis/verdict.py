@@ -8,6 +8,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.diagnosis.budget import Budget
+from hdcal.inference.hypotheses import LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.report.answer import Count, EffectName, Probability, Promise, Real, Words
@@ -234,8 +235,9 @@ class Verdict(Shown):
         shrink: how far it closes once the effect is added.
         next_test: runs that would tell more, best first.
         budget: of the scale factor K.
-        posteriors: calibrated corrected models by effect (joined with +), with the
-            probability that weighs their bands; empty with `quick`.
+        posteriors: calibrated models by hypothesis (effects joined with +), with the
+            probability that weighs their bands, sum 1; empty with `quick`.
+        left_out: probability without a model of its own, and which one carries it.
         library: names of the effects that were considered.
         notes: remarks, such as rows thinned.
         reasons: why the result must not be used; empty when it may.
@@ -254,6 +256,7 @@ class Verdict(Shown):
     budget: Budget
     posteriors: dict[str, tuple[float, Posterior]]
     library: tuple[str, ...]
+    left_out: LeftOut | None = None
     notes: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
     averaged_rows: int = 1

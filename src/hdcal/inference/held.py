@@ -13,6 +13,7 @@ from hdcal.data.prior_checks import family_faults, range_faults, sign_faults
 from hdcal.data.typed_json import PART, RESULT, STRICT, Size, within
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.hypotheses import HeldOrigin, LeftOut
 
 
 @dataclass(frozen=True)
@@ -124,6 +125,8 @@ class HeldSettings:
     versions: dict[str, str]
     with_gap: bool = False
     kind: Literal["static", "dynamic"] = "static"
+    diagnosis: HeldOrigin | None = None
+    left_out: LeftOut | None = None
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.held import HeldModel, HeldSettings
+from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.values import site_shapes
@@ -175,6 +176,7 @@ class Posterior(Shown):
             chosen = _look_up(model.effects, effects, file)
             sites = cls.sites(case, chosen, settings.with_gap)
             check_draws(tree, sites)
+            _check_mixture(tree, chosen, settings)
             model.check_diagnoses(sites)
             return cls(
                 case=case,
@@ -188,6 +190,18 @@ class Posterior(Shown):
             )
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error
+
+
+def _check_mixture(tree: xr.DataTree, effects, settings: HeldSettings) -> None:
+    draws, origin = tree["posterior"].to_dataset(), settings.diagnosis
+    labelled = HYPOTHESIS in draws.coords
+    if origin is None or origin.hypothesis is not None:
+        if labelled:
+            raise ValueError("has hypotheses of which it says nothing")
+    elif not labelled:
+        raise ValueError("does not say which draws are of which hypothesis")
+    else:
+        check_hypotheses(draws, effects, origin.probabilities)
 
 
 def _of_another_kind(file, wanted: str) -> Finding:

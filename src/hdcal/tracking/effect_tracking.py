@@ -42,19 +42,13 @@ def build_particles(
         InputError: an effect remembers earlier rows, needs what a stream does not
             carry, shapes the noise, or is not linear in the stiffness.
     """
-    chosen = np.linspace(0, len(posterior.draws["K"]) - 1, PARTICLES).astype(int)
-    findings = []
-    for effect in posterior.problem.effects:
-        words = _undeclared(effect) or _tried(effect, posterior, prior, chosen[::16])
-        if words:
-            remedy = "Calibrate without it, or diagnose blocks of rows"
-            problem = f"its effect '{effect.name}' {words}"
-            findings.append(Finding("known", problem, remedy))
+    findings = unfollowed(posterior, prior)
     if forget < 1.0:
         words = "does not go with effects"
         findings.append(Finding("forget", words, "Leave it out"))
     if findings:
         raise InputError(findings)
+    chosen = _particle_draws(posterior)
     draws = _draws(posterior, chosen)
     # As arrays once, not at every row.
     reading = jax.tree.map(jnp.asarray, prior.reading)
@@ -65,6 +59,27 @@ def build_particles(
         return np.asarray(_columns(draws, reading, ends, row)).T
 
     return _particles(posterior, prior, chosen), columns
+
+
+def unfollowed(posterior: Posterior, prior: StreamPrior) -> list[Finding]:
+    """Return which effects of a posterior cannot be followed row by row.
+
+    Args:
+        posterior: that may be used.
+        prior: of the stream, from the same posterior.
+    """
+    few, findings = _particle_draws(posterior)[::16], []
+    for effect in posterior.problem.effects:
+        words = _undeclared(effect) or _tried(effect, posterior, prior, few)
+        if words:
+            remedy = "Calibrate without it, or diagnose blocks of rows"
+            problem = f"its effect '{effect.name}' {words}"
+            findings.append(Finding("known", problem, remedy))
+    return findings
+
+
+def _particle_draws(posterior: Posterior) -> np.ndarray:
+    return np.linspace(0, len(posterior.draws["K"]) - 1, PARTICLES).astype(int)
 
 
 def _undeclared(effect: type[Effect]) -> str | None:

@@ -9,9 +9,11 @@ from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.change_alarm import ChangeAlarm
 from hdcal.tracking.effect_tracking import build_particles
 from hdcal.tracking.first_rows import FirstRows
+from hdcal.tracking.followed_causes import followed_causes
 from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
 from hdcal.tracking.normal_inverse_gamma import match_draws
 from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
@@ -67,7 +69,13 @@ class Tracker:
             wrong += implausible("alarm_rows", alarm_rows)
             wrong += implausible("forget", forget) + implausible("reopen", reopen)
             wrong += implausible("seed", seed)
+        self._causes, self._untested = [], None
+        if isinstance(known, Posterior):
+            known, self._causes = followed_causes(known, forget)
         prior = _stream_prior(known, seed)
+        if isinstance(known, Posterior):
+            self._untested = UntestedReading(known)
+        self._variance = float(np.mean(prior.variance))
         self._core, self._columns = _core(known, prior, forget)
         self._limits = reading_limits(known, prior)
         self._reference = prior.reading.reference_temperature
@@ -108,7 +116,9 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
-        middle, half, score = self._step(columns, force)
+        shift, weight = self._beyond(deformation, warmth)
+        middle, half, score = self._step(columns * weight, (force - shift) * weight)
+        middle, half = middle / weight + shift, half / weight
         self.rows += 1
         share, alarm = self._alarm.step(score)
         band = [middle - half, middle + half]
@@ -130,6 +140,17 @@ class Tracker:
             found |= _degeneracy(self._core, found["stiffness_N_per_mm"])
         return found
 
+    def _beyond(self, deformation: float, temperature: float) -> tuple[float, float]:
+        """Return what untested conditions add to a reading [N], and its weight.
+
+        As nobody knows how much they add, such a reading tells less of the gear.
+        """
+        tested = self._limits.were_tested(deformation, temperature)
+        if self._untested is None or tested:
+            return 0.0, 1.0
+        shift, sd = self._untested.at(deformation, temperature)
+        return shift, (1.0 + sd**2 / self._variance) ** -0.5
+
     def _step(self, columns, force: float) -> tuple[float, float, float]:
         step = self._core.step(columns, force)
         if isinstance(self._core, FirstRows) and self._core.complete:
@@ -148,7 +169,7 @@ class Tracker:
             f"begins with {self._source}: stiffness {mean:.4g} N/mm, 95 % credible "
             f"interval {mean - half:.4g} … {mean + half:.4g}, on a mounting that was "
             f"not tested; one false alarm in {self._alarm_rows:g} readings"
-        )
+        ) + "".join(f"\n{words}" for words in self._causes)
 
     def _mount(self, run: str | None) -> None:
         """Widen the zero of the force if the label of the mounting is another one."""

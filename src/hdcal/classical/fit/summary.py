@@ -21,6 +21,7 @@ from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
+from hdcal.prediction.engine.causes import averaging_words, causes_of
 from hdcal.report.parameters import credible_interval
 from hdcal.report.write import Report
 
@@ -63,7 +64,7 @@ def fit_answer(
         fits=curves,
         at_mm=at,
         bayesian=None if posterior is None else _beside(posterior, at),
-        notes=(*case.notes, *notes(case)),
+        notes=(*case.notes, *notes(case), *_averaging(posterior)),
     )
 
 
@@ -154,6 +155,10 @@ def _beside(posterior: Posterior, at: float | None) -> BayesianAnswer:
         sigma_N=credible_interval(posterior.draws["sigma"]),
         at=None if at is None else _predicted(posterior, at),
     )
+
+
+def _averaging(posterior: Posterior | None) -> list[str]:
+    return [] if posterior is None else averaging_words(causes_of(posterior))
 
 
 def _predicted(posterior: Posterior, at: float) -> BayesianForceAt:

@@ -1,7 +1,7 @@
 """A parameter study: the force on gears of many sizes, every combination of them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import prod
 
 import numpy as np
@@ -22,7 +22,7 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.physics.profile import peak_stress
-from hdcal.prediction.engine.forces import gear_forces
+from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 
 SCHEMA = "hdcal.study/1"
@@ -202,19 +202,33 @@ def force_quantiles(
     Returns:
         Forces [N], shape (q, d).
     """
-    if not is_linear(draws):
+    if any(effect.stage == "force" for effect in draws.problem.effects):
         return general_quantiles(draws, factor, deformation, temperature, shares)
-    # Multiplied by a positive number no draw changes its rank: one gear's quantiles
-    # at 1 mm, for each temperature and sense of loading, serve all designs.
-    sense = np.sign(deformation)
-    places = np.stack([sense, temperature])
-    (way, levels), which = np.unique(places, axis=1, return_inverse=True)
-    unit = general_quantiles(draws, np.ones_like(levels), way, levels, shares)
-    return unit[:, which] * (factor * np.abs(deformation))
+    # Multiplied by a positive number no draw changes its rank: the quantiles of the
+    # tested gear at each place serve all sizes, and where the force is a straight line
+    # those at 1 mm for each sense of loading every deformation.
+    line = draws.within_tested(deformation) & is_linear(draws)
+    found = np.empty((len(shares), len(factor)))
+    for rows, at, scale, basis in (
+        (
+            line,
+            np.sign(deformation),
+            np.abs(deformation),
+            replace(draws, untested=None),
+        ),
+        (~line, deformation, np.ones_like(deformation), draws),
+    ):
+        if rows.any():
+            places = np.stack([at, temperature])[:, rows]
+            (way, levels), which = np.unique(places, axis=1, return_inverse=True)
+            ones = np.ones_like(levels)
+            unit = general_quantiles(basis, ones, way, levels, shares)
+            found[:, rows] = unit[:, which] * (factor * scale)[rows]
+    return found
 
 
 def is_linear(draws: DesignDraws) -> bool:
-    """Tell whether the force is proportional to stiffness and deformation."""
+    """Tell whether the model's force is proportional to stiffness and deformation."""
     bent = any(effect.stage == "force" for effect in draws.problem.effects)
     return not bent and draws.problem.discrepancy is None
 
@@ -231,7 +245,8 @@ def general_quantiles(draws, factor, deformation, temperature, shares) -> np.nda
         at, warm, scale = (
             _filled(a[rows], size) for a in (deformation, temperature, factor)
         )
-        forces = np.asarray(gear_forces(draws.problem, values, at, warm, scale))
+        where = at, warm, scale, draws.untested
+        forces = np.asarray(gear_forces(draws.problem, values, *where))
         found.append(np.quantile(forces[: len(factor[rows])], shares, axis=1))
     return np.concatenate(found, axis=1)
 

@@ -10,6 +10,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.motion.quantities import quantity_table
 from hdcal.motion.respond.answer import QuantityEstimate, ResponseAnswer
 from hdcal.physics.dynamics import FRICTION_SPEED
+from hdcal.prediction.engine.causes import averaging_words, causes_of
 from hdcal.report.document import Document, Picture, Section, Text, notices
 from hdcal.report.parameters import Interval
 from hdcal.report.provenance import gear_rows
@@ -77,7 +78,15 @@ def remarks(
     if outside:
         yield (
             f"{outside} of {len(tested)} times lie outside the deformations or the "
-            "temperature that were calibrated: extrapolated."
+            "temperature that were calibrated: extrapolated. This assumes that the "
+            "model goes on holding there; a bend that may grow beyond the tested "
+            "deformation, by which predicted forces widen, is not in the motion."
+        )
+    yield from averaging_words(causes_of(posterior))
+    if posterior.settings.get("with_gap"):
+        yield (
+            "This assumes that the gear is the model alone: a leftover discrepancy is "
+            "not in the motion."
         )
     if left:
         listed = ", ".join(effect.name for effect in left)

@@ -5,6 +5,7 @@ from functools import partial
 import click
 
 from hdcal.cli.command import command
+from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import GRID, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
@@ -38,8 +39,13 @@ _BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
 @json_option
 @click.pass_obj
 def predict(console: Console, run, deformation, temperature, direction, out, force):
-    """Predict the force with its bands from RUN, a folder of `hdcal calibrate`."""
-    from hdcal.cli.sources import load_posterior
+    """Predict the force with its bands from RUN.
+
+    RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
+    could not tell apart are averaged over by their probability.
+    """
+    keep_compilations()
+    from hdcal.prediction.engine.causes import averaging_words, causes_of, read_models
     from hdcal.report.saving.reserve import reserve_file
 
     file = None
@@ -47,15 +53,17 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
         if out is not None:
             asked = {"force": force, "beginning": _BEGINNING}
             file = console.hold(partial(reserve_file, out, **asked))
-    posterior = load_posterior(run)
+    models = read_models(run)
+    causes = causes_of(models)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows
     from hdcal.prediction.bands.summary import prediction_answer
     from hdcal.report.csv_table import columns_csv
 
-    bands = bands_of(posterior, deformation, temperature, direction)
-    if untested := untested_rows(bands, posterior.case.records):
-        console.words(untested)
+    bands = bands_of(models, deformation, temperature, direction)
+    untested = untested_rows(bands, causes[0].posterior.case.records)
+    for words in (*averaging_words(causes), *filter(None, [untested])):
+        console.words(words)
     table = columns_csv(bands.columns())
     if file is not None:
         file.write(table.encode())
@@ -63,5 +71,5 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     elif not console.json:
         console.result(table.rstrip("\n"))
     if console.json:
-        console.data(prediction_answer(bands))
+        console.data(prediction_answer(bands, causes=causes))
     return 0

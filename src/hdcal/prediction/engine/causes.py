@@ -10,18 +10,21 @@ import numpy as np
 
 from hdcal.data.prior import Prior
 from hdcal.data.regular_file import why_not_readable
+from hdcal.data.typed_json import typed
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.distributions import distribution
+from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN, HeldOrigin, LeftOut
+from hdcal.inference.mixed_posterior import models_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import POSITIVE, Values
+from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
 SCHEMA = "hdcal.verdict/1"
 _LARGEST_VERDICT = 64 << 20
-# What a posterior of a diagnosis knows of the diagnosis: its own hypothesis, and the
-# probabilities of all that were calibrated.
-ORIGIN = "diagnosis"
+# Of probability that is left out, less than this is the rounding of a sum.
+_ROUNDING = 1e-6
 
 Models = Posterior | Sequence[tuple[float, Posterior]]
 # What an uncertainty comes from.
@@ -73,14 +76,20 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
     """Return models as causes whose probabilities sum to 1.
 
     Args:
-        models: a posterior, or several with the probabilities of their models.
+        models: a posterior, or several with the probabilities of their models. One
+            that is a mixture counts as the models in it.
         allow_failed: also calibrations that failed their checks.
 
     Raises:
         NotUsable: a calibration failed its checks.
         InputError: there are none, or they are not of the same data.
     """
-    listed = [(1.0, models)] if isinstance(models, Posterior) else list(models)
+    given = [(1.0, models)] if isinstance(models, Posterior) else list(models)
+    listed = [
+        (weight * share, alone)
+        for weight, model in given
+        for share, alone in models_of(model)
+    ]
     total = sum(share for share, _ in listed)
     cases = {model.case.data_sha256 for _, model in listed}
     if not listed or not total > 0.0 or any(share < 0.0 for share, _ in listed):
@@ -99,6 +108,71 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
 def likeliest(causes: Sequence[Cause]) -> Cause:
     """Return the cause of the highest probability."""
     return max(causes, key=lambda cause: cause.probability)
+
+
+def chances_of(causes: Sequence[Cause]) -> dict[str, float]:
+    """Return the probability of each hypothesis, the most probable first."""
+    found = dict.fromkeys((cause.name for cause in causes), 0.0)
+    for cause in causes:
+        found[cause.name] += cause.probability
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def weight_left_out(causes: Sequence[Cause]) -> float:
+    """Return the probability of what has no model of its own among the causes."""
+    missing = left_out(causes[0].posterior)
+    return 0.0 if missing is None else missing.probability
+
+
+def left_out(posterior: Posterior) -> LeftOut | None:
+    """Return what a diagnosis calibrated no model of; None where that is nothing."""
+    told, origin = posterior.settings.get(LEFT_OUT), posterior.settings.get(ORIGIN)
+    if told is not None:
+        return typed(LeftOut, told)
+    if origin is None:
+        return None
+    # An older diagnosis left out what failed its checks, and the sum fell short.
+    chances = typed(HeldOrigin, origin).probabilities
+    missing = 1.0 - sum(chances.values())
+    if missing <= _ROUNDING:
+        return None
+    return LeftOut(missing, max(chances, key=lambda name: chances[name]))
+
+
+def averaging_words(causes: Sequence[Cause]) -> list[str]:
+    """Say over which hypotheses an answer averages, and what was left out."""
+    told = []
+    if len(causes) > 1:
+        listed = ", ".join(
+            f"{hypothesis(name)} ({percent(share)})"
+            for name, share in chances_of(causes).items()
+        )
+        told.append(f"The cause is not settled; this averages over {listed}.")
+    return told + left_out_words(causes)
+
+
+def left_out_words(causes: Sequence[Cause]) -> list[str]:
+    """Say what part of a diagnosis has no model of its own in an answer."""
+    first = causes[0].posterior
+    origin = first.settings.get(ORIGIN)
+    if origin is None:
+        return []
+    known = typed(HeldOrigin, origin)
+    others = len(known.probabilities) - 1
+    if len(causes) == 1 and (others or LEFT_OUT not in first.settings):
+        name = hypothesis(known.hypothesis or causes[0].name)
+        return [
+            f"This rests on {name} alone: what else the diagnosis held possible has "
+            "no part in it. Name the folder of the diagnosis, or diagnose again."
+        ]
+    missing = left_out(first)
+    if missing is None or missing.probability <= _ROUNDING:
+        return []
+    return [
+        f"{percent(missing.probability)} of the probability lies on hypotheses that "
+        f"were not calibrated; it counts as {hypothesis(missing.counted_as)}, the "
+        "widest of the models that were."
+    ]
 
 
 def sample_prior(prior: Prior, name: str, key, count: int) -> np.ndarray:

@@ -21,8 +21,10 @@ SENSE = {"up": 1.0, "down": -1.0}
 # How far beyond the data still counts as tested: thermometers are no better [K], and
 # a deformation is compared with itself as it was written [mm].
 NEAR_K, NEAR_MM = 1.0, 1e-9
-# Temperatures of one answer; each is a row of it.
+# Temperatures of one answer, at each of which every draw has a force.
 MOST_LEVELS = 1_000
+# A force this many times larger or smaller than the usual is a slip of the unit.
+_OFF = 100.0
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
 
@@ -118,18 +120,38 @@ def _within(values, measured, slack: float) -> np.ndarray:
     return (values >= low - slack) & (values <= high + slack)
 
 
-def level_findings(temperature: np.ndarray, name: str) -> list[Finding]:
+def slip_findings(
+    name: str, force: float, usual: float, deformation: float
+) -> list[Finding]:
+    """Return a finding where a force can only be a slip of the unit.
+
+    Args:
+        name: of the parameter.
+        force: as given, of either sign [N].
+        usual: what the deformation takes, a size [N].
+        deformation: as given [mm].
+    """
+    if not usual > 0.0 or usual / _OFF < abs(force) < usual * _OFF:
+        return []
+    words = f"{force:g} N, where {deformation:g} mm takes about {usual:.3g} N"
+    return [Finding(name, words, "Give it in N")]
+
+
+def level_findings(
+    temperature: np.ndarray, name: str, most: int = MOST_LEVELS
+) -> list[Finding]:
     """Return what is wrong with the temperatures at all of which something holds.
 
     Args:
         temperature: those asked for [°C].
         name: of the parameter.
+        most: temperatures that can be answered at once.
     """
     if temperature.size == 0 or not np.isfinite(temperature).all():
         return [Finding(name, "is an empty window", "Give it like -20:80, in °C")]
-    if temperature.size > MOST_LEVELS:
+    if temperature.size > most:
         words = f"{temperature.size} temperatures are too many"
-        return [Finding(name, words, f"Give at most {MOST_LEVELS}")]
+        return [Finding(name, words, f"Give at most {most}")]
     return []
 
 

@@ -6,7 +6,6 @@ Every answer about the future rests on `force_of`: bands, margins, designs and s
 from dataclasses import replace
 from typing import Literal, get_args
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -103,49 +102,3 @@ def force_of(
     records = replace(records, deformation=at, temperature=warm)
     force, noise = predict_reading(base, effects, records, problem.reading)
     return acting(values, force), noise
-
-
-@jax.jit
-def gear_forces(
-    problem: Problem,
-    values: Values,
-    deformation: Float[Array, " n"],
-    temperature: Float[Array, " n"],
-    factor: Float[Array, "..."] | float = 1.0,
-) -> Float[Array, "n draw"]:
-    """Compute the force of every draw on gears at a deformation of their own.
-
-    A product has neither the rig's zeros nor its compliance: ω is what the gear sees,
-    counted from its free shape. Left are the force model, effects on the force and,
-    where it was fitted, the leftover discrepancy. Each row is another gear, loaded
-    from rest in one go.
-
-    Args:
-        problem: structure.
-        values: draws by site: [draw, …].
-        deformation: radial ω, of either sign [mm].
-        temperature: of the gear [°C].
-        factor: stiffness relative to the tested gear's [-], broadcast to [draw, n];
-            the leftover discrepancy is taken to grow with it.
-
-    Returns:
-        Force [N].
-    """
-    count = len(deformation)
-    as_read = deformation / problem.reading.radial_per_read
-    pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
-    records = grid_records(as_read, temperature, pressed, 0.0)
-    # A run for each row: what remembers starts from rest in each.
-    records = replace(records, run=np.arange(count), specimen=np.arange(count))
-
-    def of_draw(value, own):
-        force, _ = force_of(problem, value, records, factor=own, quantity="gear")
-        if problem.discrepancy is None:
-            return force
-        place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
-        # Beyond the tested range the fit simply goes on.
-        leftover = problem.discrepancy.columns(place) @ value["gap_weights"]
-        return force + own * acting(value, leftover)
-
-    factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
-    return jax.vmap(of_draw, out_axes=1)(values, factor)

@@ -14,8 +14,9 @@ from hdcal.data.case import Theory
 from hdcal.data.records import Array, Geometry
 from hdcal.inference.problem import Problem
 from hdcal.physics.theory import Scalar
-from hdcal.prediction.engine.forces import gear_forces
+from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
+from hdcal.prediction.engine.untested import Untested
 
 
 class SampledGears(eqx.Module):
@@ -27,6 +28,7 @@ class SampledGears(eqx.Module):
         tested: sizes of the gear that the draws are of [mm].
         deviation: of each gear's stiffness from the tested mean, relative, (draw,).
         shifts: of its sizes from the drawing [mm], by field, (draw,).
+        untested: what the draws leave open, or None where no gear was tested.
         theory: which stiffness K multiplies.
     """
 
@@ -35,6 +37,7 @@ class SampledGears(eqx.Module):
     tested: Geometry
     deviation: Float[Array, " draw"]
     shifts: Mapping[str, Float[Array, " draw"]]
+    untested: Untested | None
     theory: Theory = eqx.field(static=True)
 
     def made(self, drawing: Geometry) -> Geometry:
@@ -61,4 +64,5 @@ class SampledGears(eqx.Module):
         ratio = stiffness_ratio(self.made(drawing), self.tested, self.theory)
         factor = ratio * (1.0 + self.deviation) * modulus * K
         factor = jnp.asarray(factor)[:, None]
-        return gear_forces(self.problem, self.values, deformation, temperature, factor)
+        where = deformation, temperature, factor, self.untested
+        return gear_forces(self.problem, self.values, *where)

@@ -10,6 +10,7 @@ from hdcal.prediction.engine.causes import Cause, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
     level_findings,
+    slip_findings,
     temperature_findings,
 )
 from hdcal.prediction.engine.forces import QUANTITIES
@@ -20,10 +21,9 @@ from hdcal.prediction.engine.sizes import check_tolerances
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
 from hdcal.prediction.margin.stated import RULES
+from hdcal.prediction.margin.temperatures import MOST_TEMPERATURES
 from hdcal.prediction.tolerance_factors import check_shares
 
-# A force this many times larger or smaller than the one needed is a slip of the unit.
-_OFF = 100.0
 # Draws that must lie beyond a bound: fewer do not say where it is.
 _BEYOND = 10
 # The normal law is no guide to shares rarer than this.
@@ -135,7 +135,9 @@ def _check_choices(request: MarginRequest, criteria: Criteria) -> list[Finding]:
 
 
 def _check_temperature(cause: Cause, temperature) -> list[Finding]:
-    return level_findings(temperature, "temperature") or temperature_findings(
+    name = "temperature"
+    many = level_findings(temperature, name, MOST_TEMPERATURES)
+    return many or temperature_findings(
         cause.posterior.case.gear, cause.values, temperature
     )
 
@@ -158,7 +160,7 @@ def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:
 
 
 def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
-    scale = abs(float(np.median(cause.values["stiffness"])) * deformation)
+    usual = abs(float(np.median(cause.values["stiffness"])) * deformation)
     findings = []
     for name, force in forces.items():
         if force is None:
@@ -168,7 +170,6 @@ def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
         elif force == 0.0:
             words = f"{force:g} N is no force"
             findings.append(Finding(name, words, "Give a number of N"))
-        elif scale > 0.0 and not scale / _OFF < abs(force) < scale * _OFF:
-            words = f"{force:g} N, where {deformation:g} mm takes about {scale:.3g} N"
-            findings.append(Finding(name, words, "Give it in N"))
+        else:
+            findings += slip_findings(name, force, usual, deformation)
     return findings

@@ -20,6 +20,7 @@ from hdcal.prediction.margin.sentences import (
     newtons,
     next_steps,
 )
+from hdcal.prediction.margin.temperatures import shown_levels
 from hdcal.report.document import (
     Document,
     Picture,
@@ -123,7 +124,7 @@ def _bounds(found: Margin) -> Section:
     )
     table = Table(
         ["°C", "tested", *numbers],
-        [_level(level) for level in found.levels],
+        [_level(level) for level in shown_levels(found.levels)],
         frozenset(["°C", *numbers]),
     )
     return Section("Bounds", [shown, table, Text(words, soft=True)])

@@ -14,6 +14,7 @@ from hdcal.prediction.margin.sentences import (
     member_word,
 )
 from hdcal.prediction.margin.stated import BudgetLine
+from hdcal.prediction.margin.temperatures import shown_levels
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -94,21 +95,22 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
 
 def _draw_window(axes: Axes, found: Margin) -> None:
     heading(axes, "Over temperature")
-    warm = np.array([level.temperature_C for level in found.levels])
+    levels = shown_levels(found.levels)
+    warm = np.array([level.temperature_C for level in levels])
 
     def ends(name: str) -> tuple[np.ndarray, np.ndarray]:
-        spans = [getattr(level, name) for level in found.levels]
+        spans = [getattr(level, name) for level in levels]
         return np.array([s.lo for s in spans]), np.array([s.hi for s in spans])
 
     axes.fill_between(warm, *ends("member_N"), color=BLUE, alpha=0.18, linewidth=0)
     axes.fill_between(warm, *ends("force_N"), color=BLUE, alpha=0.45, linewidth=0)
     for name in ("lower_bound_N", "upper_bound_N"):
-        line = [getattr(level, name) for level in found.levels]
+        line = [getattr(level, name) for level in levels]
         axes.plot(warm, line, color=DARK, linewidth=1.2)
-    untested = np.array([not level.tested for level in found.levels])
+    untested = np.array([not level.tested for level in levels])
     axes.plot(
         warm[untested],
-        np.array([level.force_N.median for level in found.levels])[untested],
+        np.array([level.force_N.median for level in levels])[untested],
         "o",
         markerfacecolor="white",
         markeredgecolor=BLUE,

@@ -4,7 +4,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
+from hdcal.prediction.engine.causes import (
+    Cause,
+    Models,
+    causes_of,
+    chances_of,
+    likeliest,
+    weight_left_out,
+)
 from hdcal.prediction.engine.conditions import (
     SENSE,
     Direction,
@@ -38,6 +45,7 @@ from hdcal.prediction.margin.remarks import (
 from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import FAR, Level, Margin
 from hdcal.prediction.margin.stated import Rule
+from hdcal.prediction.margin.temperatures import levels_between, nodes_of
 from hdcal.prediction.margin.uncertainty import stated_uncertainty
 from hdcal.prediction.margin.variance_shares import variance_shares
 from hdcal.prediction.tolerance_factors import BASES
@@ -108,15 +116,16 @@ def _margin(
     criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
     forces = _forces(causes, request, whose, sense)
-    draws = population_draws(forces, warm, criteria)
-    levels = _levels(draws, main, request, warm, criteria)
+    nodes = nodes_of(warm, main.posterior.case.records)
+    draws = population_draws(forces, nodes, criteria)
+    levels = _levels(draws, main, request, nodes, criteria)
     check_sign(levels, request, criteria, sense)
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
     beyond = beyond_tested(forces[0].conditions)
     slopes, shares = (), ()
     if sensitivities:
-        upper = draws.table["upper"][list(warm).index(worst.temperature_C)]
+        upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
         slopes = gradients(there, upper, criteria)
         shares = variance_shares(there, request.seed)
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
@@ -134,26 +143,19 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=levels,
+        levels=levels_between(levels, warm, _tested(main, request, sense, warm)),
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
-        causes=_named(causes),
         models=model_bounds(forces, draws, criteria),
+        causes=chances_of(causes),
+        weight_left_out=weight_left_out(causes),
         gradients=slopes,
         shares=shares,
         beyond_tested=beyond,
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )
-
-
-def _named(causes: Sequence[Cause]) -> dict[str, float]:
-    """Return the probability of each hypothesis; models may be of the same."""
-    found: dict[str, float] = {}
-    for cause in causes:
-        found[cause.name] = found.get(cause.name, 0.0) + cause.probability
-    return found
 
 
 def _reached(
@@ -186,17 +188,22 @@ def _levels(
     draws: PopulationDraws, main: Cause, request: MarginRequest, warm, criteria
 ) -> tuple[Level, ...]:
     """Return what holds at each temperature [°C]."""
-    tested = is_tested(
-        main.posterior.case.records,
-        deformation=request.deformation,
-        temperature=warm,
-        sense=draws.sense * SENSE[request.direction],
-    )
+    tested = _tested(main, request, draws.sense, warm)
     tables = [{n: t[i] for n, t in draws.table.items()} for i in range(len(warm))]
     places = zip(tables, draws.predicted, warm, tested, strict=True)
     return tuple(
         level_of(draws, table, ahead, criteria, float(at), bool(inside))
         for table, ahead, at, inside in places
+    )
+
+
+def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
+    """Tell at which temperatures [°C] the data hold what is asked for."""
+    return is_tested(
+        main.posterior.case.records,
+        deformation=request.deformation,
+        temperature=warm,
+        sense=sense * SENSE[request.direction],
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.inference.checks import listed
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
+from hdcal.prediction.engine.causes import left_out_words
 from hdcal.prediction.engine.conditions import beyond_tested, temperature_is_tested
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
@@ -153,7 +154,8 @@ def remarks(
         criteria: what was to be kept.
     """
     first = _main(forces)
-    said = [*_signs(levels, first.sense), *_of_population(first)]
+    said = left_out_words([force.cause for force in forces])
+    said += [*_signs(levels, first.sense), *_of_population(first)]
     straight = all(force.cause.problem.discrepancy is None for force in forces)
     said += misfits(first.cause.posterior, shapes=straight)
     used = sum(force.cause.size for force in forces)

@@ -127,8 +127,9 @@ class Margin(StatedUncertainty, Shown):
         worst: over all temperatures at once.
         reached: deformation reached by a given force, or None.
         decision: whether the force keeps the limit, or None without one.
-        causes: what was averaged over, with its probability.
         models: each model's own bounds, if there are several.
+        causes: probability of each hypothesis that was averaged over.
+        weight_left_out: of it, what lay on hypotheses without a model of their own.
         gradients: of the bound that is the larger one in size.
         shares: of the variance of one future member's force.
         beyond_tested: how far the deformation lies outside the tested range, as a
@@ -153,8 +154,9 @@ class Margin(StatedUncertainty, Shown):
     worst: Level
     reached: DeformationReached | None
     decision: Decision | None
-    causes: Mapping[str, Chance]
     models: tuple[ModelBound, ...]
+    causes: Mapping[str, Chance]
+    weight_left_out: Chance
     gradients: tuple[Gradient, ...]
     shares: tuple[VarianceShare, ...]
     beyond_tested: Size

@@ -1,0 +1,113 @@
+"""The force on gears alone: a product has no rig, neither its zeros nor its drift."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from hdcal.data.records import Array
+from hdcal.inference.gauges import acting, shown
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
+from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.forces import force_of, grid_records
+from hdcal.prediction.engine.untested import SITES, Untested, spread_evenly, untested_of
+
+# Sites of a draw: which of the causes it is of, and its modulus over that of the tested
+# gear where another material was drawn.
+CAUSE, MODULUS = "_cause", "_modulus"
+
+
+def gear_values(posterior: Posterior, seed: int = 0) -> tuple[Values, Untested]:
+    """Return draws with what they leave open, and what that is for each cause.
+
+    Args:
+        posterior: of one model, or a mixture.
+        seed: of what the draws leave open.
+
+    Returns:
+        The draws; every leaf of what is untested has an axis of causes first.
+    """
+    values, causes = posterior.draws, causes_of(posterior)
+    levels = spread_evenly(len(values["K"]), SITES, seed)
+    # A mixture has its causes in the order of its draws, alike in each chain.
+    chains = posterior.tree["posterior"].sizes["chain"]
+    sizes = [cause.size // chains for cause in causes]
+    index = np.tile(np.repeat(np.arange(len(causes)), sizes), chains)
+    each = [untested_of(cause, levels[index == i]) for i, cause in enumerate(causes)]
+    found: dict[str, np.ndarray] = {CAUSE: index}
+    for name, first in each[0][1].items():
+        found[name] = np.empty((len(index), *first.shape[1:]))
+        for i, (_, sites) in enumerate(each):
+            found[name][index == i] = sites[name]
+    parts = [untested for untested, _ in each]
+    stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *parts)
+    return {**values, **found}, stacked
+
+
+@jax.jit
+def gear_forces(
+    problem: Problem,
+    values: Values,
+    deformation: Float[Array, " n"],
+    temperature: Float[Array, " n"],
+    factor: Float[Array, "..."] | float = 1.0,
+    untested: Untested | None = None,
+) -> Float[Array, "n draw"]:
+    """Compute the force of every draw on gears at a deformation of their own.
+
+    ω is what the gear sees, counted from its free shape. Left are the force model,
+    effects on the force, where it was fitted the leftover discrepancy, and beyond the
+    tested deformation the bend that may grow there. Temperatures beyond the tested ones
+    change the modulus only: a product has no rig that drifts. Each row is another gear,
+    loaded from rest in one go.
+
+    Args:
+        problem: structure.
+        values: draws by site: [draw, …].
+        deformation: radial ω, of either sign [mm].
+        temperature: of the gear [°C].
+        factor: stiffness relative to the tested gear's [-], broadcast to [draw, n];
+            the leftover discrepancy is taken to grow with it.
+        untested: from `gear_values`; None where no gear was tested.
+
+    Returns:
+        Force [N].
+    """
+    count = len(deformation)
+    as_read = deformation / problem.reading.radial_per_read
+    pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
+    records = grid_records(as_read, temperature, pressed, 0.0)
+    # A run for each row: what remembers starts from rest in each.
+    records = replace(records, run=np.arange(count), specimen=np.arange(count))
+
+    def of_draw(value, own):
+        force, _ = force_of(problem, value, records, factor=own, quantity="gear")
+        if untested is None:
+            return force
+        place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
+        left = acting(value, _leftover(problem, value, untested, place, pressed))
+        return force + own * value.get(MODULUS, 1.0) * left
+
+    factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
+    return jax.vmap(of_draw, out_axes=1)(values, factor)
+
+
+def _leftover(problem: Problem, value: Values, untested: Untested, place, pressed):
+    """Return the bend and the fitted leftover of a draw at deformations [N].
+
+    The free shape is known, without force: between it and the nearer end of the tested
+    range no bend grows.
+    """
+    own = jax.tree.map(lambda leaf: leaf[value[CAUSE]], untested)
+    low, high = own.above.far, own.above.end
+    known = jnp.clip(place, jnp.minimum(low, 0.0), jnp.maximum(high, 0.0))
+    beyond = jnp.clip(place, low, high) + (place - known)
+    bend, _ = own.leftover(problem, value, beyond, pressed)
+    if problem.discrepancy is None:
+        return bend
+    _, fitted = own.leftover(problem, value, place, pressed)
+    return bend + fitted

@@ -1,0 +1,77 @@
+"""Which hypotheses are calibrated, and who carries the probability of the rest."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hdcal.diagnosis.refit import weighed
+
+
+def calibrated(failing=(), widths=None):
+    """Return a calibration that fails for some, and the list of what it was asked."""
+    asked = []
+
+    def run(name: str):
+        asked.append(name)
+        width = (widths or {}).get(name, 1.0)
+        draws = {"stiffness": 200.0 + width * np.array([-1.0, 1.0])}
+        return SimpleNamespace(usable=name not in failing, draws=draws, reasons=("no",))
+
+    return run, asked
+
+
+def shares(found) -> dict[str, float]:
+    return {name: share for name, (share, _) in found.models.items()}
+
+
+def test_every_hypothesis_of_five_per_cent_is_kept_whatever_the_verdict():
+    run, asked = calibrated()
+    chances = {"none": 0.009, "a": 0.55, "a+b": 0.2, "c": 0.06, "unknown": 0.17}
+    found = weighed(chances | {"d": 0.011}, run)
+    assert asked == ["a", "a+b", "unknown", "c"]
+    assert sum(shares(found).values()) == pytest.approx(1.0)
+    # 2 % and less is left out, said, and given to what bends wherever data let it.
+    assert found.left_out.probability == pytest.approx(0.02)
+    assert found.left_out.counted_as == "unknown"
+    assert shares(found)["unknown"] == pytest.approx(0.19)
+    assert shares(found)["a"] == 0.55
+
+
+def test_more_than_two_per_cent_calls_for_the_unknown():
+    """What the xb1 case leaves: 7 % that were renormalised away unsaid."""
+    run, asked = calibrated()
+    chances = {"a": 0.74, "b": 0.08, "none": 0.06, "unknown": 0.02}
+    found = weighed(chances | dict.fromkeys("cdefghij", 0.0125), run)
+    assert asked == ["a", "b", "none", "unknown"]
+    assert found.left_out.probability == pytest.approx(0.1)
+    assert shares(found)["unknown"] == pytest.approx(0.12)
+    assert shares(found)["a"] == 0.74
+
+
+def test_two_per_cent_and_less_goes_to_the_widest():
+    run, asked = calibrated(widths={"a": 1.0, "b": 3.0})
+    found = weighed({"a": 0.9, "b": 0.085, "unknown": 0.01, "none": 0.005}, run)
+    assert asked == ["a", "b"]
+    assert found.left_out.counted_as == "b"
+    assert shares(found) == pytest.approx({"a": 0.9, "b": 0.1})
+
+
+def test_what_fails_its_checks_is_left_out_not_shared_out():
+    run, asked = calibrated(failing=("a",))
+    found = weighed({"a": 0.3, "b": 0.7, "unknown": 0.0, "none": 0.0}, run)
+    assert asked == ["b", "a", "unknown"]
+    assert {*found.failed} == {"a"}
+    assert found.left_out.probability == pytest.approx(0.3)
+    assert shares(found) == pytest.approx({"b": 0.7, "unknown": 0.3})
+    run, _ = calibrated(failing=("a", "b", "unknown"))
+    nothing = weighed({"a": 0.3, "b": 0.7, "unknown": 0.0, "none": 0.0}, run)
+    assert not nothing.models and nothing.left_out is None
+
+
+def test_of_many_small_ones_the_likeliest_is_kept():
+    run, asked = calibrated()
+    chances = {f"e{i}": 0.03 for i in range(32)} | {"unknown": 0.0, "none": 0.04}
+    found = weighed(chances, run)
+    assert asked == ["none", "unknown"]
+    assert shares(found) == pytest.approx({"none": 0.04, "unknown": 0.96})
