@@ -32,7 +32,7 @@ from hdcal.prediction.margin.result import (
 )
 
 # The least probability and the least distance to 1 that a number can hold.
-_LEAST, _LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
+LEAST, LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
 _TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
 
 
@@ -130,15 +130,17 @@ def level_of(
 def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
     above = table["above"]
     mean = float(np.sum(weights * above) / np.sum(weights))
+    error = float(np.linalg.norm(weights * (above - mean)) / np.sum(weights))
     low, high, sure = (
         weighted_quantile(above, weights, share)
         for share in (_TAILS[0], _TAILS[2], criteria.confidence)
     )
     # Nobody can know that nothing or everything exceeds it.
-    chances = np.clip([mean, low, high, sure], _LEAST, 1.0 - _LEAST_LEFT)
+    chances = np.clip([mean, low, high, sure], LEAST, 1.0 - LEAST_LEFT)
     beta, beta_hi, beta_lo, beta_sure = map(float, -ndtri(chances))
     mean, low, high, sure = map(float, chances)
-    return Exceedance(mean, low, high, sure, beta, beta_lo, beta_hi, beta_sure)
+    betas = beta, beta_lo, beta_hi, beta_sure
+    return Exceedance(mean, low, high, sure, *betas, error / mean, "")
 
 
 def worst_level(

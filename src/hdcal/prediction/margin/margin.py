@@ -37,6 +37,7 @@ from hdcal.prediction.margin.deformation_reached import (
     deformation_reached,
 )
 from hdcal.prediction.margin.gradients import gradients
+from hdcal.prediction.margin.rare import refined
 from hdcal.prediction.margin.remarks import (
     extrapolations,
     population_words,
@@ -122,6 +123,7 @@ def _margin(
     check_sign(levels, request, criteria, sense)
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
+    worst = refined(worst, there, criteria.limit_force, request.seed)
     beyond = beyond_tested(forces[0].conditions)
     slopes, shares = (), ()
     if sensitivities:

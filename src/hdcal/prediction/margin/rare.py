@@ -30,6 +30,8 @@ from hdcal.prediction.engine.population_force import (
     member_mixture,
 )
 from hdcal.prediction.engine.untested import SITES, spread_evenly, untested_of
+from hdcal.prediction.margin.bounds import LEAST, LEAST_LEFT
+from hdcal.prediction.margin.result import Level
 
 # Points about each of both places, and degrees of freedom of their law.
 _POINTS, _FREE = 8192, 5.0
@@ -38,6 +40,10 @@ _ABREAST = 4
 _SPREAD = 1.3
 # Degrees of freedom of the scatter that the normal one is compared with.
 _HEAVY = 5.0
+# Relative Monte Carlo error up to which a mean over the sampler's draws is good enough.
+_ENOUGH = 0.05
+# By how many times an assumption must move a probability to be told.
+_TOLD = 1.5
 
 
 @dataclass(frozen=True)
@@ -59,26 +65,30 @@ class Rare:
 
 
 class _Target(eqx.Module):
-    """What a point is weighed by: the posterior, and what exceeds the limit."""
+    """What a point is weighed by: the posterior, and what exceeds the limit.
+
+    A force that does not scatter exceeds it or not: `blur` [N] gives a search a slope.
+    """
 
     problem: Any
     whitening: laplace.Whitening
     whose: Any
     conditions: Any
     limit: Float[Array, ""]
+    blur: Float[Array, ""] | float
 
     def log_density(self, point: Float[Array, " d"]) -> Float[Array, ""]:
         """Return the log posterior density in whitened coordinates, but a constant."""
         return -laplace.potential(self.problem, self.whitening.position(point))
 
-    def terms(self, point: Float[Array, " d"], sites: dict, key):
+    def terms(self, point: Float[Array, " d"], sites: dict, key, blur=0.0):
         """Return log tails, normal and heavy, and the log prior of σ's logarithm."""
         named = laplace.values_at(self.problem, self.whitening.position(point))
         value = named | draw_members(self.problem, named, key) | sites
         weight, mean, sd = member_mixture(
             self.problem, value, self.whose, self.conditions
         )
-        room = (self.conditions.loading * mean - self.limit) / sd
+        room = (self.conditions.loading * mean - self.limit) / jnp.hypot(sd, blur)
         prior = self.problem.priors["sigma"]
         of_sigma = 0.0
         if prior.family != "fixed":
@@ -102,7 +112,7 @@ def _towards(target: _Target, point, sites):
     """Return −log of density times tail, and its gradient."""
 
     def height(point):
-        tail, *_ = target.terms(point, sites, jax.random.key(0))
+        tail, *_ = target.terms(point, sites, jax.random.key(0), target.blur)
         return -(target.log_density(point) + tail)
 
     return jax.value_and_grad(height)(point)
@@ -138,7 +148,8 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     sites = {**sites, SCORES: ndtri(levels[:, :2])}
     where = replace(force.conditions, untested=untested)
     whitening = laplace.fit(problem)
-    target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit, float))
+    blur = 0.1 * np.std(np.asarray(force.along().centre()))
+    target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit), blur)
     points, log_law = _points(target, sites, np.random.default_rng(seed))
     keys = jax.random.split(jax.random.key(seed), len(points))
     found = _weigh(target, points, sites, keys)
@@ -177,6 +188,53 @@ def _points(target: _Target, sites: dict, rng) -> tuple[np.ndarray, np.ndarray]:
     # What is open is spread evenly over both places.
     points = rng.permutation(np.concatenate(drawn))
     return points, np.logaddexp(*(np.atleast_1d(law.logpdf(points)) for law in laws))
+
+
+def refined(
+    level: Level, forces: Sequence[PopulationForce], limit: float | None, seed: int
+) -> Level:
+    """Return a level whose probability of exceedance does not hang on a few draws.
+
+    Args:
+        level: of all causes.
+        forces: of each cause, at its temperature.
+        limit: along the sense of loading [N], or None.
+        seed: of the points.
+    """
+    risk = level.exceedance
+    if risk is None or limit is None or risk.relative_error <= _ENOUGH:
+        return level
+    found = pooled_rare([(f.cause.probability, rare(f, limit, seed)) for f in forces])
+    if not found.relative_error < risk.relative_error:
+        return level
+    chance = float(np.clip(found.probability, LEAST, 1.0 - LEAST_LEFT))
+    better = replace(
+        risk,
+        probability=chance,
+        beta=float(-ndtri(chance)),
+        relative_error=found.relative_error,
+        rests_on=_words(found),
+    )
+    return replace(level, exceedance=better)
+
+
+def _words(found: Rare) -> str:
+    """Say what a rare exceedance rests on."""
+    error = 100.0 * found.relative_error
+    told = [
+        f"So rare an event is computed, not counted (Monte Carlo error {error:.1g} %)"
+    ]
+    if found.heavy_tailed > _TOLD:
+        told.append(
+            "it rests on the normal law of the scatter: by Student's t of five degrees "
+            f"of freedom it were {found.heavy_tailed:.2g} times as probable"
+        )
+    if not 1.0 / _TOLD < found.without_prior < _TOLD:
+        told.append(
+            "and on the prior of the noise: without one it were "
+            f"{found.without_prior:.2g} times as probable"
+        )
+    return "; ".join(told) + "."
 
 
 def _ratio(weight: np.ndarray, values: np.ndarray) -> float:

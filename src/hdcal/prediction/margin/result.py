@@ -38,6 +38,8 @@ class Exceedance:
         beta_lo: of `hi`.
         beta_hi: of `lo`.
         beta_at_confidence: of `at_confidence`.
+        relative_error: Monte Carlo standard error over the probability.
+        rests_on: what a rare one rests on; empty where it is not rare.
     """
 
     probability: Chance
@@ -48,6 +50,8 @@ class Exceedance:
     beta_lo: Real
     beta_hi: Real
     beta_at_confidence: Real
+    relative_error: Real
+    rests_on: Words
 
 
 @dataclass(frozen=True)

@@ -223,6 +223,8 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     if max(risk.hi, risk.probability) < _RAREST:
         rarest = chance(risk.probability)
         yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
+        if risk.rests_on:
+            yield risk.rests_on
         return
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
@@ -237,9 +239,11 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     )
     if risk.probability > risk.hi:
         yield (
-            "The probability lies above the interval of the share because the few "
-            "draws with the widest scatter make most of it."
+            "The probability lies above the interval of the share because the widest "
+            "scatter that is possible makes most of it."
         )
+    if risk.rests_on:
+        yield risk.rests_on
 
 
 def _inverse(found: Margin) -> Iterator[str]:
