@@ -1,6 +1,7 @@
 """Margins: the force that a deformation needs, for how many of whom, how surely."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -124,12 +125,9 @@ def _margin(
     worst = worst_level(draws, criteria, levels)
     there = [force.at(worst.temperature_C) for force in forces]
     worst = refined(worst, there, criteria.limit_force, request.seed)
+    levels = tuple(_of_worst(level, worst) for level in levels)
     beyond = beyond_tested(forces[0].conditions)
-    slopes, shares = (), ()
-    if sensitivities:
-        upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
-        slopes = gradients(there, upper, criteria)
-        shares = variance_shares(there, request.seed)
+    upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
     return Margin(
         **vars(stated),
@@ -152,12 +150,18 @@ def _margin(
         models=model_bounds(forces, draws, criteria),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
-        gradients=slopes,
-        shares=shares,
+        gradients=gradients(there, upper, criteria) if sensitivities else (),
+        shares=variance_shares(there, request.seed) if sensitivities else (),
         beyond_tested=beyond,
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )
+
+
+def _of_worst(level: Level, worst: Level) -> Level:
+    """Return a level with what is known better of the worst one, where it is that."""
+    same = level.temperature_C == worst.temperature_C
+    return replace(level, exceedance=worst.exceedance) if same else level
 
 
 def _reached(

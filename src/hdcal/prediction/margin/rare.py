@@ -221,9 +221,7 @@ def refined(
 def _words(found: Rare) -> str:
     """Say what a rare exceedance rests on."""
     error = 100.0 * found.relative_error
-    told = [
-        f"So rare an event is computed, not counted (Monte Carlo error {error:.1g} %)"
-    ]
+    told = [f"Its Monte Carlo error is {error:.1g} %, by importance sampling"]
     if found.heavy_tailed > _TOLD:
         told.append(
             "it rests on the normal law of the scatter: by Student's t of five degrees "
