@@ -131,7 +131,7 @@ def calibrate(
     Args:
         case: from `read_case`.
         effects: names of effects to include.
-        theory: overrides the gear's theory.
+        theory: overrides the gear's.
         with_gap: add a leftover discrepancy, orthogonal to the base model.
         adapt_noise: let the noise grow with the force where it clearly does.
         chains: independent chains, two or more so that they can be compared.
@@ -147,19 +147,19 @@ def calibrate(
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
-    check_settings(chains, warmup, draws, seed)
-    bound_executables()
     began = time.perf_counter()
-    chosen = _chosen(case, choose_effects(effects, registry), adapt_noise)
+    check_settings(chains, warmup, draws, seed)
     check_effect_priors(case, registry)
+    bound_executables()
+    chosen = _chosen(case, choose_effects(effects, registry), adapt_noise)
     theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
-    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    keys = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
-    own = _specifics(case, problem, found)
-    parts = assemble(case, priors, problem, found, own, of_prior)
+    found = sample(problem, laplace.fit(problem), keys[0], progress=progress, **size)
+    own = _specifics(case, problem, found), keys[1]
+    parts = assemble(case, priors, problem, found, *own)
     settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
     settings["seconds"] = round(time.perf_counter() - began, 3)
     return Posterior(case, theory, chosen, priors, *parts, settings)

@@ -56,9 +56,6 @@ def diagnose(
         seed: of all random numbers.
         progress: called with (iterations done, iterations in all) while sampling.
 
-    Returns:
-        The verdict; it may be none, ambiguous or unknown.
-
     Raises:
         InputError: an effect, a prior or the data cannot be used, see `_check`.
     """

@@ -20,6 +20,16 @@ if TYPE_CHECKING:
     from hdcal.motion.respond.respond import Response
 
 _FROM_PRIORS = {"mass_kg": "mass", "damping_N_s_per_mm": "damping"}
+_EXTRAPOLATED = (
+    "lie outside the deformations or the temperature that were calibrated: "
+    "extrapolated. This assumes that the model goes on holding there; a bend that may "
+    "grow beyond the tested deformation, by which predicted forces widen, is not in "
+    "the motion."
+)
+_NO_GAP = (
+    "This assumes that the gear is the model alone: a leftover discrepancy is not in "
+    "the motion."
+)
 
 
 def headline(peak: Interval, *, pulled: bool) -> str:
@@ -76,18 +86,10 @@ def remarks(
         )
     outside = np.count_nonzero(~tested)
     if outside:
-        yield (
-            f"{outside} of {len(tested)} times lie outside the deformations or the "
-            "temperature that were calibrated: extrapolated. This assumes that the "
-            "model goes on holding there; a bend that may grow beyond the tested "
-            "deformation, by which predicted forces widen, is not in the motion."
-        )
+        yield f"{outside} of {len(tested)} times {_EXTRAPOLATED}"
     yield from averaging_words(causes_of(posterior))
     if posterior.settings.get("with_gap"):
-        yield (
-            "This assumes that the gear is the model alone: a leftover discrepancy is "
-            "not in the motion."
-        )
+        yield _NO_GAP
     if left:
         listed = ", ".join(effect.name for effect in left)
         yield (

@@ -126,7 +126,6 @@ def _margin(
     there = [force.at(worst.temperature_C) for force in forces]
     worst = refined(worst, there, criteria.limit_force, request.seed)
     levels = tuple(_of_worst(level, worst) for level in levels)
-    beyond = beyond_tested(forces[0].conditions)
     upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
     return Margin(
@@ -137,7 +136,7 @@ def _margin(
         quantity=request.quantity,
         population=whose,
         population_words=population_words(whose, main.problem),
-        basis="" if beyond > FAR else _basis(whose, criteria),
+        basis=_basis(whose, criteria, beyond_tested(forces[0].conditions)),
         content=criteria.content,
         confidence=criteria.confidence,
         required_probability=criteria.required,
@@ -152,7 +151,7 @@ def _margin(
         weight_left_out=weight_left_out(causes),
         gradients=gradients(there, upper, criteria) if sensitivities else (),
         shares=variance_shares(there, request.seed) if sensitivities else (),
-        beyond_tested=beyond,
+        beyond_tested=beyond_tested(forces[0].conditions),
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, levels, worst, criteria),
     )
@@ -213,9 +212,9 @@ def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
     )
 
 
-def _basis(population: Population, criteria: Criteria) -> str:
-    """Return the name that a bound of these shares has, if of a population of gears."""
-    if population != "specimens":
+def _basis(population: Population, criteria: Criteria, beyond: float) -> str:
+    """Return the name of such a bound, of gears whose deformation was tested."""
+    if population != "specimens" or beyond > FAR:
         return ""
     pair = (criteria.content, criteria.confidence)
     return next((name for name, shares in BASES.items() if shares == pair), "")
