@@ -79,15 +79,9 @@ def remarks(
         yield (
             f"{outside} of {len(tested)} times lie outside the deformations or the "
             "temperature that were calibrated: extrapolated. This assumes that the "
-            "model goes on holding there; a bend that may grow beyond the tested "
-            "deformation, by which predicted forces widen, is not in the motion."
+            "model goes on holding; the bend that may grow there is not in the motion."
         )
-    yield from averaging_words(causes_of(posterior))
-    if posterior.settings.get("with_gap"):
-        yield (
-            "This assumes that the gear is the model alone: a leftover discrepancy is "
-            "not in the motion."
-        )
+    yield from _assumed(posterior)
     if left:
         listed = ", ".join(effect.name for effect in left)
         yield (
@@ -111,6 +105,16 @@ def remarks(
         )
     if len(posterior.case.specimen_labels) > 1:
         yield "The stiffness is the mean of the tested gears, not of a new one."
+
+
+def _assumed(posterior: Posterior) -> Iterator[str]:
+    """Say which causes the motion averages over, and what it leaves out."""
+    yield from averaging_words(causes_of(posterior))
+    if posterior.settings.get("with_gap"):
+        yield (
+            "This assumes that the gear is the model alone: a leftover discrepancy is "
+            "not in the motion."
+        )
 
 
 def response_document(

@@ -31,7 +31,10 @@ from hdcal.prediction.margin.bounds import (
     worst_level,
 )
 from hdcal.prediction.margin.checks import check_margin, check_sign
-from hdcal.prediction.margin.deformation_reached import deformation_reached
+from hdcal.prediction.margin.deformation_reached import (
+    DeformationReached,
+    deformation_reached,
+)
 from hdcal.prediction.margin.gradients import gradients
 from hdcal.prediction.margin.remarks import (
     extrapolations,
@@ -111,14 +114,12 @@ def _margin(
     forces = _forces(causes, request, whose, sense)
     nodes = nodes_of(warm, main.posterior.case.records)
     draws = population_draws(forces, nodes, criteria)
-    levels = _levels(draws, main, request, nodes, criteria)
-    check_sign(levels, request, criteria, sense)
-    worst = worst_level(draws, criteria, levels)
+    computed = _levels(draws, main, request, nodes, criteria)
+    check_sign(computed, request, criteria, sense)
+    worst = worst_level(draws, criteria, computed)
     there = [force.at(worst.temperature_C) for force in forces]
     beyond = beyond_tested(forces[0].conditions)
-    reached, slopes, shares = None, (), ()
-    if request.given_force is not None:
-        reached = deformation_reached(there, request.given_force, criteria)
+    slopes, shares = (), ()
     if sensitivities:
         upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
         slopes = gradients(there, upper, criteria)
@@ -136,9 +137,9 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=levels_between(levels, warm, _tested(main, request, sense, warm)),
+        levels=levels_between(computed, warm, _tested(main, request, sense, warm)),
         worst=worst,
-        reached=reached,
+        reached=_reached(there, request, criteria),
         models=model_bounds(forces, draws, criteria),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
@@ -146,7 +147,7 @@ def _margin(
         shares=shares,
         beyond_tested=beyond,
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, levels, worst, criteria),
+        remarks=remarks(forces, computed, worst, criteria),
     )
 
 
@@ -178,6 +179,13 @@ def _levels(
         level_of(draws, table, ahead, criteria, float(at), bool(inside))
         for table, ahead, at, inside in places
     )
+
+
+def _reached(
+    there: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
+) -> DeformationReached | None:
+    given = request.given_force
+    return None if given is None else deformation_reached(there, given, criteria)
 
 
 def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
