@@ -33,7 +33,7 @@ BAD = {
     "no limit": ({"limit_force": np.inf}, "inf N does not lie"),
     "given in mN": ({"given_force": 80_000.0}, "Give it in N"),
     "empty window": ({"temperature": []}, "empty window"),
-    "endless window": ({"temperature": [20.0] * 1001}, "at most 1000"),
+    "endless window": ({"temperature": [20.0] * 100_001}, "at most 100000"),
     "below zero": ({"temperature": [-300.0]}, "absolute zero"),
     "in kelvin by far": ({"temperature": [2500.0]}, "half of Young's modulus"),
     "content 99": ({"content": 99.0}, "does not lie between 0 and 1"),

@@ -149,26 +149,30 @@ def calibrate(
     """
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
-    check_effect_priors(case, registry)
     bound_executables()
-    chosen = _chosen(case, choose_effects(effects, registry), adapt_noise)
+    chosen = _chosen(case, effects, registry, adapt_noise)
     theory, shipped = theory or case.gear.theory, effect_priors()
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
-    keys = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, laplace.fit(problem), keys[0], progress=progress, **size)
-    own = _specifics(case, problem, found), keys[1]
-    parts = assemble(case, priors, problem, found, *own)
+    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
+    own = _specifics(case, problem, found)
+    parts = assemble(case, priors, problem, found, own, of_prior)
     settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
-    settings["seconds"] = round(time.perf_counter() - began, 3)
+    settings |= {"seconds": round(time.perf_counter() - began, 3)}
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
 
 def _chosen(
-    case: Case, effects: tuple[type[Effect], ...], adapt_noise: bool
+    case: Case,
+    names: Sequence[str],
+    registry: Mapping[str, type[Effect]],
+    adapt_noise: bool,
 ) -> tuple[type[Effect], ...]:
     """Return the effects, with noise that grows where it does and none is of noise."""
+    effects = choose_effects(names, registry)
+    check_effect_priors(case, registry)
     spoken_of = any(effect.stage == "noise" for effect in effects)
     grows = adapt_noise and not spoken_of and noise_grows(case)
     return (*effects, HeteroscedasticNoise) if grows else effects

@@ -14,7 +14,6 @@ from hdcal.diagnosis.model_posterior import ModelPosterior, model_posterior
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.refit import (
     MOST_LEFT_OUT,
-    NOTHING,
     Refits,
     failure_reasons,
     refit,
@@ -61,14 +60,12 @@ def diagnose(
     """
     _check(case, library, seed)
     rng = np.random.default_rng(seed)
-    averaged, group = average_rows(case)
-    library = _testable(library, group)
+    averaged, group, library = _averaged(case, library)
     evidence, posterior = _evidence_and_posterior(averaged, library)
     found = detect_gap(evidence, posterior, averaged, rng)
     which = identify_cause(evidence, found.posterior, found.detected, library, rng)
     closed = _closure(evidence, which, found, rng)
-    asked = found.posterior, library, seed, progress
-    fits = NOTHING if quick else refit(case, *asked)
+    fits = refit(case, found.posterior, library, seed, progress, quick=quick)
     runs, no_run = rank_runs(evidence, found.posterior, library, rng)
     return Verdict(
         case=case,
@@ -90,12 +87,14 @@ def diagnose(
     )
 
 
-def _testable(
-    library: Mapping[str, type[Effect]], group: int
-) -> dict[str, type[Effect]]:
-    """Return the effects that means of `group` rows can show."""
+def _averaged(
+    case: Case, library: Mapping[str, type[Effect]]
+) -> tuple[Case, int, dict[str, type[Effect]]]:
+    """Return means of rows, of how many each, and the effects that these can show."""
+    averaged, group = average_rows(case)
     # They say nothing of the noise of single rows.
-    return {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
+    shown = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
+    return averaged, group, shown
 
 
 def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:

@@ -116,9 +116,7 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
-        shift, weight = self._beyond(deformation, warmth)
-        middle, half, score = self._step(columns * weight, (force - shift) * weight)
-        middle, half = middle / weight + shift, half / weight
+        middle, half, score = self._step(columns, force, (deformation, warmth))
         self.rows += 1
         share, alarm = self._alarm.step(score)
         band = [middle - half, middle + half]
@@ -151,11 +149,13 @@ class Tracker:
         shift, sd = self._untested.at(deformation, temperature)
         return shift, (1.0 + sd**2 / self._variance) ** -0.5
 
-    def _step(self, columns, force: float) -> tuple[float, float, float]:
-        step = self._core.step(columns, force)
+    def _step(self, columns, force: float, at: tuple[float, float]):
+        shift, weight = self._beyond(*at)
+        step = self._core.step(columns * weight, (force - shift) * weight)
         if isinstance(self._core, FirstRows) and self._core.complete:
             self._core = self._core.merged(self._forget)
-        return step
+        middle, half, score = step
+        return middle / weight + shift, half / weight, score
 
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""

@@ -20,16 +20,6 @@ if TYPE_CHECKING:
     from hdcal.motion.respond.respond import Response
 
 _FROM_PRIORS = {"mass_kg": "mass", "damping_N_s_per_mm": "damping"}
-_EXTRAPOLATED = (
-    "lie outside the deformations or the temperature that were calibrated: "
-    "extrapolated. This assumes that the model goes on holding there; a bend that may "
-    "grow beyond the tested deformation, by which predicted forces widen, is not in "
-    "the motion."
-)
-_NO_GAP = (
-    "This assumes that the gear is the model alone: a leftover discrepancy is not in "
-    "the motion."
-)
 
 
 def headline(peak: Interval, *, pulled: bool) -> str:
@@ -86,10 +76,12 @@ def remarks(
         )
     outside = np.count_nonzero(~tested)
     if outside:
-        yield f"{outside} of {len(tested)} times {_EXTRAPOLATED}"
-    yield from averaging_words(causes_of(posterior))
-    if posterior.settings.get("with_gap"):
-        yield _NO_GAP
+        yield (
+            f"{outside} of {len(tested)} times lie outside the deformations or the "
+            "temperature that were calibrated: extrapolated. This assumes that the "
+            "model goes on holding; the bend that may grow there is not in the motion."
+        )
+    yield from _assumed(posterior)
     if left:
         listed = ", ".join(effect.name for effect in left)
         yield (
@@ -113,6 +105,16 @@ def remarks(
         )
     if len(posterior.case.specimen_labels) > 1:
         yield "The stiffness is the mean of the tested gears, not of a new one."
+
+
+def _assumed(posterior: Posterior) -> Iterator[str]:
+    """Say which causes the motion averages over, and what it leaves out."""
+    yield from averaging_words(causes_of(posterior))
+    if posterior.settings.get("with_gap"):
+        yield (
+            "This assumes that the gear is the model alone: a leftover discrepancy is "
+            "not in the motion."
+        )
 
 
 def response_document(

@@ -120,12 +120,12 @@ def _margin(
     forces = _forces(causes, request, whose, sense)
     nodes = nodes_of(warm, main.posterior.case.records)
     draws = population_draws(forces, nodes, criteria)
-    levels = _levels(draws, main, request, nodes, criteria)
-    check_sign(levels, request, criteria, sense)
-    worst = worst_level(draws, criteria, levels)
+    computed = _levels(draws, main, request, nodes, criteria)
+    check_sign(computed, request, criteria, sense)
+    worst = worst_level(draws, criteria, computed)
     there = [force.at(worst.temperature_C) for force in forces]
     worst = refined(worst, there, criteria.limit_force, request.seed)
-    levels = tuple(_of_worst(level, worst) for level in levels)
+    computed = tuple(_of_worst(level, worst) for level in computed)
     upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
     return Margin(
@@ -142,7 +142,7 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=levels_between(levels, warm, _tested(main, request, sense, warm)),
+        levels=levels_between(computed, warm, _tested(main, request, sense, warm)),
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
@@ -153,7 +153,7 @@ def _margin(
         shares=variance_shares(there, request.seed) if sensitivities else (),
         beyond_tested=beyond_tested(forces[0].conditions),
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, levels, worst, criteria),
+        remarks=remarks(forces, computed, worst, criteria),
     )
 
 
@@ -161,15 +161,6 @@ def _of_worst(level: Level, worst: Level) -> Level:
     """Return a level with what is known better of the worst one, where it is that."""
     same = level.temperature_C == worst.temperature_C
     return replace(level, exceedance=worst.exceedance) if same else level
-
-
-def _reached(
-    forces: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
-) -> DeformationReached | None:
-    """Return the deformation that the given force reaches, if there is one."""
-    if request.given_force is None:
-        return None
-    return deformation_reached(forces, request.given_force, criteria)
 
 
 def _forces(
@@ -200,6 +191,13 @@ def _levels(
         level_of(draws, table, ahead, criteria, float(at), bool(inside))
         for table, ahead, at, inside in places
     )
+
+
+def _reached(
+    there: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
+) -> DeformationReached | None:
+    given = request.given_force
+    return None if given is None else deformation_reached(there, given, criteria)
 
 
 def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
