@@ -81,7 +81,7 @@ class _Target(eqx.Module):
         """Return the log posterior density in whitened coordinates, but a constant."""
         return -laplace.potential(self.problem, self.whitening.position(point))
 
-    def terms(self, point: Float[Array, " d"], sites: dict, key, blur=0.0):
+    def terms(self, point: Float[Array, " d"], sites: dict, key, blur: Any = 0.0):
         """Return log tails, normal and heavy, and the log prior of σ's logarithm."""
         named = laplace.values_at(self.problem, self.whitening.position(point))
         value = named | draw_members(self.problem, named, key) | sites
@@ -148,7 +148,7 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     sites = {**sites, SCORES: ndtri(levels[:, :2])}
     where = replace(force.conditions, untested=untested)
     whitening = laplace.fit(problem)
-    blur = 0.1 * np.std(np.asarray(force.along().centre()))
+    blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
     target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit), blur)
     points, log_law = _points(target, sites, np.random.default_rng(seed))
     keys = jax.random.split(jax.random.key(seed), len(points))
