@@ -35,6 +35,7 @@ class LinearCores:
         prior: what is known before the first row.
 
     Attributes:
+        prior: what was known before the first row.
         mean: m, shape (..., p).
         root: A, shape (..., p, r).
         shape: a of the noise variance [-].
@@ -49,7 +50,7 @@ class LinearCores:
         root = np.broadcast_to(prior.root, (*axes, prior.root.shape[-1]))
         self.root = root.copy("F")
         self.shape, self.rate = prior.shape, prior.rate
-        self._prior, self._inverse = prior, np.linalg.pinv(prior.root)
+        self.prior, self._inverse = prior, np.linalg.pinv(prior.root)
 
     def learn(self, columns: np.ndarray, force: float):
         """Predict a row from the rows before it, then learn from it.
@@ -75,6 +76,10 @@ class LinearCores:
         self.rate = self.rate + 0.5 * error * error / wide
         return expected, scale, freedom
 
+    def slower(self) -> "LinearCores":
+        """Return what follows the noise of the last rows less: itself."""
+        return self
+
     def marginal(self, index: int):
         """Return median, scale and degrees of freedom of a coefficient."""
         part = self.root[..., index, :]
@@ -94,7 +99,7 @@ class LinearCores:
         added = np.sqrt(ratio) * self._inverse[..., index, None]
         added = np.broadcast_to(added, (*relative.shape[:-1], 1))
         wider = np.linalg.qr(np.concatenate([relative, added], axis=-1).mT).R.mT
-        self.root = self._prior.root @ wider
+        self.root = self.prior.root @ wider
 
 
 class LinearCore(LinearCores):
@@ -122,27 +127,38 @@ class LinearCore(LinearCores):
             Median [N] and half-width of the 95 % interval [N] of the predictive
             distribution, and the normal score of the reading in it.
         """
-        if self._forget < 1.0:
-            self._fade()
+        self.fade()
         expected, scale, freedom = map(float, self.learn(columns, force))
         score = normal_score((force - expected) / scale, freedom)
         return expected, scale * half_width(freedom), score
+
+    def expect(self, columns: np.ndarray) -> float:
+        """Return the force that the coefficients give at a row [N]."""
+        return float(columns @ self.mean)
 
     def coefficient(self, index: int) -> tuple[float, float, float]:
         """Return mean, sd and half-width of the 95 % interval of a coefficient."""
         middle, scale, freedom = map(float, self.marginal(index))
         return middle, student_sd(scale, freedom), scale * half_width(freedom)
 
-    def _fade(self) -> None:
+    def slower(self) -> "LinearCore":
+        """Return one that forgets a quarter as fast; itself if it forgets nothing."""
+        if self._forget == 1.0:
+            return self
+        return LinearCore(self.prior, self._forget**0.25)
+
+    def fade(self) -> None:
         """Temper towards the wide prior: add a part of the first prior's precision."""
-        keep, prior = self._forget, self._prior
+        keep, prior = self._forget, self.prior
+        if keep == 1.0:
+            return
         part = (1.0 - keep) / _FADED**2
         relative = self._inverse @ self.root
         precision = part * (relative.T @ relative) + self._kept
         # LAPACK itself: on these sizes NumPy's wrappers take ten times as long.
         factor, _ = dpotrf(precision, lower=1)
         self.root = dtrtrs(factor, self.root.T, lower=1)[0].T
-        away = (part * self._inverse) @ (prior.mean - self.mean)
-        self.mean += self.root @ (away @ (self._inverse @ self.root))
+        away = (prior.mean - self.mean) @ (part * self._inverse).T
+        self.mean += away @ (self._inverse @ self.root) @ self.root.T
         self.shape = keep * self.shape + (1.0 - keep) * prior.shape
         self.rate = keep * self.rate + (1.0 - keep) * prior.rate

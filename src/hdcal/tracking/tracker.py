@@ -9,13 +9,15 @@ from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
-from hdcal.tracking.change_alarm import ChangeAlarm
+from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
 from hdcal.tracking.effect_tracking import build_particles
 from hdcal.tracking.first_rows import FirstRows
+from hdcal.tracking.forgetting_alarm import forgetting_threshold
 from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
 from hdcal.tracking.normal_inverse_gamma import match_draws
 from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
 from hdcal.tracking.reading_limits import reading_limits
+from hdcal.tracking.serial_correlation import SerialCorrelation
 from hdcal.tracking.stream_prior import (
     StreamPrior,
     prior_from_gear,
@@ -69,13 +71,17 @@ class Tracker:
             wrong += implausible("seed", seed)
         prior = _stream_prior(known, seed)
         self._core, self._columns = _core(known, prior, forget)
+        self._slow, self._noise = self._core.slower(), SerialCorrelation()
         self._limits = reading_limits(known, prior)
         self._reference = prior.reading.reference_temperature
         self._remounting = prior.remounting
-        self._alarm, self._alarm_rows = ChangeAlarm(alarm_rows), alarm_rows
+        self._alarm_rows = alarm_rows
+        self._alarm = ChangeAlarm(threshold_for(alarm_rows))
+        self._design = _design(known, prior)
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
         self._since, self._run = 1, None
         self._forget, self._reopen = forget, reopen
+        self._set_threshold()
         self._first = self._core.coefficient(STIFFNESS)[2]
         self.rows = self.alarms = 0
 
@@ -108,6 +114,7 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
+        rho = self._noise.value
         middle, half, score = self._step(columns, force)
         self.rows += 1
         share, alarm = self._alarm.step(score)
@@ -122,6 +129,8 @@ class Tracker:
             "alarm": alarm,
             "alarm_score": share,
             "alarm_since_row": self._since,
+            "false_alarm_rows": self._alarm_rows,
+            "correlation": rho,
             "tested": self._limits.were_tested(deformation, warmth),
         }
         if alarm:
@@ -131,10 +140,29 @@ class Tracker:
         return found
 
     def _step(self, columns, force: float) -> tuple[float, float, float]:
-        step = self._core.step(columns, force)
+        """Predict a row from the rows before it, then learn from it.
+
+        Returns:
+            Middle [N], half-width of the 95 % interval [N], normal score.
+        """
+        error = force - self._slow.expect(columns)
+        row = self._noise.whiten(columns, force)
+        middle, half, score = self._core.step(row.columns, row.force)
+        if self._slow is not self._core:
+            self._slow.step(row.columns, row.force)
+        self._noise.learn(error / half)
         if isinstance(self._core, FirstRows) and self._core.complete:
             self._core = self._core.merged(self._forget)
-        return step
+            self._slow = self._core.slower()
+            self._set_threshold()
+        return row.carried + row.scale * middle, row.scale * half, score
+
+    def _set_threshold(self) -> None:
+        """Take the threshold of a core that forgets, once there is one."""
+        if isinstance(self._core, LinearCore) and self._forget < 1.0:
+            self._alarm.threshold = forgetting_threshold(
+                self._core.prior, self._forget, self._design, self._alarm_rows
+            )
 
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""
@@ -155,8 +183,14 @@ class Tracker:
         if run is None or run == self._run:
             return
         if self._run is not None:
-            self._core.widen(ZERO, self._remounting)
+            self._widen(ZERO, self._remounting)
+            self._noise.restart()
         self._run = run
+
+    def _widen(self, index: int, variance: float) -> None:
+        self._core.widen(index, variance)
+        if self._slow is not self._core:
+            self._slow.widen(index, variance)
 
     def _restart(self) -> None:
         """Begin anew to look for a change; widen what may have changed, if wanted."""
@@ -164,8 +198,8 @@ class Tracker:
         self._since = self.rows + 1
         if self._reopen:
             moved = self._reopen * self._core.coefficient(STIFFNESS)[0]
-            self._core.widen(STIFFNESS, moved**2)
-            self._core.widen(ZERO, self._remounting)
+            self._widen(STIFFNESS, moved**2)
+            self._widen(ZERO, self._remounting)
 
     def _stiffness(self) -> dict:
         mean, sd, half = self._core.coefficient(STIFFNESS)
@@ -206,6 +240,20 @@ def _core(
         return build_particles(known, prior, forget)
     law = match_draws(prior.coefficients(), prior.variance)
     return LinearCore(law, forget), _linear_columns
+
+
+def _design(known: Posterior | Gear, prior: StreamPrior) -> np.ndarray:
+    """Return linear columns of rows such as will come, shape (row, 4)."""
+    if isinstance(known, Gear):
+        # About a hundredth of the radius; the scale of deformations matters little.
+        deformation = np.linspace(0.0, 0.01, 50) * float(known.geometry.radius)
+        rise = np.zeros(50)
+    else:
+        deformation = np.asarray(known.case.records.deformation)
+        rise = np.asarray(known.case.records.temperature)
+        rise = rise - prior.reading.reference_temperature
+    ones = np.ones_like(rise)
+    return np.stack([deformation, deformation * rise, ones, rise], axis=1)
 
 
 def _linear_columns(deformation: float, rise: float, time: float) -> np.ndarray:

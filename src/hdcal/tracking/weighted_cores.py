@@ -65,6 +65,10 @@ class WeightedCores(LinearCores, ABC):
         self.rows += 1
         return middle, spread * half_width(freedom), score
 
+    def expect(self, columns: np.ndarray) -> float:
+        """Return the force that the coefficients give at a row [N]."""
+        return float(self.weight @ np.vecdot(columns, self.mean))
+
     def mixed(
         self, middle: np.ndarray, spread: np.ndarray | float
     ) -> tuple[float, float]:
