@@ -6,7 +6,7 @@ false alarms is then simulated on many streams without a change.
 """
 
 import numpy as np
-from scipy.optimize import brentq, nnls
+from scipy.optimize import nnls, root_scalar
 
 from hdcal.tracking.change_alarm import ALLOWANCE, threshold_for
 from hdcal.tracking.linear_core import LinearCore
@@ -24,7 +24,11 @@ _LONG = 2000.0
 
 
 def forgetting_threshold(
-    law: NormalInverseGamma, forget: float, design: np.ndarray, rows: float
+    law: NormalInverseGamma,
+    forget: float,
+    design: np.ndarray,
+    rows: float,
+    correlation: float = 0.0,
 ) -> float:
     """Return h of the two-sided CUSUM of a tracker that forgets.
 
@@ -37,13 +41,14 @@ def forgetting_threshold(
         forget: share of the past kept at each row, below 1.
         design: columns of rows such as will come, shape (n, p).
         rows: mean number between false alarms.
+        correlation: ρ that is taken out of the rows.
     """
     usual = threshold_for(rows)
     if 1.0 / (1.0 - forget) > _LONG:
         return usual
     rng = np.random.default_rng(0)
     levels = np.linspace(0.15, 1.0, _LEVELS) * threshold_for(1e6)
-    scores = simulate_scores(law, forget, design, rng)
+    scores = simulate_scores(law, forget, design, rng, correlation)
     called = count_alarms(scores, levels)
     use = called >= _FEWEST
     level, weight = levels[use], np.sqrt(called[use])
@@ -57,11 +62,27 @@ def forgetting_threshold(
 
     if excess(0.0) > 0.0:
         return float(levels[0])
-    return float(min(brentq(excess, 0.0, 10.0 * usual), usual))
+    found = root_scalar(excess, bracket=(0.0, 10.0 * usual)).root
+    return float(min(found, usual))
+
+
+def settling_rows(forget: float) -> int:
+    """Return after how many rows a tracker that forgets has settled.
+
+    Until then it follows its beginning, and the threshold is the usual one.
+
+    Args:
+        forget: share of the past kept at each row, below 1.
+    """
+    return int(_MEMORIES / (1.0 - forget))
 
 
 def simulate_scores(
-    law: NormalInverseGamma, forget: float, design: np.ndarray, rng
+    law: NormalInverseGamma,
+    forget: float,
+    design: np.ndarray,
+    rng,
+    correlation: float = 0.0,
 ) -> np.ndarray:
     """Return innovations of streams without a change, shape (row, stream).
 
@@ -73,6 +94,7 @@ def simulate_scores(
         forget: share of the past kept at each row.
         design: columns that rows are drawn from, shape (n, p).
         rng: source of randomness.
+        correlation: ρ that is taken out of the rows.
     """
     core = LinearCore(law, forget)
     sd = (law.rate / rng.gamma(law.shape, size=_STREAMS)) ** 0.5
@@ -80,9 +102,10 @@ def simulate_scores(
     truth = law.mean + (sd * wide).T
     core.mean = np.tile(law.mean, (_STREAMS, 1))
     core.rate = np.full(_STREAMS, law.rate)
-    settling = int(_MEMORIES / (1.0 - forget))
-    rows = design[rng.integers(0, len(design), settling + _ROWS)]
-    kept = []
+    settling = settling_rows(forget)
+    rows = design[rng.integers(0, len(design), settling + _ROWS + 1)]
+    rows = (rows[1:] - correlation * rows[:-1]) / (1.0 - correlation**2) ** 0.5
+    kept, freedom = [], 0.0
     for columns in rows:
         core.fade()
         force = truth @ columns + sd * rng.standard_normal(_STREAMS)

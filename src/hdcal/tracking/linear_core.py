@@ -8,6 +8,8 @@ this keeps its digits when rows hardly differ from each other.
 Arrays have leading axes "...": none for one core, one for many cores side by side.
 """
 
+from typing import Self
+
 import numpy as np
 from scipy.linalg.lapack import (
     dpotrf,  # pyright: ignore[reportAttributeAccessIssue]
@@ -52,12 +54,13 @@ class LinearCores:
         self.shape, self.rate = prior.shape, prior.rate
         self.prior, self._inverse = prior, np.linalg.pinv(prior.root)
 
-    def learn(self, columns: np.ndarray, force: float):
+    def learn(self, columns: np.ndarray, force: float, weight: float = 1.0):
         """Predict a row from the rows before it, then learn from it.
 
         Args:
             columns: x, shape (p,) or (..., p).
             force: reading y [N].
+            weight: of what the row says, 0 to 1.
 
         Returns:
             Median [N], scale [N] and degrees of freedom of the predictive
@@ -68,15 +71,27 @@ class LinearCores:
         expected = np.vecdot(columns, self.mean)
         error = force - expected
         scale, freedom = (self.rate / self.shape * wide) ** 0.5, 2.0 * self.shape
-        gain = np.matvec(self.root, spread, order="F")
-        self.mean += gain * (error / wide)[..., None]
-        spread /= (wide + wide**0.5)[..., None]
-        self.root -= gain[..., :, None] * spread[..., None, :]
-        self.shape += 0.5
-        self.rate = self.rate + 0.5 * error * error / wide
+        if weight > 0.0:
+            self._gain(spread, error, 1.0 / weight)
+        self.shape += 0.5 * weight
+        self.rate = self.rate + 0.5 * weight * error * error / wide
         return expected, scale, freedom
 
-    def slower(self) -> "LinearCores":
+    def _gain(self, spread: np.ndarray, error, noise: float) -> None:
+        """Update the coefficients by Potter's formula.
+
+        Args:
+            spread: Aᵀx, shape (..., r).
+            error: of the row [N].
+            noise: its variance over σ².
+        """
+        wide = noise + np.vecdot(spread, spread)
+        gain = np.matvec(self.root, spread, order="F")
+        self.mean += gain * (error / wide)[..., None]
+        spread = spread / (wide + (noise * wide) ** 0.5)[..., None]
+        self.root -= gain[..., :, None] * spread[..., None, :]
+
+    def slower(self) -> Self:
         """Return what follows the noise of the last rows less: itself."""
         return self
 
@@ -116,21 +131,28 @@ class LinearCore(LinearCores):
         super().__init__(prior)
         self._forget, self._kept = forget, forget * np.eye(prior.root.shape[1])
 
-    def step(self, columns: np.ndarray, force: float) -> tuple[float, float, float]:
+    def step(
+        self, columns: np.ndarray, force: float, weight: float = 1.0
+    ) -> tuple[float, float, float]:
         """Predict a row from the rows before it, then learn from it.
 
         Args:
             columns: x, shape (p,).
             force: reading y [N].
+            weight: of what the row says, 0 to 1.
 
         Returns:
             Median [N] and half-width of the 95 % interval [N] of the predictive
             distribution, and the normal score of the reading in it.
         """
         self.fade()
-        expected, scale, freedom = map(float, self.learn(columns, force))
+        expected, scale, freedom = map(float, self.learn(columns, force, weight))
         score = normal_score((force - expected) / scale, freedom)
         return expected, scale * half_width(freedom), score
+
+    def variance(self) -> float:
+        """Return that of a reading, its coefficients known [N²]."""
+        return float(self.rate / self.shape)
 
     def expect(self, columns: np.ndarray) -> float:
         """Return the force that the coefficients give at a row [N]."""
@@ -141,11 +163,11 @@ class LinearCore(LinearCores):
         middle, scale, freedom = map(float, self.marginal(index))
         return middle, student_sd(scale, freedom), scale * half_width(freedom)
 
-    def slower(self) -> "LinearCore":
-        """Return one that forgets a quarter as fast; itself if it forgets nothing."""
+    def slower(self) -> Self:
+        """Return one that forgets a tenth as fast; itself if it forgets nothing."""
         if self._forget == 1.0:
             return self
-        return LinearCore(self.prior, self._forget**0.25)
+        return type(self)(self.prior, self._forget**0.1)
 
     def fade(self) -> None:
         """Temper towards the wide prior: add a part of the first prior's precision."""

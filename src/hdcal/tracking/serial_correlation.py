@@ -13,9 +13,13 @@ from math import sqrt
 
 import numpy as np
 
-# Sds of chance that an estimate has to lie from zero before it is believed. While
-# readings are independent rows thus stay as they are.
-_BELIEVED = 3.0
+# Sds of chance that an estimate has to lie from zero before it is believed, so that
+# independent readings mostly stay as they are; it then counts as one sd larger,
+# because too small a one means too many false alarms.
+_BELIEVED, _CAREFUL = 2.5, 1.0
+# Fewer pairs of readings say too little. Until then scores count for the alarm as if
+# their correlation were this: the sums of a larger one would call far too often.
+_FEWEST, _UNSEEN = 30, 0.6
 # Largest correlation in size: nearer to one a zero could not be told from its noise.
 _MOST = 0.95
 # A glitch beyond so many half-widths counts as one of this size.
@@ -53,6 +57,12 @@ class SerialCorrelation:
         self._row: tuple[np.ndarray, float] | None = None
         self._error: float | None = None
 
+    @property
+    def weight(self) -> float:
+        """Share of a score that counts for the alarm: less before ρ can be seen."""
+        seen = self._pairs >= _FEWEST
+        return 1.0 if seen else sqrt((1.0 - _UNSEEN) / (1.0 + _UNSEEN))
+
     def restart(self) -> None:
         """Begin anew with the next row, as on another mounting; ρ is kept."""
         self._row = self._error = None
@@ -86,5 +96,8 @@ class SerialCorrelation:
         self._product += error * before
         self._power += 0.5 * (error**2 + before**2)
         found = self._product / self._power if self._power > 0.0 else 0.0
-        believed = found**2 * self._pairs > _BELIEVED**2
+        chance = sqrt((1.0 - min(found**2, 1.0)) / self._pairs)
+        believed = abs(found) * sqrt(self._pairs) > _BELIEVED
+        believed = believed and self._pairs >= _FEWEST
+        found += _CAREFUL * chance
         self.value = min(max(found, -_MOST), _MOST) if believed else 0.0

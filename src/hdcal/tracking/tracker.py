@@ -1,7 +1,7 @@
 """Follow a gear reading by reading: stiffness, the next force, and a change alarm."""
 
 from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
@@ -10,9 +10,10 @@ from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
+from hdcal.tracking.coarse_rounding import CoarseRounding
 from hdcal.tracking.effect_tracking import build_particles
 from hdcal.tracking.first_rows import FirstRows
-from hdcal.tracking.forgetting_alarm import forgetting_threshold
+from hdcal.tracking.forgetting_alarm import forgetting_threshold, settling_rows
 from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
 from hdcal.tracking.normal_inverse_gamma import match_draws
 from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
@@ -26,6 +27,10 @@ from hdcal.tracking.stream_prior import (
 
 SCHEMA = "hdcal.track/1"
 ALARM_ROWS = 10_000.0
+# With forgetting the threshold is taken anew when the correlation has changed by this.
+_ANOTHER_CORRELATION = 0.1
+# Errors that repeat with the force, by more than this share, are no correlated noise.
+_MOST_REPEATED = 0.1
 
 
 class Tracker:
@@ -72,6 +77,7 @@ class Tracker:
         prior = _stream_prior(known, seed)
         self._core, self._columns = _core(known, prior, forget)
         self._slow, self._noise = self._core.slower(), SerialCorrelation()
+        self._rounding = CoarseRounding(prior.step)
         self._limits = reading_limits(known, prior)
         self._reference = prior.reading.reference_temperature
         self._remounting = prior.remounting
@@ -81,9 +87,9 @@ class Tracker:
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
         self._since, self._run = 1, None
         self._forget, self._reopen = forget, reopen
-        self._set_threshold()
+        self._threshold_for = inf
         self._first = self._core.coefficient(STIFFNESS)[2]
-        self.rows = self.alarms = 0
+        self.rows = self.alarms = self._readings = 0
 
     def update(
         self,
@@ -114,10 +120,11 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
-        rho = self._noise.value
+        rho, weight = self._noise.value, self._noise.weight
         middle, half, score = self._step(columns, force)
         self.rows += 1
-        share, alarm = self._alarm.step(score)
+        self._readings += 1
+        share, alarm = self._alarm.step(weight * score)
         band = [middle - half, middle + half]
         found = {
             "schema": SCHEMA,
@@ -145,23 +152,31 @@ class Tracker:
         Returns:
             Middle [N], half-width of the 95 % interval [N], normal score.
         """
-        error = force - self._slow.expect(columns)
+        expected = self._slow.expect(columns)
+        repeated = self._rounding.share(self._slow.variance())
+        told = self._rounding.weight(expected, repeated)
         row = self._noise.whiten(columns, force)
-        middle, half, score = self._core.step(row.columns, row.force)
+        middle, half, score = self._core.step(row.columns, row.force, told)
         if self._slow is not self._core:
-            self._slow.step(row.columns, row.force)
-        self._noise.learn(error / half)
+            self._slow.step(row.columns, row.force, told)
+        if repeated < _MOST_REPEATED:
+            self._noise.learn((force - expected) / half)
         if isinstance(self._core, FirstRows) and self._core.complete:
             self._core = self._core.merged(self._forget)
             self._slow = self._core.slower()
-            self._set_threshold()
+        self._set_threshold()
         return row.carried + row.scale * middle, row.scale * half, score
 
     def _set_threshold(self) -> None:
-        """Take the threshold of a core that forgets, once there is one."""
-        if isinstance(self._core, LinearCore) and self._forget < 1.0:
+        """Take the threshold of a core that forgets, once it has settled."""
+        if self._forget == 1.0 or self._readings < settling_rows(self._forget):
+            return
+        rho = self._noise.value
+        moved = abs(rho - self._threshold_for) > _ANOTHER_CORRELATION
+        if moved and isinstance(self._core, LinearCore):
+            self._threshold_for = rho
             self._alarm.threshold = forgetting_threshold(
-                self._core.prior, self._forget, self._design, self._alarm_rows
+                self._core.prior, self._forget, self._design, self._alarm_rows, rho
             )
 
     def skip(self) -> int:
@@ -178,6 +193,20 @@ class Tracker:
             f"not tested; one false alarm in {self._alarm_rows:g} readings"
         )
 
+    def summary(self) -> str:
+        """Say how many alarms there were, and how many are due by chance."""
+        due = self._readings / self._alarm_rows
+        words = (
+            f"{self.rows} rows, {self.alarms} alarms; without a change {due:.2g} false "
+            f"ones are due in {self._readings} readings"
+        )
+        if self._noise.value:
+            words += (
+                "; readings are correlated with the one before "
+                f"({self._noise.value:.2f}), which is taken into account"
+            )
+        return words
+
     def _mount(self, run: str | None) -> None:
         """Widen the zero of the force if the label of the mounting is another one."""
         if run is None or run == self._run:
@@ -185,6 +214,7 @@ class Tracker:
         if self._run is not None:
             self._widen(ZERO, self._remounting)
             self._noise.restart()
+            self._rounding.restart()
         self._run = run
 
     def _widen(self, index: int, variance: float) -> None:
