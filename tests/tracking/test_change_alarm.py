@@ -72,12 +72,11 @@ def test_false_alarms_come_at_the_stated_rate():
 
 
 def test_the_alarm_is_the_sums_and_starts_again():
-    alarm = ChangeAlarm(200.0)
-    assert alarm.threshold == threshold_for(200.0)
+    alarm = ChangeAlarm(threshold_for(200.0))
     scores = [alarm.step(2.0) for _ in range(4)]
     sums = np.array([1.5, 3.0, 4.5]) / alarm.threshold
     assert [score for score, _ in scores[:2]] == pytest.approx(sums[:2])
     first = next(i for i, (_, called) in enumerate(scores) if called)
     assert scores[first + 1 :] == scores[: len(scores) - first - 1]
-    score, called = ChangeAlarm(200.0).step(-30.0)
+    score, called = ChangeAlarm(threshold_for(200.0)).step(-30.0)
     assert called and score < -1.0

@@ -5,6 +5,7 @@ the output, read with a zero of its own and white noise.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -136,11 +137,11 @@ def oscillation(problem: DynamicProblem, values: Values) -> dict:
     }
 
 
-def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
-    """Return the mean reading of the deformation at the padded rows [mm]."""
+def predict_states(problem: DynamicProblem, values: Values) -> Float[Array, "n 2"]:
+    """Return deformation [mm] and speed [mm/s] at the padded rows."""
     own = oscillation(problem, values)
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
-    states = linear_response(
+    return linear_response(
         with_gains(values, values["mass"]),
         with_gains(values, own["damping"]),
         with_gains(values, own["warm_stiffness"]),
@@ -148,7 +149,29 @@ def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"
         problem.force,
         start,
     )
-    return states[:, 0] + values["deformation_offset"]
+
+
+def predict_motion(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:
+    """Return the mean reading of the deformation at the padded rows [mm]."""
+    return predict_states(problem, values)[:, 0] + values["deformation_offset"]
+
+
+def stretch(problem: DynamicProblem, first: int, rows: int) -> DynamicProblem:
+    """Return the problem with some of its padded rows only.
+
+    Args:
+        problem: data and priors.
+        first: index of the first of them.
+        rows: their number; past the end they are fewer.
+    """
+    part = slice(first, first + rows)
+    return replace(
+        problem,
+        time=problem.time[part],
+        force=problem.force[part],
+        deformation=problem.deformation[part],
+        count=max(min(problem.count - first, rows), 0),
+    )
 
 
 def pointwise(problem: DynamicProblem, values: Values) -> Float[Array, " n"]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_problem import DynamicProblem
+from hdcal.inference.dynamic_problem import DynamicProblem, stretch
 from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import linear_response
 
@@ -20,6 +20,9 @@ _RATIOS = np.array([0.005, 0.03, 0.2])
 _FINENESS = 0.25
 _MOST, _FEWEST, _BLOCK = 6000, 60, 64
 _TAIL = 1e-3
+# Longer records are scanned in a window of so many rows, then near its peaks in whole.
+_WINDOW, _WHOLE_BLOCK = 2048, 4
+_NEAR = np.linspace(-1.0, 1.0, 9)
 
 
 @jax.jit
@@ -63,24 +66,68 @@ def scan(problem: DynamicProblem, count: int) -> list[dict[str, float]]:
         problem: data and priors.
         count: how many peaks at most.
     """
-    frequency = _frequencies(problem)
+    window = _liveliest(problem)
+    frequency = _frequencies(window)
     grid = np.stack(np.meshgrid(frequency, _RATIOS, indexing="ij"), axis=-1)
-    flat = grid.reshape(-1, 2)
-    # Blocks of one shape: one compilation, bounded memory.
-    padded = np.pad(flat, ((0, -len(flat) % _BLOCK), (0, 0)), mode="edge")
-    parts = [
-        _residual(problem, part[:, 0], part[:, 1])
-        for part in padded.reshape(-1, _BLOCK, 2)
-    ]
-    left = np.concatenate([np.asarray(p[0]) for p in parts])[: len(flat)]
-    found = np.concatenate([np.asarray(p[1]) for p in parts])[: len(flat)]
+    left, found = _residuals(window, grid.reshape(-1, 2), _BLOCK)
     best = np.argmin(left.reshape(grid.shape[:2]), axis=1)
     rows = np.arange(len(frequency)) * len(_RATIOS) + best
     rows = rows[np.isfinite(left[rows])]
     level = np.pad(left[rows], 1, constant_values=np.inf)
     peaks = rows[(level[1:-1] <= level[:-2]) & (level[1:-1] <= level[2:])]
     peaks = peaks[np.argsort(left[peaks], kind="stable")][:count]
-    return [_values(problem, flat[i], found[i], left[i]) for i in peaks]
+    places = grid.reshape(-1, 2)
+    if window is problem:
+        return [_values(problem, places[i], found[i], left[i]) for i in peaks]
+    step = frequency[1] - frequency[0]
+    return [_refined(problem, places[i], step) for i in peaks]
+
+
+def _residuals(problem: DynamicProblem, places: np.ndarray, block: int):
+    """Return what `_residual` does at every frequency and ratio, in bounded memory.
+
+    Args:
+        problem: data and priors.
+        places: frequency [Hz] and damping ratio, shape (m, 2).
+        block: how many at once; blocks of one shape are compiled once.
+    """
+    padded = np.pad(places, ((0, -len(places) % block), (0, 0)), mode="edge")
+    parts = [
+        _residual(problem, part[:, 0], part[:, 1])
+        for part in padded.reshape(-1, block, 2)
+    ]
+    left = np.concatenate([np.asarray(p[0]) for p in parts])[: len(places)]
+    found = np.concatenate([np.asarray(p[1]) for p in parts])[: len(places)]
+    return left, found
+
+
+def _liveliest(problem: DynamicProblem) -> DynamicProblem:
+    """Return the window of a long record in which the deformation varies most.
+
+    Where a window begins the gear may be in any state: the scan leaves that open.
+    """
+    if problem.count <= _WINDOW:
+        return problem
+    starts = range(0, problem.count - _WINDOW + 1, _WINDOW // 2)
+    spread = [np.std(problem.deformation[i : i + _WINDOW]) for i in starts]
+    return stretch(problem, starts[int(np.argmax(spread))], _WINDOW)
+
+
+def _refined(problem: DynamicProblem, place: np.ndarray, step: float):
+    """Return where to start near a peak of the window, from all rows.
+
+    Args:
+        problem: data and priors.
+        place: frequency [Hz] and damping ratio of the peak.
+        step: of the scan over the window [Hz].
+    """
+    for _ in range(2):
+        near = np.tile(place, (len(_NEAR), 1))
+        near[:, 0] += step * _NEAR
+        left, found = _residuals(problem, near, _WHOLE_BLOCK)
+        best = int(np.argmin(left))
+        place, step = near[best], step * float(_NEAR[1] - _NEAR[0])
+    return _values(problem, place, found[best], left[best])
 
 
 def _frequencies(problem: DynamicProblem) -> np.ndarray:

@@ -17,7 +17,7 @@ from hdcal.inference.sample import Draws
 from hdcal.inference.serial_correlation import previous_rows
 
 # Above this many numbers the log likelihood of every row and draw is not kept.
-_MOST_LOG_LIKELIHOODS = 8_000_000
+MOST_LOG_LIKELIHOODS = 8_000_000
 TOTAL = "total"
 
 
@@ -79,7 +79,7 @@ def force_log_likelihood(
         draws: from the sampler.
     """
     rows = len(case.records.force)
-    if draws.energy.size * rows > _MOST_LOG_LIKELIHOODS:
+    if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
         return {TOTAL: densities(problem, draws.values)[1]}
     padded = pad_records(case.records)
     columns = discrepancy_columns(problem.discrepancy, padded.deformation)

@@ -1,16 +1,19 @@
 """Bands of the calibrated model around the record that it was calibrated with."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import jax
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import DynamicProblem, predict_motion
+from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
 from hdcal.report.parameters import INTERVAL
 
 # Draws from which the bands of a record are made.
 _DRAWS = 1000
+# Longer records are taken in stretches of so many rows, to bound the memory.
+_STRETCH = 4096
 
 
 @dataclass(frozen=True)
@@ -49,11 +52,31 @@ def _predict(problem: DynamicProblem, values, key):
     keys = jax.random.split(key, len(values["mass"]))
 
     def one(value, key):
-        mean = predict_motion(problem, value)
+        states = predict_states(problem, value)
+        mean = states[:, 0] + value["deformation_offset"]
         # The same quantile in every row: bands are row by row, and smooth so.
-        return mean, mean + value["deformation_sigma"] * jax.random.normal(key)
+        new = mean + value["deformation_sigma"] * jax.random.normal(key)
+        return mean, new, states[-1]
 
     return jax.vmap(one)(values, keys)
+
+
+def _stretches(problem: DynamicProblem, values, key) -> Iterator[np.ndarray]:
+    """Yield the bands of one stretch of rows after the other, shape (6, row).
+
+    Each stretch begins with the last row of the one before, where its states are known.
+    """
+    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
+    for first in range(0, problem.count, _STRETCH):
+        part = stretch(problem, first, _STRETCH + 1)
+        mean, new, last = _predict(part, values, key)
+        values = values | {
+            "initial_deformation": last[:, 0],
+            "initial_velocity": last[:, 1],
+        }
+        kept = slice(min(part.count, _STRETCH))
+        both = np.asarray(mean)[:, kept], np.asarray(new)[:, kept]
+        yield np.concatenate([np.quantile(each, tails, axis=0) for each in both])
 
 
 def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
@@ -66,12 +89,9 @@ def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
     problem, draws = posterior.moving, posterior.draws
     rows = np.linspace(0, len(draws["mass"]) - 1, _DRAWS).astype(int)
     values = {name: draw[rows] for name, draw in draws.items()}
-    predicted = _predict(problem, values, jax.random.key(seed))
-    real = slice(problem.count)
-    mean, new = (np.asarray(part)[:, real] for part in predicted)
-    tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
-    low, middle, high = np.quantile(mean, tails, axis=0)
-    new_low, _, new_high = np.quantile(new, tails, axis=0)
+    real, key = slice(problem.count), jax.random.key(seed)
+    parts = list(_stretches(problem, values, key))
+    low, middle, high, new_low, _, new_high = np.concatenate(parts, axis=1)
     return MotionBands(
         np.asarray(problem.time[real]),
         np.asarray(problem.force[real]),

@@ -12,6 +12,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import Check
+from hdcal.inference.density import densities
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import (
     DynamicProblem,
@@ -22,6 +23,7 @@ from hdcal.inference.dynamic_problem import (
 )
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.frequency_scan import scan
+from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 
 FEWEST_ROWS = 20
@@ -88,9 +90,8 @@ def calibrate_dynamic(
 
 def _specifics(problem: DynamicProblem, found: Draws, rival: Check) -> Specifics:
     """Return what the model of the motion adds to what every calibration has."""
-    each = np.asarray(_pointwise(problem, found.values))[..., : problem.count]
     return Specifics(
-        log_likelihood={"deformation": each},
+        log_likelihood=_log_likelihood(problem, found),
         slopes=_slopes_in_sds(problem, found),
         mixed={name: found.values[name] for name in _DERIVED},
         checks=[
@@ -100,6 +101,14 @@ def _specifics(problem: DynamicProblem, found: Draws, rival: Check) -> Specifics
         ],
         observed=("force", "deformation"),
     )
+
+
+def _log_likelihood(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
+    """Return the log likelihood by draw and row, or the totals of many."""
+    if found.energy.size * problem.count > MOST_LOG_LIKELIHOODS:
+        return {TOTAL: densities(problem, found.values)[1]}
+    each = np.asarray(_pointwise(problem, found.values))
+    return {"deformation": each[..., : problem.count]}
 
 
 def check_motion(case: Case) -> None:
@@ -172,7 +181,8 @@ def _slopes(problem: DynamicProblem, values, part):
 
 @jax.jit
 def _pointwise(problem: DynamicProblem, values):
-    return jax.vmap(jax.vmap(partial(pointwise, problem)))(values)
+    # Chains side by side, draws one after the other: all at once fill the memory.
+    return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)
 
 
 def _best_draw(found: Draws) -> dict[str, np.ndarray]:

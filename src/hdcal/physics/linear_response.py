@@ -16,6 +16,8 @@ from hdcal.data.records import Array
 Scalar = Float[Array, ""] | float
 # Below this |x| the functions of √x are summed as series, smooth through zero.
 _SMALL = 1e-4
+# Longer records are taken in stretches of so many steps, to bound the memory.
+_STRETCH = 16_384
 
 
 def _cosine(x):
@@ -78,6 +80,15 @@ def linear_response(
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
     """
+    known = mass, damping, stiffness
+    if len(time) > 2 * _STRETCH:
+        return _in_stretches(known, time, force, start)
+    return jnp.concatenate([start[None], _advance(known, time, force, start)])
+
+
+def _advance(known, time, force, start) -> Float[Array, "n-1 2"]:
+    """Return the states at all rows but the first; mass, damping, stiffness known."""
+    mass, damping, stiffness = known
     step = jnp.diff(time)
     slope = jnp.diff(force) / step
     lag = damping * slope / stiffness**2
@@ -85,8 +96,30 @@ def linear_response(
     after = jnp.stack([force[1:] / stiffness - lag, slope / stiffness], axis=-1)
     matrix = free_decay(mass, damping, stiffness, step)
     gain = after - jnp.einsum("nij,nj->ni", matrix, before)
+    return _follow(matrix, gain, start)
 
-    return jnp.concatenate([start[None], _follow(matrix, gain, start)])
+
+def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
+    """Return all states, stretch after stretch; a gradient computes each anew.
+
+    Of the record only the states are kept for a gradient, where otherwise some thirty
+    numbers per row would be.
+    """
+    steps = len(time) - 1
+    count = -(-steps // _STRETCH)
+    spare = count * _STRETCH - steps
+    beyond = jnp.arange(1, spare + 1) * (time[-1] - time[-2])
+    time = jnp.concatenate([time, time[-1] + beyond])
+    force = jnp.pad(force, (0, spare), mode="edge")
+    rows = jnp.arange(count)[:, None] * _STRETCH + jnp.arange(_STRETCH + 1)
+
+    @jax.checkpoint
+    def stretch(state, part):
+        states = _advance(known, *part, state)
+        return states[-1], states
+
+    _, states = jax.lax.scan(stretch, start, (time[rows], force[rows]))
+    return jnp.concatenate([start[None], states.reshape(-1, 2)[:steps]])
 
 
 def _follow(

@@ -61,11 +61,11 @@ class ChangeAlarm:
     """The two sums of a CUSUM, restarted from zero after each alarm.
 
     Args:
-        rows: mean number of rows between false alarms.
+        threshold: h [-], as from `threshold_for`.
     """
 
-    def __init__(self, rows: float):
-        self.threshold = threshold_for(rows)
+    def __init__(self, threshold: float):
+        self.threshold = threshold
         self._above = self._below = 0.0
 
     def step(self, innovation: float) -> tuple[float, bool]:

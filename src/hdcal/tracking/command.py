@@ -69,6 +69,6 @@ def track(console: Console, known, gear, **settings):
     except BrokenPipeError:
         console.unread = True
         discard_output()
-    words = f"{tracker.rows} rows, {tracker.alarms} alarms"
+    words = tracker.summary()
     console.words(words + (f", {bad} rows that were no reading" if bad else ""))
     return 2 if bad else 0

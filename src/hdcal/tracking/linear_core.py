@@ -8,6 +8,8 @@ this keeps its digits when rows hardly differ from each other.
 Arrays have leading axes "...": none for one core, one for many cores side by side.
 """
 
+from typing import Self
+
 import numpy as np
 from scipy.linalg.lapack import (
     dpotrf,  # pyright: ignore[reportAttributeAccessIssue]
@@ -35,6 +37,7 @@ class LinearCores:
         prior: what is known before the first row.
 
     Attributes:
+        prior: what was known before the first row.
         mean: m, shape (..., p).
         root: A, shape (..., p, r).
         shape: a of the noise variance [-].
@@ -49,14 +52,15 @@ class LinearCores:
         root = np.broadcast_to(prior.root, (*axes, prior.root.shape[-1]))
         self.root = root.copy("F")
         self.shape, self.rate = prior.shape, prior.rate
-        self._prior, self._inverse = prior, np.linalg.pinv(prior.root)
+        self.prior, self._inverse = prior, np.linalg.pinv(prior.root)
 
-    def learn(self, columns: np.ndarray, force: float):
+    def learn(self, columns: np.ndarray, force: float, weight: float = 1.0):
         """Predict a row from the rows before it, then learn from it.
 
         Args:
             columns: x, shape (p,) or (..., p).
             force: reading y [N].
+            weight: of what the row says, 0 to 1.
 
         Returns:
             Median [N], scale [N] and degrees of freedom of the predictive
@@ -67,13 +71,29 @@ class LinearCores:
         expected = np.vecdot(columns, self.mean)
         error = force - expected
         scale, freedom = (self.rate / self.shape * wide) ** 0.5, 2.0 * self.shape
+        if weight > 0.0:
+            self._gain(spread, error, 1.0 / weight)
+        self.shape += 0.5 * weight
+        self.rate = self.rate + 0.5 * weight * error * error / wide
+        return expected, scale, freedom
+
+    def _gain(self, spread: np.ndarray, error, noise: float) -> None:
+        """Update the coefficients by Potter's formula.
+
+        Args:
+            spread: Aᵀx, shape (..., r).
+            error: of the row [N].
+            noise: its variance over σ².
+        """
+        wide = noise + np.vecdot(spread, spread)
         gain = np.matvec(self.root, spread, order="F")
         self.mean += gain * (error / wide)[..., None]
-        spread /= (wide + wide**0.5)[..., None]
+        spread = spread / (wide + (noise * wide) ** 0.5)[..., None]
         self.root -= gain[..., :, None] * spread[..., None, :]
-        self.shape += 0.5
-        self.rate = self.rate + 0.5 * error * error / wide
-        return expected, scale, freedom
+
+    def slower(self) -> Self:
+        """Return what follows the noise of the last rows less: itself."""
+        return self
 
     def marginal(self, index: int):
         """Return median, scale and degrees of freedom of a coefficient."""
@@ -94,7 +114,7 @@ class LinearCores:
         added = np.sqrt(ratio) * self._inverse[..., index, None]
         added = np.broadcast_to(added, (*relative.shape[:-1], 1))
         wider = np.linalg.qr(np.concatenate([relative, added], axis=-1).mT).R.mT
-        self.root = self._prior.root @ wider
+        self.root = self.prior.root @ wider
 
 
 class LinearCore(LinearCores):
@@ -111,38 +131,56 @@ class LinearCore(LinearCores):
         super().__init__(prior)
         self._forget, self._kept = forget, forget * np.eye(prior.root.shape[1])
 
-    def step(self, columns: np.ndarray, force: float) -> tuple[float, float, float]:
+    def step(
+        self, columns: np.ndarray, force: float, weight: float = 1.0
+    ) -> tuple[float, float, float]:
         """Predict a row from the rows before it, then learn from it.
 
         Args:
             columns: x, shape (p,).
             force: reading y [N].
+            weight: of what the row says, 0 to 1.
 
         Returns:
             Median [N] and half-width of the 95 % interval [N] of the predictive
             distribution, and the normal score of the reading in it.
         """
-        if self._forget < 1.0:
-            self._fade()
-        expected, scale, freedom = map(float, self.learn(columns, force))
+        self.fade()
+        expected, scale, freedom = map(float, self.learn(columns, force, weight))
         score = normal_score((force - expected) / scale, freedom)
         return expected, scale * half_width(freedom), score
+
+    def variance(self) -> float:
+        """Return that of a reading, its coefficients known [N²]."""
+        return float(self.rate / self.shape)
+
+    def expect(self, columns: np.ndarray) -> float:
+        """Return the force that the coefficients give at a row [N]."""
+        return float(columns @ self.mean)
 
     def coefficient(self, index: int) -> tuple[float, float, float]:
         """Return mean, sd and half-width of the 95 % interval of a coefficient."""
         middle, scale, freedom = map(float, self.marginal(index))
         return middle, student_sd(scale, freedom), scale * half_width(freedom)
 
-    def _fade(self) -> None:
+    def slower(self) -> Self:
+        """Return one that forgets a tenth as fast; itself if it forgets nothing."""
+        if self._forget == 1.0:
+            return self
+        return type(self)(self.prior, self._forget**0.1)
+
+    def fade(self) -> None:
         """Temper towards the wide prior: add a part of the first prior's precision."""
-        keep, prior = self._forget, self._prior
+        keep, prior = self._forget, self.prior
+        if keep == 1.0:
+            return
         part = (1.0 - keep) / _FADED**2
         relative = self._inverse @ self.root
         precision = part * (relative.T @ relative) + self._kept
         # LAPACK itself: on these sizes NumPy's wrappers take ten times as long.
         factor, _ = dpotrf(precision, lower=1)
         self.root = dtrtrs(factor, self.root.T, lower=1)[0].T
-        away = (part * self._inverse) @ (prior.mean - self.mean)
-        self.mean += self.root @ (away @ (self._inverse @ self.root))
+        away = (prior.mean - self.mean) @ (part * self._inverse).T
+        self.mean += away @ (self._inverse @ self.root) @ self.root.T
         self.shape = keep * self.shape + (1.0 - keep) * prior.shape
         self.rate = keep * self.rate + (1.0 - keep) * prior.rate

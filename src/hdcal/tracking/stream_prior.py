@@ -26,12 +26,14 @@ class StreamPrior:
         variance: of a reading, rounding and stated errors included [N²], (draw,).
         reading: how the rig reads.
         remounting: variance of the force's zero from one mounting to the next [N²].
+        step: of the force as read [N], 0 = not rounded.
     """
 
     base: Base
     variance: np.ndarray
     reading: Reading
     remounting: float
+    step: float
 
     def coefficients(self) -> np.ndarray:
         """Return the coefficients of the linear columns, shape (draw, 4)."""
@@ -64,9 +66,8 @@ def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
     reading = Reading(
         float(reading.radial_per_read), float(reading.reference_temperature)
     )
-    return _stream_prior(
-        stiffness, draws, float(problem.step) ** 2 / 12.0 + stated, reading, run_sd
-    )
+    step = float(problem.step)
+    return _stream_prior(stiffness, draws, stated, reading, run_sd, step)
 
 
 def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
@@ -87,15 +88,14 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
     half = 0.5 if gear.reading == "diametral" else 1.0
     reading = Reading(half, gear.reference_temperature)
     stiffness = draws["K"] * draws["E0"] * own
-    return _stream_prior(
-        stiffness, draws, gear.force_resolution**2 / 12.0, reading, run_sd
-    )
+    step = gear.force_resolution
+    return _stream_prior(stiffness, draws, 0.0, reading, run_sd, step)
 
 
-def _stream_prior(stiffness, draws, known_variance, reading, run_sd) -> StreamPrior:
+def _stream_prior(stiffness, draws, stated, reading, run_sd, step) -> StreamPrior:
     base = Base(stiffness=stiffness, **{name: draws[name] for name in _SITES[2:]})
-    variance = draws["sigma"] ** 2 + known_variance
-    return StreamPrior(base, variance, reading, 2.0 * float(np.mean(run_sd**2)))
+    variance = draws["sigma"] ** 2 + stated + step**2 / 12.0
+    return StreamPrior(base, variance, reading, 2.0 * float(np.mean(run_sd**2)), step)
 
 
 def _draw(prior: Prior, rng, size: int, positive: bool = False) -> np.ndarray:

@@ -1,31 +1,31 @@
 """Follow a gear reading by reading: stiffness, the next force, and a change alarm."""
 
-from collections.abc import Callable
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Findings
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.untested_reading import UntestedReading
-from hdcal.tracking.change_alarm import ChangeAlarm
-from hdcal.tracking.effect_tracking import build_particles
+from hdcal.tracking.beginning import begin_core, begin_prior, usual_design
+from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
+from hdcal.tracking.coarse_rounding import CoarseRounding
 from hdcal.tracking.first_rows import FirstRows
 from hdcal.tracking.followed_causes import followed_causes
+from hdcal.tracking.forgetting_alarm import forgetting_threshold, settling_rows
 from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
-from hdcal.tracking.normal_inverse_gamma import match_draws
 from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
 from hdcal.tracking.reading_limits import reading_limits
-from hdcal.tracking.stream_prior import (
-    StreamPrior,
-    prior_from_gear,
-    prior_from_posterior,
-)
+from hdcal.tracking.serial_correlation import SerialCorrelation
 
 SCHEMA = "hdcal.track/1"
 ALARM_ROWS = 10_000.0
+# With forgetting the threshold is taken anew when the correlation has changed by this.
+_ANOTHER_CORRELATION = 0.1
+# Errors that repeat with the force, by more than this share, are no correlated noise.
+_MOST_REPEATED = 0.1
 
 
 class Tracker:
@@ -72,20 +72,25 @@ class Tracker:
         self._causes, self._untested = [], None
         if isinstance(known, Posterior):
             known, self._causes = followed_causes(known, forget)
-        prior = _stream_prior(known, seed)
+        prior = begin_prior(known, seed)
         if isinstance(known, Posterior):
             self._untested = UntestedReading(known)
         self._variance = float(np.mean(prior.variance))
-        self._core, self._columns = _core(known, prior, forget)
+        self._core, self._columns = begin_core(known, prior, forget)
+        self._slow, self._noise = self._core.slower(), SerialCorrelation()
+        self._rounding = CoarseRounding(prior.step)
         self._limits = reading_limits(known, prior)
         self._reference = prior.reading.reference_temperature
         self._remounting = prior.remounting
-        self._alarm, self._alarm_rows = ChangeAlarm(alarm_rows), alarm_rows
+        self._alarm_rows = alarm_rows
+        self._alarm = ChangeAlarm(threshold_for(alarm_rows))
+        self._design = usual_design(known, prior)
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
         self._since, self._run = 1, None
         self._forget, self._reopen = forget, reopen
+        self._threshold_for = inf
         self._first = self._core.coefficient(STIFFNESS)[2]
-        self.rows = self.alarms = 0
+        self.rows = self.alarms = self._readings = 0
 
     def update(
         self,
@@ -116,27 +121,27 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         columns = self._columns(deformation, warmth - self._reference, time or 0.0)
+        rho, weight = self._noise.value, self._noise.weight
         middle, half, score = self._step(columns, force, (deformation, warmth))
-        self.rows += 1
-        share, alarm = self._alarm.step(score)
-        band = [middle - half, middle + half]
+        self.rows, self._readings = self.rows + 1, self._readings + 1
+        share, alarm = self._alarm.step(weight * score)
         found = {
             "schema": SCHEMA,
             "status": "ok",
             "row": self.rows,
             "stiffness_N_per_mm": self._stiffness(),
-            "force_N": {"predicted": middle, "predictive_95": band},
+            "force_N": _force(middle, half),
             "innovation": score,
             "alarm": alarm,
             "alarm_score": share,
             "alarm_since_row": self._since,
+            "false_alarm_rows": self._alarm_rows,
+            "correlation": rho,
             "tested": self._limits.were_tested(deformation, warmth),
         }
         if alarm:
             self._restart()
-        if isinstance(self._core, Particles):
-            found |= _degeneracy(self._core, found["stiffness_N_per_mm"])
-        return found
+        return found | _degeneracy(self._core, found["stiffness_N_per_mm"])
 
     def _beyond(self, deformation: float, temperature: float) -> tuple[float, float]:
         """Return what untested conditions add to a reading [N], and its weight.
@@ -149,13 +154,43 @@ class Tracker:
         shift, sd = self._untested.at(deformation, temperature)
         return shift, (1.0 + sd**2 / self._variance) ** -0.5
 
-    def _step(self, columns, force: float, at: tuple[float, float]):
+    def _step(
+        self, columns, force: float, at: tuple[float, float]
+    ) -> tuple[float, float, float]:
+        """Predict a row from the rows before it, then learn from it.
+
+        Returns:
+            Middle [N], half-width of the 95 % interval [N], normal score.
+        """
         shift, weight = self._beyond(*at)
-        step = self._core.step(columns * weight, (force - shift) * weight)
+        columns, force = columns * weight, (force - shift) * weight
+        expected = self._slow.expect(columns)
+        repeated = self._rounding.share(self._slow.variance())
+        told = self._rounding.weight(expected / weight + shift, repeated)
+        row = self._noise.whiten(columns, force)
+        middle, half, score = self._core.step(row.columns, row.force, told)
+        if self._slow is not self._core:
+            self._slow.step(row.columns, row.force, told)
+        if repeated < _MOST_REPEATED:
+            self._noise.learn((force - expected) / half)
         if isinstance(self._core, FirstRows) and self._core.complete:
             self._core = self._core.merged(self._forget)
-        middle, half, score = step
+            self._slow = self._core.slower()
+        self._set_threshold()
+        middle, half = row.carried + row.scale * middle, row.scale * half
         return middle / weight + shift, half / weight, score
+
+    def _set_threshold(self) -> None:
+        """Take the threshold of a core that forgets, once it has settled."""
+        if self._forget == 1.0 or self._readings < settling_rows(self._forget):
+            return
+        rho = self._noise.value
+        moved = abs(rho - self._threshold_for) > _ANOTHER_CORRELATION
+        if moved and isinstance(self._core, LinearCore):
+            self._threshold_for = rho
+            self._alarm.threshold = forgetting_threshold(
+                self._core.prior, self._forget, self._design, self._alarm_rows, rho
+            )
 
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""
@@ -171,13 +206,34 @@ class Tracker:
             f"not tested; one false alarm in {self._alarm_rows:g} readings"
         ) + "".join(f"\n{words}" for words in self._causes)
 
+    def summary(self) -> str:
+        """Say how many alarms there were, and how many are due by chance."""
+        due = self._readings / self._alarm_rows
+        words = (
+            f"{self.rows} rows, {self.alarms} alarms; without a change {due:.2g} false "
+            f"ones are due in {self._readings} readings"
+        )
+        if self._noise.value:
+            words += (
+                "; readings are correlated with the one before "
+                f"({self._noise.value:.2f}), which is taken into account"
+            )
+        return words
+
     def _mount(self, run: str | None) -> None:
         """Widen the zero of the force if the label of the mounting is another one."""
         if run is None or run == self._run:
             return
         if self._run is not None:
-            self._core.widen(ZERO, self._remounting)
+            self._widen(ZERO, self._remounting)
+            self._noise.restart()
+            self._rounding.restart()
         self._run = run
+
+    def _widen(self, index: int, variance: float) -> None:
+        self._core.widen(index, variance)
+        if self._slow is not self._core:
+            self._slow.widen(index, variance)
 
     def _restart(self) -> None:
         """Begin anew to look for a change; widen what may have changed, if wanted."""
@@ -185,8 +241,8 @@ class Tracker:
         self._since = self.rows + 1
         if self._reopen:
             moved = self._reopen * self._core.coefficient(STIFFNESS)[0]
-            self._core.widen(STIFFNESS, moved**2)
-            self._core.widen(ZERO, self._remounting)
+            self._widen(STIFFNESS, moved**2)
+            self._widen(ZERO, self._remounting)
 
     def _stiffness(self) -> dict:
         mean, sd, half = self._core.coefficient(STIFFNESS)
@@ -198,37 +254,16 @@ class Tracker:
         }
 
 
-def _degeneracy(core: Particles, stiffness: dict) -> dict:
+def _force(middle: float, half: float) -> dict:
+    return {"predicted": middle, "predictive_95": [middle - half, middle + half]}
+
+
+def _degeneracy(core, stiffness: dict) -> dict:
+    if not isinstance(core, Particles):
+        return {}
     effective = core.effective
     degenerate = effective < LEAST_EFFECTIVE
     if degenerate:
         # A few draws are left: their spread is no posterior's.
         stiffness |= {"sd": None, "credible_95": None, "narrowed": None}
     return {"effective_particles": effective, "degenerate": degenerate}
-
-
-def _stream_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
-    if isinstance(known, Gear):
-        return prior_from_gear(known, seed)
-    known.require_usable()
-    if known.problem.discrepancy is not None:
-        words = "holds a leftover discrepancy, which cannot be followed"
-        raise InputError([Finding("known", words, "Calibrate again without it")])
-    return prior_from_posterior(known, seed)
-
-
-def _core(
-    known: Posterior | Gear, prior: StreamPrior, forget: float
-) -> tuple[LinearCore | FirstRows | Particles, Callable[..., np.ndarray]]:
-    """Return the core, and what makes of a row the columns that it takes."""
-    if isinstance(known, Gear):
-        return FirstRows(prior.coefficients(), prior.variance), _linear_columns
-    if known.problem.effects:
-        return build_particles(known, prior, forget)
-    law = match_draws(prior.coefficients(), prior.variance)
-    return LinearCore(law, forget), _linear_columns
-
-
-def _linear_columns(deformation: float, rise: float, time: float) -> np.ndarray:
-    # Those of physics.chain.linear_columns.
-    return np.array([deformation, deformation * rise, 1.0, rise])

@@ -40,30 +40,41 @@ class WeightedCores(LinearCores, ABC):
             freedom: degrees of freedom.
         """
 
-    def step(self, columns: np.ndarray, force: float) -> tuple[float, float, float]:
+    def step(
+        self, columns: np.ndarray, force: float, weight: float = 1.0
+    ) -> tuple[float, float, float]:
         """Predict a row from the rows before it, then learn from it.
 
         Args:
             columns: of the linear coefficients, shape (p,) or (core, p).
             force: reading [N].
+            weight: of what the row says, 0 to 1.
 
         Returns:
             Mean [N] and half-width of the 95 % interval [N] of the predictive
             mixture, taken as a Student law of its mean and variance, and the normal
             score of the reading in the mixture itself.
         """
-        expected, scale, freedom = self.learn(columns, force)
+        expected, scale, freedom = self.learn(columns, force, weight)
         t = (force - expected) / scale
         tail = stdtr(freedom, -np.abs(t))
         middle, spread = self.mixed(expected, scale)
         score = _normal_score(self.weight, t, tail)
         log = self._log_weight + self.log_density(t, tail, freedom) - np.log(scale)
         log -= log.max()
-        weight = np.exp(log)
-        total = weight.sum()
-        self.weight, self._log_weight = weight / total, log - np.log(total)
+        likely = np.exp(log)
+        total = likely.sum()
+        self.weight, self._log_weight = likely / total, log - np.log(total)
         self.rows += 1
         return middle, spread * half_width(freedom), score
+
+    def variance(self) -> float:
+        """Return that of a reading, its coefficients known [N²]."""
+        return float(self.weight @ (self.rate / self.shape))
+
+    def expect(self, columns: np.ndarray) -> float:
+        """Return the force that the coefficients give at a row [N]."""
+        return float(self.weight @ np.vecdot(columns, self.mean))
 
     def mixed(
         self, middle: np.ndarray, spread: np.ndarray | float
