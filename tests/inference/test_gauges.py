@@ -31,6 +31,7 @@ from hdcal.inference.gauges import with_gains
 from hdcal.inference.model import model
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
+from hdcal.inference.serial_correlation import CORRELATION
 
 GAUGES = {"force_gain": 0.02, "deformation_gain": -0.013, "temperature_offset": 7.0}
 
@@ -82,6 +83,7 @@ def test_the_prior_of_the_coefficient_stays_exact():
     seen = values["E0"] * (1.0 + values["force_gain"])
     seen /= 1.0 + values["deformation_gain"]
     sites = ["E0", *GAUGE_UNITS, "alpha", "sigma", "force_offset", "deformation_offset"]
+    sites.append(CORRELATION)
     given = {name: values[name] for name in sites} | {"_KE0": values["K"] * seen}
     total = float(log_density(model, (problem,), {}, given)[0])
     wanted = float(log_likelihood(problem, values)) - np.log(seen)

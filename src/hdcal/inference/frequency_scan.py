@@ -121,13 +121,13 @@ def _refined(problem: DynamicProblem, place: np.ndarray, step: float):
         place: frequency [Hz] and damping ratio of the peak.
         step: of the scan over the window [Hz].
     """
-    for _ in range(2):
+    for width in (step, step * float(_NEAR[1] - _NEAR[0])):
         near = np.tile(place, (len(_NEAR), 1))
-        near[:, 0] += step * _NEAR
+        near[:, 0] += width * _NEAR
         left, found = _residuals(problem, near, _WHOLE_BLOCK)
         best = int(np.argmin(left))
-        place, step = near[best], step * float(_NEAR[1] - _NEAR[0])
-    return _values(problem, place, found[best], left[best])
+        place, answer = near[best], (found[best], left[best])
+    return _values(problem, place, *answer)
 
 
 def _frequencies(problem: DynamicProblem) -> np.ndarray:

@@ -115,7 +115,8 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
 
     @jax.checkpoint
     def stretch(state, part):
-        states = _advance(known, *part, state)
+        time, force = part
+        states = _advance(known, time, force, state)
         return states[-1], states
 
     _, states = jax.lax.scan(stretch, start, (time[rows], force[rows]))

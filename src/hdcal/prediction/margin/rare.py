@@ -41,7 +41,7 @@ _SPREAD = 1.3
 # Degrees of freedom of the scatter that the normal one is compared with.
 _HEAVY = 5.0
 # Relative Monte Carlo error up to which a mean over the sampler's draws is good enough.
-_ENOUGH = 0.05
+_ENOUGH = 0.1
 # By how many times an assumption must move a probability to be told.
 _TOLD = 1.5
 
