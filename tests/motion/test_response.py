@@ -8,6 +8,8 @@ import pytest
 from moving import TRUTH, motion, still_posterior
 
 from hdcal import InputError, NotUsable, respond
+from hdcal.motion.respond import integrate
+from hdcal.motion.respond import respond as asked
 from hdcal.physics.linear_response import linear_response
 
 # One number of points and draws for all: the integration is compiled once.
@@ -33,6 +35,18 @@ def test_gears_that_are_known_move_as_the_exact_solution():
     assert drivers["mass_kg"] == drivers["damping_N_s_per_mm"] == "given"
     assert drivers["natural_frequency_Hz"] == "data"
     assert not any("prior" in words for words in found.remarks)
+
+
+def test_draws_integrated_by_the_few_move_alike(monkeypatch):
+    given = (still_posterior(K=0.05), "step")
+    together = respond(*given, **KNOWN, **SMALL)
+    monkeypatch.setattr(integrate, "_MOST_STATES", 20 * SMALL["points"])
+    monkeypatch.setattr(asked, "_TIMES", 40)
+    apart = respond(*given, **KNOWN, **SMALL)
+    for name, column in together.columns().items():
+        np.testing.assert_allclose(apart.columns()[name], column, atol=1e-10)
+    for name, one in together.estimates.items():
+        assert apart.estimates[name]["hi"] == pytest.approx(one["hi"])
 
 
 def test_without_them_priors_are_the_answer_and_it_says_so():

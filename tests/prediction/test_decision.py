@@ -61,6 +61,7 @@ def test_the_simple_rule_looks_at_the_estimate_alone():
         assert "risk of about 50 %" in found.rule_words
 
 
+@pytest.mark.usefixtures("counted")
 def test_a_gear_that_is_pulled_has_the_same_decision():
     pressed = single(size=400)
     for limit in (70.0, 81.0, 90.0):

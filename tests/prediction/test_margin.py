@@ -81,6 +81,7 @@ def test_the_numbers_are_those_of_brute_force(gears):
     assert level.capacity_median_N == pytest.approx(middle, rel=5e-3)
 
 
+@pytest.mark.usefixtures("counted")
 def test_a_capacity_meets_what_it_was_asked_to(gears):
     asked = hdcal.margin(gears, 0.4, required_probability=0.999, **QUICK).worst
     expected, sure = asked.capacity_predictive_N, asked.capacity_N

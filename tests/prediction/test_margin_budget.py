@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gauged import certified
 from posteriors import (
     batch,
     compensated,
@@ -117,7 +118,7 @@ def test_a_budget_that_ignores_the_covariance_is_told_from_the_true_one():
 
 def test_what_the_data_say_nothing_of_has_its_row_with_all_that_hangs_on_it():
     """A load cell with a gain: the stiffness is the larger where it reads too much."""
-    case = ramp_case(compensated())
+    case = ramp_case(certified(compensated(), force_gain=0.0025))
     draws, rng = plain_draws(case, SIZE), np.random.default_rng(6)
     gain = rng.normal(0.0, 0.0025, SIZE)
     cells = draws | {name: draws[name] * (1.0 + gain) for name in ("K", "stiffness")}

@@ -177,6 +177,7 @@ ASKED = {
 }
 
 
+@pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("name", ASKED)
 def test_the_answer_is_mirrored(name: str):
     make, asked = ASKED[name]

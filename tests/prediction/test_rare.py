@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from mirrored import mirrored
 from rigs import make_case, make_gear, make_records
 from scipy import stats
 
@@ -78,7 +79,8 @@ def counted(force, limit: float) -> float:
 @pytest.mark.parametrize("law", SIGMAS)
 def test_tails_are_exact_however_far(law):
     case = conjugate_case(SIGMAS[law])
-    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=300))
+    posterior = calibrate(case, chains=2, warmup=300, draws=300)
+    (cause,), (pulled,) = causes_of(posterior), causes_of(mirrored(posterior))
     force = population_force(cause, AT, "readings")
     for limit in LIMITS[law]:
         found, true = rare(force, limit), exact(case, limit)
@@ -87,6 +89,9 @@ def test_tails_are_exact_however_far(law):
         assert error < max(5.0 * found.relative_error, 0.01) * true
         assert abs(np.log(found.probability / true)) < 0.05 * abs(np.log(true))
         assert found.relative_error < 0.1
+    # A gear that is pulled exceeds it in tension.
+    other = rare(population_force(pulled, -AT, "readings"), limit).probability
+    assert other == pytest.approx(true, rel=5.0 * found.relative_error + 0.01)
     if law == "normal":
         return
     # The comparison can fail: a mean over draws does, where they are too few.

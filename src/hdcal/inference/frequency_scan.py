@@ -121,13 +121,17 @@ def _refined(problem: DynamicProblem, place: np.ndarray, step: float):
         place: frequency [Hz] and damping ratio of the peak.
         step: of the scan over the window [Hz].
     """
-    for width in (step, step * float(_NEAR[1] - _NEAR[0])):
-        near = np.tile(place, (len(_NEAR), 1))
-        near[:, 0] += width * _NEAR
-        left, found = _residuals(problem, near, _WHOLE_BLOCK)
-        best = int(np.argmin(left))
-        place, answer = near[best], (found[best], left[best])
-    return _values(problem, place, *answer)
+    place, _, _ = _best_near(problem, place, step)
+    return _values(problem, *_best_near(problem, place, step * (_NEAR[1] - _NEAR[0])))
+
+
+def _best_near(problem: DynamicProblem, place: np.ndarray, step: float):
+    """Return the best place within a step, and what `_residual` says there."""
+    near = np.tile(place, (len(_NEAR), 1))
+    near[:, 0] += step * _NEAR
+    left, found = _residuals(problem, near, _WHOLE_BLOCK)
+    best = int(np.argmin(left))
+    return near[best], found[best], left[best]
 
 
 def _frequencies(problem: DynamicProblem) -> np.ndarray:

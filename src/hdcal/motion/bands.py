@@ -13,7 +13,7 @@ from hdcal.report.parameters import INTERVAL
 # Draws from which the bands of a record are made.
 _DRAWS = 1000
 # Longer records are taken in stretches of so many rows, to bound the memory.
-_STRETCH = 4096
+_STRETCH = 1024
 
 
 @dataclass(frozen=True)

@@ -115,8 +115,7 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
 
     @jax.checkpoint
     def stretch(state, part):
-        time, force = part
-        states = _advance(known, time, force, state)
+        states = _advance(known, part[0], part[1], state)
         return states[-1], states
 
     _, states = jax.lax.scan(stretch, start, (time[rows], force[rows]))

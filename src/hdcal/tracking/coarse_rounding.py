@@ -11,8 +11,9 @@ say as much as one of variance b² + s²/k, where b² + s² is the variance of a
 
 from math import exp, pi
 
-# Forces within this share of a step have the same error of rounding.
-_CELL = 0.25
+# Forces in neighbouring cells, so many steps wide, share their error of rounding: what
+# is expected of a force moves a little while the stiffness is learned.
+_CELL = 0.125
 # Forces that are told apart, to bound the memory; others count as new.
 _MOST_CELLS = 4096
 # A smaller share of the variance is no matter.
@@ -57,9 +58,9 @@ class CoarseRounding:
         if share == 0.0:
             return 1.0
         cell = round(expected / (_CELL * self._step))
-        before = self._count.get(cell, 0)
-        if before or len(self._count) < _MOST_CELLS:
-            self._count[cell] = before + 1
+        before = sum(self._count.get(near, 0) for near in range(cell - 1, cell + 2))
+        if cell in self._count or len(self._count) < _MOST_CELLS:
+            self._count[cell] = self._count.get(cell, 0) + 1
         rest = 1.0 - share
         after = before + 1
         return after / (after * share + rest) - before / (max(before, 1) * share + rest)

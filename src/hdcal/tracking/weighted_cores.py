@@ -60,7 +60,8 @@ class WeightedCores(LinearCores, ABC):
         tail = stdtr(freedom, -np.abs(t))
         middle, spread = self.mixed(expected, scale)
         score = _normal_score(self.weight, t, tail)
-        log = self._log_weight + self.log_density(t, tail, freedom) - np.log(scale)
+        density = self.log_density(t, tail, freedom) - np.log(scale)
+        log = self._log_weight + weight * density
         log -= log.max()
         likely = np.exp(log)
         total = likely.sum()
@@ -70,7 +71,7 @@ class WeightedCores(LinearCores, ABC):
 
     def variance(self) -> float:
         """Return that of a reading, its coefficients known [N²]."""
-        return float(self.weight @ (self.rate / self.shape))
+        return float(np.sum(self.weight * (self.rate / self.shape)))
 
     def expect(self, columns: np.ndarray) -> float:
         """Return the force that the coefficients give at a row [N]."""

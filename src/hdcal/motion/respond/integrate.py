@@ -24,8 +24,9 @@ from hdcal.physics.dynamics import (
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 
-# Draws integrated side by side: all wait for the slowest.
-_CHUNK = 250
+# Draws integrated side by side: all wait for the slowest. With many times they are
+# fewer, so that no more numbers than this are in memory at once.
+_CHUNK, _MOST_STATES = 250, 1_000_000
 
 
 def thinned(draws: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
@@ -60,7 +61,7 @@ def _with_values(effect: type[Effect], values) -> Effect:
 
 @partial(jax.jit, static_argnames=("kept", "with_damping"))
 def _each(kept, with_damping, reading, values, temperature, damping, force, times):
-    """Return states, facts and whether each draw of a batch came through."""
+    """Return motion, facts and whether each draw of a batch came through."""
 
     def one(value):
         effects = tuple(_with_values(effect, value) for effect in kept)
@@ -72,7 +73,9 @@ def _each(kept, with_damping, reading, values, temperature, damping, force, time
         c = damping if with_damping else 2.0 * value["_ratio"] * jnp.sqrt(k * mass)
         gear = replace(still, damping=c)
         states, done = integrate(gear, force, times)
-        return states, _facts(mass, c, k), done
+        deformation = states[:, 0]
+        facts = _facts(mass, c, k) | {"peak_mm": jnp.max(jnp.abs(deformation))}
+        return deformation, facts, done
 
     return jax.vmap(one)(values)
 
@@ -104,14 +107,15 @@ def integrate_all(
         request: force and times.
 
     Returns:
-        Deformation and speed (draw, time, 2), facts by name (draw,), and which draws
-        came through.
+        Deformation (draw, time), facts by name (draw,), and which draws came through.
     """
-    parts = []
-    for start in range(0, len(values["K"]), _CHUNK):
-        chunk = {n: v[start : start + _CHUNK] for n, v in values.items() if v.ndim == 1}
+    size = max(min(_CHUNK, _MOST_STATES // len(request.times)), 1)
+    count = len(values["K"])
+    motion, parts = np.empty((count, len(request.times))), []
+    for start in range(0, count, size):
+        chunk = {n: v[start : start + size] for n, v in values.items() if v.ndim == 1}
         given = 0.0 if damping is None else float(damping)
-        part = _each(
+        moved, *part = _each(
             kept,
             damping is not None,
             reading,
@@ -121,7 +125,7 @@ def integrate_all(
             request.force,
             request.times,
         )
+        motion[start : start + size] = moved
         parts.append(jax.device_get(part))
-    states = np.concatenate([part[0] for part in parts])
-    facts = {n: np.concatenate([p[1][n] for p in parts]) for n in parts[0][1]}
-    return states, facts, np.concatenate([part[2] for part in parts])
+    facts = {n: np.concatenate([p[0][n] for p in parts]) for n in parts[0][0]}
+    return motion, facts, np.concatenate([part[1] for part in parts])

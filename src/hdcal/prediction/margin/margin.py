@@ -125,9 +125,9 @@ def _margin(
     worst = worst_level(draws, criteria, computed)
     there = [force.at(worst.temperature_C) for force in forces]
     worst = refined(worst, there, criteria.limit_force, request.seed)
-    computed = tuple(_of_worst(level, worst) for level in computed)
     upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
+    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
     return Margin(
         **vars(stated),
         deformation_mm=float(request.deformation),
@@ -142,7 +142,7 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=levels_between(computed, warm, _tested(main, request, sense, warm)),
+        levels=tuple(_of_worst(level, worst) for level in levels),
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
