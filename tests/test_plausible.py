@@ -100,7 +100,7 @@ def read_entries() -> Iterator[tuple[str, str, Callable]]:
         *("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"),
         *("run_offset_sd", "specimen_sd", "gap_sd", "gap_length", "mass"),
         *("damping_ratio", "initial_deformation", "initial_velocity"),
-        "deformation_sigma",
+        *("deformation_sigma", "noise_correlation"),
     ):
         place = f"priors.{name}.value"
         yield NAMES.get(name, name), place, partial(prior, name)

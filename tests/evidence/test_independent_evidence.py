@@ -159,12 +159,13 @@ def test_importance_sampling_finds_a_known_evidence():
     rise = np.asarray(records.temperature) - 20.0
     unit = problem.unit_stiffness * 207e3 * (1.0 - 3e-4 * rise) * records.deformation
     wide = 0.25 * np.outer(unit, unit) + 25.0
+    median, log_sd = gear.priors["sigma"].numbers
     grid = np.log(0.4) + np.linspace(-0.5, 0.5, 60)
     exact = [
         stats.multivariate_normal.logpdf(
             records.force, 2.0 * unit, wide + np.exp(2.0 * at) * np.eye(len(unit))
         )
-        + stats.norm.logpdf(at, np.log(0.5), 1.2)
+        + stats.norm.logpdf(at, np.log(median), log_sd)
         for at in grid
     ]
     exact = logsumexp(exact) + np.log(grid[1] - grid[0])

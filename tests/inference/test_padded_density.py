@@ -58,7 +58,8 @@ def case_of(*, runs=1, specimens=1, sds=(0.0,), resolution=0.0):
 
 def values_of(problem, seed=0) -> dict:
     """Return parameters and members, all of them away from their nulls."""
-    values = draw_truth(problem, jax.random.key(seed)) | {"sigma": np.float64(0.7)}
+    values = draw_truth(problem, jax.random.key(seed))
+    values |= {"sigma": np.float64(0.7), "noise_correlation": np.float64(0.5)}
     rng, basis = np.random.default_rng(seed), 20 if problem.discrepancy else 0
     members = {
         "run_offset": rng.normal(0.0, 1.0, problem.runs),

@@ -12,7 +12,8 @@ from scipy import stats
 import hdcal
 from hdcal.data.certificates import GAINS
 from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.forces import force_of, gear_forces, grid_records
+from hdcal.prediction.engine.forces import force_of, grid_records
+from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.tracking.stream_prior import prior_from_posterior
 

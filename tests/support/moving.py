@@ -94,7 +94,8 @@ def still_posterior(effects: dict | None = None, *, usable: bool = True, **sprea
     case = make_case(records, gear)
     shape = (2, 100)
     influence = TRUTH["K"] * np.exp(spread.get("K", 0.0) * rng.standard_normal(shape))
-    fixed = {"E0": 207e3, "alpha": 3e-4, "deformation_offset": 0.0} | (effects or {})
+    fixed = {"E0": 207e3, "alpha": 3e-4, "deformation_offset": 0.0}
+    fixed |= {"noise_correlation": 0.0} | (effects or {})
     draws = {name: np.full(shape, value) for name, value in fixed.items()}
     unit = unit_stiffness(case, "ring")
     draws |= {"K": influence, "stiffness": influence * 207e3 * unit}

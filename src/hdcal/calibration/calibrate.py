@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from hdcal.data.case import Case, Theory
+from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
@@ -26,6 +27,16 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
+
+# Where readings show that they scatter more at larger forces, it may be by any share.
+_SHOWN = {
+    f"{HeteroscedasticNoise.name}.share": Prior(
+        "half_normal",
+        (0.2,),
+        "1",
+        "wide, as the readings scatter more at larger forces",
+    )
+}
 
 
 def choose_effects(
@@ -151,7 +162,7 @@ def calibrate(
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     chosen = _chosen(case, effects, registry, adapt_noise)
-    theory, shipped = theory or case.gear.theory, effect_priors()
+    theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
     problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
@@ -176,6 +187,12 @@ def _chosen(
     spoken_of = any(effect.stage == "noise" for effect in effects)
     grows = adapt_noise and not spoken_of and noise_grows(case)
     return (*effects, HeteroscedasticNoise) if grows else effects
+
+
+def _shipped(chosen: Sequence[type[Effect]], names: Sequence[str]) -> dict[str, Prior]:
+    """Return the priors of effects; wide where readings showed that noise grows."""
+    shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in names
+    return effect_priors() | (_SHOWN if shown else {})
 
 
 def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:

@@ -140,7 +140,7 @@ def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
     beta, beta_hi, beta_lo, beta_sure = map(float, -ndtri(chances))
     mean, low, high, sure = map(float, chances)
     betas = beta, beta_lo, beta_hi, beta_sure
-    return Exceedance(mean, low, high, sure, *betas, error / mean, "")
+    return Exceedance(mean, low, high, sure, *betas, error / mean, None)
 
 
 def worst_level(

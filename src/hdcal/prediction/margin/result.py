@@ -39,7 +39,7 @@ class Exceedance:
         beta_hi: of `lo`.
         beta_at_confidence: of `at_confidence`.
         relative_error: Monte Carlo standard error over the probability.
-        rests_on: what a rare one rests on; empty where it is not rare.
+        rests_on: what a rare one rests on; None where it is not rare.
     """
 
     probability: Chance
@@ -51,7 +51,7 @@ class Exceedance:
     beta_hi: Real
     beta_at_confidence: Real
     relative_error: Real
-    rests_on: Words
+    rests_on: Words | None
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,7 @@ def levels_between(
 def _between(parts: list[Any], nodes: np.ndarray, at: np.ndarray) -> list[Any]:
     """Return dataclasses of numbers, or numbers, between those at the nodes."""
     first = parts[0]
-    if first is None or isinstance(first, bool | str):
+    if first is None or isinstance(first, bool):
         return [first] * len(at)
     if not is_dataclass(first):
         return np.interp(at, nodes, parts).tolist()
