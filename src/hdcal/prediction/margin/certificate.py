@@ -99,18 +99,27 @@ def _asked(found: MarginAnswer) -> Facts:
     way = {"up": "loading", "down": "unloading"}[found.direction]
     method = {"version": found.versions["hdcal"], "seed": found.seed}
     sizes = "; ".join(f"{n} ± {t:g}" for n, t in found.tolerances_mm.items())
-    causes = ", ".join(
-        f"{hypothesis(name)} ({100.0 * chance:.0f} %)"
-        for name, chance in found.causes.items()
-    )
     rows = [
         ("measurand", what),
         ("conditions", f"{found.deformation_mm:g} mm as read, {way}, {warm}"),
         ("whose", found.population_words),
-        ("cause of the gap", causes),
+        _model(found),
         ("method", _METHOD.format(**method)),
     ]
     return Facts(rows + ([("tolerances", sizes)] if sizes else []))
+
+
+def _model(found: MarginAnswer) -> tuple[str, str]:
+    """Return which model was taken for right, or over which causes was averaged."""
+    if len(found.causes) == 1:
+        (name,) = found.causes
+        effects = "alone" if name == "none" else f"with {hypothesis(name)}"
+        return "model", f"the force model {effects}, taken for right"
+    causes = ", ".join(
+        f"{hypothesis(name)} ({100.0 * chance:.0f} %)"
+        for name, chance in found.causes.items()
+    )
+    return "cause of the gap", causes
 
 
 def _budget(found: MarginAnswer) -> list[Block]:
