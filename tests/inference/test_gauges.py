@@ -83,13 +83,18 @@ def test_the_prior_of_the_coefficient_stays_exact():
     seen = values["E0"] * (1.0 + values["force_gain"])
     seen /= 1.0 + values["deformation_gain"]
     sites = ["E0", *GAUGE_UNITS, "alpha", "sigma", "force_offset", "deformation_offset"]
-    sites.append(CORRELATION)
     given = {name: values[name] for name in sites} | {"_KE0": values["K"] * seen}
+    place = np.arctanh(np.sqrt(values[CORRELATION]))
+    given[f"_{CORRELATION}"] = place
     total = float(log_density(model, (problem,), {}, given)[0])
     wanted = float(log_likelihood(problem, values)) - np.log(seen)
     for name in (*sites, "K"):
         law = distribution(problem.priors[name], positive=name == "E0")
         wanted += float(law.log_prob(values[name]))
+    # Both signs of the place are the same correlation.
+    law = distribution(problem.priors[CORRELATION])
+    wanted += float(law.log_prob(values[CORRELATION]))
+    wanted += np.log(np.tanh(place) / np.cosh(place) ** 2)
     assert total == pytest.approx(wanted, rel=1e-10)
 
 
@@ -114,10 +119,11 @@ def test_mountings_add_to_the_zero_that_a_certificate_states():
     stated = build_problem(case, shipped)
     plain = replace(stated, zero_stated=False)
     truth = draw_truth(stated, jax.random.key(4)) | {"run_offset_sd": np.float64(0.7)}
-    names = {*stated.priors} - {"K", "gap_sd", "gap_length"}
+    names = {*stated.priors} - {"K", "gap_sd", "gap_length", CORRELATION}
     for zero in (-0.5, 0.0, 0.8):
         given = {name: truth[name] for name in names}
         given |= {"_KE0": truth["K"] * truth["E0"], "force_offset": np.float64(zero)}
+        given[f"_{CORRELATION}"] = np.float64(0.5)
         added = [
             float(log_density(model, (one,), {}, given)[0]) for one in (stated, plain)
         ]

@@ -61,6 +61,10 @@ def test_correlation_is_asked_where_it_can_be_told():
     # Within steps wider than the noise neighbours are alike anyway.
     assert not correlates(case_of(noise, gear=make_gear(resolution=0.98)), ())
     assert correlates(case_of(noise, gear=make_gear(resolution=0.1)), ())
+    # Few rows cannot tell it from a leftover discrepancy.
+    assert correlates(case_of(noise), (), with_gap=True)
+    few = case_of(noise[:14], x=X[:14])
+    assert correlates(few, ()) and not correlates(few, (), with_gap=True)
 
 
 @pytest.fixture(scope="module")

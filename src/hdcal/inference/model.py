@@ -73,6 +73,24 @@ def _sample_influence(prior: Prior, modulus):
     return numpyro.deterministic("K", product / modulus)
 
 
+def _sample_correlation(prior: Prior):
+    """Sample the correlation ρ of neighbouring readings from its prior.
+
+    A beta one is sampled as ρ = tanh² v. To either side of v = 0 everything is the
+    same, so that no correlation lies in the middle and not at the end of a long tail.
+    """
+    if prior.family != "beta":
+        return sample_site(CORRELATION, prior)
+    standard = dist.Normal(0.0, 1.0)
+    v = numpyro.sample(f"_{CORRELATION}", standard)
+    size = jnp.tanh(v) ** 2 + 1e-12
+    log_cosh = jnp.logaddexp(v, -v) - jnp.log(2.0)
+    log_jacobian = 0.5 * jnp.log(size) - 2.0 * log_cosh
+    log_prior = distribution(prior).log_prob(size) + log_jacobian
+    numpyro.factor(f"_{CORRELATION}_prior", log_prior - standard.log_prob(v))
+    return numpyro.deterministic(CORRELATION, size)
+
+
 def _sample_members(name: str, sd, count: int):
     """Sample how far each tested member is from the mean of the tested members.
 
@@ -129,7 +147,7 @@ def _(problem: Problem) -> None:
     for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
         values[name] = sample_site(name, priors[name])
     if problem.correlated:
-        values[CORRELATION] = sample_site(CORRELATION, priors[CORRELATION])
+        values[CORRELATION] = _sample_correlation(priors[CORRELATION])
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"

@@ -19,6 +19,8 @@ _FEW_ROWS = 500
 _FINE_STEP = 1.3
 # The same where the noise sd is roughly known.
 _FINE_STEP_OF_FEW = 0.5
+# Rows from which on correlation is inferred beside a leftover discrepancy.
+_BESIDE_A_GAP = 50
 # Fewer rows do not show how their noise depends on anything.
 _LEAST_ROWS = 12
 # Probability that noise of one size is let grow: one parameter more, near nothing.
@@ -102,11 +104,12 @@ def noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, boo
     """Return whether the noise needs its exact rounding, and may be correlated.
 
     Of rounded readings no exact likelihood is known whose noise is correlated, nor of
-    mixtures.
+    mixtures. A leftover discrepancy is told from correlated noise by many rows only.
     """
     step, records = case.gear.force_resolution, case.records
     few = len(records.force) <= _FEW_ROWS and not members
     rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
     one_normal = not any(effect.mixture for effect in effects)
     neighbours = bool(np.any(previous_rows(records) >= 0))
-    return rounded, one_normal and neighbours and not rounded
+    told_apart = "discrepancy" not in members or len(records.force) >= _BESIDE_A_GAP
+    return rounded, one_normal and neighbours and told_apart and not rounded
