@@ -215,6 +215,7 @@ def both_senses():
     return {1: pressed, -1: mirrored(pressed)}
 
 
+@pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("sense", [1, -1])
 def test_the_larger_the_capacity_the_rarer_it_is_exceeded(both_senses, sense: int):
     names = ("probability", "lo", "hi", "at_confidence")

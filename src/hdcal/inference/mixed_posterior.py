@@ -49,12 +49,17 @@ def mixed_posterior(models: _Weighed) -> Posterior:
     sizes = {"draws": sum(map(len, rows)), "with_gap": gap}
     chances = {name: models[name][0] for name in names}
     origin = {"hypothesis": None, "probabilities": chances}
+    sites = likeliest.sites(likeliest.case, effects, gap)
     return replace(
         likeliest,
         effects=effects,
         priors={n: p for one in reversed(posteriors) for n, p in one.priors.items()},
         tree=_tree(names, posteriors, rows, effects),
-        diagnoses=_diagnoses(posteriors),
+        diagnoses={
+            name: found
+            for name, found in _diagnoses(posteriors).items()
+            if name in sites
+        },
         checks=tuple(_checks(names, posteriors)),
         settings={**likeliest.settings, **sizes, ORIGIN: origin},
     )

@@ -82,7 +82,7 @@ def _sample_correlation(prior: Prior):
     if prior.family != "beta":
         return sample_site(CORRELATION, prior)
     standard = dist.Normal(0.0, 1.0)
-    v = numpyro.sample(f"_{CORRELATION}", standard)
+    v = jnp.asarray(numpyro.sample(f"_{CORRELATION}", standard))
     size = jnp.tanh(v) ** 2 + 1e-12
     log_cosh = jnp.logaddexp(v, -v) - jnp.log(2.0)
     log_jacobian = 0.5 * jnp.log(size) - 2.0 * log_cosh

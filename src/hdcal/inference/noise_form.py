@@ -19,8 +19,9 @@ _FEW_ROWS = 500
 _FINE_STEP = 1.3
 # The same where the noise sd is roughly known.
 _FINE_STEP_OF_FEW = 0.5
-# Rows from which on correlation is inferred beside a leftover discrepancy.
-_BESIDE_A_GAP = 50
+# Rows from which on correlation is inferred beside a leftover discrepancy: the first
+# number of a bucket, so that all of it share their programs.
+_BESIDE_A_GAP = 49
 # Fewer rows do not show how their noise depends on anything.
 _LEAST_ROWS = 12
 # Probability that noise of one size is let grow: one parameter more, near nothing.

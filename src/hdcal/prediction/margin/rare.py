@@ -179,10 +179,14 @@ def _points(target: _Target, sites: dict, rng) -> tuple[np.ndarray, np.ndarray]:
         method="BFGS",
         options={"maxiter": 200, "gtol": 1e-3},
     )
-    spread = 0.5 * (found.hess_inv + found.hess_inv.T)
+    shape, place = found.hess_inv, found.x
+    if not (np.isfinite(shape).all() and np.isfinite(place).all()):
+        shape, place = np.eye(size), np.zeros(size)
+    strength, axes = np.linalg.eigh(0.5 * (shape + shape.T))
+    spread = (axes * np.maximum(strength, 1e-8 * strength.max())) @ axes.T
     laws: list[Any] = [
-        stats.multivariate_t(place, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
-        for place, shape in ((np.zeros(size), np.eye(size)), (found.x, spread))
+        stats.multivariate_t(centre, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
+        for centre, shape in ((np.zeros(size), np.eye(size)), (place, spread))
     ]
     drawn = [np.reshape(law.rvs(_POINTS, random_state=rng), (-1, size)) for law in laws]
     # What is open is spread evenly over both places.
@@ -204,7 +208,10 @@ def refined(
     risk = level.exceedance
     if risk is None or limit is None or risk.relative_error <= _ENOUGH:
         return level
-    found = pooled_rare([(f.cause.probability, rare(f, limit, seed)) for f in forces])
+    # What cannot be computed stays what was counted.
+    with np.errstate(all="ignore"):
+        each = [(force.cause.probability, rare(force, limit, seed)) for force in forces]
+        found = pooled_rare(each)
     if not found.relative_error < risk.relative_error:
         return level
     chance = float(np.clip(found.probability, LEAST, 1.0 - LEAST_LEFT))
