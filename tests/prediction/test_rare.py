@@ -2,72 +2,38 @@
 
 import numpy as np
 import pytest
+from conjugate import SIGMA, conjugate_case, known_posterior, unit_stiffness
 from mirrored import mirrored
-from rigs import make_case, make_gear, make_records
+from rigs import make_case, make_records
 from scipy import stats
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior
-from hdcal.physics.theory import ring
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.margin.rare import pooled_rare, rare
 
-MODULUS, AT = 207e3, 0.4
-K, OFFSET = (2.5, 0.5), (0.0, 5.0)
-SIGMAS = {
-    "Student's t": Prior("lognormal", (0.5, 1.2)),
-    "normal": Prior("fixed", (0.9,)),
-}
+AT = 0.4
+SIGMAS = {"Student's t": SIGMA, "normal": Prior("fixed", (0.9,))}
 LIMITS = {"Student's t": (85.0, 100.0, 130.0), "normal": (83.0, 84.0, 85.0)}
 
 pytestmark = pytest.mark.computes
 
 
-def conjugate_case(sigma: Prior, rows: int = 6):
+def case_of(sigma: Prior, rows: int = 6):
     """Return few rows; the law of a further reading is known in closed form."""
     rng = np.random.default_rng(3)
     deformation = np.linspace(0.02, 0.54, rows)
     force = 205.0 * deformation - 3.0 + rng.normal(0.0, 0.9, rows)
-    gear = make_gear(
-        K=Prior("normal", K),
-        E0=Prior("fixed", (MODULUS,)),
-        alpha=Prior("fixed", (3e-4,)),
-        deformation_offset=Prior("fixed", (0.0,)),
-        force_offset=Prior("normal", OFFSET),
-        sigma=sigma,
-        noise_correlation=Prior("fixed", (0.0,)),
-    )
-    return make_case(make_records(deformation, force), gear)
+    return conjugate_case(deformation, force, sigma)
 
 
 def exact(case, limit: float) -> float:
     """Return the probability that a further reading exceeds a limit, by quadrature."""
-    records, sigma = case.records, case.gear.priors["sigma"]
-    unit = float(ring(case.gear.geometry, MODULUS))
-    design = np.column_stack([unit * records.deformation, np.ones(len(records.force))])
-    place = np.array([unit * AT, 1.0])
-    mean0, precision0 = np.array([K[0], OFFSET[0]]), np.diag([K[1], OFFSET[1]])
-    precision0 = np.linalg.inv(precision0**2)
-    if sigma.family == "fixed":
-        grid, prior = np.log(np.array(sigma.numbers)), np.zeros(1)
-    else:
-        grid = np.linspace(-6.0, 12.0, 6001)
-        prior = stats.norm.logpdf(grid, np.log(sigma.numbers[0]), sigma.numbers[1])
-    log_weight, tail = [], []
-    for log_sigma in grid:
-        variance = np.exp(2.0 * log_sigma)
-        precision = precision0 + design.T @ design / variance
-        covariance = np.linalg.inv(precision)
-        pull = precision0 @ mean0 + design.T @ records.force / variance
-        mean = covariance @ pull
-        fit = records.force @ records.force / variance - pull @ mean
-        _, volume = np.linalg.slogdet(precision)
-        log_weight.append(-0.5 * (fit + volume) - len(records.force) * log_sigma)
-        sd = np.sqrt(variance + place @ covariance @ place)
-        tail.append(stats.norm.sf((limit - place @ mean) / sd))
-    weight = np.exp(np.array(log_weight) + prior - np.max(log_weight + prior))
-    return float(weight @ np.array(tail) / weight.sum())
+    known, place = known_posterior(case), np.array([AT * unit_stiffness(case), 1.0])
+    variance = known.sigma**2 + np.einsum("i,nij,j->n", place, known.covariance, place)
+    tail = stats.norm.sf((limit - known.mean @ place) / np.sqrt(variance))
+    return float(known.weight @ tail)
 
 
 def counted(force, limit: float) -> float:
@@ -78,7 +44,7 @@ def counted(force, limit: float) -> float:
 
 @pytest.mark.parametrize("law", SIGMAS)
 def test_tails_are_exact_however_far(law):
-    case = conjugate_case(SIGMAS[law])
+    case = case_of(SIGMAS[law])
     posterior = calibrate(case, chains=2, warmup=300, draws=300)
     (cause,), (pulled,) = causes_of(posterior), causes_of(mirrored(posterior))
     force = population_force(cause, AT, "readings")
@@ -119,7 +85,7 @@ def test_mountings_and_gaps_are_weighed_as_they_are_sampled():
 
 
 def test_causes_are_averaged():
-    case = conjugate_case(SIGMAS["normal"])
+    case = case_of(SIGMAS["normal"])
     (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=300))
     force = population_force(cause, AT, "readings")
     near, far = (rare(force, limit) for limit in (85.0, 87.0))

@@ -136,10 +136,7 @@ def _tree(names, posteriors: Sequence[Posterior], rows, effects) -> xr.DataTree:
         if len(tables) < len(posteriors):
             continue
         if group == "posterior":
-            tables = [
-                _completed(table, name, posteriors, effects)
-                for table, name in zip(tables, names, strict=True)
-            ]
+            tables = [_completed(table, posteriors, effects) for table in tables]
         common = set.intersection(*({*table.data_vars} for table in tables))
         joined = xr.concat([t[sorted(map(str, common))] for t in tables], "draw")
         joined = joined.assign_coords(draw=np.arange(len(labels)))
@@ -154,7 +151,7 @@ def _tree(names, posteriors: Sequence[Posterior], rows, effects) -> xr.DataTree:
 
 
 def _completed(
-    table: xr.Dataset, name: str, posteriors: Sequence[Posterior], effects
+    table: xr.Dataset, posteriors: Sequence[Posterior], effects
 ) -> xr.Dataset:
     """Return draws of a model with the sites that only others have."""
     nulls = dict(null_sites(effects)) | dict.fromkeys((*GAP, CORRELATION), 0.0)

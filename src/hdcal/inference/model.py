@@ -25,6 +25,9 @@ from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import POSITIVE, stiffness
 from hdcal.physics.effect import parameters
 
+# What a correlation keeps away from 0 and 1.
+_OPEN = 1e-12
+
 
 def sample_site(name: str, prior: Prior):
     """Sample a parameter from its prior; a fixed one is what it is."""
@@ -78,16 +81,18 @@ def _sample_correlation(prior: Prior):
 
     A beta one is sampled as ρ = tanh² v. To either side of v = 0 everything is the
     same, so that no correlation lies in the middle and not at the end of a long tail.
+    The normal law of v is where a search starts, and is taken off again.
     """
     if prior.family != "beta":
         return sample_site(CORRELATION, prior)
-    standard = dist.Normal(0.0, 1.0)
-    v = jnp.asarray(numpyro.sample(f"_{CORRELATION}", standard))
-    size = jnp.tanh(v) ** 2 + 1e-12
+    formal = dist.Normal(0.5, 1.0)
+    v = jnp.asarray(numpyro.sample(f"_{CORRELATION}", formal))
+    # At exactly 0 or 1 a beta law has no logarithm.
+    size = _OPEN + (1.0 - 2.0 * _OPEN) * jnp.tanh(v) ** 2
     log_cosh = jnp.logaddexp(v, -v) - jnp.log(2.0)
     log_jacobian = 0.5 * jnp.log(size) - 2.0 * log_cosh
     log_prior = distribution(prior).log_prob(size) + log_jacobian
-    numpyro.factor(f"_{CORRELATION}_prior", log_prior - standard.log_prob(v))
+    numpyro.factor(f"_{CORRELATION}_prior", log_prior - formal.log_prob(v))
     return numpyro.deterministic(CORRELATION, size)
 
 
