@@ -65,6 +65,15 @@ def test_a_file_of_several_models_is_read_back(mixed: Posterior, tmp_path: Path)
         assert {*alone.draws} == {*sites}
 
 
+def test_offsets_of_runs_are_a_hypothesis_too(tmp_path: Path):
+    """How much runs differ is in every model: no amplitude of an effect is sought."""
+    models = {"none": (0.8, single(size=200))}
+    models["run_offset"] = (0.2, beside(single(size=200), "run_offset"))
+    mixed_posterior(models).save(tmp_path / "posterior.nc")
+    found = models_of(Posterior.load(tmp_path / "posterior.nc"))
+    assert [share for share, _ in found] == [0.8, 0.2]
+
+
 def test_any_reader_of_netcdf_sees_the_hypotheses(mixed: Posterior, tmp_path: Path):
     mixed.save(tmp_path / "posterior.nc")
     with xr.open_datatree(tmp_path / "posterior.nc", engine="h5netcdf") as tree:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdcal.prediction.margin import rare
+from hdcal.prediction.margin import refined
 
 
 @pytest.fixture
@@ -12,4 +12,4 @@ def counted(monkeypatch):
 
     They are not of the posterior of the readings beside them, which would else count.
     """
-    monkeypatch.setattr(rare, "_ENOUGH", np.inf)
+    monkeypatch.setattr(refined, "_ENOUGH", np.inf)

@@ -9,6 +9,7 @@ from datetime import date
 from pathlib import Path
 
 import pytest
+from benchmarks.certificates import gear_of
 from browser import PAPER, look, print_pages
 from commands import Hdcal
 from posteriors import batch, single, stiffer
@@ -77,12 +78,22 @@ def test_it_says_what_a_certificate_has_to_say():
         "reading noise",
         found.decision.words,
         "Guarded acceptance (ISO/IEC 17025, 7.8.6; ILAC-G8; JCGM 106)",
-        "not stated, so no part of U: load cell, displacement gauge, thermometer",
+        "not stated, so no part of U: gain of the load cell, gain of the displacement "
+        "gauge, zero of the thermometer",
         "Other gears: nothing here says how much they differ from this one.",
         "2026-11-22 date of issue signature",
     ):
         assert said in words, said
     assert "ISO/IEC 17025 accredited" not in words
+
+
+def test_it_says_which_certificates_are_part_of_it():
+    text = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40.0\nlength_mm = 70.0\n"
+    text += "[measurement]\nforce_calibration = { expanded_N = 0.2 }\n"
+    posterior = single(gear_of(text), size=400)
+    found = margin_answer(hdcal.margin(posterior, 0.4, **ASKED), posterior, seed=3)
+    words = words_of(certificate_page(found, posterior, ISSUED))
+    assert "part of the model: zero of the load cell; not stated, so no" in words
 
 
 def hdcal_version() -> str:

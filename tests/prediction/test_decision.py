@@ -9,6 +9,7 @@ from test_margin_budget import exact
 
 import hdcal
 from hdcal.errors import InputError
+from hdcal.prediction.budget.risk import global_false_accept
 from hdcal.prediction.margin.decision import decide
 
 SIGMA = 1.5
@@ -76,6 +77,24 @@ def test_of_gears_there_is_a_global_risk():
     found = hdcal.margin(batch(6, 400), 0.4, limit_force=90.0).decision
     assert 0.0 < found.global_false_accept_risk < found.false_accept_risk
     assert "(global risk)" in found.words
+
+
+def test_tolerances_make_gears_differ_and_no_measurement():
+    """Accepted by its estimate, a gear exceeds the limit if its sizes make it stiff."""
+    about = {"limit_force": 90.0, "rule": "simple"}
+    plain = hdcal.margin(batch(6, 400), 0.4, **about).decision
+    thick = {"wall_thickness_mm": 0.02}
+    wide = hdcal.margin(batch(6, 400), 0.4, tolerances=thick, **about)
+    lines = {line.component: line.contribution_N for line in wide.budget}
+    own = [lines.pop(name) for name in ("gear to gear", "wall thickness δ")]
+    sds = np.linalg.norm(own), np.linalg.norm([*lines.values()])
+    expected = global_false_accept(wide.estimate_N, *sds, 90.0, 90.0)
+    found = wide.decision.global_false_accept_risk
+    assert found == pytest.approx(expected)
+    assert found > 2.0 * plain.global_false_accept_risk
+    # As an error of the measurement they would hardly count.
+    sds = own[0], np.linalg.norm([own[1], *lines.values()])
+    assert found > 1.1 * global_false_accept(wide.estimate_N, *sds, 90.0, 90.0)
 
 
 def test_without_a_limit_nothing_is_decided():

@@ -11,6 +11,7 @@ from hdcal.prediction.margin.temperatures import nodes_of
 QUICK = {"limit_force": 95.0, "sensitivities": False}
 
 
+@pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("make", [single, batch])
 def test_each_is_what_it_is_alone(make):
     posterior, warm = make(size=500), np.linspace(-40.0, 120.0, 100_000)

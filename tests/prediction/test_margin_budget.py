@@ -239,4 +239,6 @@ def test_what_would_halve_a_row_is_said_where_it_can_be(count: int, words: str):
     found = hdcal.margin(batch(count, 400), 0.4, population="mountings")
     rows = {line.component: line for line in found.budget}
     assert rows["mounting to mounting"].halved_by.startswith(words)
-    assert rows["reading noise"].halved_by == "the mean of 4 readings"
+    assert rows["reading noise"].halved_by == (
+        "the mean of 4 readings, independent of each other"
+    )

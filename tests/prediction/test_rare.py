@@ -1,17 +1,22 @@
 """Rare exceedances against their exact probability, and what they rest on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conjugate import SIGMA, conjugate_case, known_posterior, unit_stiffness
 from mirrored import mirrored
-from rigs import make_case, make_records
+from rigs import make_case, make_gear, make_records
 from scipy import stats
 
+import hdcal
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
-from hdcal.prediction.margin.rare import pooled_rare, rare
+from hdcal.prediction.engine.untested import PLACES
+from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
+from hdcal.prediction.margin.refined import rests_on as refined_words
 
 AT = 0.4
 SIGMAS = {"Student's t": SIGMA, "normal": Prior("fixed", (0.9,))}
@@ -76,12 +81,81 @@ def test_mountings_and_gaps_are_weighed_as_they_are_sampled():
     force = force + rng.normal(0.0, 0.5, 40)
     known = {"run", "runs"}
     case = make_case(make_records(deformation, force, run=run, known=known))
-    (cause,) = causes_of(calibrate(case, with_gap=True, warmup=500, draws=1000))
+    (cause,) = causes_of(
+        calibrate(case, with_gap=True, chains=2, warmup=400, draws=600)
+    )
     expected = population_force(cause, AT, "mountings")
     limit = float(np.quantile(np.asarray(expected.along().centre()), 0.9)) + 2.0
     found, mean = rare(expected, limit), counted(expected, limit)
     assert 0.005 < mean < 0.2
     assert found.probability == pytest.approx(mean, rel=0.1)
+
+
+def test_what_is_open_is_weighed_too():
+    """Where the rig's drift makes the event no draw of the sampler is near it."""
+    case = case_of(SIGMAS["normal"])
+    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=300))
+    warm = population_force(cause, AT, "readings").at(60.0)
+
+    def mean_with(*scores: float) -> np.ndarray:
+        places = np.tile(scores, (cause.size, 1))
+        values = {**warm.cause.values, PLACES: places}
+        there = replace(warm, cause=replace(warm.cause, values=values))
+        return np.asarray(there.along().centre())
+
+    middle = mean_with(0.0, 0.0, 0.0)
+    shifts = mean_with(0.0, 1.0, 0.0) - middle, mean_with(0.0, 0.0, 1.0) - middle
+    sd = np.linalg.norm([0.9 + 0.0 * middle, *shifts], axis=0)
+    for limit in (110.0, 130.0):
+        found, true = rare(warm, limit), stats.norm.sf((limit - middle) / sd).mean()
+        assert 1e-12 < true < 1e-2 and found.relative_error < 0.1
+        assert found.probability == pytest.approx(true, rel=0.15)
+    assert counted(warm, limit) < 1e-3 * true
+
+
+def test_rounding_is_part_of_a_reading():
+    rng, step = np.random.default_rng(4), 0.98
+    deformation = np.linspace(0.02, 0.54, 60)
+    exact_force = 205.0 * deformation - 1.0 + rng.normal(0.0, 0.2, 60)
+    rounded = step * np.round(exact_force / step)
+    case = make_case(make_records(deformation, rounded), make_gear(resolution=step))
+    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=400))
+    force = population_force(cause, AT, "readings")
+    limit = float(np.mean(np.asarray(force.along().centre()))) + 0.7
+    finer = replace(force, whose=replace(force.whose, rounded=False))
+    assert 0.005 < counted(force, limit) < 0.2
+    assert rare(force, limit).probability == pytest.approx(
+        counted(force, limit), rel=0.1
+    )
+    assert counted(finer, limit) < 0.5 * counted(force, limit)
+
+
+def test_at_every_temperature_it_is_refined():
+    """The likeliest one counts, and its neighbours do not stay counted."""
+    case = case_of(SIGMAS["normal"])
+    posterior = calibrate(case, chains=2, warmup=300, draws=300)
+    asked = {"limit_force": 130.0, "temperature": [40.0, 60.0, 50.0]}
+    found = hdcal.margin(posterior, AT, sensitivities=False, **asked)
+    risks = [level.exceedance for level in found.levels]
+    chances = [risk.probability for risk in risks]
+    assert chances[0] < 0.1 * chances[2] < 0.01 * chances[1]
+    assert max(risk.relative_error for risk in risks) < 0.2
+    assert all("importance sampling" in risk.rests_on for risk in risks)
+    assert found.worst.exceedance.probability == chances[1]
+    assert found.worst.exceedance.rests_on == risks[1].rests_on
+
+
+def test_it_says_what_it_rests_on():
+    one = Rare(1e-6, 0.03, 1.0, 1.2)
+    words = refined_words(one)
+    assert words == "Its Monte Carlo error is 3 %, by importance sampling."
+    words = refined_words(replace(one, heavy_tailed=40.0, without_prior=0.2))
+    assert "rests on the normal law of the scatter (by Student's t" in words
+    assert "and on the prior of the noise (without one it were 0.2 times" in words
+    words = refined_words(replace(one, relative_error=0.6, without_prior=np.nan))
+    assert words.endswith(
+        "60 %, by importance sampling: no more than its order of magnitude is known."
+    )
 
 
 def test_causes_are_averaged():

@@ -27,6 +27,11 @@ from hdcal.errors import Finding
     help="Fit what no effect explains as a smooth leftover discrepancy.",
 )
 @click.option(
+    "--constant-noise",
+    is_flag=True,
+    help="Let the noise be of one size, also where it clearly grows with the force.",
+)
+@click.option(
     "--dynamic",
     is_flag=True,
     help="DATA are a gear that moves: calibrate mass, damping and stiffness.",
@@ -45,7 +50,7 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
     from hdcal.inference.sample import check_settings
 
     with console.wrong as wrong:
-        for name in ("effects", "with_gap") if dynamic else ():
+        for name in ("effects", "with_gap", "constant_noise") if dynamic else ():
             if settings.pop(name):
                 words = "does not go with --dynamic, whose model is linear"
                 wrong.append(Finding(name, words, "Leave it out"))
@@ -69,6 +74,7 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
         from hdcal.calibration.calibrate import calibrate as sample
         from hdcal.calibration.summary import calibration_report as report
 
+        settings["adapt_noise"] = not settings.pop("constant_noise")
     for note in case.notes:
         console.words(note)
     with progress_bar() as progress:

@@ -144,7 +144,7 @@ def _frequencies(problem: DynamicProblem) -> np.ndarray:
     nyquist = np.pi / np.median(np.diff(time))
     high = min(high, nyquist)
     low = min(low, 0.5 * high)
-    width = _FINENESS * 2.0 * np.pi / time[-1]
+    width = _FINENESS * 2.0 * np.pi / (time[-1] - time[0])
     count = int(np.clip((high - low) / width, _FEWEST, _MOST))
     return np.linspace(low, high, count) / (2.0 * np.pi)
 

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.typed_json import STRICT, Name, Share
+from hdcal.inference.problem import without_scatter
 from hdcal.physics.effect import Effect, parameters
 
 # The coordinate of the draws of a mixture.
@@ -67,8 +68,11 @@ def parts_of(hypothesis: str) -> frozenset[str]:
 
 
 def null_sites(effects: Sequence[type[Effect]]) -> Iterator[tuple[str, float]]:
-    """Yield the sites of the amplitudes of effects, with their null values."""
-    for effect in effects:
+    """Yield the sites of the amplitudes of effects, with their null values.
+
+    How much members scatter is in every model that has them: no site of an effect.
+    """
+    for effect in without_scatter(effects):
         for name, spec in parameters(effect).items():
             if spec.null is not None:
                 yield f"{effect.name}.{name}", spec.null

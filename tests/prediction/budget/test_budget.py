@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from propagation import monte_carlo
 from rigs import make_gear
 from scipy import stats
 
@@ -13,11 +14,11 @@ from hdcal.prediction.budget.inputs import (
     scatter_law,
 )
 from hdcal.prediction.budget.linear import (
+    check_linear,
     coverage_factor,
     effective_dof,
     linear_budget,
 )
-from hdcal.prediction.budget.monte_carlo import check_linear, monte_carlo
 from hdcal.prediction.budget.risk import global_false_accept
 
 make_gear()  # double precision

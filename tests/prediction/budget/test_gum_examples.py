@@ -6,12 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from propagation import monte_carlo
 
 from hdcal.prediction.budget.inputs import joined_inputs, limited_input, one_input
-from hdcal.prediction.budget.linear import coverage_factor, linear_budget
-from hdcal.prediction.budget.monte_carlo import (
+from hdcal.prediction.budget.linear import (
     check_linear,
-    monte_carlo,
+    coverage_factor,
+    linear_budget,
     numerical_tolerance,
 )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 Law = Literal["normal", "rectangular", "triangular", "arcsine"]
 # Standard uncertainty of a law within −1 … 1 (JCGM 101:2008, 6.4).
-_SD_WITHIN = {
+SD_WITHIN = {
     "rectangular": 1.0 / np.sqrt(3.0),
     "triangular": 1.0 / np.sqrt(6.0),
     "arcsine": 1.0 / np.sqrt(2.0),
@@ -45,31 +45,6 @@ class InputGroup:
             return f"Student t, {self.dof:.3g} degrees of freedom"
         return self.law
 
-    def sample(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return draws of the inputs, (count, k)."""
-        size = (count, len(self.names))
-        if self.law == "normal":
-            values, axes = np.linalg.eigh(self.covariance)
-            root = axes * np.sqrt(np.maximum(values, 0.0))
-            scale = np.ones(count)
-            if np.isfinite(self.dof):
-                scale = np.sqrt(self.dof / rng.chisquare(self.dof, count))
-            return self.estimates + scale[:, None] * (rng.normal(size=size) @ root.T)
-        sd = np.sqrt(np.diag(self.covariance))
-        return self.estimates + sd / _SD_WITHIN[self.law] * self._within(rng, size)
-
-    def _within(self, rng: np.random.Generator, size) -> np.ndarray:
-        """Return draws between −1 and 1, or about that where the limits are inexact."""
-        if self.law == "arcsine":
-            return np.sin(2.0 * np.pi * rng.uniform(size=size))
-        if self.law == "triangular":
-            return rng.uniform(size=size) - rng.uniform(size=size)
-        # A relative uncertainty r of the half width is 1/(2 r²) degrees of freedom
-        # (JCGM 100:2008, G.4.2); the middle stays where it is.
-        inexact = 1.0 / np.sqrt(2.0 * self.dof)
-        half = 1.0 + inexact * rng.uniform(-1.0, 1.0, size)
-        return half * rng.uniform(-1.0, 1.0, size)
-
 
 def one_input(
     name: str, estimate: float, standard_uncertainty: float, dof: float = np.inf
@@ -95,7 +70,7 @@ def limited_input(
         law: rectangular, triangular or arcsine.
         dof: of the standard uncertainty, where the limits are known inexactly.
     """
-    variance = np.array([[(0.5 * (high - low) * _SD_WITHIN[law]) ** 2]])
+    variance = np.array([[(0.5 * (high - low) * SD_WITHIN[law]) ** 2]])
     middle = np.array([0.5 * (low + high)])
     return InputGroup((name,), middle, variance, law, dof)
 

@@ -1,7 +1,8 @@
 """The law of propagation of uncertainty, with covariances and degrees of freedom.
 
 JCGM 100:2008, 5.1.2, 5.2.2 and G.4: the model is replaced by its tangent at the
-estimates, its derivatives are exact (JAX).
+estimates, its derivatives are exact (JAX). What that costs is told by the comparison
+with Monte Carlo of JCGM 101:2008, clause 8.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,6 +16,8 @@ from scipy import stats
 
 from hdcal.prediction.budget.inputs import InputGroup
 
+# Digits of a standard uncertainty that count.
+_DIGITS = 2
 # A function of all inputs in their order, shape (n,), that returns the output. A
 # pytree, such as `jax.tree_util.Partial`, is compiled once for all its values.
 Model: TypeAlias = Callable[..., Any]
@@ -103,3 +106,52 @@ def effective_dof(variances: np.ndarray, dof: np.ndarray) -> float:
     """
     uncertain = np.sum(variances**2 / dof)
     return float(variances.sum() ** 2 / uncertain) if uncertain > 0.0 else np.inf
+
+
+def numerical_tolerance(standard_uncertainty: float, digits: int = _DIGITS) -> float:
+    """Return half a unit in the last of the digits of an uncertainty that count.
+
+    JCGM 101:2008, 7.9.2: for u = c·10^l with c of so many digits it is ½·10^l.
+    """
+    if not standard_uncertainty > 0.0:
+        return 0.0
+    # Rounded first: 0.0996 has the digits 10 and not 99.
+    rounded = float(f"{standard_uncertainty:.{digits - 1}e}")
+    place = int(np.floor(np.log10(rounded) + 1e-9))
+    return 0.5 * 10.0 ** (place - digits + 1)
+
+
+@dataclass(frozen=True)
+class LinearCheck:
+    """A linear coverage interval beside that of Monte Carlo.
+
+    Attributes:
+        tolerance: how far the ends may differ.
+        low: how far the lower ends do.
+        high: how far the upper ends do.
+    """
+
+    tolerance: float
+    low: float
+    high: float
+
+    @property
+    def valid(self) -> bool:
+        """Whether the linear budget stands."""
+        return max(self.low, self.high) <= self.tolerance
+
+
+def check_linear(
+    linear: tuple[float, float],
+    reference: tuple[float, float],
+    standard_uncertainty: float,
+) -> LinearCheck:
+    """Compare the coverage interval of a linear budget with that of Monte Carlo.
+
+    Args:
+        linear: interval of the linear budget.
+        reference: of Monte Carlo, of the same kind and coverage.
+        standard_uncertainty: whose digits say how far they may differ.
+    """
+    low, high = (abs(a - b) for a, b in zip(linear, reference, strict=True))
+    return LinearCheck(numerical_tolerance(standard_uncertainty), low, high)

@@ -117,7 +117,7 @@ class FittedGrowth:
     chances: np.ndarray
 
     def drawn(self, levels: np.ndarray) -> np.ndarray:
-        """Return the pairs at levels between 0 and 1, shape (d, 2)."""
+        """Return the pairs at levels from 0 to 1, by size; shape (d, 2)."""
         rows = np.searchsorted(np.cumsum(self.chances)[:-1], levels, side="right")
         return self.pairs[rows]
 
@@ -191,7 +191,9 @@ def _sizes(strength, found, within: float, rows: int, change: float):
     """Return sizes of the bend and noises [N], and how probable each pair is."""
     left = np.sqrt((found @ found + within) / max(rows - 2, 1))
     noises = max(left, _LEAST_NOISE * change) * _NOISES
-    size, noise = (grid.ravel() for grid in np.meshgrid(change * _SIZES, noises))
+    size, noise = (
+        grid.ravel() for grid in np.meshgrid(change * _SIZES, noises, indexing="ij")
+    )
     spread = size[:, None] ** 2 * strength + noise[:, None] ** 2
     log_chance = -0.5 * np.sum(np.log(spread) + found**2 / spread, axis=1)
     rest = max(rows - 2 - len(found), 0)

@@ -130,7 +130,6 @@ def level_of(
 def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
     above = table["above"]
     mean = float(np.sum(weights * above) / np.sum(weights))
-    error = float(np.linalg.norm(weights * (above - mean)) / np.sum(weights))
     low, high, sure = (
         weighted_quantile(above, weights, share)
         for share in (_TAILS[0], _TAILS[2], criteria.confidence)
@@ -138,9 +137,13 @@ def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
     # Nobody can know that nothing or everything exceeds it.
     chances = np.clip([mean, low, high, sure], LEAST, 1.0 - LEAST_LEFT)
     beta, beta_hi, beta_lo, beta_sure = map(float, -ndtri(chances))
-    mean, low, high, sure = map(float, chances)
     betas = beta, beta_lo, beta_hi, beta_sure
-    return Exceedance(mean, low, high, sure, *betas, error / mean, None)
+    error = 1.0
+    if mean > LEAST:
+        # Of shares this small the squares may be zero.
+        error = float(np.linalg.norm(weights * (above / mean - 1.0)) / np.sum(weights))
+    mean, low, high, sure = map(float, chances)
+    return Exceedance(mean, low, high, sure, *betas, error, None)
 
 
 def worst_level(

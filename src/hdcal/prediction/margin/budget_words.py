@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from hdcal.prediction.budget.linear import coverage_factor
-from hdcal.prediction.budget.monte_carlo import LinearCheck
+from hdcal.prediction.budget.linear import LinearCheck, coverage_factor
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component
 from hdcal.prediction.margin.sentences import chance, input_label, newtons
@@ -30,7 +29,7 @@ _UNITS = {
     **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), ("mm", 1.0)),
 }
 _REMEDIES = {
-    "noise": "the mean of 4 readings",
+    "noise": "the mean of 4 readings, independent of each other",
     "alpha": "readings at a second temperature",
     "cause": "the run that a diagnosis proposes next",
 }
@@ -75,7 +74,7 @@ def halved_by(part: Component, force: PopulationForce) -> str:
     if name in ("zero_drift", "frame"):
         return f"readings at {float(where.temperature):g} °C"
     rows = len(force.cause.posterior.case.records.force)
-    return f"about {4 * rows} readings instead of {rows}"
+    return f"about {4 * rows} independent readings instead of {rows}"
 
 
 def _more_members(count: int, what: str) -> str:

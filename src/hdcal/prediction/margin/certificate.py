@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from datetime import date
 
+from hdcal.data.certificates import ZEROS, is_stated
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED
-from hdcal.prediction.margin.budget_words import component_label, stated_words
+from hdcal.prediction.margin.budget_words import stated_words
 from hdcal.prediction.margin.document import budget_table
 from hdcal.prediction.margin.sentences import capital, measurand
 from hdcal.report.document import Block, Document, Facts, Section, Sentences, Text
@@ -18,6 +19,14 @@ FILE, TEMPLATE = "certificate.html", "certificate.html.j2"
 _UNTESTED = "What was not tested, and what the result rests on"
 # Letters of a name in the title; the whole of it stands below.
 _LONGEST = 60
+# What certificates of the rig may state, by site of the model.
+_OF_GAUGES = {
+    "force_gain": "gain of the load cell",
+    "deformation_gain": "gain of the displacement gauge",
+    "temperature_offset": "zero of the thermometer",
+    "force_offset": "zero of the load cell",
+    "deformation_offset": "zero of the displacement gauge",
+}
 _METHOD = (
     "Bayesian calibration of the force model with the readings; uncertainty by the law "
     "of propagation (JCGM 100) and by Monte Carlo (JCGM 101), which are compared; "
@@ -68,11 +77,12 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
 def _measured(posterior: Posterior) -> Facts:
     case = posterior.case
     words = {True: "part of the model: ", False: "not stated, so no part of U: "}
+    known = {name: name in posterior.draws for name in CERTIFIED}
+    known |= {name: True for name in ZEROS if is_stated(case.gear.priors[name])}
     parts = []
-    for known, said in words.items():
-        listed = [n for n in CERTIFIED if (n in posterior.draws) is known]
-        instruments = [component_label(n).partition(",")[0] for n in listed]
-        parts += [said + ", ".join(instruments)] * bool(listed)
+    for stated, said in words.items():
+        listed = [_OF_GAUGES[name] for name, one in known.items() if one is stated]
+        parts += [said + ", ".join(listed)] * bool(listed)
     apart = {"case", "gear", "SHA-256 of the data"}
     gear = dict(gear_rows(case, posterior.theory))
     sizes = [f"{name} {words}" for name, words in gear.items() if name not in apart]

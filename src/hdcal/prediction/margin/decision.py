@@ -8,6 +8,7 @@ import numpy as np
 from hdcal.prediction.budget.risk import global_false_accept
 from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
 from hdcal.prediction.engine.population import Population
+from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.budget_words import (
     GEAR,
     component_label,
@@ -85,8 +86,9 @@ def decision(
 
 
 def _production_and_measurement(stated: StatedUncertainty) -> tuple[float, float]:
-    """Return the sd between gears, and that of all else [N]."""
-    own = [line.component == component_label(GEAR) for line in stated.budget]
+    """Return the sd between gears, also by their sizes, and that of all else [N]."""
+    between = {component_label(name) for name in (GEAR, *SIZES.values())}
+    own = [line.component in between for line in stated.budget]
     squares = np.array([line.contribution_N**2 for line in stated.budget])
     production = float(squares[own].sum())
     rest = max(float(squares.sum()) - production, 0.0)

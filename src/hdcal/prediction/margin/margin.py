@@ -1,7 +1,6 @@
 """Margins: the force that a deformation needs, for how many of whom, how surely."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,7 +37,7 @@ from hdcal.prediction.margin.deformation_reached import (
     deformation_reached,
 )
 from hdcal.prediction.margin.gradients import gradients
-from hdcal.prediction.margin.rare import refined
+from hdcal.prediction.margin.refined import refined, with_likeliest
 from hdcal.prediction.margin.remarks import (
     extrapolations,
     population_words,
@@ -122,12 +121,12 @@ def _margin(
     draws = population_draws(forces, nodes, criteria)
     computed = _levels(draws, main, request, nodes, criteria)
     check_sign(computed, request, criteria, sense)
-    worst = worst_level(draws, criteria, computed)
+    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
+    levels = refined(levels, forces, criteria.limit_force, request.seed)
+    worst = with_likeliest(worst_level(draws, criteria, computed), levels)
     there = [force.at(worst.temperature_C) for force in forces]
-    worst = refined(worst, there, criteria.limit_force, request.seed)
     upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
-    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
     return Margin(
         **vars(stated),
         deformation_mm=float(request.deformation),
@@ -142,7 +141,7 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=tuple(_of_worst(level, worst) for level in levels),
+        levels=levels,
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
@@ -155,12 +154,6 @@ def _margin(
         extrapolated=extrapolations(forces, warm),
         remarks=remarks(forces, computed, worst, criteria),
     )
-
-
-def _of_worst(level: Level, worst: Level) -> Level:
-    """Return a level with what is known better of the worst one, where it is that."""
-    same = level.temperature_C == worst.temperature_C
-    return replace(level, exceedance=worst.exceedance) if same else level
 
 
 def _forces(

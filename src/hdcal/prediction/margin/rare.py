@@ -3,7 +3,8 @@
 Of the parameters that make an event rare the draws of a sampler hold few or none: a
 mean over them rests on one or two. Here points are drawn about the posterior's mode and
 about the likeliest place at which the limit is exceeded, from Student's t, and weighed
-by the exact density: P = Σ w P(force > limit) / Σ w, with a Monte Carlo error.
+by the exact density: P = Σ w P(force > limit) / Σ w, with a Monte Carlo error. Scores
+of what the data leave open, such as the rig's drift, are coordinates of a point too.
 """
 
 from collections.abc import Sequence
@@ -18,32 +19,36 @@ import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
 from scipy import optimize, stats
-from scipy.special import ndtri
 
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import draw_members
+from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
     SCORES,
     PopulationForce,
     member_mixture,
 )
-from hdcal.prediction.engine.untested import SITES, spread_evenly, untested_of
-from hdcal.prediction.margin.bounds import LEAST, LEAST_LEFT
-from hdcal.prediction.margin.result import Level
+from hdcal.prediction.engine.untested import (
+    BENDS,
+    PLACES,
+    SITES,
+    spread_evenly,
+    untested_of,
+)
 
 # Points about each of both places, and degrees of freedom of their law.
 _POINTS, _FREE = 8192, 5.0
 _ABREAST = 4
+# Standard normal scores of a point, beside its parameters.
+_OPEN = 5
+# Of the levels of a bend's size, the power of their distance from the largest.
+_TOWARDS_LARGE = 4.0
 # How much wider than the posterior's own shape the points are spread.
 _SPREAD = 1.3
 # Degrees of freedom of the scatter that the normal one is compared with.
 _HEAVY = 5.0
-# Relative Monte Carlo error up to which a mean over the sampler's draws is good enough.
-_ENOUGH = 0.1
-# By how many times an assumption must move a probability to be told.
-_TOLD = 1.5
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,8 @@ class Rare:
 class _Target(eqx.Module):
     """What a point is weighed by: the posterior, and what exceeds the limit.
 
-    A force that does not scatter exceeds it or not: `blur` [N] gives a search a slope.
+    A point is a whitened position followed by the scores of what is left open. A force
+    that does not scatter exceeds it or not: `blur` [N] gives a search a slope.
     """
 
     problem: Any
@@ -78,57 +84,77 @@ class _Target(eqx.Module):
     blur: Float[Array, ""] | float
 
     def log_density(self, point: Float[Array, " d"]) -> Float[Array, ""]:
-        """Return the log posterior density in whitened coordinates, but a constant."""
-        return -laplace.potential(self.problem, self.whitening.position(point))
+        """Return the log posterior density of a point, but a constant."""
+        position, scores = point[:-_OPEN], point[-_OPEN:]
+        whole = laplace.potential(self.problem, self.whitening.position(position))
+        return -whole - 0.5 * scores @ scores
 
-    def terms(self, point: Float[Array, " d"], sites: dict, key, blur: Any = 0.0):
-        """Return log tails, normal and heavy, and the log prior of σ's logarithm."""
-        named = laplace.values_at(self.problem, self.whitening.position(point))
-        value = named | draw_members(self.problem, named, key) | sites
+    def value(self, point: Float[Array, " d"], sizes, key) -> dict:
+        """Return the parameters of a point; the sizes of bends are not in it."""
+        position, scores = point[:-_OPEN], point[-_OPEN:]
+        named = laplace.values_at(self.problem, self.whitening.position(position))
+        left_open = {SCORES: scores[:2], PLACES: scores[2:], BENDS: sizes}
+        return named | draw_members(self.problem, named, key) | left_open
+
+    def mixture(self, value: dict, blur: Any = 0.0) -> Mixture:
+        """Return the force of the next member along the sense of loading."""
         weight, mean, sd = member_mixture(
             self.problem, value, self.whose, self.conditions
         )
-        room = (self.conditions.loading * mean - self.limit) / jnp.hypot(sd, blur)
-        prior = self.problem.priors["sigma"]
-        of_sigma = 0.0
+        rounded = self.whose.rounded
+        step = self.problem.step if rounded else 0.0
+        sd = jnp.hypot(sd, blur)
+        return Mixture(weight, self.conditions.loading * mean, sd, step, rounded)
+
+    def log_tail(self, point: Float[Array, " d"], sizes) -> Float[Array, ""]:
+        """Return the log of about how much exceeds the limit, however little."""
+        value = self.value(point, sizes, jax.random.key(0))
+        found = self.mixture(value, self.blur)
+        sd = jnp.hypot(found.sd, found.step / np.sqrt(12.0))
+        tail = log_ndtr((found.mean - self.limit) / sd)
+        return logsumexp(jnp.log(found.weight) + tail)
+
+    def terms(self, point: Float[Array, " d"], sizes, key):
+        """Return tails, normal and heavy, log prior of log σ, and log density."""
+        value = self.value(point, sizes, key)
+        found = self.mixture(value)
+        prior, of_sigma = self.problem.priors["sigma"], 0.0
         if prior.family != "fixed":
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
-        log_weight = jnp.log(weight)
-        tails = (log_ndtr(room), _log_heavy(room))
-        return *(logsumexp(log_weight + tail) for tail in tails), of_sigma
+        heavy = _heavy(found, self.limit)
+        return found.above(self.limit), heavy, of_sigma, self.log_density(point)
 
 
-def _log_heavy(room):
-    """Return the log of Student's share beyond, of five degrees and variance 1."""
-    z = room * np.sqrt(_HEAVY / (_HEAVY - 2.0))
+def _heavy(found: Mixture, limit):
+    """Return the share beyond, were the scatter Student's t of the same variance."""
+    sd = jnp.hypot(found.sd, found.step / np.sqrt(12.0))
+    z = (found.mean - limit) / sd * np.sqrt(_HEAVY / (_HEAVY - 2.0))
     # The regularised incomplete beta function, for whole halves of the degrees.
     share = jax.scipy.special.betainc(_HEAVY / 2.0, 0.5, _HEAVY / (_HEAVY + z**2))
-    return jnp.log(jnp.where(z < 0.0, 0.5 * share, 1.0 - 0.5 * share))
+    return jnp.sum(found.weight * jnp.where(z < 0.0, 0.5 * share, 1.0 - 0.5 * share))
 
 
 @jax.jit
-def _towards(target: _Target, point, sites):
+def _towards(target: _Target, point, sizes):
     """Return −log of density times tail, and its gradient."""
 
     def height(point):
-        tail, *_ = target.terms(point, sites, jax.random.key(0), target.blur)
-        return -(target.log_density(point) + tail)
+        return -(target.log_density(point) + target.log_tail(point, sizes))
 
     return jax.value_and_grad(height)(point)
 
 
 @jax.jit
-def _weigh(target: _Target, points, sites, keys):
-    """Return the terms of points and their log densities, each (point,)."""
+def _weigh(target: _Target, points, sizes, keys):
+    """Return the terms of points, each (point,)."""
 
     def one(given):
-        point, own, key = given
-        return *target.terms(point, own, key), target.log_density(point)
+        return target.terms(*given)
 
     # Few side by side, the others one after the other, as draws are treated.
     given = jax.tree.map(
-        lambda part: part.reshape(_ABREAST, -1, *part.shape[1:]), (points, sites, keys)
+        lambda part: part.reshape(_ABREAST, -1, *part.shape[1:]), (points, sizes, keys)
     )
     found = jax.vmap(partial(jax.lax.map, one))(given)
     return jax.tree.map(jnp.ravel, found)
@@ -143,19 +169,21 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         seed: of the points.
     """
     problem = force.cause.problem
-    levels = spread_evenly(2 * _POINTS, 2 + SITES, seed)
-    untested, sites = untested_of(force.cause, levels[:, 2:])
-    sites = {**sites, SCORES: ndtri(levels[:, :2])}
+    # Large bends are few and count much: the levels are drawn towards them.
+    near = spread_evenly(2 * _POINTS, SITES, seed)
+    untested, sites = untested_of(force.cause, 1.0 - near**_TOWARDS_LARGE)
     where = replace(force.conditions, untested=untested)
     whitening = laplace.fit(problem)
     blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
     target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit), blur)
-    points, log_law = _points(target, sites, np.random.default_rng(seed))
+    usual = np.median(force.cause.values[BENDS], axis=0)
+    points, log_law = _points(target, usual, np.random.default_rng(seed))
     keys = jax.random.split(jax.random.key(seed), len(points))
-    found = _weigh(target, points, sites, keys)
-    normal, heavy, of_sigma, density = map(np.asarray, found)
-    weight = np.where(np.isfinite(density), density, -np.inf) - log_law
-    weight, above = np.exp(weight - weight.max()), np.exp(normal)
+    found = _weigh(target, points, sites[BENDS], keys)
+    above, heavy, of_sigma, density = map(np.asarray, found)
+    density = np.where(np.isfinite(density), density, -np.inf)
+    weight = density - log_law + (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
+    weight = np.exp(weight - weight.max())
     share = _ratio(weight, above)
     error = np.linalg.norm(weight * (above - share)) / weight.sum()
     # Without its prior σ would be as likely on any scale.
@@ -164,82 +192,41 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         probability=share,
         relative_error=float(error / share),
         without_prior=_ratio(free, above) / share,
-        heavy_tailed=_ratio(weight, np.exp(heavy)) / share,
+        heavy_tailed=_ratio(weight, heavy) / share,
     )
 
 
-def _points(target: _Target, sites: dict, rng) -> tuple[np.ndarray, np.ndarray]:
-    """Return whitened points about both places, and the log density of their law."""
-    even = {name: np.median(column, axis=0) for name, column in sites.items()}
-    size = len(target.whitening.factor)
-    found = optimize.minimize(
-        lambda x: tuple(map(np.asarray, _towards(target, x, even))),
-        np.zeros(size),
-        jac=True,
-        method="BFGS",
-        options={"maxiter": 200, "gtol": 1e-3},
-    )
+def _points(target: _Target, sizes, rng) -> tuple[np.ndarray, np.ndarray]:
+    """Return points about both places, and the log density of their law."""
+    size = len(target.whitening.factor) + _OPEN
+    start = np.zeros(size)
+
+    def towards(point):
+        return tuple(map(np.asarray, _towards(target, point, sizes)))
+
+    options = {"maxiter": 200, "gtol": 1e-3}
+    found = optimize.minimize(towards, start, jac=True, method="BFGS", options=options)
     shape, place = found.hess_inv, found.x
     if not (np.isfinite(shape).all() and np.isfinite(place).all()):
-        shape, place = np.eye(size), np.zeros(size)
+        shape, place = np.eye(size), start
+    # A score on which nothing depends stays what it is: standard normal.
+    counts = np.append(np.ones(size - _OPEN, bool), towards(start)[1][-_OPEN:] != 0.0)
+    place, shape = place[counts], shape[np.ix_(counts, counts)]
     strength, axes = np.linalg.eigh(0.5 * (shape + shape.T))
     spread = (axes * np.maximum(strength, 1e-8 * strength.max())) @ axes.T
     laws: list[Any] = [
         stats.multivariate_t(centre, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
-        for centre, shape in ((np.zeros(size), np.eye(size)), (place, spread))
+        for centre, shape in ((0.0 * place, np.eye(len(place))), (place, spread))
     ]
-    drawn = [np.reshape(law.rvs(_POINTS, random_state=rng), (-1, size)) for law in laws]
-    # What is open is spread evenly over both places.
-    points = rng.permutation(np.concatenate(drawn))
-    return points, np.logaddexp(*(np.atleast_1d(law.logpdf(points)) for law in laws))
-
-
-def refined(
-    level: Level, forces: Sequence[PopulationForce], limit: float | None, seed: int
-) -> Level:
-    """Return a level whose probability of exceedance does not hang on a few draws.
-
-    Args:
-        level: of all causes.
-        forces: of each cause, at its temperature.
-        limit: along the sense of loading [N], or None.
-        seed: of the points.
-    """
-    risk = level.exceedance
-    if risk is None or limit is None or risk.relative_error <= _ENOUGH:
-        return level
-    # What cannot be computed stays what was counted.
-    with np.errstate(all="ignore"):
-        each = [(force.cause.probability, rare(force, limit, seed)) for force in forces]
-        found = pooled_rare(each)
-    if not found.relative_error < risk.relative_error:
-        return level
-    chance = float(np.clip(found.probability, LEAST, 1.0 - LEAST_LEFT))
-    better = replace(
-        risk,
-        probability=chance,
-        beta=float(-ndtri(chance)),
-        relative_error=found.relative_error,
-        rests_on=_words(found),
-    )
-    return replace(level, exceedance=better)
-
-
-def _words(found: Rare) -> str:
-    """Say what a rare exceedance rests on."""
-    error = 100.0 * found.relative_error
-    told = [f"Its Monte Carlo error is {error:.1g} %, by importance sampling"]
-    if found.heavy_tailed > _TOLD:
-        told.append(
-            "it rests on the normal law of the scatter: by Student's t of five degrees "
-            f"of freedom it were {found.heavy_tailed:.2g} times as probable"
-        )
-    if not 1.0 / _TOLD < found.without_prior < _TOLD:
-        told.append(
-            "and on the prior of the noise: without one it were "
-            f"{found.without_prior:.2g} times as probable"
-        )
-    return "; ".join(told) + "."
+    drawn = [
+        np.reshape(law.rvs(_POINTS, random_state=rng), (_POINTS, -1)) for law in laws
+    ]
+    points = rng.normal(size=(2 * _POINTS, size))
+    log_law = stats.norm.logpdf(points[:, ~counts]).sum(axis=1)
+    # What has an order of its own is spread evenly over both places.
+    points[:, counts] = rng.permutation(np.concatenate(drawn))
+    each = [np.atleast_1d(law.logpdf(points[:, counts])) for law in laws]
+    return points, log_law + np.logaddexp(*each)
 
 
 def _ratio(weight: np.ndarray, values: np.ndarray) -> float:

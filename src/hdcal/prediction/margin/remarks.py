@@ -29,7 +29,7 @@ _CERTIFIED = (
     "{which} widen it, and not a reading."
 )
 _NOT_CERTIFIED = (
-    "The gear file states no calibration certificate of the gauges, so their gains "
+    "The gear file states no calibration certificate with a gain of a gauge: gains "
     "count as exact in a load."
 )
 _ZERO = (

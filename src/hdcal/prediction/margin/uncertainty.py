@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from hdcal.prediction.budget.linear import coverage_factor
-from hdcal.prediction.budget.monte_carlo import LinearCheck, check_linear
+from hdcal.prediction.budget.linear import LinearCheck, check_linear, coverage_factor
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component, ForceBudget, averaged_budget
 from hdcal.prediction.margin.budget_words import (
