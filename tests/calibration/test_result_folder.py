@@ -15,6 +15,7 @@ from schema_checks import obeys
 from short import SHORT, options
 
 from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.errors import Finding, InputError
 from hdcal.report.answer import json_schema
 
 Calibrated = tuple[Done, Path]
@@ -208,3 +209,16 @@ def test_without_a_writable_cache_it_works_too(
     done = hdcal(*asked, env={"HDCAL_CACHE_DIR": str(tmp_path / "file")})
     assert done.returncode == 0
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("given", [(), ("--constant-noise",)])
+def test_the_noise_may_be_kept_at_one_size(here: Hdcal, case: Path, monkeypatch, given):
+    asked = {}
+
+    def refuse(case, **settings):
+        asked.update(settings)
+        raise InputError([Finding("case", "is not sampled here", "Look at `asked`")])
+
+    monkeypatch.setattr("hdcal.calibration.calibrate.calibrate", refuse)
+    assert here("calibrate", case, *given).returncode == 2
+    assert asked["adapt_noise"] is not bool(given)

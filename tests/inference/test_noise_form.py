@@ -1,5 +1,7 @@
 """Noise is correlated or grows where readings do so, and the answers allow for it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import autoregression, make_case, make_gear, make_records
@@ -105,3 +107,6 @@ def test_noise_in_proportion_to_the_force_is_let_grow():
     assert low < 0.2 < high
     assert growth_check(found.draws).outcome == "note"
     assert not calibrate(case, adapt_noise=False, **SHORT).effects
+    share = {"heteroscedastic_noise.share": Prior("fixed", (0.0,))}
+    decided = replace(case.gear, effect_priors=share)
+    assert not calibrate(replace(case, gear=decided), **SHORT).effects

@@ -105,10 +105,10 @@ def test_a_failed_calibration_gives_nothing(here: Hdcal, tmp_path: Path):
 
 
 def test_effects_do_not_go_with_dynamic(here: Hdcal, case: Path):
-    given = ["--dynamic", "--effect", "relaxation", "--with-gap"]
+    given = ["--dynamic", "--effect", "relaxation", "--with-gap", "--constant-noise"]
     done = here("calibrate", case, *given)
     assert done.returncode == 2
-    assert done.stderr.count("does not go with --dynamic") == 2
+    assert done.stderr.count("does not go with --dynamic") == 3
     # A ramp without a clock is no motion.
     done = here("calibrate", case, "--dynamic")
     assert done.returncode == 2

@@ -29,8 +29,9 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
+_SHARE = f"{HeteroscedasticNoise.name}.share"
 _SHOWN = {
-    f"{HeteroscedasticNoise.name}.share": Prior(
+    _SHARE: Prior(
         "half_normal",
         (0.2,),
         "1",
@@ -185,7 +186,9 @@ def _chosen(
     effects = choose_effects(names, registry)
     check_effect_priors(case, registry)
     spoken_of = any(effect.stage == "noise" for effect in effects)
-    grows = adapt_noise and not spoken_of and noise_grows(case)
+    stated = case.gear.effect_priors.get(_SHARE)
+    decided = spoken_of or (stated is not None and stated.family == "fixed")
+    grows = adapt_noise and not decided and noise_grows(case)
     return (*effects, HeteroscedasticNoise) if grows else effects
 
 
