@@ -139,6 +139,20 @@ def test_what_the_data_say_nothing_of_has_its_row_with_all_that_hangs_on_it():
     assert line.halved_by == "a load cell certified to ± 0.25 % (k = 2)"
 
 
+def test_what_draws_show_by_chance_is_no_tie():
+    """At 40 K the loss of modulus moves a force by 40 times as much, whatever draws."""
+    posterior = single(size=400)
+    draws = {n: np.array(v) for n, v in posterior.draws.items()}
+    zero = draws["force_offset"] - draws["force_offset"].mean()
+    draws["alpha"] += 0.1 * zero / zero.std() * draws["alpha"].std()
+    tied = written_posterior(posterior.case, draws)
+    found = hdcal.margin(tied, 0.4, temperature=60.0, quantity="load")
+    rows = {line.component: line for line in found.budget}
+    line = rows["loss of modulus per kelvin α"]
+    cold = hdcal.margin(tied, 0.4, temperature=20.0, quantity="load").estimate_N
+    assert line.sensitivity_N_per_unit == pytest.approx(-40.0 * cold, rel=0.03)
+
+
 def test_every_source_has_its_row_and_the_shares_sum_to_one():
     gears = batch(6, 400)
     asked = {"tolerances": {"wall_thickness_mm": 0.02}, "temperature": 60.0}

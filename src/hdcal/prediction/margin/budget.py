@@ -33,6 +33,8 @@ CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
 # Sites that are inputs of their own where the data say nothing of them.
 _BY_PRIOR = ("alpha", "force_offset")
 _BASE = ("stiffness", "deformation_offset", "alpha", "force_offset")
+# Correlations up to so many standard errors are what draws show by chance.
+_CHANCE = 4.0
 # A component with less of the variance than this has no row.
 _LEAST_SHARE = 1e-9
 
@@ -108,7 +110,7 @@ def force_budget(force: PopulationForce) -> ForceBudget:
     columns = [cause.values[site].reshape(cause.size, -1) for site in sites]
     sizes = [column.shape[1] for column in columns]
     draws = np.concatenate(columns, axis=1)
-    covariance = np.atleast_2d(np.cov(draws, rowvar=False))
+    covariance = _covariance(draws, sum(sizes[:own]))
     blocks = [*sizes[:own], sum(sizes[own:])]
     depend, parts = independent(covariance, blocks)
     groups = [
@@ -136,6 +138,24 @@ def force_budget(force: PopulationForce) -> ForceBudget:
         theory=cause.posterior.theory,
     )
     return _budget(model, groups, cause)
+
+
+def _covariance(draws: np.ndarray, own: int) -> np.ndarray:
+    """Return the covariance of sites, (m, m), from draws of them, (d, m).
+
+    A site of which the data say nothing hangs together with others or not at all:
+    what many independent draws would show by chance is no tie.
+
+    Args:
+        draws: of the sites.
+        own: how many of them, the first, are inputs of their own.
+    """
+    covariance = np.atleast_2d(np.cov(draws, rowvar=False))
+    sd = np.sqrt(np.diag(covariance))
+    chance = np.abs(covariance) < _CHANCE / np.sqrt(len(draws)) * np.outer(sd, sd)
+    chance[own:, own:] = False
+    covariance[chance] = 0.0
+    return covariance
 
 
 def _sites(cause: Cause) -> tuple[list[str], int]:

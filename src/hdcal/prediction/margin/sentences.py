@@ -66,7 +66,7 @@ def chance(probability: float) -> str:
         return f"less than {_RAREST:.0e}"
     if probability > _NEARLY_ALL:
         return "more than 99.9 %"
-    if probability > 0.99:
+    if probability > 0.9:
         return f"{100.0 * probability:.1f} %"
     if probability >= 0.001:
         return f"{100.0 * probability:.2g} %"
@@ -226,10 +226,12 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         if risk.rests_on:
             yield risk.rests_on
         return
+    low, high = chance(risk.lo), chance(risk.hi)
+    span = f"is {high}" if low == high else f"lies between {low} and {high}"
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
-        f"β = {index(risk.beta)}. The share of {_many(found)} that do lies "
-        f"between {chance(risk.lo)} and {chance(risk.hi)} (95 % credible interval); "
+        f"β = {index(risk.beta)}. The share of {_many(found)} that do {span} "
+        "(95 % credible interval); "
         + (
             f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
             f"{index(risk.beta_at_confidence)}."
@@ -239,8 +241,8 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     )
     if risk.probability > risk.hi:
         yield (
-            "The probability lies above the interval of the share because the widest "
-            "scatter that is possible makes most of it."
+            "The probability lies above the interval of the share because what is "
+            "least likely of the gear, of its zero or of its scatter makes most of it."
         )
     if risk.rests_on:
         yield risk.rests_on
