@@ -83,7 +83,8 @@ def test_a_notebook_shows_the_answer(posterior):
 def test_a_probability_has_no_more_digits_than_it_can_have():
     assert chance(0.990173) == "99.0 %"
     assert chance(0.999966) == "more than 99.9 %"
-    assert chance(0.98) == "98 %"
+    assert chance(0.85) == "85 %"
+    assert chance(0.98) == "98.0 %"
     assert chance(1.0 - 1e-16) == "more than 99.9 %"
 
 
