@@ -16,8 +16,14 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
+from hdcal.inference.held import PILOT_NOISE
 from hdcal.inference.linearisation import linearise
-from hdcal.inference.noise_form import noise_grows
+from hdcal.inference.noise_form import (
+    Pilot,
+    noise_grows,
+    pilot_fit,
+    why_independent,
+)
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
@@ -161,16 +167,19 @@ def calibrate(
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     bound_executables()
-    chosen = _chosen(case, effects, registry, adapt_noise)
+    pilot = pilot_fit(case.records)
+    chosen = _chosen(case, effects, registry, pilot if adapt_noise else None)
     theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
-    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
+    model = {"theory": theory, "with_gap": with_gap, "noise_sd": pilot.noise_sd}
+    problem = build_problem(case, shipped, chosen, **model)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
+    settings |= {PILOT_NOISE: pilot.noise_sd}
     settings |= {"seconds": round(time.perf_counter() - began, 3)}
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
@@ -179,13 +188,16 @@ def _chosen(
     case: Case,
     names: Sequence[str],
     registry: Mapping[str, type[Effect]],
-    adapt_noise: bool,
+    pilot: Pilot | None,
 ) -> tuple[type[Effect], ...]:
-    """Return the effects, with noise that grows where it does and none is of noise."""
+    """Return the effects, with noise that grows where it does and none is of noise.
+
+    Without a pilot fit it is not asked.
+    """
     effects = choose_effects(names, registry)
     check_effect_priors(case, registry)
     spoken_of = any(effect.stage == "noise" for effect in effects)
-    grows = adapt_noise and not spoken_of and noise_grows(case)
+    grows = pilot is not None and not spoken_of and noise_grows(case, pilot)
     return (*effects, HeteroscedasticNoise) if grows else effects
 
 
@@ -202,7 +214,8 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
     }
     near = linearise(problem, centre, case.records)
     members = near.members / near.sd[:, None]
-    sigma = found.values["sigma"]
+    sigma, with_gap = found.values["sigma"], problem.discrepancy is not None
+    form = {"rounded": problem.rounded, "with_gap": with_gap}
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
@@ -212,7 +225,9 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
         mixed=_other_quantities(problem, found),
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),
-            correlation_check(found.values),
+            correlation_check(
+                found.values, why_independent(case, problem.effects, **form)
+            ),
             growth_check(found.values),
         ],
     )
