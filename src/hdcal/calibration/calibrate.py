@@ -19,7 +19,6 @@ from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.held import PILOT_NOISE
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.noise_form import (
-    Pilot,
     noise_grows,
     pilot_fit,
     why_independent,
@@ -145,6 +144,8 @@ def calibrate(
 ) -> Posterior:
     """Calibrate the force model against a case; the same seed gives the same draws.
 
+    The posterior may have failed its checks, see `Posterior.usable`.
+
     Args:
         case: from `read_case`.
         effects: names of effects to include.
@@ -158,29 +159,24 @@ def calibrate(
         registry: the library in which names are looked up.
         progress: called with (iterations done, iterations in all).
 
-    Returns:
-        The posterior; it may have failed its checks, see `Posterior.usable`.
-
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     bound_executables()
-    pilot = pilot_fit(case.records)
-    chosen = _chosen(case, effects, registry, pilot if adapt_noise else None)
+    chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
     theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
-    model = {"theory": theory, "with_gap": with_gap, "noise_sd": pilot.noise_sd}
+    model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
     problem = build_problem(case, shipped, chosen, **model)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
-    settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
-    settings |= {PILOT_NOISE: pilot.noise_sd}
-    settings |= {"seconds": round(time.perf_counter() - began, 3)}
+    settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
+    settings |= run_settings(found, began)
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
 
@@ -188,17 +184,17 @@ def _chosen(
     case: Case,
     names: Sequence[str],
     registry: Mapping[str, type[Effect]],
-    pilot: Pilot | None,
-) -> tuple[type[Effect], ...]:
+    adapt_noise: bool,
+) -> tuple[tuple[type[Effect], ...], float]:
     """Return the effects, with noise that grows where it does and none is of noise.
 
-    Without a pilot fit it is not asked.
+    And the noise sd of the pilot fit [N].
     """
-    effects = choose_effects(names, registry)
+    effects, pilot = choose_effects(names, registry), pilot_fit(case.records)
     check_effect_priors(case, registry)
     spoken_of = any(effect.stage == "noise" for effect in effects)
-    grows = pilot is not None and not spoken_of and noise_grows(case, pilot)
-    return (*effects, HeteroscedasticNoise) if grows else effects
+    grows = adapt_noise and not spoken_of and noise_grows(case, pilot)
+    return (*effects, HeteroscedasticNoise) if grows else effects, pilot.noise_sd
 
 
 def _shipped(chosen: Sequence[type[Effect]], names: Sequence[str]) -> dict[str, Prior]:

@@ -80,7 +80,8 @@ def _correlation_faults(family: str, numbers: Sequence[float]) -> list[Fault]:
     within = {
         "beta": True,
         "uniform": float(numbers[0]) >= 0.0 and last <= 1.0,
-        "fixed": 0.0 <= last < 1.0,
+        # Above 1 its range speaks.
+        "fixed": last >= 0.0 and last != 1.0,
     }
     if within.get(family, False):
         return []

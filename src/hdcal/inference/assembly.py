@@ -1,5 +1,6 @@
 """From draws to a posterior: what every kind of calibration does after sampling."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -90,6 +91,15 @@ def assemble(
     return tree, diagnoses, checks
 
 
-def run_settings(found: Draws) -> dict[str, object]:
-    """Return what the file says of a run that was not asked for."""
-    return {"target_acceptance": found.target_acceptance, "versions": versions()}
+def run_settings(found: Draws, began: float) -> dict[str, object]:
+    """Return what the file says of a run that was not asked for.
+
+    Args:
+        found: its draws.
+        began: `time.perf_counter` at its beginning [s].
+    """
+    return {
+        "target_acceptance": found.target_acceptance,
+        "versions": versions(),
+        "seconds": round(time.perf_counter() - began, 3),
+    }

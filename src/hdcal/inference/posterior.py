@@ -24,7 +24,7 @@ from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
 from hdcal.inference.member_counts import member_counts
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.values import site_shapes
+from hdcal.inference.values import MEMBER_SD, site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
@@ -117,7 +117,8 @@ class Posterior(Shown):
         zero = self.priors.get("force_offset")
         counts = member_counts(self.case, with_gap=False)
         mountings = counts.get("run", 0) if zero and is_stated(zero) else 0
-        sizes = self.tree["posterior"].to_dataset().median(("chain", "draw"))
+        scale = MEMBER_SD["run"]
+        sizes = {scale: np.median(self.draws[scale])} if mountings else {}
         return effective_priors(self.priors, sizes, mountings)
 
     def require_usable(self) -> None:

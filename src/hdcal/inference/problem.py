@@ -173,7 +173,8 @@ def unit_stiffness(case: Case, theory: Theory) -> float:
     return float(THEORIES[theory](case.gear.geometry, 1.0))
 
 
-def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
+def _checked(case: Case, effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Return the effects that have sites, all of which these data can bear."""
     findings = [
         Finding(
             case.name,
@@ -185,6 +186,9 @@ def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
     ]
     if findings:
         raise InputError(findings)
+    effects = without_scatter(effects)
+    check_padding(effects, case.records, case_reading(case))
+    return effects
 
 
 def build_problem(
@@ -201,21 +205,17 @@ def build_problem(
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: in the model. Those of scatter must have what they need and then
-            change nothing: the model's own members carry them.
+        effects: in the model; those of scatter change nothing, members carry them.
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
-        noise_sd: from `pilot_noise` [N], where it is known; it decides the form of
-            the noise.
+        noise_sd: from `pilot_noise` [N], where it is known; it decides the noise form.
 
     Raises:
         InputError: an effect lacks its covariates or a prior, or bears no padding.
     """
-    _check_needs(case, effects)
-    effects, theory = without_scatter(effects), theory or case.gear.theory
+    effects, theory = _checked(case, effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
-    check_padding(effects, records, reading)
     noise_sd = pilot_noise(records) if noise_sd is None else noise_sd
     members = member_counts(case, with_gap)
     rounded, correlated = noise_form(case, effects, members, noise_sd)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
@@ -163,8 +163,7 @@ def _tests(
     """Test each column beside what is absorbed, by generalised least squares.
 
     Where neighbours may err alike the p value is that given ρ, averaged over what the
-    data say of ρ with that column in the model. Without it a bend would pass for
-    correlation, and whitened by that it would not be seen.
+    data say of ρ with that column in the model: a bend alone passes for correlation.
 
     Args:
         residual: in noise sds, shape (n,).
@@ -173,8 +172,8 @@ def _tests(
         noise: how neighbours may err alike.
 
     Returns:
-        p value, coefficient of the unit-length remainder, that remainder, and the
-        name. Left out is what the model absorbs, and all where too few rows are left.
+        p value, coefficient of the unit-length remainder, that remainder and the name,
+        of what the model does not absorb; nothing where too few rows are left.
     """
 
     def beside(part):
@@ -193,16 +192,14 @@ def _tests(
     table = np.column_stack([basis, *units.values(), beside(residual)])
     squares, log_weight = _squares(table, noise)
     held, mixed = squares[:, :size, :size], squares[:, :size, size:]
-    left = squares[:, size:, size:]
-    left = left - np.swapaxes(mixed, 1, 2) @ np.linalg.solve(held, mixed)
+    left = squares[:, size:, size:] - mixed.mT @ np.linalg.solve(held, mixed)
     log_weight = log_weight - 0.5 * np.linalg.slogdet(held)[1]
     tests = []
     for index, (name, unit) in enumerate(units.items()):
         own, tied = left[:, index, index], left[:, index, -1]
         rest = np.maximum(left[:, -1, -1] - tied**2 / own, np.finfo(float).tiny)
         log_chance = log_weight - 0.5 * (np.log(own) + free * np.log(rest))
-        chance = np.exp(log_chance - log_chance.max())
-        chance /= chance.sum()
+        chance = special.softmax(log_chance)
         t = np.abs(tied) / np.sqrt(own * rest / free)
         p, part = chance @ (2.0 * stats.t.sf(t, free)), chance @ (tied / own)
         tests.append((float(p), float(part), unit, name))
