@@ -18,7 +18,8 @@ from arviz_base import from_dict
 from benchmarks.children import table
 from hdcal.data.case import Case, Gear
 from hdcal.data.gear import read_gear
-from hdcal.data.priors import effect_priors
+from hdcal.data.prior import Prior
+from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.records import Records
 from hdcal.inference import laplace
 from hdcal.inference.posterior import Posterior
@@ -44,8 +45,11 @@ force_calibration = { expanded_percent = 1.0, expanded_N = 0.2 }
 deformation_calibration = { expanded_percent = 0.6, expanded_mm = 0.002 }
 temperature_calibration = { expanded_K = 4.0 }
 """
+# Standard uncertainty of the displacement gauge's zero [mm].
+STATED_MM = 0.001
 TOLD = "as stated"
 WRONG = "gains ignored"
+TOUCHED = "contact as sure as its gauge"
 SILENT = "no certificate"
 QUANTITIES = ("load", "stiffness", "next reading")
 TAILS = np.array([0.025, 0.975])
@@ -63,10 +67,11 @@ def gear_of(text: str) -> Gear:
 @cache
 def gears() -> dict[str, Gear]:
     """Return what each contender is told of the rig."""
-    told = gear_of(SIZES + STATED)
+    told, gauge = gear_of(SIZES + STATED), Prior("normal", (0.0, STATED_MM))
     return {
         TOLD: told,
         WRONG: replace(told, gauge_priors={}),
+        TOUCHED: replace(told, priors={**told.priors, "deformation_offset": gauge}),
         SILENT: gear_of(SIZES),
     }
 
@@ -89,9 +94,9 @@ def made(seed: int) -> Rig:
         return float(rng.normal(*prior.numbers))
 
     gain, stretch, offset = map(normal, told.gauge_priors.values())
-    zero, contact = (
-        normal(told.priors[f"{n}_offset"]) for n in ("force", "deformation")
-    )
+    zero = normal(told.priors["force_offset"])
+    # Where the rig was found to touch the gear, by a gauge that is wrong too.
+    contact = normal(rig_priors()["deformation_offset"]) + rng.normal(0.0, STATED_MM)
     median, log_sd = told.priors["K"].numbers
     influence = median * np.exp(log_sd * rng.normal())
     modulus, loss = normal(told.priors["E0"]), normal(told.priors["alpha"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdcal.data.certificates import CLASSES
+from hdcal.data.certificates import CLASSES, is_stated
 from hdcal.data.gear import read_gear
 from hdcal.data.priors import rig_priors
 from hdcal.errors import InputError
@@ -38,7 +38,9 @@ def test_numbers_become_priors_of_gains_and_zeros(tmp_path):
         "temperature_offset": (0.0, 0.5),
     }
     assert found.priors["force_offset"].numbers == (0.0, pytest.approx(0.12))
-    assert found.priors["deformation_offset"].numbers == (0.0, 0.002)
+    contact = rig_priors()["deformation_offset"].numbers[1]
+    wanted = pytest.approx(np.hypot(contact, 0.002))
+    assert found.priors["deformation_offset"].numbers == (0.0, wanted)
 
 
 def test_without_a_certificate_nothing_changes(tmp_path):
@@ -53,6 +55,25 @@ def test_a_prior_of_the_file_wins_over_a_certificate(tmp_path):
     found = gear(tmp_path, FORCE.format("expanded_N = 0.3") + prior)
     assert found.priors["force_offset"].numbers == (1.0, 0.5)
     assert found.gauge_priors == {}
+
+
+CONTACTS = {
+    "normal": ("mean = 0.01, sd = 0.003", (0.01, 0.005)),
+    "fixed": ("value = 0.01", (0.01, 0.004)),
+    # Of other laws the sum is none that there is: the file's own word stays.
+    "uniform": ("low = -0.01, high = 0.03", (-0.01, 0.03)),
+}
+
+
+@pytest.mark.parametrize("family", CONTACTS)
+def test_a_displacement_gauge_adds_to_the_contact_point(tmp_path, family: str):
+    """Its certificate says nothing of where the rig touches the gear."""
+    given, wanted = CONTACTS[family]
+    certificate = "deformation_calibration = { expanded_mm = 0.008 }\n[priors]\n"
+    prior = f'deformation_offset = {{ family = "{family}", {given}, unit = "mm" }}\n'
+    found = gear(tmp_path, M + certificate + prior).priors["deformation_offset"]
+    assert found.numbers == pytest.approx(wanted)
+    assert is_stated(found) == (family != "uniform")
 
 
 PRESETS = [(kind, name) for kind, known in CLASSES.items() for name in known]

@@ -2,6 +2,7 @@
 
 import pytest
 
+from hdcal.data.gear import read_gear
 from hdcal.data.prior import FAMILIES
 from hdcal.data.priors import (
     MODEL_UNITS,
@@ -51,3 +52,45 @@ def test_the_effects():
     assert found["outliers.fraction"].numbers == (1.0, 13.0)
     assert found["thermal_zero_drift.slope"].unit == "N/K"
     assert all(prior.source.startswith("typical size: ") for prior in found.values())
+
+
+CORRELATION = "[priors]\nnoise_correlation = {{ {} }}\n"
+SIZES = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40.0\nlength_mm = 70.0\n"
+
+
+@pytest.mark.parametrize(
+    "entry",
+    [
+        'family = "fixed", value = 0.0',
+        'family = "fixed", value = 0.5',
+        'family = "uniform", low = 0.0, high = 1.0',
+        'family = "uniform", low = 0.2, high = 0.6',
+        'family = "beta", a = 1.0, b = 3.0',
+    ],
+)
+def test_a_correlation_may_be_none_known_or_a_share(tmp_path, entry: str):
+    (tmp_path / "gear.toml").write_text(SIZES + CORRELATION.format(entry))
+    prior = read_gear(tmp_path / "gear.toml").scale_priors["noise_correlation"]
+    assert prior.family in entry
+
+
+@pytest.mark.parametrize(
+    ("entry", "number"),
+    [
+        ('family = "fixed", value = 1.0', "value"),
+        ('family = "fixed", value = -0.1', "value"),
+        ('family = "uniform", low = 0.0, high = 1.5', "high"),
+        ('family = "uniform", low = -0.5, high = 0.5', "low"),
+        ('family = "normal", mean = 0.3, sd = 0.3', "family"),
+        ('family = "half_normal", sd = 0.3', "family"),
+        ('family = "lognormal", median = 0.3, log_sd = 0.3', "family"),
+    ],
+)
+def test_a_correlation_out_of_bounds_is_one_finding(tmp_path, entry, number):
+    (tmp_path / "gear.toml").write_text(SIZES + CORRELATION.format(entry))
+    with pytest.raises(InputError) as caught:
+        read_gear(tmp_path / "gear.toml")
+    (found,) = caught.value.findings
+    assert found.column == f"priors.noise_correlation.{number}"
+    assert "from 0 to below 1" in found.problem and '"beta"' in found.remedy
+    assert "gear.toml" in str(caught.value)

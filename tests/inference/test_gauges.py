@@ -148,7 +148,9 @@ def test_a_moving_gear_reads_the_same():
     ]
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
     assert problems[1].priors.keys() - problems[0].priors.keys() == SDS.keys()
-    sites = DynamicPosterior.sites(with_gear(case, certified()), (), False)
+    # The sites of a moving gear are the same whatever was sampled.
+    any_one = object.__new__(DynamicPosterior)
+    sites = any_one.sites(with_gear(case, certified()), (), False)
     assert SDS.keys() < sites.keys() <= problems[1].priors.keys()
 
 

@@ -2,15 +2,27 @@
 
 from dataclasses import replace
 
+import jax
 import numpy as np
 import pytest
-from rigs import autoregression, make_case, make_gear, make_records
+from rigs import autoregression, draw_truth, make_case, make_gear, make_records
+from scipy import stats
 
 from hdcal.calibration.calibrate import calibrate
-from hdcal.data.priors import Prior
+from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference.checks import correlation_check, growth_check
-from hdcal.inference.noise_form import correlates, noise_grows
+from hdcal.inference.density import log_likelihood
+from hdcal.inference.member_counts import member_counts
+from hdcal.inference.noise_form import (
+    correlates,
+    growth_p_value,
+    noise_form,
+    noise_grows,
+    why_independent,
+)
+from hdcal.inference.problem import build_problem
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
+from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Noise, Rows, parameters
 from hdcal.physics.registry import EFFECTS
 
@@ -69,6 +81,49 @@ def test_correlation_is_asked_where_it_can_be_told():
     assert correlates(few, ()) and not correlates(few, (), with_gap=True)
 
 
+def reason(case, effects=(), with_gap=False) -> str:
+    form = noise_form(case, effects, member_counts(case, with_gap), 0.6)
+    found = why_independent(case, effects, rounded=form[0], with_gap=with_gap)
+    assert form[1] == (not found)
+    return found
+
+
+def test_why_no_correlation_is_asked_for_is_said():
+    noise = np.random.default_rng(0).normal(0.0, 0.6, ROWS)
+    none = make_gear(noise_correlation=Prior("fixed", (0.0,)))
+    assert reason(case_of(noise)) == ""
+    assert "mixture" in reason(case_of(noise), (EFFECTS["outliers"],))
+    assert "follows" in reason(case_of(noise, run=np.arange(ROWS)))
+    assert "steps" in reason(case_of(noise, gear=make_gear(resolution=0.98)))
+    assert "49 rows" in reason(case_of(noise[:14], x=X[:14]), with_gap=True)
+    assert "prior" in reason(case_of(noise, gear=none))
+
+
+def test_none_seen_is_said_only_where_it_was_looked_for():
+    seen = correlation_check({CORRELATION: np.full((2, 50), 0.01)}, "")
+    assert seen.outcome == "passed" and "no correlation" in seen.words
+    unasked = correlation_check({}, "the steps are wide")
+    assert unasked.outcome == "note"
+    assert unasked.words.endswith("not inferred for these data: the steps are wide")
+
+
+def test_a_correlation_held_at_none_is_independent_noise():
+    """The density is that of least squares; any other correlation is another one."""
+    noise = np.random.default_rng(0).normal(0.0, 0.6, ROWS)
+    found = {}
+    for rho in (0.0, 0.5):
+        gear = make_gear(noise_correlation=Prior("fixed", (rho,)))
+        case = case_of(noise, gear=gear)
+        problem = build_problem(case, effect_priors())
+        values = draw_truth(problem, jax.random.key(1)) | {"sigma": np.float64(0.6)}
+        found[rho] = float(log_likelihood(problem, values))
+        mean = stiffness(problem, values) * (X - values["deformation_offset"])
+        mean = mean + values["force_offset"]
+        error = np.asarray(case.records.force) - mean
+        alone = stats.norm.logpdf(error, 0.0, 0.6).sum()
+        assert (found[rho] == pytest.approx(alone, rel=1e-9)) == (rho == 0.0)
+
+
 @pytest.fixture(scope="module")
 def alike():
     noise = autoregression(np.random.default_rng(3).normal(size=ROWS), 0 * X, 0.7)
@@ -84,8 +139,11 @@ def test_correlated_noise_widens_what_it_should(alike):
     wide, narrow = (np.std(one.draws["stiffness"]) for one in alike)
     # Of a line through 60 readings: √((1 + ρ)/(1 − ρ)) times, less what ρ may be.
     assert 1.5 < wide / narrow < 3.5
-    assert correlation_check(found.draws).outcome == "note"
-    assert correlation_check(independent.draws).outcome == "passed"
+    assert correlation_check(found.draws, "").outcome == "note"
+    told = {check.name: check for check in independent.checks}
+    found = told["neighbouring readings err independently"]
+    assert found.outcome == "note" and CORRELATION not in independent.draws
+    assert "not inferred" in found.words and "its prior says" in found.words
 
 
 def test_noise_of_one_size_is_seldom_let_grow():
@@ -94,6 +152,15 @@ def test_noise_of_one_size_is_seldom_let_grow():
         x = np.linspace(0.02, 0.54, rows)
         grown = [noise_grows(case_of(rng.normal(size=rows), x=x)) for _ in range(400)]
         assert np.mean(grown) < most
+
+
+def test_of_many_rows_a_trace_of_growth_is_none():
+    rng, x = np.random.default_rng(3), np.linspace(0.02, 0.54, 100_000)
+    for growth, seen in ((0.03, False), (0.3, True)):
+        sd = 0.6 * (1.0 + growth * x / x.max())
+        case = case_of(sd * rng.normal(size=len(x)), x=x)
+        assert growth_p_value((sd * rng.normal(size=len(x))) ** 2, x) < 0.01
+        assert noise_grows(case) is seen
 
 
 def test_noise_in_proportion_to_the_force_is_let_grow():

@@ -4,20 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs import cycles
+from rigs import autoregression, cycles
 from scipy import stats
 from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
+from hdcal.data.prior import Prior
+from hdcal.data.priors import rig_priors
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder
 from hdcal.inference.residual_shapes import (
     FALSE_ALARM,
+    Correlated,
     Whitened,
     find_structure,
+    orthonormal,
     shapes_of,
 )
 from hdcal.inference.residuals import residuals
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 
 SIZE_OF_SHAPE = 6.0
 
@@ -99,3 +104,67 @@ def test_thermal_demo_needs_its_effect():
     for name, value in truth.items():
         low, high = np.quantile(effect.draws[name], [0.025, 0.975])
         assert low < value < high, name
+
+
+# --- noise whose neighbours err alike, simulated: no sampler ---
+
+PRIOR = rig_priors()[CORRELATION]
+ALIKE = Correlated(previous_rows(RECORDS), PRIOR)
+
+
+def errors(rho: float, rng, count: int) -> list[np.ndarray]:
+    """Return autoregressive errors of 96 rows, sd 1."""
+    run = np.zeros(96, int)
+    return [autoregression(rng.normal(size=96), run, rho) for _ in range(count)]
+
+
+def alarms(rho: float, noise, count: int, bend: float = 0.0) -> int:
+    """Return how often a shape is found; `bend` is its rms in noise sds."""
+    column = whitened(np.zeros(96)).shapes["curvature"][0]
+    basis = orthonormal(whitened(np.zeros(96)).absorbed)
+    left = column - basis @ (basis.T @ column)
+    shape = bend * left / left.std()
+    rng = np.random.default_rng(11)
+    found = (
+        find_structure(whitened(error + shape), np.ones(96), noise)
+        for error in errors(rho, rng, count)
+    )
+    return sum(bool(shapes) for shapes in found)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.3, 0.6, 0.8])
+def test_correlated_noise_raises_few_false_alarms(rho: float):
+    few = alarms(rho, ALIKE, 400)
+    assert stats.binomtest(few, 400, FALSE_ALARM, "greater").pvalue > 1e-3
+
+
+def test_correlated_noise_taken_for_independent_is_noticed():
+    """The check can fail: as it was before the correlation was allowed for."""
+    many = alarms(0.6, None, 200)
+    assert stats.binomtest(many, 200, FALSE_ALARM, "greater").pvalue < 1e-6
+
+
+@pytest.mark.parametrize(("rho", "bend"), [(0.0, 0.6), (0.0, 3.0), (0.5, 1.2)])
+def test_a_bend_is_found_in_correlated_noise(rho: float, bend: float):
+    """A large one does not pass for a large correlation."""
+    assert alarms(rho, ALIKE, 60, bend) >= 55
+
+
+def test_a_known_correlation_is_generalised_least_squares():
+    """With dense matrices, runs that alternate included."""
+    rng, rho = np.random.default_rng(5), 0.6
+    run = np.arange(96) % 3
+    records = replace(RECORDS, run=run)
+    error = autoregression(rng.normal(size=96), run, rho)
+    data = whitened(error + 3.0 * np.asarray(RECORDS.sense))
+    noise = Correlated(previous_rows(records), Prior("fixed", (rho,)))
+    found = {shape.name: shape for shape in find_structure(data, np.ones(96), noise)}
+    apart = np.abs(np.arange(96)[:, None] - np.arange(96)) // 3
+    inverse = np.linalg.inv(np.where(run[:, None] == run, rho**apart, 0.0))
+    design = np.column_stack([data.absorbed, data.shapes["direction"][0]])
+    cover = np.linalg.inv(design.T @ inverse @ design)
+    fit = cover @ design.T @ inverse @ data.residual
+    left = data.residual - design @ fit
+    t = fit[-1] / np.sqrt(cover[-1, -1] * (left @ inverse @ left) / 93)
+    p = 2.0 * stats.t.sf(abs(t), 93) * len(data.shapes)
+    assert found["direction"].p_value == pytest.approx(p, rel=1e-6)

@@ -16,8 +16,13 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
+from hdcal.inference.held import PILOT_NOISE
 from hdcal.inference.linearisation import linearise
-from hdcal.inference.noise_form import noise_grows
+from hdcal.inference.noise_form import (
+    noise_grows,
+    pilot_fit,
+    why_independent,
+)
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
@@ -140,6 +145,8 @@ def calibrate(
 ) -> Posterior:
     """Calibrate the force model against a case; the same seed gives the same draws.
 
+    The posterior may have failed its checks, see `Posterior.usable`.
+
     Args:
         case: from `read_case`.
         effects: names of effects to include.
@@ -153,26 +160,24 @@ def calibrate(
         registry: the library in which names are looked up.
         progress: called with (iterations done, iterations in all).
 
-    Returns:
-        The posterior; it may have failed its checks, see `Posterior.usable`.
-
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates.
     """
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     bound_executables()
-    chosen = _chosen(case, effects, registry, adapt_noise)
+    chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
     theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
-    problem = build_problem(case, shipped, chosen, theory=theory, with_gap=with_gap)
+    model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
+    problem = build_problem(case, shipped, chosen, **model)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
-    settings = {"seed": seed, **size, "with_gap": with_gap, **run_settings(found)}
-    settings |= {"seconds": round(time.perf_counter() - began, 3)}
+    settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
+    settings |= run_settings(found, began)
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
 
@@ -181,15 +186,18 @@ def _chosen(
     names: Sequence[str],
     registry: Mapping[str, type[Effect]],
     adapt_noise: bool,
-) -> tuple[type[Effect], ...]:
-    """Return the effects, with noise that grows where it does and none is of noise."""
-    effects = choose_effects(names, registry)
+) -> tuple[tuple[type[Effect], ...], float]:
+    """Return the effects, with noise that grows where it does and none is of noise.
+
+    And the noise sd of the pilot fit [N].
+    """
+    effects, pilot = choose_effects(names, registry), pilot_fit(case.records)
     check_effect_priors(case, registry)
     spoken_of = any(effect.stage == "noise" for effect in effects)
     stated = case.gear.effect_priors.get(_SHARE)
     decided = spoken_of or (stated is not None and stated.family == "fixed")
-    grows = adapt_noise and not decided and noise_grows(case)
-    return (*effects, HeteroscedasticNoise) if grows else effects
+    grows = adapt_noise and not decided and noise_grows(case, pilot)
+    return (*effects, HeteroscedasticNoise) if grows else effects, pilot.noise_sd
 
 
 def _shipped(chosen: Sequence[type[Effect]], names: Sequence[str]) -> dict[str, Prior]:
@@ -205,7 +213,8 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
     }
     near = linearise(problem, centre, case.records)
     members = near.members / near.sd[:, None]
-    sigma = found.values["sigma"]
+    sigma, with_gap = found.values["sigma"], problem.discrepancy is not None
+    form = {"rounded": problem.rounded, "with_gap": with_gap}
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
@@ -215,7 +224,9 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
         mixed=_other_quantities(problem, found),
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),
-            correlation_check(found.values),
+            correlation_check(
+                found.values, why_independent(case, problem.effects, **form)
+            ),
             growth_check(found.values),
         ],
     )

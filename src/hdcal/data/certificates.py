@@ -1,9 +1,12 @@
 """Calibration certificates of the rig's gauges: what they state, and as priors.
 
 A gain is an error in proportion to the reading, a zero one that all readings share.
-Neither averages out over rows, and no row shows it.
+Neither averages out over rows, and no row shows it. The zero of a force gauge is the
+zero of the force. The zero of the deformation is where the rig touches the gear: to
+the error of finding that point a displacement gauge adds its own.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
@@ -145,3 +148,19 @@ def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior
             unit = GAUGE_UNITS.get(site) or MODEL_UNITS[site]
             found[site] = Prior("normal", (0.0, sd), unit, source)
     return found
+
+
+def contact_as_read(contact: Prior, gauge: Prior) -> Prior:
+    """Return the prior of the deformation that is read at first contact.
+
+    Args:
+        contact: prior of what is read there on a gauge without error [mm]. One that
+            is neither normal nor fixed stays as it is.
+        gauge: what the certificate of the gauge states [mm].
+    """
+    if contact.family not in ("normal", "fixed"):
+        return contact
+    middle, own = (*map(float, contact.numbers), 0.0)[:2]
+    sd = math.hypot(own, float(gauge.numbers[1]))
+    source = f"{gauge.source}; and of the contact: {contact.source}"
+    return Prior("normal", (middle, sd), gauge.unit, source)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from hdcal.data.case import Gear, Theory
-from hdcal.data.certificates import GAUGE_UNITS, certificate_priors
+from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
 from hdcal.data.gear_schema import GearFile, check_schema, size_findings
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.prior_entry import read_prior
@@ -37,7 +37,8 @@ def read_gear(
     """Read a gear file and merge its priors.
 
     Later ones win: shipped rig priors, the material's, those of certificates, those
-    of the gear file.
+    of the gear file. The certificate of a displacement gauge replaces no prior: it
+    adds to the error of the contact point.
     An influence coefficient K in the file refers to the theory in the file, the
     shipped one to `ring`.
 
@@ -75,6 +76,9 @@ def _assemble(
     given, effects = own
     stated = certificate_priors(measurement.certificates)
     merged = rig_priors() | facts | stated | given
+    if gauge := stated.get("deformation_offset"):
+        contact = (rig_priors() | given)["deformation_offset"]
+        merged["deformation_offset"] = contact_as_read(contact, gauge)
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     geometry = Geometry(
         wall_thickness=sizes.wall_thickness_mm,

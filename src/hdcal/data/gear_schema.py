@@ -83,6 +83,11 @@ def check_schema(toml: TomlFile) -> GearFile:
     return found
 
 
+def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
+    """Return the certificates in the tables of a gear file that was checked."""
+    return MeasurementTable.model_validate(table.get("measurement", {})).certificates
+
+
 def _translate(error: dict, toml: TomlFile) -> Finding:
     """One of pydantic's errors in the words of the gear file."""
     key = ".".join(str(part) for part in error["loc"])

@@ -56,11 +56,15 @@ def family_faults(family: str, numbers: Sequence[float]) -> list[Fault]:
 def sign_faults(family: str, numbers: Sequence[float], parameter: str) -> list[Fault]:
     """Return a fault where a parameter that is positive is centred below zero.
 
+    Likewise where the correlation of the noise can be none.
+
     Args:
         family: of the prior.
         numbers: of the family, in any unit.
         parameter: a key of `RANGES` or `NAMES`.
     """
+    if parameter == "noise_correlation":
+        return _correlation_faults(family, numbers)
     if family not in ("normal", "fixed", "uniform") or parameter in _SIGNED:
         return []
     lowest, name = numbers[0], FAMILIES[family][0]
@@ -68,6 +72,28 @@ def sign_faults(family: str, numbers: Sequence[float], parameter: str) -> list[F
         return []
     words = f"{parameter} is positive, but {name} is {lowest:g}"
     return [Fault(name, words, "Write a positive number")]
+
+
+def _correlation_faults(family: str, numbers: Sequence[float]) -> list[Fault]:
+    """Return a fault where a correlation could leave 0 to 1, or be 1 for certain."""
+    last = float(numbers[-1])
+    within = {
+        "beta": True,
+        "uniform": float(numbers[0]) >= 0.0 and last <= 1.0,
+        # Above 1 its range speaks.
+        "fixed": last >= 0.0 and last != 1.0,
+    }
+    if within.get(family, False):
+        return []
+    remedy = (
+        'Write family = "beta", "uniform" within 0 and 1, or "fixed" from 0 (none) to '
+        "below 1"
+    )
+    name = FAMILIES[family][-1] if family in within else "family"
+    if family == "uniform" and last <= 1.0:
+        name = "low"
+    words = f"a correlation lies from 0 to below 1, and this {family} prior does not"
+    return [Fault(name, words, remedy)]
 
 
 def range_faults(family: str, numbers: Sequence[float], quantity: str) -> list[Fault]:

@@ -1,7 +1,8 @@
 """From draws to a posterior: what every kind of calibration does after sampling."""
 
+import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -64,13 +65,17 @@ def assemble(
         own: of this kind of calibration.
         key: of the prior draws.
     """
+    weights = densities(problem, found.values)
+    centre = {name: np.median(v, axis=(0, 1)) for name, v in found.values.items()}
+    # From here on what is compared with the draws is what was believed of them.
+    problem = replace(problem, priors=problem.priors_given(centre))
     sampled = {
-        name: prior
+        name: problem.priors[name]
         for name, prior in priors.items()
         if name in found.values and prior.family != "fixed"
     }
     scalars = {name: found.values[name] for name in sampled}
-    diagnoses = diagnose_parameters(scalars, sampled, *densities(problem, found.values))
+    diagnoses = diagnose_parameters(scalars, sampled, *weights)
     prior_draws = draw_priors(sampled, key)
     tree = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
     dead = dead_parameters(own.slopes, problem)
@@ -86,6 +91,15 @@ def assemble(
     return tree, diagnoses, checks
 
 
-def run_settings(found: Draws) -> dict[str, object]:
-    """Return what the file says of a run that was not asked for."""
-    return {"target_acceptance": found.target_acceptance, "versions": versions()}
+def run_settings(found: Draws, began: float) -> dict[str, object]:
+    """Return what the file says of a run that was not asked for.
+
+    Args:
+        found: its draws.
+        began: `time.perf_counter` at its beginning [s].
+    """
+    return {
+        "target_acceptance": found.target_acceptance,
+        "versions": versions(),
+        "seconds": round(time.perf_counter() - began, 3),
+    }

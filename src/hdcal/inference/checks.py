@@ -119,15 +119,18 @@ def _check(name: str, passed: bool, words: str) -> Check:
     return Check(name, "passed" if passed else "failed", words)
 
 
-def correlation_check(draws: Mapping[str, np.ndarray]) -> Check:
-    """Say that neighbouring readings err alike, where the data show it.
+def correlation_check(draws: Mapping[str, np.ndarray], reason: str) -> Check:
+    """Say that neighbouring readings err alike, or that nobody looked.
 
     Args:
         draws: by parameter.
+        reason: why no correlation is in the model, from `why_independent`.
     """
     name = "neighbouring readings err independently"
-    found = draws.get(CORRELATION, np.zeros(1))
-    low, middle, high = np.quantile(found, [0.05, 0.5, 0.95])
+    if CORRELATION not in draws:
+        words = f"a correlation of neighbours is not inferred for these data: {reason}"
+        return Check(name, "note", words)
+    low, middle, high = np.quantile(draws[CORRELATION], [0.05, 0.5, 0.95])
     if low < _TOLD_CORRELATION:
         return Check(name, "passed", "no correlation of neighbours is seen")
     words = f"their correlation is {middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"

@@ -20,8 +20,7 @@ class DynamicPosterior(Posterior):
 
     kind: ClassVar[str] = "dynamic"
 
-    @staticmethod
-    def sites(case, effects, with_gap) -> dict[str, tuple[int, ...]]:
+    def sites(self, case, effects, with_gap) -> dict[str, tuple[int, ...]]:
         """Return the shape of each parameter that a draw holds."""
         return dict.fromkeys(("E0", "K", *case.gear.gauge_priors, *SITES), ())
 

@@ -15,6 +15,9 @@ from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.hypotheses import HeldOrigin, LeftOut
 
+# The setting that holds the noise sd of the fit before sampling [N].
+PILOT_NOISE = "pilot_noise_N"
+
 
 @dataclass(frozen=True)
 class HeldPrior:
@@ -127,6 +130,8 @@ class HeldSettings:
     kind: Literal["static", "dynamic"] = "static"
     diagnosis: HeldOrigin | None = None
     left_out: LeftOut | None = None
+    # Of older files the pilot fit is made anew.
+    pilot_noise_N: Size | None = None
 
 
 @dataclass(frozen=True)

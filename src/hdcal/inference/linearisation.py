@@ -94,7 +94,9 @@ def _members(problem: Problem, values, records: Records, columns, stiffening):
     table, place = [np.zeros((len(records.force), 0))], [np.zeros(0)]
     if 0 < problem.runs <= _MOST_MEMBERS:
         sd = values["run_offset_sd"]
-        table.append(sd * (records.run[:, None] == np.arange(problem.runs)))
+        # Deviations from the mean of the tested ones, which is the zero itself.
+        own = records.run[:, None] == np.arange(problem.runs)
+        table.append(sd * (own - 1.0 / problem.runs))
         place.append(values["run_offset"] / sd)
     if 0 < problem.specimens <= _MOST_MEMBERS:
         sd = values["specimen_sd"]

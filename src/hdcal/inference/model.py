@@ -108,11 +108,13 @@ def _sample_members(name: str, sd, count: int):
 
 
 def _widen_zero(problem: Problem, values: dict) -> None:
-    """Add what the tested mountings add on average to the zero of the gauge itself."""
-    gauge, zero = distribution(problem.priors["force_offset"]), values["force_offset"]
-    of_mean = values["run_offset_sd"] / jnp.sqrt(problem.runs)
-    both = dist.Normal(gauge.mean, jnp.hypot(gauge.variance**0.5, of_mean))
-    numpyro.factor("_zero", both.log_prob(zero) - gauge.log_prob(zero))
+    """Put the effective prior of the zero in the place of that of the gauge itself."""
+    name = "force_offset"
+    gauge, both = (
+        jnp.asarray(distribution(priors[name]).log_prob(values[name]))
+        for priors in (problem.priors, problem.priors_given(values))
+    )
+    numpyro.factor("_zero", both - gauge)
 
 
 def _sample_structure(problem: Problem, values: dict) -> None:

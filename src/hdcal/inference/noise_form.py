@@ -1,6 +1,7 @@
 """Which form the noise of a case has, decided by a pilot fit before any sampling."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
@@ -8,7 +9,7 @@ from scipy import stats
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.member_counts import member_counts
-from hdcal.inference.serial_correlation import previous_rows
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.physics.effect import Effect
 
 # Up to this many rows the noise that a fit leaves is a rough number, and the exact
@@ -24,25 +25,36 @@ _FINE_STEP_OF_FEW = 0.5
 _BESIDE_A_GAP = 49
 # Fewer rows do not show how their noise depends on anything.
 _LEAST_ROWS = 12
+# Noise sds over a range that differ by less are one: of very many rows any would show.
+_LEAST_GROWTH = 1.1
 # Probability that noise of one size is let grow: one parameter more, near nothing.
 _FALSE_ALARM = 0.05
 
 
+@dataclass(frozen=True)
+class Pilot:
+    """A fit before any sampling.
+
+    Attributes:
+        residual: of each row [N].
+        noise_sd: of the noise [N].
+    """
+
+    residual: np.ndarray
+    noise_sd: float
+
+
 def pilot_noise(records: Records) -> float:
-    """Return the noise sd left by a generous least-squares fit [N].
+    """Return the noise sd left by `pilot_fit` [N]."""
+    return pilot_fit(records).noise_sd
+
+
+def pilot_fit(records: Records) -> Pilot:
+    """Fit records by generous least squares.
 
     Generous, because too small a noise only chooses the exact rounding likelihood,
-    which is never wrong.
-    """
-    residual, free = _pilot(records)
-    return float(np.sqrt(residual @ residual / free))
-
-
-def _pilot(records: Records) -> tuple[np.ndarray, int]:
-    """Return residuals of a generous least-squares fit [N], and degrees of freedom.
-
-    A cubic in deformation with a slope for each specimen, a step for the direction
-    and temperature terms, within runs.
+    which is never wrong. A cubic in deformation with a slope for each specimen, a step
+    for the direction and temperature terms, within runs.
     """
     scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
@@ -55,20 +67,35 @@ def _pilot(records: Records) -> tuple[np.ndarray, int]:
     design, force = table[:, :-1], table[:, -1]
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
-    return residual, max(len(force) - len(count) - int(rank), 1)
+    free = max(len(force) - len(count) - int(rank), 1)
+    return Pilot(residual, float(np.sqrt(residual @ residual / free)))
 
 
-def noise_grows(case: Case) -> bool:
+def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     """Return whether readings clearly scatter more the farther the gear is deformed.
 
-    Not asked where every row's sd is stated, nor below the steps of the reading.
+    Not by so little that it matters to nobody. Not asked where every row's sd is
+    stated, nor below the steps of the reading.
+
+    Args:
+        case: records and gear.
+        pilot: fit of these records, where there is one.
     """
-    records = case.records
-    residual, free = _pilot(records)
-    coarse = case.gear.force_resolution > np.sqrt(residual @ residual / free)
-    if len(residual) < _LEAST_ROWS or coarse or "force_sd" in records.known:
+    records, pilot = case.records, pilot or pilot_fit(case.records)
+    coarse = case.gear.force_resolution > pilot.noise_sd
+    if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
-    return growth_p_value(residual**2, records.deformation) < _FALSE_ALARM
+    square = pilot.residual**2
+    clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
+    return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
+
+
+def _variance_ratio(square: np.ndarray, deformation) -> float:
+    """Return the variance at the farthest row over that at the nearest, on a line."""
+    far = np.abs(np.asarray(deformation))
+    slope, start = np.polyfit(far, square, 1)
+    least, most = start + slope * far.min(), start + slope * far.max()
+    return float(most / least) if least > 0.0 else np.inf
 
 
 def growth_p_value(square, deformation) -> float:
@@ -88,7 +115,11 @@ def growth_p_value(square, deformation) -> float:
 
 
 def correlates(
-    case: Case, effects: Sequence[type[Effect]], *, with_gap: bool = False
+    case: Case,
+    effects: Sequence[type[Effect]],
+    *,
+    with_gap: bool = False,
+    noise_sd: float | None = None,
 ) -> bool:
     """Return whether the model of a case has a correlation of neighbouring readings.
 
@@ -96,21 +127,42 @@ def correlates(
         case: records and gear.
         effects: in the model.
         with_gap: whether the leftover discrepancy is.
+        noise_sd: from `pilot_noise` [N], where it is known.
     """
-    members = member_counts(case, with_gap)
-    return noise_form(case, effects, members, pilot_noise(case.records))[1]
+    noise_sd = pilot_noise(case.records) if noise_sd is None else noise_sd
+    return noise_form(case, effects, member_counts(case, with_gap), noise_sd)[1]
 
 
 def noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, bool]:
-    """Return whether the noise needs its exact rounding, and may be correlated.
-
-    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
-    mixtures. A leftover discrepancy is told from correlated noise by many rows only.
-    """
+    """Return whether the noise needs its exact rounding, and may be correlated."""
     step, records = case.gear.force_resolution, case.records
     few = len(records.force) <= _FEW_ROWS and not members
     rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
-    one_normal = not any(effect.mixture for effect in effects)
-    neighbours = bool(np.any(previous_rows(records) >= 0))
-    told_apart = "discrepancy" not in members or len(records.force) >= _BESIDE_A_GAP
-    return rounded, one_normal and neighbours and told_apart and not rounded
+    beside = "discrepancy" in members
+    return rounded, not why_independent(case, effects, rounded=rounded, with_gap=beside)
+
+
+def why_independent(case: Case, effects, *, rounded: bool, with_gap: bool) -> str:
+    """Return why no correlation of neighbours is inferred; empty where it is.
+
+    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
+    mixtures. A leftover discrepancy is told from correlated noise by many rows only.
+
+    Args:
+        case: records and gear.
+        effects: in the model.
+        rounded: whether the noise needs its exact rounding.
+        with_gap: whether the leftover discrepancy is in the model.
+    """
+    prior, records = case.gear.scale_priors[CORRELATION], case.records
+    if prior.family == "fixed" and float(prior.numbers[0]) == 0.0:
+        return "its prior says that there is none"
+    if not np.any(previous_rows(records) >= 0):
+        return "no reading follows another one in its run"
+    if any(effect.mixture for effect in effects):
+        return "no exact likelihood is known beside noise that is a mixture"
+    if rounded:
+        return "the steps of the reading are too wide beside the noise"
+    if with_gap and len(records.force) < _BESIDE_A_GAP:
+        return f"fewer than {_BESIDE_A_GAP} rows do not tell it from the leftover"
+    return ""

@@ -11,17 +11,20 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.case import Case, Theory
+from hdcal.data.certificates import is_stated
 from hdcal.data.priors import Prior
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.held import HeldModel, HeldSettings
+from hdcal.inference.effective_priors import effective_priors
+from hdcal.inference.held import PILOT_NOISE, HeldModel, HeldSettings
 from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
+from hdcal.inference.member_counts import member_counts
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.values import site_shapes
+from hdcal.inference.values import MEMBER_SD, site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
@@ -41,7 +44,8 @@ class Posterior(Shown):
             observed_data, constant_data and log_likelihood.
         diagnoses: sampling quality and driver by parameter.
         checks: what was checked and what came out.
-        settings: seed, chains, warmup, draws, seconds, with_gap, versions.
+        settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
+            `PILOT_NOISE`, by which the form of the noise was decided [N].
     """
 
     kind: ClassVar[str] = "static"
@@ -55,12 +59,17 @@ class Posterior(Shown):
     checks: tuple[Check, ...]
     settings: Mapping[str, object]
 
-    @staticmethod
     def sites(
-        case: Case, effects: Sequence[type[Effect]], with_gap: bool
+        self, case: Case, effects: Sequence[type[Effect]], with_gap: bool
     ) -> dict[str, tuple[int, ...]]:
-        """Return the shape of each parameter that a draw holds."""
-        return site_shapes(case, effects, with_gap)
+        """Return the shape of each parameter that a draw of a model holds."""
+        return site_shapes(case, effects, with_gap, self._noise_sd)
+
+    @property
+    def _noise_sd(self) -> float | None:
+        """What decided the form of the noise [N]; None in older files."""
+        kept = self.settings.get(PILOT_NOISE)
+        return None if kept is None else float(str(kept))
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -99,7 +108,18 @@ class Posterior(Shown):
             self.effects,
             theory=self.theory,
             with_gap=bool(self.settings["with_gap"]),
+            noise_sd=self._noise_sd,
         )
+
+    @cached_property
+    def effective_priors(self) -> Mapping[str, Prior]:
+        """The priors, that of the force zero given how the mountings differ."""
+        zero = self.priors.get("force_offset")
+        counts = member_counts(self.case, with_gap=False)
+        mountings = counts.get("run", 0) if zero and is_stated(zero) else 0
+        scale = MEMBER_SD["run"]
+        sizes = {scale: np.median(self.draws[scale])} if mountings else {}
+        return effective_priors(self.priors, sizes, mountings)
 
     def require_usable(self) -> None:
         """Raise when nothing may be derived from this posterior.
@@ -174,11 +194,7 @@ class Posterior(Shown):
                 tree["observed_data"].to_dataset()["force"],
             )
             chosen = _look_up(model.effects, effects, file)
-            sites = cls.sites(case, chosen, settings.with_gap)
-            check_draws(tree, sites)
-            _check_mixture(tree, chosen, settings)
-            model.check_diagnoses(sites)
-            return cls(
+            found = cls(
                 case=case,
                 theory=model.theory,
                 effects=chosen,
@@ -188,6 +204,11 @@ class Posterior(Shown):
                 checks=tuple(model.checks),
                 settings=model.settings,
             )
+            sites = found.sites(case, chosen, settings.with_gap)
+            check_draws(tree, sites)
+            _check_mixture(tree, chosen, settings)
+            model.check_diagnoses(sites)
+            return found
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error
 

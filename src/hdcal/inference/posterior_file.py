@@ -16,6 +16,7 @@ from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, InputError
 from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
 from hdcal.inference.posterior_limits import check_container, check_rows
+from hdcal.inference.serial_correlation import CORRELATION
 
 FORMAT = "hdcal.posterior/1"
 # The attribute that holds the digest of everything else.
@@ -101,6 +102,8 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     gear = {f.name: getattr(held.gear, f.name) for f in fields(HeldGear)}
     for table in _TABLES:
         gear[table] = restore_priors(gear[table])
+    # A file without it is of before correlation was inferred: there was none.
+    gear["scale_priors"].setdefault(CORRELATION, Prior("fixed", (0.0,), "1"))
     gear["geometry"] = Geometry(**vars(held.gear.geometry))
     rows = {name: constant[name].to_numpy() for name in UNITS}
     rows["force"] = force.to_numpy()

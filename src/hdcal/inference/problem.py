@@ -16,6 +16,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
+from hdcal.inference.effective_priors import effective_priors
 from hdcal.inference.member_counts import (
     check_member_counts,
     integrated_kinds,
@@ -57,7 +58,7 @@ class Problem(Sampled):
             None where neighbours are not correlated or rows are compressed.
         correlated: whether neighbouring readings of a run may err alike.
         zero_stated: a certificate states the zero of the force gauge itself, to which
-            each mounting adds its own.
+            each mounting adds its own, see `priors_given`.
     """
 
     priors: dict[str, Prior]
@@ -78,6 +79,15 @@ class Problem(Sampled):
     before: Int[Array, " n"] | None = None
     correlated: bool = eqx.field(static=True, default=False)
     zero_stated: bool = eqx.field(static=True, default=False)
+
+    def priors_given(self, values: Mapping) -> dict[str, Prior]:
+        """Return the prior of each parameter given how mountings differ in a draw.
+
+        Args:
+            values: parameters of the draw.
+        """
+        mountings = self.runs if self.zero_stated else 0
+        return effective_priors(self.priors, values, mountings)
 
     @property
     def rows(self) -> Records:
@@ -163,7 +173,8 @@ def unit_stiffness(case: Case, theory: Theory) -> float:
     return float(THEORIES[theory](case.gear.geometry, 1.0))
 
 
-def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
+def _checked(case: Case, effects: Sequence[type[Effect]]) -> tuple[type[Effect], ...]:
+    """Return the effects that have sites, all of which these data can bear."""
     findings = [
         Finding(
             case.name,
@@ -175,6 +186,9 @@ def _check_needs(case: Case, effects: Sequence[type[Effect]]) -> None:
     ]
     if findings:
         raise InputError(findings)
+    effects = without_scatter(effects)
+    check_padding(effects, case.records, case_reading(case))
+    return effects
 
 
 def build_problem(
@@ -184,26 +198,26 @@ def build_problem(
     *,
     theory: Theory | None = None,
     with_gap: bool = False,
+    noise_sd: float | None = None,
 ) -> Problem:
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
     Args:
         case: records and gear.
         shipped: priors of every effect in the library.
-        effects: in the model. Those of scatter must have what they need and then
-            change nothing: the model's own members carry them.
+        effects: in the model; those of scatter change nothing, members carry them.
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
+        noise_sd: from `pilot_noise` [N], where it is known; it decides the noise form.
 
     Raises:
         InputError: an effect lacks its covariates or a prior, or bears no padding.
     """
-    _check_needs(case, effects)
-    effects, theory = without_scatter(effects), theory or case.gear.theory
+    effects, theory = _checked(case, effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
-    check_padding(effects, records, reading)
-    noise_sd, members = pilot_noise(records), member_counts(case, with_gap)
+    noise_sd = pilot_noise(records) if noise_sd is None else noise_sd
+    members = member_counts(case, with_gap)
     rounded, correlated = noise_form(case, effects, members, noise_sd)
     leftover = build_discrepancy(records.deformation) if with_gap else None
     columns, keep = _columns(records, reading), rounded or bool(effects)

@@ -3,12 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special, stats
 
+from hdcal.data.prior import Prior
 from hdcal.data.records import Records
+from hdcal.inference.distributions import frozen
 
 # Family-wise probability that pure noise is said to have a shape.
 FALSE_ALARM = 0.01
+# Correlations that are tried, and the largest: nearer to 1 is as good as that.
+_CORRELATIONS, _CLOSEST = 128, 0.99
 
 # Name -> (column, words if positive, words if negative).
 Shapes = dict[str, tuple[np.ndarray, str, str]]
@@ -47,6 +51,19 @@ class Whitened:
     residual: np.ndarray
     absorbed: np.ndarray
     shapes: Shapes
+
+
+@dataclass(frozen=True)
+class Correlated:
+    """Noise whose neighbours may err alike.
+
+    Attributes:
+        before: index of the row before each in its run, −1 for none, shape (n,).
+        prior: of their correlation.
+    """
+
+    before: np.ndarray
+    prior: Prior
 
 
 def shapes_of(records: Records, reference_temperature: float) -> Shapes:
@@ -94,7 +111,9 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
     return {name: shape for name, shape in shapes.items() if np.ptp(shape[0]) > 0.0}
 
 
-def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
+def find_structure(
+    data: Whitened, sd: np.ndarray, noise: Correlated | None = None
+) -> tuple[Structure, ...]:
     """Find the shapes that residuals have beyond what the model can absorb.
 
     The clearest shape is taken first; the others are then tested on what it leaves.
@@ -102,6 +121,7 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
     Args:
         data: residuals, sensitivities and shapes.
         sd: noise sd of each row [N].
+        noise: how neighbours may err alike; None where they do not in the model.
 
     Returns:
         The shapes found, each at a family-wise error of `FALSE_ALARM`, Bonferroni
@@ -110,12 +130,8 @@ def find_structure(data: Whitened, sd: np.ndarray) -> tuple[Structure, ...]:
     shapes, absorbed = dict(data.shapes), data.absorbed
     found: list[Structure] = []
     while shapes:
-        basis = orthonormal(absorbed)
-        tests = [
-            (*test, name)
-            for name, (column, _, _) in shapes.items()
-            if (test := _test(data.residual, column, basis)) is not None
-        ]
+        columns = {name: column for name, (column, _, _) in shapes.items()}
+        tests = _tests(data.residual, columns, orthonormal(absorbed), noise)
         if not tests:
             break
         p, part, left, name = min(tests, key=lambda test: test[0])
@@ -138,26 +154,87 @@ def orthonormal(absorbed: np.ndarray) -> np.ndarray:
     return left[:, strength > 1e-8 * strength[0]]
 
 
-def _test(residual, column, left):
-    """Test one column; None when the model absorbs it or too few rows are left.
+def _tests(
+    residual: np.ndarray,
+    columns: dict[str, np.ndarray],
+    basis: np.ndarray,
+    noise: Correlated | None,
+) -> list[tuple[float, float, np.ndarray, str]]:
+    """Test each column beside what is absorbed, by generalised least squares.
+
+    Where neighbours may err alike the p value is that given ρ, averaged over what the
+    data say of ρ with that column in the model: a bend alone passes for correlation.
 
     Args:
         residual: in noise sds, shape (n,).
-        column: likewise.
-        left: from `orthonormal`.
+        columns: likewise, by name.
+        basis: from `orthonormal`.
+        noise: how neighbours may err alike.
 
     Returns:
-        p value, coefficient of the unit-length remainder, and that remainder.
+        p value, coefficient of the unit-length remainder, that remainder and the name,
+        of what the model does not absorb; nothing where too few rows are left.
     """
-    size = np.linalg.norm(column)
-    error, column = (part - left @ (left.T @ part) for part in (residual, column))
-    free = len(error) - left.shape[1] - 1
-    norm = np.linalg.norm(column)
-    # Nearly all of it is absorbed: the rest is rounding, not evidence.
-    if free < 1 or norm <= 1e-3 * size:
-        return None
-    column = column / norm
-    part = float(column @ error)
-    rest = max(float(error @ error) - part**2, np.finfo(float).tiny)
-    p = 2.0 * stats.t.sf(abs(part) / np.sqrt(rest / free), free)
-    return float(p), part, column
+
+    def beside(part):
+        return part - basis @ (basis.T @ part)
+
+    size, free = basis.shape[1], len(residual) - basis.shape[1] - 1
+    rests = {name: beside(column) for name, column in columns.items()}
+    units = {
+        name: rest / np.linalg.norm(rest)
+        for name, rest in rests.items()
+        # Nearly all of it is absorbed: the rest is rounding, not evidence.
+        if np.linalg.norm(rest) > 1e-3 * np.linalg.norm(columns[name])
+    }
+    if free < 1 or not units:
+        return []
+    table = np.column_stack([basis, *units.values(), beside(residual)])
+    squares, log_weight = _squares(table, noise)
+    held, mixed = squares[:, :size, :size], squares[:, :size, size:]
+    left = squares[:, size:, size:] - mixed.mT @ np.linalg.solve(held, mixed)
+    log_weight = log_weight - 0.5 * np.linalg.slogdet(held)[1]
+    tests = []
+    for index, (name, unit) in enumerate(units.items()):
+        own, tied = left[:, index, index], left[:, index, -1]
+        rest = np.maximum(left[:, -1, -1] - tied**2 / own, np.finfo(float).tiny)
+        log_chance = log_weight - 0.5 * (np.log(own) + free * np.log(rest))
+        chance = special.softmax(log_chance)
+        t = np.abs(tied) / np.sqrt(own * rest / free)
+        p, part = chance @ (2.0 * stats.t.sf(t, free)), chance @ (tied / own)
+        tests.append((float(p), float(part), unit, name))
+    return tests
+
+
+def _squares(
+    table: np.ndarray, noise: Correlated | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return products of columns in which noise is independent, (m, k, k), for each ρ.
+
+    And the logarithm of the prior weight of each ρ times the density of its whitening,
+    (m,). The sums of whitened rows need those over rows and the rows before them only.
+    """
+    if noise is None:
+        return (table.T @ table)[None], np.zeros(1)
+    rho, weight = _correlations(noise.prior)
+    (follows,) = np.nonzero(noise.before >= 0)
+    own, before = table[follows], table[noise.before[follows]]
+    crossed, first = own.T @ before, np.delete(table, follows, axis=0)
+    r = rho[:, None, None]
+    rows = own.T @ own - r * (crossed + crossed.T) + r**2 * (before.T @ before)
+    volume = -0.5 * len(follows) * np.log1p(-(rho**2))
+    return first.T @ first + rows / (1.0 - r**2), np.log(weight) + volume
+
+
+def _correlations(prior: Prior) -> tuple[np.ndarray, np.ndarray]:
+    """Return correlations over all of their prior, and the weight of each."""
+    if prior.family == "fixed":
+        return np.array([float(prior.numbers[0])]), np.ones(1)
+    law = frozen(prior)
+    ends = np.clip(law.ppf([1e-3, 1.0 - 1e-3]), 0.0, _CLOSEST)
+    # Of ρ = tanh² v the prior is smooth in v, see `model`.
+    low, high = np.arctanh(np.sqrt(ends))
+    v = np.linspace(low, high, _CORRELATIONS + 1)
+    v = 0.5 * (v[1:] + v[:-1])
+    rho = np.tanh(v) ** 2
+    return rho, law.pdf(rho) * np.tanh(v) / np.cosh(v) ** 2

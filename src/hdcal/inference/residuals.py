@@ -6,18 +6,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.data.records import Records
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
 from hdcal.inference.linearisation import Linearisation, linearise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.problem import Problem
 from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
+    Correlated,
     Structure,
     Whitened,
     find_structure,
     shapes_of,
 )
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
@@ -65,7 +69,7 @@ def residuals(posterior: Posterior) -> Residuals:
     centre = {name: np.median(v, axis=0) for name, v in posterior.draws.items()}
     near = linearise(problem, centre, records)
     whitened = _whiten(posterior, centre, near, residual)
-    structure = find_structure(whitened, near.sd)
+    structure = find_structure(whitened, near.sd, _noise(problem, records))
     shapes = [whitened.shapes[shape.name][0] for shape in structure]
     rest = replace(whitened, absorbed=np.column_stack([whitened.absorbed, *shapes]))
     coarse = float(problem.step) > float(np.median(near.sd))
@@ -105,12 +109,19 @@ def _fit(problem, values, records, columns):
     return total / len(values["K"])
 
 
+def _noise(problem: Problem, records: Records) -> Correlated | None:
+    if not problem.correlated:
+        return None
+    return Correlated(previous_rows(records), problem.priors[CORRELATION])
+
+
 def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whitened:
     """Bring residuals, sensitivities and shapes to noise and prior sds."""
     records, sd = posterior.case.records, near.sd
+    priors = posterior.problem.priors_given(centre)
     table, pull = [near.members], [-near.place]
     for name, slope in near.slopes.items():
-        law = frozen(posterior.priors[name])
+        law = frozen(priors[name])
         table.append(slope[:, None] * law.std())
         pull.append(np.array([(law.mean() - centre[name]) / law.std()]))
     below = np.concatenate(pull)

@@ -1,5 +1,7 @@
 """What the one sampler can take: a problem with priors and a declared density."""
 
+from collections.abc import Mapping
+
 import equinox as eqx
 
 from hdcal.data.priors import Prior
@@ -16,3 +18,11 @@ class Sampled(eqx.Module):
     """
 
     priors: eqx.AbstractVar[dict[str, Prior]]
+
+    def priors_given(self, values: Mapping) -> dict[str, Prior]:
+        """Return the prior of each parameter given the scales of one draw.
+
+        Args:
+            values: parameters of the draw.
+        """
+        return self.priors

@@ -36,14 +36,24 @@ LEAST_NOISE = 0.1
 
 
 def site_shapes(
-    case: Case, effects: Sequence[type[Effect]], with_gap: bool
+    case: Case,
+    effects: Sequence[type[Effect]],
+    with_gap: bool,
+    noise_sd: float | None = None,
 ) -> dict[str, tuple[int, ...]]:
-    """Return the shape of each parameter that a draw of the model holds."""
+    """Return the shape of each parameter that a draw of the model holds.
+
+    Args:
+        case: records and gear.
+        effects: in the model.
+        with_gap: whether the leftover discrepancy is.
+        noise_sd: from `pilot_noise` [N], where it is known.
+    """
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     names += case.gear.gauge_priors
     for effect in without_scatter(effects):
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
-    if correlates(case, effects, with_gap=with_gap):
+    if correlates(case, effects, with_gap=with_gap, noise_sd=noise_sd):
         names.append(CORRELATION)
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
     for kind, count in member_counts(case, with_gap).items():

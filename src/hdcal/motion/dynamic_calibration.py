@@ -81,10 +81,9 @@ def calibrate_dynamic(
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, whitening, of_draws, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
-    settings |= run_settings(found)
     own = _specifics(problem, found, rival)
     parts = assemble(case, priors, problem, found, own, of_prior)
-    settings["seconds"] = round(time.perf_counter() - began, 3)
+    settings |= run_settings(found, began)
     return DynamicPosterior(case, theory, (), priors, *parts, settings)
 
 

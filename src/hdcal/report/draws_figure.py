@@ -48,7 +48,8 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def _draw_prior(axes: Axes, posterior: Posterior, name: str) -> None:
-    found, believed = posterior.diagnoses[name], frozen(posterior.priors[name])
+    found = posterior.diagnoses[name]
+    believed = frozen(posterior.effective_priors[name])
     shown, factor = unit_of(posterior, name)
     after = posterior.draws[name]
     # The prior's long tails would squeeze everything else into one bin.

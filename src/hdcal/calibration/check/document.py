@@ -21,7 +21,9 @@ STATED = {
         "next reading of this rig"
     ),
     "force_offset": _ZERO,
-    "deformation_offset": "it is the prior of that zero, which widens a load",
+    "deformation_offset": (
+        "it adds to the error of finding the first contact; both widen a load"
+    ),
 }
 OWN_SCATTER = (
     "force_sd is taken as scatter of its own in each row, which many rows average out, "

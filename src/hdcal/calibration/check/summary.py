@@ -18,7 +18,8 @@ from hdcal.calibration.check.document import (
     STATED,
 )
 from hdcal.data.case import Case, Gear
-from hdcal.data.certificates import ZEROS, is_stated
+from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
+from hdcal.data.gear_schema import certificates_in
 from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
@@ -63,12 +64,13 @@ def check_answer(case: Case) -> CheckAnswer:
 def _certificates(gear: Gear) -> tuple[StatedError, ...]:
     """Say what comes of the certificates that the gear file states."""
     priors = {name: gear.priors[name] for name in ZEROS} | gear.gauge_priors
+    stated = certificate_priors(certificates_in(gear.source))
     return tuple(
         StatedError(
             name,
-            float(prior.numbers[1]) * UNITS[name][1],
+            float(stated[name].numbers[1]) * UNITS[name][1],
             UNITS[name][0],
-            prior.source,
+            stated[name].source,
             STATED[name],
         )
         for name, prior in priors.items()
