@@ -1,6 +1,7 @@
 """What untested conditions add to readings one by one, by unknowns that they share."""
 
 from dataclasses import dataclass
+from math import hypot
 
 import jax
 import jax.numpy as jnp
@@ -72,7 +73,7 @@ class UntestedReading:
         return Addition(
             mean + sum(bend.shift for bend in bends),
             np.concatenate([[drift], *(bend.columns for bend in bends)]),
-            float(np.hypot(*(bend.rest for bend in bends))),
+            hypot(*(bend.rest for bend in bends)),
         )
 
     def _drift(self, deformation: float, temperature: float) -> tuple[float, float]:
