@@ -123,15 +123,9 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         tested = self._limits.were_tested(deformation, warmth)
-        terms = RowTerms()
-        if self._unequal is not None:
-            terms = self._unequal.at(deformation, warmth, tested=tested)
-        columns = self._columns(deformation, warmth - self._reference, time or 0.0)
-        columns = self._with_unknowns(columns, terms)
+        columns, terms = self._row(deformation, warmth, time or 0.0, tested=tested)
         rho, weight = self._noise.value, self._noise.weight
         middle, half, score = self._step(columns, force, terms)
-        self.rows, self._readings = self.rows + 1, self._readings + 1
-        self._full_scale.see(force)
         share, alarm = self._alarm.step(weight * score)
         found = {
             "schema": SCHEMA,
@@ -150,6 +144,17 @@ class Tracker:
         if alarm:
             self._restart()
         return found | _degeneracy(self._core, found["stiffness_N_per_mm"])
+
+    def _row(
+        self, deformation: float, warmth: float, time: float, *, tested: bool | None
+    ) -> tuple[np.ndarray, RowTerms]:
+        """Count a row; return its columns, and what it has beside the model."""
+        self.rows, self._readings = self.rows + 1, self._readings + 1
+        terms = RowTerms()
+        if self._unequal is not None:
+            terms = self._unequal.at(deformation, warmth, tested=tested)
+        columns = self._columns(deformation, warmth - self._reference, time)
+        return self._with_unknowns(columns, terms), terms
 
     def _with_unknowns(self, columns: np.ndarray, terms: RowTerms) -> np.ndarray:
         """Return the columns beside those of what untested conditions add.
@@ -176,6 +181,7 @@ class Tracker:
         Returns:
             Middle [N], half-width of the 95 % interval [N], normal score.
         """
+        self._full_scale.see(force)
         shift, weight = terms.shift, terms.weight
         columns, force = columns * weight, (force - shift) * weight
         expected = self._slow.expect(columns)
