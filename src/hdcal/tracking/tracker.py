@@ -202,7 +202,7 @@ class Tracker:
 
     def _set_threshold(self) -> None:
         """Take the threshold of a core that forgets, once it has settled."""
-        if self._forget == 1.0 or self._readings < settling_rows(self._forget):
+        if self._forget == 1.0 or self._readings <= settling_rows(self._forget):
             return
         rho = self._noise.value
         moved = abs(rho - self._threshold_for) > _ANOTHER_CORRELATION
