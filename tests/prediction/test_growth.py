@@ -9,7 +9,7 @@ from pulled_further import OF_TIME, all_pulled_further
 import hdcal
 from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
 from hdcal.prediction.engine.causes import causes_of
-from hdcal.prediction.engine.growth import Growth, fit_growths
+from hdcal.prediction.engine.growth import Growth, bend_covariance, fit_growths
 from hdcal.prediction.margin.margin import Margin
 
 QUICK = {"sensitivities": False}
@@ -47,6 +47,12 @@ def test_the_bend_is_that_of_a_dense_process(turned: bool):
     spread = spread - 0.36 * over @ np.linalg.solve(lines.T @ lines, over.T)
     np.testing.assert_allclose(mean, expected, rtol=5e-3, atol=5e-3)
     np.testing.assert_allclose(np.asarray(sd) ** 2, np.diag(spread), rtol=2e-2)
+
+    powers = new[:, None] ** np.arange(3)
+    taken = np.asarray(growth.given(7.0, 0.6)[1])
+    taken = powers @ (0.5 * (taken + taken.T)) @ powers.T
+    together = 49.0 * (bend_covariance(new, new) - taken)
+    np.testing.assert_allclose(together[1:, 1:], spread[1:, 1:], rtol=2e-2)
 
 
 def test_it_has_no_part_in_what_was_tested_and_begins_without_a_step():

@@ -14,7 +14,9 @@ from hdcal.tracking.tracker import Tracker
 STEP = 0.98
 
 
-def coverage(noise: float, streams: int, rows: int) -> tuple[float, float]:
+def coverage(
+    noise: float, streams: int, rows: int, forget: float = 1.0
+) -> tuple[float, float]:
     """Return how often reading and stiffness lie inside, five deformations in turn."""
     priors = {
         "K": Prior("lognormal", (2.6, 0.02)),
@@ -22,7 +24,7 @@ def coverage(noise: float, streams: int, rows: int) -> tuple[float, float]:
         "sigma": Prior("lognormal", (noise, 0.15)),
     }
     gear = make_gear(resolution=STEP, **priors)
-    begin, start = prior_from_gear(gear, seed=9), Tracker(gear)
+    begin, start = prior_from_gear(gear, seed=9), Tracker(gear, forget=forget)
     deformation = np.resize(np.linspace(0.05, 0.5, 5), rows)
     reading, stiffness = [], []
     for i in range(streams):
@@ -59,6 +61,45 @@ def test_intervals_hold_at_every_noise(noise):
     assert reading > 0.93
     # Errors of rounding at even spacing have longer tails than a normal law.
     assert stiffness > (0.8 if noise < 0.1 else 0.88)
+
+
+def test_intervals_hold_and_stay_where_the_past_is_forgotten():
+    reading, stiffness = coverage(0.05, 25, 300, forget=0.99)
+    assert reading > 0.93
+    assert stiffness >= 0.8
+
+
+def test_a_gear_that_softens_is_followed_where_the_past_is_forgotten():
+    gear, width = make_gear(resolution=1.0), {}
+    tracker, rng = Tracker(gear, forget=0.99), np.random.default_rng(0)
+    deformation = np.resize([0.1, 0.2, 0.3, 0.4, 0.5], 1500).tolist()
+    for row, at in enumerate(deformation):
+        stiffness = 209.0 if row < 1000 else 180.0
+        force = np.round(stiffness * at + 2.3 + rng.normal(0.0, 0.1))
+        low, high = tracker.update(at, float(force))["stiffness_N_per_mm"][
+            "credible_95"
+        ]
+        width[row] = high - low
+        if row in (100, 999):
+            assert low < 209.5 and high > 208.5
+    # Repeated readings say nothing new, and what fades they say again.
+    assert width[999] < 2.0 * width[100]
+    assert low < 180.5 and high > 179.5
+    assert tracker.alarms < 20
+
+
+@pytest.mark.parametrize("share", [0.2, 0.9])
+def test_what_is_kept_of_a_force_is_what_its_faded_number_says(share):
+    rounding, forget, kept, count = CoarseRounding(STEP, 0.9), 0.9, 0.0, 0.0
+    for row in range(60):
+        if row % 3:
+            rounding.weight(100.0, 0.0)
+            kept, count = forget * kept, forget * count
+            continue
+        count = forget * count + 1.0
+        kept = forget * kept + rounding.weight(12.0, share)
+        if share == 0.9:
+            assert kept == pytest.approx(count / (count * share + 1.0 - share))
 
 
 @pytest.mark.parametrize("share", [0.2, 1.0])

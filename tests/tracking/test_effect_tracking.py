@@ -118,7 +118,7 @@ def test_the_force_without_the_effect_is_that_of_the_linear_core():
     ("name", "words"),
     [
         ("coulomb_friction", "needs unloading"),
-        ("heteroscedastic_noise", "shapes the noise"),
+        ("outliers", "shapes the noise"),
         ("charge_leakage", "remembers earlier rows"),
         ("force_saturation", "is not linear in the stiffness"),
     ],
@@ -145,3 +145,46 @@ def test_an_effect_of_temperature_needs_the_temperature():
 
 def test_half_of_a_normal_interval_is_the_limit():
     assert half_width(1e9) == pytest.approx(stats.norm.ppf(0.975), rel=1e-6)
+
+
+GROWING = {"heteroscedastic_noise__share": (0.03, 0.003)}
+
+
+def test_noise_that_grows_is_taken_at_every_reading():
+    """2.4 N beside 0.8 N at 0.4 mm; without a force as without the effect."""
+    plain, growing = handmade([]), handmade(["heteroscedastic_noise"], **GROWING)
+
+    def band(known, at: float) -> float:
+        found = Tracker(known).update(at, 194.0 * at)["force_N"]["predictive_95"]
+        return (found[1] - found[0]) / 3.92
+
+    added = band(growing, 0.4) ** 2 - band(plain, 0.4) ** 2
+    assert added == pytest.approx((0.03 * 194.0 * 0.4) ** 2, rel=0.1)
+    assert band(growing, 0.0) == pytest.approx(band(plain, 0.0), rel=0.05)
+
+
+@pytest.mark.parametrize("others", [{}, ONSET])
+def test_streams_whose_noise_grows_have_normal_scores(others):
+    names = ["heteroscedastic_noise", *(["contact_onset"] if others else [])]
+    tracker, rng = (
+        Tracker(handmade(names, **GROWING, **others)),
+        np.random.default_rng(5),
+    )
+    w = rng.uniform(0.0, 0.54, 300)
+    force = 194.0 * w
+    if others:
+        force = force + 194.0 * 0.3 * np.maximum(0.0, w - 0.25)
+    force = force + rng.normal(0.0, np.hypot(0.8, 0.03 * 194.0 * w))
+    scores = np.array(
+        [
+            tracker.update(*row)["innovation"]
+            for row in zip(w.tolist(), force.tolist(), strict=True)
+        ]
+    )
+    for part in (scores[w < 0.15], scores[w > 0.4]):
+        assert np.std(part) == pytest.approx(1.0, abs=0.25)
+
+
+def test_growing_noise_goes_with_forgetting():
+    posterior = handmade(["heteroscedastic_noise"], **GROWING)
+    assert Tracker(posterior, forget=0.99).update(0.2, 39.0)["row"] == 1

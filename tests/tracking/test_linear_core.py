@@ -223,3 +223,35 @@ def test_memory_does_not_grow():
         for n in (10, 3000)
     }
     assert len(sizes) == 1
+
+
+@pytest.mark.parametrize("forget", [1.0, 0.95])
+def test_unknowns_that_come_later_are_those_of_the_beginning(forget):
+    first, later = follow_with_unknowns(forget, 0), follow_with_unknowns(forget, 15)
+    np.testing.assert_allclose(later.mean, first.mean, rtol=1e-6)
+    np.testing.assert_allclose(covariance_of(later), covariance_of(first), rtol=1e-6)
+
+
+def follow_with_unknowns(forget: float, at: int) -> LinearCore:
+    """Follow rows of a known noise, of which the last see two unknowns as well."""
+    prior = replace(make_prior(), shape=1e8, rate=1e8)
+    design, force = rows(40, hard=False)
+    core = LinearCore(prior, forget)
+    for row in range(40):
+        if row == at:
+            core.add_unknowns(2)
+        own = [] if row < at else [float(row > 20), float(row > 30)]
+        core.step(np.append(design[row], own), float(force[row] + sum(own)))
+    return core
+
+
+def test_unknowns_fade_to_what_they_began_with():
+    core = LinearCore(make_prior(), 0.9)
+    core.add_unknowns(1)
+    core.step(np.array([0.3, 0.0, 1.0, 0.0, 5.0]), 70.0)
+    for _ in range(400):
+        core.fade()
+    _, sd, _ = core.coefficient(4)
+    expected = LinearCore(make_prior())
+    expected.add_unknowns(1)
+    assert sd == pytest.approx(expected.coefficient(4)[1], rel=1e-3)

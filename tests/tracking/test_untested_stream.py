@@ -1,5 +1,6 @@
 """Readings at untested conditions: their bands are wide, and they teach little."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +11,11 @@ import hdcal
 from hdcal.errors import InputError
 from hdcal.inference.hypotheses import LEFT_OUT
 from hdcal.inference.mixed_posterior import mixed_posterior
-from hdcal.prediction.engine.untested_reading import UntestedReading
+from hdcal.prediction.engine.untested_reading import Addition, UntestedReading
+from hdcal.tracking.stream_prior import prior_from_posterior
 from hdcal.tracking.tracker import Tracker
+
+PLACES = [0.6, 0.7, 0.8, 0.9, 1.0]
 
 
 def width(found: dict) -> float:
@@ -19,35 +23,46 @@ def width(found: dict) -> float:
     return high - low
 
 
+def spread(added: Addition) -> float:
+    return float(np.hypot(np.linalg.norm(added.columns), added.rest))
+
+
 def test_the_band_widens_as_that_of_predict():
     posterior = single()
     added = UntestedReading(posterior)
     for at, warm in ((0.9, 20.0), (0.4, 80.0), (-0.3, 20.0)):
         tested = Tracker(posterior)
-        tested._untested = None
+        tested._unequal = None
         narrow = width(tested.update(at, 205.0 * at - 1.0, temperature=warm))
         found = Tracker(posterior).update(at, 205.0 * at - 1.0, temperature=warm)
-        _, sd = added.at(at, warm)
+        sd = spread(added.at(at, warm))
         expected = np.hypot(narrow, 2 * 1.96 * sd)
         assert not found["tested"]
         assert width(found) == pytest.approx(expected, rel=0.1)
         assert width(found) > 1.05 * narrow
     inside = added.at(0.4, 20.0)
-    assert inside == pytest.approx((0.0, 0.0), abs=1e-9)
+    assert (inside.shift, spread(inside)) == (0.0, 0.0)
 
 
-def test_what_is_added_is_what_predict_adds():
+@pytest.mark.parametrize(("at", "warm"), [(0.4, 80.0), (0.9, 20.0), (-0.3, 20.0)])
+def test_what_is_added_is_what_predict_adds(at, warm):
     posterior = single()
-    shift, sd = UntestedReading(posterior).at(0.4, 80.0)
+    added = UntestedReading(posterior).at(at, warm)
     far, near = (
-        hdcal.predict(posterior, [0.4], [warm]).columns() for warm in (80.0, 20.0)
+        hdcal.predict(posterior, [where], [heat]).columns()
+        for where, heat in ((at, warm), (0.4, 20.0))
     )
-    spread = [
+    ends = [
         np.ptp([found[f"physics_{end}_N"][0] for end in ("lo", "hi")]) / 3.92
         for found in (far, near)
     ]
-    # Young's modulus has its own, smaller part in it.
-    assert spread[0] == pytest.approx(np.hypot(sd, spread[1]), rel=0.1)
+    # Stiffness and Young's modulus have their own, smaller part in it.
+    assert ends[0] == pytest.approx(np.hypot(spread(added), ends[1]), rel=0.1)
+
+
+def test_the_drift_has_no_preferred_sense():
+    added = UntestedReading(single()).at(0.4, 80.0)
+    shift, sd = added.shift, spread(added)
     assert abs(shift) < 0.2 * sd
 
 
@@ -56,13 +71,89 @@ def test_a_bend_beyond_what_was_tested_is_not_learned_as_stiffness():
     x = np.linspace(0.02, 0.54, 30)
     posterior = regressed(x, 200.0 * x + rng.normal(0.0, 0.5, 30), rng)
     known, naive = Tracker(posterior), Tracker(posterior)
-    naive._untested = None
+    naive._unequal = None
     for at in np.linspace(0.6, 1.0, 40):
         # Stiffer beyond the tested range, as no row could show.
         force = 200.0 * at * (1.0 + 0.3 * (at - 0.54)) + rng.normal(0.0, 0.5)
         found, other = known.update(at, force), naive.update(at, force)
     assert found["stiffness_N_per_mm"]["mean"] == pytest.approx(200.0, abs=10.0)
     assert other["stiffness_N_per_mm"]["mean"] > 215.0
+
+
+def followed(posterior, places, streams: int, rows: int, alarm_rows: float = 100.0):
+    """Follow readings at places beyond the tested range, whose bend is from its law.
+
+    Returns:
+        Share of streams whose stiffness lies in its interval at the end, share of
+        readings in theirs, and alarms over those due.
+    """
+    added, prior = UntestedReading(posterior), prior_from_posterior(posterior)
+    start = Tracker(posterior, alarm_rows=alarm_rows)
+    stiffness, reading, alarms = [], [], 0
+    terms = [added.at(place, 20.0) for place in places]
+    for seed in range(streams):
+        rng, mine = np.random.default_rng(800 + seed), copy.deepcopy(start)
+        draw = rng.integers(len(prior.variance))
+        truth, sd = prior.coefficients()[draw], np.sqrt(prior.variance[draw])
+        common = rng.normal(size=len(terms[0].columns))
+        at = np.resize(places, rows)
+        bend = [t.shift + t.columns @ common + t.rest * rng.normal() for t in terms]
+        force = truth[0] * at + truth[2] + np.resize(bend, rows)
+        force = force + rng.normal(0.0, sd, rows)
+        found = {}
+        for row in zip(at.tolist(), force.tolist(), strict=True):
+            found = mine.update(*row)
+            low, high = found["force_N"]["predictive_95"]
+            reading.append(low < row[1] < high)
+        low, high = found["stiffness_N_per_mm"]["credible_95"]
+        stiffness.append(low < truth[0] < high)
+        alarms += mine.alarms
+    due = streams * rows / alarm_rows
+    return np.mean(stiffness), np.mean(reading), alarms / due
+
+
+def test_a_common_error_is_never_averaged_away():
+    stiffness, reading, alarms = followed(single(), PLACES, 30, 150)
+    # Chance of fewer than 25 of 30 at 95 %: 0.3 %.
+    assert stiffness >= 0.83
+    # Four sds of chance in 4500 rows; 45 alarms are due.
+    assert reading == pytest.approx(0.95, abs=0.013)
+    assert 1.0 / 1.5 < alarms < 1.5
+
+
+def test_errors_that_are_taken_as_independent_are_flagged(monkeypatch):
+    real = UntestedReading.at
+
+    def independent(self, *at):
+        found = real(self, *at)
+        return Addition(found.shift, 0.0 * found.columns, spread(found))
+
+    posterior = single()
+    reader, places = UntestedReading(posterior), np.resize(PLACES, 600).tolist()
+    # A bend that is one sd below its mean.
+    bend = {at: a.shift - spread(a) for at in PLACES for a in [reader.at(at, 20.0)]}
+
+    def last() -> list[float]:
+        tracker, rng, found = Tracker(posterior), np.random.default_rng(0), {}
+        for at in places:
+            force = 205.0 * at - 1.0 + bend[at] + rng.normal(0.0, 0.6)
+            found = tracker.update(at, force)
+        return found["stiffness_N_per_mm"]["credible_95"]
+
+    low, high = last()
+    assert low < 205.0 < high
+    monkeypatch.setattr(UntestedReading, "at", independent)
+    low, high = last()
+    assert not low < 205.0 < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("places", [[0.81], PLACES])
+def test_a_common_error_is_never_averaged_away_in_long_streams(places):
+    stiffness, reading, alarms = followed(single(), places, 200, 2000)
+    assert stiffness >= 0.93
+    assert reading == pytest.approx(0.95, abs=0.003)
+    assert 1.0 / 1.5 < alarms < 1.5
 
 
 def mixture(**shares: float):

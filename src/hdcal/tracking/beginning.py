@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
-from hdcal.tracking.effect_tracking import build_particles
+from hdcal.tracking.effect_tracking import build_particles, force_effects
 from hdcal.tracking.first_rows import FirstRows
 from hdcal.tracking.linear_core import LinearCore
 from hdcal.tracking.normal_inverse_gamma import match_draws
@@ -41,7 +41,7 @@ def begin_core(
     """Return the core, and what makes of a row the columns that it takes."""
     if isinstance(known, Gear):
         return FirstRows(prior.coefficients(), prior.variance), _linear_columns
-    if known.problem.effects:
+    if force_effects(known):
         return build_particles(known, prior, forget)
     law = match_draws(prior.coefficients(), prior.variance)
     return LinearCore(law, forget), _linear_columns

@@ -25,11 +25,15 @@ class CoarseRounding:
 
     Args:
         step: of the force as read [N], 0 = not rounded.
+        forget: share of what is known that is kept at each row, 1 = all. A count fades
+            as the knowledge does.
     """
 
-    def __init__(self, step: float):
-        self._step = step
-        self._count: dict[int, int] = {}
+    def __init__(self, step: float, forget: float = 1.0):
+        self._step, self._forget = step, forget
+        # Readings of a cell, faded to the row of the last one, and which row that was.
+        self._count: dict[int, tuple[float, int]] = {}
+        self._rows = 0
 
     def restart(self) -> None:
         """Begin anew, as on another mounting, where forces have another zero."""
@@ -49,18 +53,31 @@ class CoarseRounding:
         return min(found, 1.0) if found > _LEAST_SHARE else 0.0
 
     def weight(self, expected: float, share: float) -> float:
-        """Return what a reading adds, as a share of what the first of its force said.
+        """Return what the next row adds, over what the first of its force said.
+
+        So what is kept of all rows of a force is what their faded number says: a row
+        says anew what has faded since.
 
         Args:
             expected: force before rounding [N].
             share: from `share`.
         """
+        self._rows += 1
         if share == 0.0:
             return 1.0
         cell = round(expected / (_CELL * self._step))
-        before = sum(self._count.get(near, 0) for near in range(cell - 1, cell + 2))
+        near = [self._count.get(cell + i, (0.0, self._rows)) for i in (-1, 0, 1)]
+        before = sum(count * self._kept(row) for count, row in near)
         if cell in self._count or len(self._count) < _MOST_CELLS:
-            self._count[cell] = self._count.get(cell, 0) + 1
-        rest = 1.0 - share
-        after = before + 1
-        return after / (after * share + rest) - before / (max(before, 1) * share + rest)
+            count, row = near[1]
+            self._count[cell] = count * self._kept(row) + 1.0, self._rows
+        rest, after = 1.0 - share, before + 1.0
+        said = after / (after * share + rest)
+        if before > 0.0:
+            kept = max(self._kept(row) for count, row in near if count)
+            said -= before * kept / (before * share + rest * kept)
+        return min(said, 1.0)
+
+    def _kept(self, row: int) -> float:
+        """Return the share that is kept of what was known at a row."""
+        return self._forget ** (self._rows - row)

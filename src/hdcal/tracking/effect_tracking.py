@@ -13,6 +13,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
+from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
 from hdcal.prediction.engine.forces import grid_records
 from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import StreamPrior
@@ -61,6 +62,15 @@ def build_particles(
     return _particles(posterior, prior, chosen), columns
 
 
+def force_effects(posterior: Posterior) -> list[type[Effect]]:
+    """Return the effects that have to be followed.
+
+    Noise that grows with the force only weighs the rows, see `UnequalRows`.
+    """
+    effects = posterior.problem.effects
+    return [effect for effect in effects if effect is not HeteroscedasticNoise]
+
+
 def unfollowed(posterior: Posterior, prior: StreamPrior) -> list[Finding]:
     """Return which effects of a posterior cannot be followed row by row.
 
@@ -69,7 +79,7 @@ def unfollowed(posterior: Posterior, prior: StreamPrior) -> list[Finding]:
         prior: of the stream, from the same posterior.
     """
     few, findings = _particle_draws(posterior)[::16], []
-    for effect in posterior.problem.effects:
+    for effect in force_effects(posterior):
         words = _undeclared(effect) or _tried(effect, posterior, prior, few)
         if words:
             remedy = "Calibrate without it, or diagnose blocks of rows"
@@ -85,7 +95,7 @@ def _particle_draws(posterior: Posterior) -> np.ndarray:
 def _undeclared(effect: type[Effect]) -> str | None:
     """Say why an effect cannot be followed, as far as it declares it."""
     if effect.stage == "noise":
-        return "shapes the noise, which is taken as one normal"
+        return "shapes the noise, which is taken as normal"
     lacking = sorted(effect.needs - _CARRIED)
     return f"needs {', '.join(lacking)}, which a stream lacks" if lacking else None
 
@@ -170,7 +180,12 @@ def _columns(draws: Draws, reading: Reading, ends, row):
 def _particles(posterior: Posterior, prior: StreamPrior, chosen) -> Particles:
     draws = posterior.draws
     sites = ["alpha", "deformation_offset"]
-    sites += [name for name in posterior.priors if "." in name and name in draws]
+    noise = f"{HeteroscedasticNoise.name}."
+    sites += [
+        name
+        for name in posterior.priors
+        if "." in name and name in draws and not name.startswith(noise)
+    ]
     fixed = np.stack([draws[name] for name in sites], axis=1)
     sd = fixed.std(axis=0)
     stiffness = np.asarray(prior.base.stiffness) * prior.reading.radial_per_read

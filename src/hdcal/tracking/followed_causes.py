@@ -4,7 +4,7 @@ from hdcal.inference.mixed_posterior import mixed_posterior, models_of
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.causes import averaging_words, causes_of
 from hdcal.report.words import hypothesis, percent
-from hdcal.tracking.effect_tracking import unfollowed
+from hdcal.tracking.effect_tracking import force_effects, unfollowed
 from hdcal.tracking.stream_prior import prior_from_posterior
 
 # Of less of the probability nothing is said by following the rest.
@@ -47,6 +47,6 @@ def followed_causes(known: Posterior, forget: float) -> tuple[Posterior, list[st
 def _can_be_followed(alone: Posterior, forget: float) -> bool:
     if alone.problem.discrepancy is not None:
         return False
-    if not alone.problem.effects:
+    if not force_effects(alone):
         return True
     return forget == 1.0 and not unfollowed(alone, prior_from_posterior(alone))

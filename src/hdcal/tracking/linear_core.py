@@ -8,6 +8,7 @@ this keeps its digits when rows hardly differ from each other.
 Arrays have leading axes "...": none for one core, one for many cores side by side.
 """
 
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -91,6 +92,20 @@ class LinearCores:
         spread = spread / (wide + (noise * wide) ** 0.5)[..., None]
         self.root -= gain[..., :, None] * spread[..., None, :]
 
+    def add_unknowns(self, count: int) -> None:
+        """Let rows have more columns at their end, of independent unknowns N(0, 1).
+
+        Args:
+            count: of the columns.
+        """
+        own = np.eye(count) / np.sqrt(self.rate / self.shape)[..., None, None]
+        prior = self.prior
+        self.mean = _longer(self.mean, count)
+        self.root = np.asfortranarray(_beside(self.root, own))
+        mean, root = _longer(prior.mean, count), _beside(prior.root, own)
+        self.prior = replace(prior, mean=mean, root=root)
+        self._inverse = np.linalg.pinv(root)
+
     def slower(self) -> Self:
         """Return what follows the noise of the last rows less: itself."""
         return self
@@ -130,6 +145,21 @@ class LinearCore(LinearCores):
     def __init__(self, prior: NormalInverseGamma, forget: float = 1.0):
         super().__init__(prior)
         self._forget, self._kept = forget, forget * np.eye(prior.root.shape[1])
+        self._faded = self._inverse / _FADED
+
+    def add_unknowns(self, count: int) -> None:
+        """Let rows have more columns at their end, of independent unknowns N(0, 1).
+
+        What is forgotten of these fades to what they began with, and no wider.
+
+        Args:
+            count: of the columns.
+        """
+        super().add_unknowns(count)
+        self._kept = self._forget * np.eye(self.root.shape[1])
+        self._faded = self._inverse / np.append(
+            np.full(len(self.mean) - count, _FADED), np.ones(count)
+        )
 
     def step(
         self, columns: np.ndarray, force: float, weight: float = 1.0
@@ -174,13 +204,25 @@ class LinearCore(LinearCores):
         keep, prior = self._forget, self.prior
         if keep == 1.0:
             return
-        part = (1.0 - keep) / _FADED**2
-        relative = self._inverse @ self.root
-        precision = part * (relative.T @ relative) + self._kept
+        relative = self._faded @ self.root
+        precision = (1.0 - keep) * (relative.T @ relative) + self._kept
         # LAPACK itself: on these sizes NumPy's wrappers take ten times as long.
         factor, _ = dpotrf(precision, lower=1)
         self.root = dtrtrs(factor, self.root.T, lower=1)[0].T
-        away = (prior.mean - self.mean) @ (part * self._inverse).T
-        self.mean += away @ (self._inverse @ self.root) @ self.root.T
+        away = (1.0 - keep) * (prior.mean - self.mean) @ self._faded.T
+        self.mean += away @ (self._faded @ self.root) @ self.root.T
         self.shape = keep * self.shape + (1.0 - keep) * prior.shape
         self.rate = keep * self.rate + (1.0 - keep) * prior.rate
+
+
+def _longer(mean: np.ndarray, count: int) -> np.ndarray:
+    return np.concatenate([mean, np.zeros((*mean.shape[:-1], count))], axis=-1)
+
+
+def _beside(root: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return the root of a covariance with independent coefficients beside it."""
+    axes = np.broadcast_shapes(root.shape[:-2], own.shape[:-2])
+    (p, r), q = root.shape[-2:], own.shape[-1]
+    found = np.zeros((*axes, p + q, r + q))
+    found[..., :p, :r], found[..., p:, r:] = root, own
+    return found

@@ -8,17 +8,19 @@ from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
 from hdcal.inference.posterior import Posterior
-from hdcal.prediction.engine.untested_reading import UntestedReading
+from hdcal.prediction.engine.untested_reading import UNKNOWNS
 from hdcal.tracking.beginning import begin_core, begin_prior, usual_design
 from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
 from hdcal.tracking.coarse_rounding import CoarseRounding
 from hdcal.tracking.first_rows import FirstRows
 from hdcal.tracking.followed_causes import followed_causes
 from hdcal.tracking.forgetting_alarm import forgetting_threshold, settling_rows
+from hdcal.tracking.full_scale import AssumedFullScale
 from hdcal.tracking.linear_core import STIFFNESS, ZERO, LinearCore
 from hdcal.tracking.particles import LEAST_EFFECTIVE, Particles
 from hdcal.tracking.reading_limits import reading_limits
 from hdcal.tracking.serial_correlation import SerialCorrelation
+from hdcal.tracking.unequal_rows import RowTerms, UnequalRows
 
 SCHEMA = "hdcal.track/1"
 ALARM_ROWS = 10_000.0
@@ -69,16 +71,16 @@ class Tracker:
             wrong += implausible("alarm_rows", alarm_rows)
             wrong += implausible("forget", forget) + implausible("reopen", reopen)
             wrong += implausible("seed", seed)
-        self._causes, self._untested = [], None
+        self._causes, self._unequal = [], None
         if isinstance(known, Posterior):
             known, self._causes = followed_causes(known, forget)
         prior = begin_prior(known, seed)
         if isinstance(known, Posterior):
-            self._untested = UntestedReading(known)
-        self._variance = float(np.mean(prior.variance))
+            self._unequal = UnequalRows(known, prior)
+        self._unknowns, self._full_scale = False, AssumedFullScale(known)
         self._core, self._columns = begin_core(known, prior, forget)
         self._slow, self._noise = self._core.slower(), SerialCorrelation()
-        self._rounding = CoarseRounding(prior.step)
+        self._rounding = CoarseRounding(prior.step, forget)
         self._limits = reading_limits(known, prior)
         self._reference = prior.reading.reference_temperature
         self._remounting = prior.remounting
@@ -120,10 +122,10 @@ class Tracker:
         warmth = self._reference if temperature is None else temperature
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
-        columns = self._columns(deformation, warmth - self._reference, time or 0.0)
+        tested = self._limits.were_tested(deformation, warmth)
+        columns, terms = self._row(deformation, warmth, time or 0.0, tested=tested)
         rho, weight = self._noise.value, self._noise.weight
-        middle, half, score = self._step(columns, force, (deformation, warmth))
-        self.rows, self._readings = self.rows + 1, self._readings + 1
+        middle, half, score = self._step(columns, force, terms)
         share, alarm = self._alarm.step(weight * score)
         found = {
             "schema": SCHEMA,
@@ -137,35 +139,53 @@ class Tracker:
             "alarm_since_row": self._since,
             "false_alarm_rows": self._alarm_rows,
             "correlation": rho,
-            "tested": self._limits.were_tested(deformation, warmth),
+            "tested": tested,
         }
         if alarm:
             self._restart()
         return found | _degeneracy(self._core, found["stiffness_N_per_mm"])
 
-    def _beyond(self, deformation: float, temperature: float) -> tuple[float, float]:
-        """Return what untested conditions add to a reading [N], and its weight.
+    def _row(
+        self, deformation: float, warmth: float, time: float, *, tested: bool | None
+    ) -> tuple[np.ndarray, RowTerms]:
+        """Count a row; return its columns, and what it has beside the model."""
+        self.rows, self._readings = self.rows + 1, self._readings + 1
+        terms = RowTerms()
+        if self._unequal is not None:
+            terms = self._unequal.at(deformation, warmth, tested=tested)
+        columns = self._columns(deformation, warmth - self._reference, time)
+        return self._with_unknowns(columns, terms), terms
 
-        As nobody knows how much they add, such a reading tells less of the gear.
+    def _with_unknowns(self, columns: np.ndarray, terms: RowTerms) -> np.ndarray:
+        """Return the columns beside those of what untested conditions add.
+
+        The unknowns come with the first untested row: until then none says anything.
         """
-        tested = self._limits.were_tested(deformation, temperature)
-        if self._untested is None or tested:
-            return 0.0, 1.0
-        shift, sd = self._untested.at(deformation, temperature)
-        return shift, (1.0 + sd**2 / self._variance) ** -0.5
+        if not self._unknowns:
+            if terms.columns is None:
+                return columns
+            self._unknowns = True
+            self._design = np.pad(self._design, ((0, 0), (0, UNKNOWNS)))
+            for core in {self._core, self._slow}:
+                core.add_unknowns(UNKNOWNS)
+            self._noise.restart()
+        own = np.zeros(UNKNOWNS) if terms.columns is None else terms.columns
+        own = np.broadcast_to(own, (*columns.shape[:-1], UNKNOWNS))
+        return np.concatenate([columns, own], axis=-1)
 
     def _step(
-        self, columns, force: float, at: tuple[float, float]
+        self, columns, force: float, terms: RowTerms
     ) -> tuple[float, float, float]:
         """Predict a row from the rows before it, then learn from it.
 
         Returns:
             Middle [N], half-width of the 95 % interval [N], normal score.
         """
-        shift, weight = self._beyond(*at)
+        self._full_scale.see(force)
+        shift, weight = terms.shift, terms.weight
         columns, force = columns * weight, (force - shift) * weight
         expected = self._slow.expect(columns)
-        repeated = self._rounding.share(self._slow.variance())
+        repeated = self._rounding.share(self._slow.variance() * terms.noise)
         told = self._rounding.weight(expected / weight + shift, repeated)
         row = self._noise.whiten(columns, force)
         middle, half, score = self._core.step(row.columns, row.force, told)
@@ -182,7 +202,7 @@ class Tracker:
 
     def _set_threshold(self) -> None:
         """Take the threshold of a core that forgets, once it has settled."""
-        if self._forget == 1.0 or self._readings < settling_rows(self._forget):
+        if self._forget == 1.0 or self._readings <= settling_rows(self._forget):
             return
         rho = self._noise.value
         moved = abs(rho - self._threshold_for) > _ANOTHER_CORRELATION
@@ -200,11 +220,12 @@ class Tracker:
     def describe(self) -> str:
         """Return in words where the tracker begins and what its alarm promises."""
         mean, _, half = self._core.coefficient(STIFFNESS)
-        return (
+        words = [
             f"begins with {self._source}: stiffness {mean:.4g} N/mm, 95 % credible "
             f"interval {mean - half:.4g} … {mean + half:.4g}, on a mounting that was "
             f"not tested; one false alarm in {self._alarm_rows:g} readings"
-        ) + "".join(f"\n{words}" for words in self._causes)
+        ]
+        return "\n".join(words + self._full_scale.at_start() + self._causes)
 
     def summary(self) -> str:
         """Say how many alarms there were, and how many are due by chance."""
@@ -218,7 +239,7 @@ class Tracker:
                 "; readings are correlated with the one before "
                 f"({self._noise.value:.2f}), which is taken into account"
             )
-        return words
+        return words + self._full_scale.at_end()
 
     def _mount(self, run: str | None) -> None:
         """Widen the zero of the force if the label of the mounting is another one."""
@@ -243,6 +264,7 @@ class Tracker:
             moved = self._reopen * self._core.coefficient(STIFFNESS)[0]
             self._widen(STIFFNESS, moved**2)
             self._widen(ZERO, self._remounting)
+            self._rounding.restart()
 
     def _stiffness(self) -> dict:
         mean, sd, half = self._core.coefficient(STIFFNESS)

@@ -76,12 +76,25 @@ class Growth(eqx.Module):
         """
         place = 1.0 + self.beyond(deformation)
         powers = jnp.stack([jnp.ones_like(place), place, place**2], axis=1)
-        spread = size**2 * self.strength + noise**2
-        mean = size**2 * powers @ (self.ties @ (self.found / spread))
-        known = self.line + size**2 * (self.ties / spread) @ self.ties.T
+        found, known = self.given(size, noise)
         free = _variance(place) - jnp.sum(powers @ known * powers, axis=1)
         # The root of zero has no derivative.
-        return mean, size * jnp.sqrt(jnp.maximum(free, 0.0) + 1e-24)
+        return powers @ found, size * jnp.sqrt(jnp.maximum(free, 0.0) + 1e-24)
+
+    def given(self, size, noise):
+        """Return what the rows say of a bend, by 1, t and t².
+
+        Args:
+            size: of the bend [N].
+            noise: sd of a reading that goes with it [N].
+
+        Returns:
+            Its mean, (3,) [N], and by their products what a bend of size 1 has less of
+            variance, (3, 3).
+        """
+        spread = size**2 * self.strength + noise**2
+        found = size**2 * (self.ties @ (self.found / spread))
+        return found, self.line + size**2 * (self.ties / spread) @ self.ties.T
 
 
 def _variance(place):
@@ -89,10 +102,10 @@ def _variance(place):
     return place**3 / 3.0 + place**5 / 20.0
 
 
-def _covariance(place: np.ndarray) -> np.ndarray:
-    """Return the covariance of a bend of size 1 between places, (k, k)."""
-    least = np.minimum(place[:, None], place)
-    later = np.maximum(place[:, None], place)
+def bend_covariance(place: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return the covariance of a bend of size 1 between places, (k, n)."""
+    least = np.minimum(place[:, None], other)
+    later = np.maximum(place[:, None], other)
     return np.sum(later**_POWERS * _with_later(least), axis=0)
 
 
@@ -151,7 +164,7 @@ def _fitted(end: float, far: float, deformation, weight, error, change) -> Fitte
     lines, root = np.stack([np.ones(_KNOTS), knots], axis=1), np.sqrt(total)
     line = np.linalg.pinv(root[:, None] * lines) * root
     bent = root[:, None] * (np.eye(_KNOTS) - lines @ line)
-    covariance = _covariance(knots)
+    covariance = bend_covariance(knots, knots)
     strength, axes = np.linalg.eigh(bent @ covariance @ bent.T)
     seen, strength = axes.T @ bent, np.maximum(strength, 0.0)
     found, cross = seen @ mean, _with_later(knots)

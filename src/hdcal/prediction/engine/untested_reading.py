@@ -1,4 +1,7 @@
-"""What untested conditions add to one reading at a time, as a shift and its sd."""
+"""What untested conditions add to readings one by one, by unknowns that they share."""
+
+from dataclasses import dataclass
+from math import hypot
 
 import jax
 import jax.numpy as jnp
@@ -9,10 +12,33 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
-from hdcal.prediction.engine.untested import Untested
+from hdcal.prediction.engine.growth import Growth, bend_covariance
+from hdcal.prediction.engine.untested import BENDS, Untested
 
 # Draws that tell: their sd is then known to some 5 %.
 _DRAWS = 256
+# Places whose bends stand for the whole, in tested ranges beyond the end.
+_NODES = np.geomspace(0.1, 6.0, 12)
+# Variance that rounding may take off that of the places, as a share.
+_ROUNDING = 1e-10
+# Unknowns that all readings share: a drift of the rig, and the bends beyond each end.
+UNKNOWNS = 1 + 2 * len(_NODES)
+
+
+@dataclass(frozen=True)
+class Addition:
+    """What untested conditions add to one reading.
+
+    Attributes:
+        shift: its mean [N].
+        columns: of unknowns that are the same at every reading, independent and
+            standard normal, shape (UNKNOWNS,) [N].
+        rest: sd of what they do not hold [N].
+    """
+
+    shift: float
+    columns: np.ndarray
+    rest: float
 
 
 class UntestedReading:
@@ -27,21 +53,102 @@ class UntestedReading:
         kept = np.linspace(0, len(values["K"]) - 1, _DRAWS).astype(int)
         self._values = {name: column[kept] for name, column in values.items()}
         self._problem = posterior.problem
+        sides = self._untested.below, self._untested.above
+        self._bends = [
+            _Bend(growth, self._values[BENDS][:, side], self._values[CAUSE])
+            for side, growth in enumerate(sides)
+        ]
+        warm = posterior.case.records.temperature
+        self._tested = float(np.min(warm)), float(np.max(warm))
 
-    def at(self, deformation: float, temperature: float) -> tuple[float, float]:
-        """Return mean and sd of what is added to a reading [N].
+    def at(self, deformation: float, temperature: float) -> Addition:
+        """Return what is added to a reading.
 
         Args:
             deformation: as read [mm].
             temperature: of the specimen [°C].
         """
+        drift, mean = self._drift(deformation, temperature)
+        bends = [bend.at(deformation) for bend in self._bends]
+        return Addition(
+            mean + sum(bend.shift for bend in bends),
+            np.concatenate([[drift], *(bend.columns for bend in bends)]),
+            hypot(*(bend.rest for bend in bends)),
+        )
+
+    def _drift(self, deformation: float, temperature: float) -> tuple[float, float]:
+        """Return sd, with the sign of the kelvins, and mean of the rig's drift [N]."""
+        coldest, warmest = self._tested
+        if coldest <= temperature <= warmest:
+            return 0.0, 0.0
         row = np.array([deformation]), np.array([temperature])
-        added = np.asarray(_added(self._problem, self._values, self._untested, *row))
-        return float(added.mean()), float(added.std())
+        found = np.asarray(_drifts(self._problem, self._values, self._untested, *row))
+        sign = 1.0 if temperature > warmest else -1.0
+        return sign * float(found.std()), float(found.mean())
+
+
+class _Bend:
+    """The bend beyond one end, by its values at a few places.
+
+    Args:
+        growth: of every cause, each leaf (cause, …).
+        sizes: of the bend and noise that goes with it, (draw, 2) [N].
+        cause: of the draws.
+    """
+
+    def __init__(self, growth: Growth, sizes: np.ndarray, cause: np.ndarray):
+        # The causes have the same rows, and so the same ends.
+        self._growth: Growth = jax.tree.map(lambda leaf: leaf[0], growth)
+        found, known = map(np.asarray, _given(growth, sizes, cause))
+        self._mean, square = found.mean(axis=0), sizes[:, 0] ** 2
+        self._square = float(square.mean())
+        known = (square[:, None, None] * known).mean(axis=0)
+        self._known = np.cov(found.T, bias=True) - 0.5 * (known + known.T)
+        nodes = 1.0 + _NODES
+        spread = self._covariance(nodes, nodes)
+        spread += np.diag(_ROUNDING * np.diag(spread))
+        self._root = np.linalg.inv(np.linalg.cholesky(spread))
+
+    def at(self, deformation: float) -> Addition:
+        """Return what it adds to a reading at a deformation as read [mm]."""
+        beyond, share = map(float, _reach(self._growth, deformation))
+        if share == 0.0:
+            return Addition(0.0, np.zeros(len(_NODES)), 0.0)
+        place = np.array([1.0 + beyond])
+        columns = self._root @ self._covariance(1.0 + _NODES, place)[:, 0]
+        rest = float(self._covariance(place, place)[0, 0]) - float(columns @ columns)
+        mean = float(_powers(place)[0] @ self._mean)
+        return Addition(share * mean, share * columns, share * max(rest, 0.0) ** 0.5)
+
+    def _covariance(self, place: np.ndarray, other: np.ndarray) -> np.ndarray:
+        """Return that of the bend between places beyond the end, (k, n) [N²]."""
+        free = self._square * bend_covariance(place, other)
+        return free + _powers(place) @ self._known @ _powers(other).T
+
+
+def _powers(place: np.ndarray) -> np.ndarray:
+    return place[:, None] ** np.arange(3)
 
 
 @jax.jit
-def _added(problem: Problem, values: Values, untested: Untested, at, warm):
+def _reach(growth: Growth, deformation):
+    """Return how far beyond the end a deformation is, and the share of the bend."""
+    return growth.beyond(deformation), growth.share(deformation)
+
+
+@jax.jit
+def _given(growth: Growth, sizes, cause):
+    """Return what `Growth.given` says of every draw."""
+
+    def one(pair, index):
+        return jax.tree.map(lambda leaf: leaf[index], growth).given(*pair)
+
+    return jax.vmap(one)(sizes, cause)
+
+
+@jax.jit
+def _drifts(problem: Problem, values: Values, untested: Untested, at, warm):
+    """Return what the rig's drift adds to a reading in every draw [N]."""
     loading = jnp.where(at < 0.0, -1.0, 1.0)
     records = grid_records(at, warm, loading, 0.0)
 
@@ -50,7 +157,6 @@ def _added(problem: Problem, values: Values, untested: Untested, at, warm):
         zero, moved = own.drift(value, warm, loading)
         drifted, _ = force_of(problem, value, records, zero=zero, moved=moved)
         still, _ = force_of(problem, value, records)
-        bend, _ = own.leftover(problem, value, at, loading)
-        return (drifted - still + bend)[0]
+        return (drifted - still)[0]
 
     return jax.vmap(one)(values)
