@@ -145,6 +145,20 @@ def test_at_every_temperature_it_is_refined():
     assert found.worst.exceedance.rests_on == risks[1].rests_on
 
 
+def test_each_model_alone_is_refined_too():
+    """What all say together is the mean of what each says."""
+    case = case_of(SIGMAS["normal"])
+    size = {"chains": 2, "warmup": 300, "draws": 300}
+    two = [(0.7, calibrate(case, **size)), (0.3, calibrate(case, seed=1, **size))]
+    found = hdcal.margin(two, AT, sensitivities=False, limit_force=86.0)
+    shares, chances = zip(
+        *((m.probability, m.probability_exceeded) for m in found.models), strict=True
+    )
+    risk = found.worst.exceedance
+    assert "importance sampling" in risk.rests_on
+    assert np.dot(shares, chances) == pytest.approx(risk.probability, rel=1e-6)
+
+
 def test_it_says_what_it_rests_on():
     one = Rare(1e-6, 0.03, 1.0, 1.2)
     words = refined_words(one)

@@ -26,7 +26,6 @@ from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
     level_of,
-    model_bounds,
     population_draws,
     worst_level,
 )
@@ -37,7 +36,11 @@ from hdcal.prediction.margin.deformation_reached import (
     deformation_reached,
 )
 from hdcal.prediction.margin.gradients import gradients
-from hdcal.prediction.margin.refined import refined, with_likeliest
+from hdcal.prediction.margin.refined import (
+    refined,
+    refined_models,
+    with_likeliest,
+)
 from hdcal.prediction.margin.remarks import (
     extrapolations,
     population_words,
@@ -145,7 +148,7 @@ def _margin(
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
-        models=model_bounds(forces, draws, criteria),
+        models=refined_models(forces, draws, criteria, worst, request.seed),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
         gradients=gradients(there, upper, criteria) if sensitivities else (),

@@ -7,9 +7,15 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.prediction.engine.population_force import PopulationForce
-from hdcal.prediction.margin.bounds import LEAST, LEAST_LEFT
+from hdcal.prediction.margin.bounds import (
+    LEAST,
+    LEAST_LEFT,
+    PopulationDraws,
+    model_bounds,
+)
 from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
-from hdcal.prediction.margin.result import Exceedance, Level
+from hdcal.prediction.margin.request import Criteria
+from hdcal.prediction.margin.result import Exceedance, Level, ModelBound
 
 # Relative Monte Carlo error up to which a mean over the sampler's draws is good enough.
 _ENOUGH = 0.1
@@ -63,6 +69,37 @@ def with_likeliest(worst: Level, levels: Sequence[Level]) -> Level:
         rests_on=top.rests_on,
     )
     return replace(worst, exceedance=known)
+
+
+def refined_models(
+    forces: Sequence[PopulationForce],
+    draws: PopulationDraws,
+    criteria: Criteria,
+    worst: Level,
+    seed: int,
+) -> tuple[ModelBound, ...]:
+    """Return what each model alone says, also of an event that all make rare.
+
+    Args:
+        forces: of each cause.
+        draws: what they say of the population.
+        criteria: what is to be kept.
+        worst: what all say together.
+        seed: of the points.
+    """
+    models, risk = model_bounds(forces, draws, criteria), worst.exceedance
+    if criteria.limit_force is None or risk is None or risk.rests_on is None:
+        return models
+    found = []
+    for model, force in zip(models, forces, strict=False):
+        there = force.at(worst.temperature_C)
+        with np.errstate(all="ignore"):
+            one = rare(there, criteria.limit_force, seed)
+        chance = model.probability_exceeded
+        if one.relative_error < _ROUGH:
+            chance = float(np.clip(one.probability, LEAST, 1.0 - LEAST_LEFT))
+        found.append(replace(model, probability_exceeded=chance))
+    return tuple(found)
 
 
 def _refined(
