@@ -58,7 +58,7 @@ def run_sbc(model: str, count: int):
         truth = draw_truth(template, of_truth)
         data = simulate(template, case, truth, of_data)
         problem, draws = posterior_draws(
-            data, effects, of_fit, chains=4, warmup=300, draws=250
+            data, effects, of_fit, chains=2, warmup=300, draws=400
         )
         every = len(draws["K"]) // RANKED
         thin = {n: v[::every][:RANKED] for n, v in draws.items()}
