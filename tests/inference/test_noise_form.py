@@ -172,6 +172,14 @@ def test_noise_in_proportion_to_the_force_is_let_grow():
     assert [effect.name for effect in found.effects] == ["heteroscedastic_noise"]
     low, high = np.quantile(found.draws["heteroscedastic_noise.share"], [0.025, 0.975])
     assert low < 0.2 < high
+    # Without a constant part every reading is above zero, and σ near none a wall.
+    for _ in range(3):
+        again = case_of(0.2 * SLOPE * X * rng.normal(size=ROWS))
+        assert calibrate(again, chains=2, warmup=300, draws=1000).usable
+    own = Prior("lognormal", (0.5, 1.6), "N", "of my rig")
+    mine = replace(case.gear, priors={**case.gear.priors, "sigma": own})
+    kept = calibrate(replace(case, gear=mine), **SHORT)
+    assert kept.case.gear.priors["sigma"] == own != found.case.gear.priors["sigma"]
     assert growth_check(found.draws).outcome == "note"
     assert not calibrate(case, adapt_noise=False, **SHORT).effects
     share = {"heteroscedastic_noise.share": Prior("fixed", (0.0,))}

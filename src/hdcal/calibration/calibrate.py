@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 
 import jax
@@ -9,7 +10,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Theory
 from hdcal.data.prior import Prior
-from hdcal.data.priors import effect_priors
+from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
@@ -34,6 +35,9 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
+# The constant part is then about this share of what a pilot fit leaves.
+_PART, _PART_LOG_SD = 0.3, 0.7
+_PART_SOURCE = "a part of the noise that a pilot fit leaves, as it was seen to grow"
 _SHARE = f"{HeteroscedasticNoise.name}.share"
 _SHOWN = {
     _SHARE: Prior(
@@ -166,7 +170,7 @@ def calibrate(
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     bound_executables()
-    chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
+    case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
     theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
     model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
@@ -186,10 +190,10 @@ def _chosen(
     names: Sequence[str],
     registry: Mapping[str, type[Effect]],
     adapt_noise: bool,
-) -> tuple[tuple[type[Effect], ...], float]:
-    """Return the effects, with noise that grows where it does and none is of noise.
+) -> tuple[Case, tuple[type[Effect], ...], float]:
+    """Return case, effects and the noise sd of the pilot fit [N].
 
-    And the noise sd of the pilot fit [N].
+    With noise that grows where it does and no effect is of noise.
     """
     effects, pilot = choose_effects(names, registry), pilot_fit(case.records)
     check_effect_priors(case, registry)
@@ -197,7 +201,23 @@ def _chosen(
     stated = case.gear.effect_priors.get(_SHARE)
     decided = spoken_of or (stated is not None and stated.family == "fixed")
     grows = adapt_noise and not decided and noise_grows(case, pilot)
-    return (*effects, HeteroscedasticNoise) if grows else effects, pilot.noise_sd
+    if not grows:
+        return case, effects, pilot.noise_sd
+    case = _with_constant_part(case, pilot.noise_sd)
+    return case, (*effects, HeteroscedasticNoise), pilot.noise_sd
+
+
+def _with_constant_part(case: Case, noise_sd: float) -> Case:
+    """Return a case in which σ is the part of the noise that does not grow.
+
+    Were it next to nothing, the least force that is possible would be a wall at which
+    a sampler fails. What the gear file states stays.
+    """
+    gear, shipped = case.gear, rig_priors()["sigma"]
+    if gear.priors["sigma"].source != shipped.source:
+        return case
+    believed = Prior("lognormal", (_PART * noise_sd, _PART_LOG_SD), "N", _PART_SOURCE)
+    return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
 def _shipped(chosen: Sequence[type[Effect]], names: Sequence[str]) -> dict[str, Prior]:
