@@ -133,7 +133,8 @@ def correlation_check(draws: Mapping[str, np.ndarray], reason: str) -> Check:
     low, middle, high = np.quantile(draws[CORRELATION], [0.05, 0.5, 0.95])
     if low < _TOLD_CORRELATION:
         return Check(name, "passed", "no correlation of neighbours is seen")
-    words = f"their correlation is {middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
+    span = f"{middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
+    words = f"the errors of neighbouring readings have a correlation of {span}"
     return Check(name, "note", f"{words}, and every interval allows for it")
 
 
@@ -147,7 +148,9 @@ def growth_check(draws: Mapping[str, np.ndarray]) -> Check:
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
-    words = f"they scatter by {np.median(share):.1%} of the force, beside σ at no force"
+    words = (
+        f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
+    )
     return Check(name, "note", f"{words}; every interval allows for it")
 
 

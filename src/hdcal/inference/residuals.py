@@ -141,19 +141,20 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
 def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     """Return a warning for all that the model left in the residuals.
 
-    For answers that take the model for right. With a leftover discrepancy in it there
-    is no shape to warn of.
+    For answers that take the model for right. A leftover discrepancy has taken what
+    depends on the deformation alone; a loop, for one, it cannot take.
 
     Args:
         posterior: from `calibrate`.
         shapes: whether to warn of them.
     """
     left = residuals(posterior)
-    shapes = shapes and posterior.problem.discrepancy is None
+    with_gap = posterior.problem.discrepancy is not None
+    remedy = "Diagnose" if with_gap else "Diagnose, or calibrate with a gap"
     return (
         *(
             "This takes the model's shape for right, but its residuals have one. "
-            f"{shape.words.rstrip('.')}. Diagnose, or calibrate with a gap."
+            f"{shape.words.rstrip('.')}. {remedy}."
             for shape in (left.structure if shapes else ())
         ),
         *(fault.words for fault in left.noise),

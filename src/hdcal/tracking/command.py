@@ -70,5 +70,5 @@ def track(console: Console, known, gear, **settings):
         console.unread = True
         discard_output()
     words = tracker.summary()
-    console.words(words + (f", {bad} rows that were no reading" if bad else ""))
+    console.words(words + (f"; lines that were no reading: {bad}" if bad else ""))
     return 2 if bad else 0

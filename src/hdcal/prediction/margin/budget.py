@@ -101,7 +101,7 @@ def _scatter(problem, values, whose, conditions):
 def force_budget(force: PopulationForce) -> ForceBudget:
     """Return the linear budget of one future member's force under one cause."""
     cause = force.cause
-    sites, own = _sites(cause)
+    sites, own = _sites(force)
     noise, bend, width = map(np.asarray, _scatter(*force.traced))
     scale, dof = scatter_law(noise)
     # Fit and noise have the same unknown variance of a reading; a load has no noise.
@@ -158,14 +158,21 @@ def _covariance(draws: np.ndarray, own: int) -> np.ndarray:
     return covariance
 
 
-def _sites(cause: Cause) -> tuple[list[str], int]:
+def _sites(force: PopulationForce) -> tuple[list[str], int]:
     """Return the sites that the mean force hangs on, and how many stand for themselves.
 
-    Those come first.
+    Those come first. On a reading of the same rig gains have no part: what they bring
+    the stiffness takes back.
     """
-    own = [site for site in CERTIFIED if site in cause.values]
-    own += [site for site in _BY_PRIOR if cause.driver(site) == "prior"]
+    cause = force.cause
+    stated = [site for site in CERTIFIED if site in cause.values]
+    of_load = force.whose.quantity == "load"
+    own = [site for site in _BY_PRIOR if cause.driver(site) == "prior"]
     sites = [site for site in _BASE if site not in own]
+    if of_load:
+        own = stated + own
+    else:
+        sites += stated
     for effect in cause.problem.effects:
         sites += [f"{effect.name}.{field}" for field in parameters(effect)]
     sites += ["gap_weights"] * ("gap_weights" in cause.values)

@@ -6,7 +6,12 @@ from hdcal.prediction.budget.linear import LinearCheck, coverage_factor
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component
 from hdcal.prediction.margin.sentences import chance, input_label, newtons
-from hdcal.prediction.margin.stated import Rule, StatedUncertainty, Statement
+from hdcal.prediction.margin.stated import (
+    BudgetCheck,
+    Rule,
+    StatedUncertainty,
+    Statement,
+)
 from hdcal.report.words import number
 
 GEAR = "gear"
@@ -119,6 +124,13 @@ def check_words(about, drawn, check: LinearCheck, error: float) -> str:
     else:
         why = "the tails are not those of Student's t"
     return f"{near}. It is not confirmed, and Monte Carlo is given: {why}."
+
+
+def coverage_words(check: BudgetCheck) -> str:
+    """Return the coverage factor of the linear budget, and what it rests on."""
+    dof = check.degrees_of_freedom
+    law = f"Student t, {dof:.3g} d.o.f." if np.isfinite(dof) else "normal"
+    return f"k = {check.coverage_factor:.2f}, {law}"
 
 
 def rule_words(rule: Rule, limit: float, guard: float) -> str:

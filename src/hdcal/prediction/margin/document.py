@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
-from hdcal.prediction.margin.budget_words import stated_words
+from hdcal.prediction.margin.budget_words import coverage_words, stated_words
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
     answer,
@@ -236,7 +236,8 @@ def budget_table(found: Margin, *, brief: bool = False) -> Table:
         rows.append([words, *[""] * 5, f"{rest:.3g}", share, ""])
     assert found.linear_check is not None
     whole = f"{found.linear_check.standard_uncertainty_N:.3g}"
-    rows.append(["combined", *[""] * 5, whole, "100 %", ""])
+    law = "" if brief else f"; {coverage_words(found.linear_check)}"
+    rows.append([f"combined{law}", *[""] * 5, whole, "100 %", ""])
     return Table(
         columns if brief else [*columns, "halved by"],
         [row[: len(columns)] if brief else row for row in rows],

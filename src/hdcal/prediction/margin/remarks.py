@@ -156,8 +156,10 @@ def remarks(
     first = _main(forces)
     said = left_out_words([force.cause for force in forces])
     said += [*_signs(levels, first.sense), *_of_population(first)]
+    # Where causes are averaged, what no model explains is one of them.
+    alone = len(forces) == 1
     straight = all(force.cause.problem.discrepancy is None for force in forces)
-    said += misfits(first.cause.posterior, shapes=straight)
+    said += misfits(first.cause.posterior, shapes=alone or straight)
     used = sum(force.cause.size for force in forces)
     risk = worst.exceedance
     rare = risk is not None and risk.probability < 1.0 / used
