@@ -5,6 +5,7 @@ from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import THEORY_WORDS
+from hdcal.inference.checks import PLAUSIBLE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
 from hdcal.inference.residuals import Residuals
@@ -62,6 +63,12 @@ def headline(found: Interval) -> str:
     )
 
 
+_IMPLAUSIBLE = (
+    "First look at the units of the columns, and at sizes and `reading` of the gear "
+    "file: what comes out is not what such a gear is believed to be."
+)
+
+
 def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     """Return what would make the answer better, most urgent first."""
     if not posterior.usable:
@@ -70,7 +77,9 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
             "still fails, look at the data and leave effects out."
         ]
     known = posterior.case.records.known
-    steps = [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
+    odd = any(c.name == PLAUSIBLE and c.outcome == "warning" for c in posterior.checks)
+    steps = [_IMPLAUSIBLE] * odd
+    steps += [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))
 

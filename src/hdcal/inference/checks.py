@@ -172,11 +172,15 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     )
 
 
+# Name of the check that data are what was believed of gears.
+PLAUSIBLE = "prior and data agree"
+
+
 def conflict_check(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> Check:
     """Say which posteriors lie where their prior thought nothing would be."""
-    name = "prior and data agree"
+    name = PLAUSIBLE
     far = []
     for parameter, values in draws.items():
         prior, median = frozen(priors[parameter]), float(np.median(values))
@@ -188,7 +192,7 @@ def conflict_check(
     if not far:
         return Check(name, "passed", "every median lies within its prior's 99.7 %")
     words = f"far outside what was expected before the data: {listed(far)}"
-    remedy = "a wrong unit, reading (radial or diametral) or size of the gear?"
+    remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
     return Check(name, "warning", f"{words}. {remedy}")
 
 
