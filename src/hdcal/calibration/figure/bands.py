@@ -55,11 +55,12 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
             _draw_points(top, left, left.measured, here, colours[index])
             _draw_points(axes, left, distance, here, colours[index])
             axes.axhline(0.0, color=DARK, linewidth=0.8, zorder=1)
-            where = f", {level:g} °C" if len(levels) > 1 else ""
-            heading(axes, f"Distance from the fit{where}")
+            # Beside each other there is room for a temperature, and not for more.
+            alone = len(levels) == 1
+            heading(axes, "Distance from the fit" if alone else f"at {level:g} °C")
         heading(top, f"{plain(gear.name)}: force as read")
         top.set_ylabel("force [N]")
-        panels[0].set_ylabel("force − fit [N]")
+        panels[0].set_ylabel("distance from the fit [N]")
         _limit(panels[0], bands, distance)
         figure.supxlabel(f"deformation as read ({gear.reading}) [mm]", fontsize=10)
         _legend(top, bands, left, levels, colours, solid)
