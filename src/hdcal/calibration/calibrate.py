@@ -35,9 +35,6 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.physics.scatter import Scatter
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
-# The constant part is then about this share of what a pilot fit leaves.
-_PART, _PART_LOG_SD = 0.3, 0.7
-_PART_SOURCE = "a part of the noise that a pilot fit leaves, as it was seen to grow"
 _SHARE = f"{HeteroscedasticNoise.name}.share"
 _SHOWN = {
     _SHARE: Prior(
@@ -47,6 +44,9 @@ _SHOWN = {
         "wide, as the readings scatter more at larger forces",
     )
 }
+# The constant part is then about this share of what a pilot fit leaves.
+_PART, _PART_LOG_SD = 0.3, 0.7
+_PART_SOURCE = "a part of the noise that a pilot fit leaves, as it was seen to grow"
 
 
 def choose_effects(

@@ -32,6 +32,10 @@ ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
     "combination of its own inputs reproduces; its K = 0.13 is no property of the gear."
 )
+_IMPLAUSIBLE = (
+    "First look at the units of the columns, and at sizes and `reading` of the gear "
+    "file: what comes out is not what such a gear is believed to be."
+)
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {
     "curvature": "Unload as well as load, take finer steps at small deformation, or "
@@ -61,12 +65,6 @@ def headline(found: Interval) -> str:
         f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
         f"interval {span} N/mm, per millimetre as read."
     )
-
-
-_IMPLAUSIBLE = (
-    "First look at the units of the columns, and at sizes and `reading` of the gear "
-    "file: what comes out is not what such a gear is believed to be."
-)
 
 
 def next_steps(posterior: Posterior, left: Residuals) -> list[str]:

@@ -17,6 +17,8 @@ from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION
 
+# Name of the check that data are what was believed of gears.
+PLAUSIBLE = "prior and data agree"
 MAX_RHAT = 1.01
 ESS_PER_CHAIN = 100
 MIN_BFMI = 0.3
@@ -172,15 +174,10 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     )
 
 
-# Name of the check that data are what was believed of gears.
-PLAUSIBLE = "prior and data agree"
-
-
 def conflict_check(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> Check:
     """Say which posteriors lie where their prior thought nothing would be."""
-    name = PLAUSIBLE
     far = []
     for parameter, values in draws.items():
         prior, median = frozen(priors[parameter]), float(np.median(values))
@@ -190,10 +187,10 @@ def conflict_check(
             low, high = prior.interval(1.0 - CONFLICT_TAIL)
             far.append(f"{parameter} = {median:.3g}, expected {low:.3g} to {high:.3g}")
     if not far:
-        return Check(name, "passed", "every median lies within its prior's 99.7 %")
+        return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
     words = f"far outside what was expected before the data: {listed(far)}"
     remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
-    return Check(name, "warning", f"{words}. {remedy}")
+    return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
 
 
 def _peaks_at_zero(prior: Prior) -> bool:

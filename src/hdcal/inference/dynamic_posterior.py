@@ -1,9 +1,11 @@
 """The calibrated posterior of a moving gear, kept in the same kind of file."""
 
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import ClassVar
 
+from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference import posterior_file
 from hdcal.inference.dynamic_problem import SITES, DynamicProblem, build_dynamic
@@ -23,6 +25,11 @@ class DynamicPosterior(Posterior):
     def sites(self, case, effects, with_gap) -> dict[str, tuple[int, ...]]:
         """Return the shape of each parameter that a draw holds."""
         return dict.fromkeys(("E0", "K", *case.gear.gauge_priors, *SITES), ())
+
+    @cached_property
+    def effective_priors(self) -> Mapping[str, Prior]:
+        """The priors; none hangs on another parameter."""
+        return self.priors
 
     @cached_property
     def problem(self) -> Problem:

@@ -11,20 +11,17 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.case import Case, Theory
-from hdcal.data.certificates import is_stated
 from hdcal.data.priors import Prior
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.effective_priors import effective_priors
 from hdcal.inference.held import PILOT_NOISE, HeldModel, HeldSettings
 from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
-from hdcal.inference.member_counts import member_counts
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.values import MEMBER_SD, site_shapes
+from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
@@ -114,12 +111,8 @@ class Posterior(Shown):
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
         """The priors, that of the force zero given how the mountings differ."""
-        zero = self.priors.get("force_offset")
-        counts = member_counts(self.case, with_gap=False)
-        mountings = counts.get("run", 0) if zero and is_stated(zero) else 0
-        scale = MEMBER_SD["run"]
-        sizes = {scale: np.median(self.draws[scale])} if mountings else {}
-        return effective_priors(self.priors, sizes, mountings)
+        centre = {name: np.median(v, axis=0) for name, v in self.draws.items()}
+        return self.problem.priors_given(centre)
 
     def require_usable(self) -> None:
         """Raise when nothing may be derived from this posterior.
