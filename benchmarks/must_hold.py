@@ -21,6 +21,8 @@ import hdcal
 
 SLOPE, ZERO, REFERENCE = 205.0, -1.0, 20.0
 AT, CONTENT, STEP = 0.4, 0.99, 0.98
+# Noise below a third of a step [N].
+FINE = 0.3
 GEAR = """
 [gear]
 wall_thickness_mm = 0.68
@@ -106,11 +108,13 @@ def loud(rng, folder: Path, seed: int) -> Outcome:
     return inside(found, "sigma", sd)
 
 
-def _bound(posterior, mean: float, share: Callable[[float], float]) -> Outcome:
+def _bound(
+    posterior, at: float, mean: float, share: Callable[[float], float]
+) -> Outcome:
     """Return whether the upper 99/95 bound of readings holds what it promises."""
     if not posterior.usable:
         return Outcome(None, True, np.nan)
-    found = hdcal.margin(posterior, AT, content=CONTENT, sensitivities=False)
+    found = hdcal.margin(posterior, at, content=CONTENT, sensitivities=False)
     upper = found.worst.upper_bound_N
     return Outcome(share(upper) >= CONTENT, warned(posterior), upper - mean)
 
@@ -120,20 +124,46 @@ def proportional(rng, folder: Path, seed: int) -> Outcome:
     x, mean = ramp(60), SLOPE * AT + ZERO
     force = (SLOPE * x + ZERO) * (1.0 + 0.2 * rng.normal(size=60))
     found = hdcal.calibrate(case_of(x, force, folder), seed=seed)
-    return _bound(found, mean, lambda upper: stats.norm.cdf(upper, mean, 0.2 * mean))
+    return _bound(
+        found, AT, mean, lambda upper: stats.norm.cdf(upper, mean, 0.2 * mean)
+    )
+
+
+def _rounded(rng, folder: Path, seed: int):
+    """Return a calibration to steps three times the noise, and a place to ask at.
+
+    The place lies anywhere between two steps: how many readings lie above a bound
+    hangs on that.
+    """
+    x, at = ramp(500), rng.uniform(0.2, 0.5)
+    exact = SLOPE * x + ZERO + rng.normal(0.0, FINE, 500)
+    case = case_of(x, STEP * np.round(exact / STEP), folder, STEP)
+    return hdcal.calibrate(case, seed=seed), at, SLOPE * at + ZERO
 
 
 def rounded(rng, folder: Path, seed: int) -> Outcome:
     """Steps three times the noise, many rows: the upper bound of readings."""
-    x, mean, sd = ramp(500), SLOPE * AT + ZERO, 0.3
-    force = STEP * np.round((SLOPE * x + ZERO + rng.normal(0.0, sd, 500)) / STEP)
-    found = hdcal.calibrate(case_of(x, force, folder, STEP), seed=seed)
+    found, at, mean = _rounded(rng, folder, seed)
 
     def share(upper: float) -> float:
         edge = (np.floor(upper / STEP) + 0.5) * STEP
-        return float(stats.norm.cdf(edge, mean, sd))
+        return float(stats.norm.cdf(edge, mean, FINE))
 
-    return _bound(found, mean, share)
+    return _bound(found, at, mean, share)
+
+
+def rounded_exceedance(rng, folder: Path, seed: int) -> Outcome:
+    """The same steps: the interval of the probability that a capacity is exceeded."""
+    found, at, mean = _rounded(rng, folder, seed)
+    capacity = mean + FINE * rng.uniform(0.5, 2.5)
+    edge = (np.floor(capacity / STEP) + 0.5) * STEP
+    truth = float(stats.norm.sf(edge, mean, FINE))
+    if not found.usable:
+        return Outcome(None, True, np.nan)
+    asked = {"limit_force": capacity, "sensitivities": False}
+    given = hdcal.margin(found, at, **asked).worst.exceedance
+    holds = given.lo <= truth <= given.hi
+    return Outcome(holds, warned(found), given.hi - given.lo)
 
 
 def few_steps(rng, folder: Path, seed: int) -> Outcome:
@@ -146,8 +176,8 @@ def few_steps(rng, folder: Path, seed: int) -> Outcome:
 
 def slack(rng, folder: Path, seed: int) -> Outcome:
     """Slack in the data and in the model: the interval of the stiffness."""
-    x = np.concatenate([ramp(30), ramp(30)[::-1]])
-    force = SLOPE * np.maximum(x - 0.08, 0.0) + ZERO + rng.normal(0.0, 0.5, 60)
+    x, size = np.concatenate([ramp(20), ramp(20)[::-1]]), rng.choice([0.02, 0.04, 0.08])
+    force = SLOPE * np.maximum(x - size, 0.0) + ZERO + rng.normal(0.0, 0.3, 40)
     case = case_of(x, force, folder)
     found = hdcal.calibrate(case, effects=["seating_slack"], seed=seed)
     return inside(found, "stiffness", SLOPE)
@@ -160,6 +190,7 @@ ROWS = {
     "noise 20 % of full scale": loud,
     "noise 20 % of the force": proportional,
     "steps of 0.98 N over a noise of 0.3 N, 500 rows": rounded,
+    "the same steps: P of more than a capacity": rounded_exceedance,
     "steps of 0.98 N, 14 rows": few_steps,
     "slack on slack": slack,
 }

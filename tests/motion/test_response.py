@@ -8,9 +8,11 @@ import pytest
 from moving import TRUTH, motion, still_posterior
 
 from hdcal import InputError, NotUsable, respond
+from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.motion.respond import integrate
 from hdcal.motion.respond import respond as asked
 from hdcal.physics.linear_response import linear_response
+from hdcal.prediction.engine.gear_forces import gear_forces, gear_values
 
 # One number of points and draws for all: the integration is compiled once.
 SMALL = {"points": 101, "draws": 50, "duration": 0.02}
@@ -95,6 +97,39 @@ def test_effects_of_the_moment_go_along_and_others_are_named():
     assert any("relaxation" in words for words in found.remarks)
     peaks = [r.estimates["peak_mm"]["median"] for r in (found, linear)]
     assert peaks[0] < 0.9 * peaks[1]
+
+
+def test_a_leftover_that_was_fitted_bends_the_motion():
+    weights = np.zeros(BASIS_SIZE)
+    weights[[1, 2]] = 6.0, -4.0
+    posterior = still_posterior(gap=weights)
+    # Held until the swing has died out.
+    slow = ([0.0, 0.01, 0.04], [0.0, 60.0, 60.0])
+    options = {name: value for name, value in SMALL.items() if name != "duration"}
+    given = KNOWN | {"damping": 5e-2}
+    bent, straight = (
+        respond(one, slow, **given, **options).deformation_median_mm[-1]
+        for one in (posterior, still_posterior())
+    )
+    places = np.linspace(0.0, 0.5, 201)
+    values, untested = gear_values(posterior)
+    where = places, np.full(201, 20.0), 1.0, untested
+    forces = np.asarray(gear_forces(posterior.problem, values, *where))[:, 0]
+    at_rest = np.interp(60.0, forces - forces[0], places)
+    assert abs(at_rest - straight) > 0.02
+    assert bent == pytest.approx(at_rest, abs=1e-3)
+
+
+def test_beyond_what_was_tested_the_band_is_wider_and_inside_it_is_not():
+    near, far = (
+        respond(still_posterior(), "step", amplitude=force, **KNOWN, **SMALL)
+        for force in (40.0, 80.0)
+    )
+    assert near.tested.all() and not far.tested.all()
+    width = far.deformation_hi_mm - far.deformation_lo_mm
+    first = int(np.argmin(far.tested))
+    assert width[: first // 2].max() < 1e-9
+    assert width.max() > 1e-3
 
 
 def test_what_swings_faster_than_the_points_is_told():

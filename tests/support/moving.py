@@ -79,18 +79,23 @@ def write_moving(case, folder: Path) -> Path:
     return folder
 
 
-def still_posterior(effects: dict | None = None, *, usable: bool = True, **spread):
+def still_posterior(
+    effects: dict | None = None, *, usable: bool = True, gap=None, **spread
+):
     """Return a calibration at rest with draws made by hand, no sampler needed.
 
     Args:
         effects: value of each `effect.parameter`, the same in every draw.
         usable: whether its checks passed.
+        gap: weights of the leftover discrepancy, the same in every draw, or None.
         spread: relative sd of K over the draws, as `K`.
     """
     rng = np.random.default_rng(0)
     gear = moving_gear()
     deformation = np.linspace(0.02, 0.54, 14)
-    records = make_records(deformation, 200.0 * deformation)
+    chosen = tuple({EFFECTS[name.partition(".")[0]]: None for name in effects or {}})
+    known = frozenset().union(*(effect.needs for effect in chosen))
+    records = make_records(deformation, 200.0 * deformation, known=known)
     case = make_case(records, gear)
     shape = (2, 100)
     influence = TRUTH["K"] * np.exp(spread.get("K", 0.0) * rng.standard_normal(shape))
@@ -100,8 +105,9 @@ def still_posterior(effects: dict | None = None, *, usable: bool = True, **sprea
     unit = unit_stiffness(case, "ring")
     draws |= {"K": influence, "stiffness": influence * 207e3 * unit}
     draws |= {"force_offset": np.zeros(shape), "sigma": np.ones(shape)}
-    classes = {EFFECTS[name.partition(".")[0]]: None for name in effects or {}}
-    chosen = tuple(classes)
+    if gap is not None:
+        draws |= {"gap_weights": np.tile(gap, (*shape, 1))}
+        draws |= {name: np.ones(shape) for name in ("gap_sd", "gap_length")}
     tree = from_dict(
         {
             "posterior": draws,
@@ -111,7 +117,13 @@ def still_posterior(effects: dict | None = None, *, usable: bool = True, **sprea
     )
     driven = Diagnosis(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
     check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
-    settings = {"with_gap": False, "seed": 0, "chains": 2, "warmup": 1, "draws": 100}
+    settings = {
+        "with_gap": gap is not None,
+        "seed": 0,
+        "chains": 2,
+        "warmup": 1,
+        "draws": 100,
+    }
     settings |= {"seconds": 0.0, "versions": {}}
     priors = problem_priors(case, chosen, effect_priors(), "ring")
     return Posterior(

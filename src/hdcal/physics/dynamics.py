@@ -6,7 +6,7 @@ of the calibrated chain with the effects that act at once; what remembers the re
 or belongs to gauges and sensors, is left out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import diffrax
@@ -73,6 +73,7 @@ class Oscillator(eqx.Module):
         effects: those that act at once, see `acting`.
         reading: how the rig reads.
         temperature: of the gear [°C].
+        leftover: what the model leaves of the force [N] at a deformation [mm], or None.
     """
 
     mass: Scalar
@@ -81,6 +82,7 @@ class Oscillator(eqx.Module):
     effects: tuple[Effect, ...]
     reading: Reading
     temperature: Scalar
+    leftover: Callable[[Scalar], Scalar] | None = None
 
     @property
     def stiffness(self) -> Float[Array, ""]:
@@ -96,6 +98,13 @@ class Oscillator(eqx.Module):
             deformation: y [mm].
             speed: ẏ [mm/s].
         """
+        modelled = self._modelled(deformation, speed)
+        if self.leftover is None:
+            return modelled
+        return modelled + self.leftover(deformation)
+
+    def _modelled(self, deformation: Scalar, speed: Scalar) -> Float[Array, ""]:
+        """Return what stiffness and effects make of g [N]."""
         if not self.effects:
             return self.stiffness * deformation
         row, none = jnp.reshape(deformation, (1,)), jnp.zeros(1)

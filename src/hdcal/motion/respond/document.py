@@ -78,10 +78,9 @@ def remarks(
     if outside:
         yield (
             f"{outside} of {len(tested)} times lie outside the deformations or the "
-            "temperature that were calibrated: extrapolated. This assumes that the "
-            "model goes on holding; the bend that may grow there is not in the motion."
+            "temperature that were calibrated: extrapolated."
         )
-    yield from _assumed(posterior)
+    yield from averaging_words(causes_of(posterior))
     if left:
         listed = ", ".join(effect.name for effect in left)
         yield (
@@ -105,16 +104,6 @@ def remarks(
         )
     if len(posterior.case.specimen_labels) > 1:
         yield "The stiffness is the mean of the tested gears, not of a new one."
-
-
-def _assumed(posterior: Posterior) -> Iterator[str]:
-    """Say which causes the motion averages over, and what it leaves out."""
-    yield from averaging_words(causes_of(posterior))
-    if posterior.settings.get("with_gap"):
-        yield (
-            "This assumes that the gear is the model alone: a leftover discrepancy is "
-            "not in the motion."
-        )
 
 
 def response_document(

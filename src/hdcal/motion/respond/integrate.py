@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,21 +13,39 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import mass_prior
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import case_reading
+from hdcal.inference.problem import Problem, case_reading
+from hdcal.inference.values import Values
 from hdcal.motion.respond.request import Request
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.dynamics import (
     Oscillator,
+    Scalar,
     damping_ratio,
     integrate,
     natural_frequency,
 )
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
+from hdcal.prediction.engine.gear_forces import gear_leftover
+from hdcal.prediction.engine.untested import Untested
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.
 _CHUNK, _MOST_STATES = 250, 1_000_000
+
+
+class _Leftover(eqx.Module):
+    """What the model leaves of the force of one draw, none at the unloaded gear."""
+
+    problem: Problem
+    value: Values
+    untested: Untested
+
+    def __call__(self, deformation: Scalar) -> Scalar:
+        """Return it at a deformation as read from the unloaded gear [N]."""
+        places = jnp.stack([deformation, jnp.zeros_like(deformation)])
+        left = gear_leftover(self.problem, self.value, self.untested, places)
+        return left[0] - left[1]
 
 
 def thinned(draws: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
@@ -60,15 +79,18 @@ def _with_values(effect: type[Effect], values) -> Effect:
 
 
 @partial(jax.jit, static_argnames=("kept", "with_damping"))
-def _each(kept, with_damping, reading, values, temperature, damping, force, times):
+def _each(
+    kept, with_damping, reading, values, temperature, damping, force, times, leftover
+):
     """Return motion, facts and whether each draw of a batch came through."""
 
     def one(value):
+        left = leftover and _Leftover(leftover[0], value, leftover[1])
         effects = tuple(_with_values(effect, value) for effect in kept)
         stiffness = value["stiffness"] / reading.radial_per_read
         base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)
         mass = value["_mass"]
-        still = Oscillator(mass, 0.0, base, effects, reading, temperature)
+        still = Oscillator(mass, 0.0, base, effects, reading, temperature, left)
         k = still.stiffness
         c = damping if with_damping else 2.0 * value["_ratio"] * jnp.sqrt(k * mass)
         gear = replace(still, damping=c)
@@ -94,7 +116,13 @@ def _facts(mass, damping, stiffness) -> dict[str, Any]:
 
 
 def integrate_all(
-    kept, reading: Reading, values: dict, temperature: float, damping, request: Request
+    kept,
+    reading: Reading,
+    values: dict,
+    temperature: float,
+    damping,
+    request: Request,
+    leftover: tuple[Problem, Untested] | None,
 ):
     """Integrate every draw.
 
@@ -105,6 +133,8 @@ def integrate_all(
         temperature: of the gear [°C].
         damping: given [N·s/mm], or None for that of the ratio.
         request: force and times.
+        leftover: structure and what is untested, whose sites the draws then hold; None
+            where the force at rest was not calibrated.
 
     Returns:
         Deformation (draw, time), facts by name (draw,), and which draws came through.
@@ -113,7 +143,7 @@ def integrate_all(
     count = len(values["K"])
     motion, parts = np.empty((count, len(request.times))), []
     for start in range(0, count, size):
-        chunk = {n: v[start : start + size] for n, v in values.items() if v.ndim == 1}
+        chunk = {name: v[start : start + size] for name, v in values.items()}
         given = 0.0 if damping is None else float(damping)
         moved, *part = _each(
             kept,
@@ -124,6 +154,7 @@ def integrate_all(
             given,
             request.force,
             request.times,
+            leftover,
         )
         motion[start : start + size] = moved
         parts.append(jax.device_get(part))

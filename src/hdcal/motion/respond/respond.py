@@ -15,6 +15,7 @@ from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
+from hdcal.inference.values import MEMBERS
 from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
@@ -23,6 +24,7 @@ from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.notebook import Shown
 from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
+from hdcal.prediction.engine.gear_forces import gear_values
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
@@ -130,13 +132,16 @@ def _move(
     """Integrate every gear of the posterior, and say what its motion rests on."""
     usual = usual_temperature(posterior.case)
     at = usual if temperature is None else float(temperature)
-    values = thinned(posterior.draws, draws)
+    values, leftover = _what_moves(posterior, seed)
+    values = thinned(values, draws)
     moved, ratio = unseen(posterior, values, mass, seed)
     kept, left = acting(without_scatter(posterior.effects))
     reading = case_reading(posterior.case)
     whole = {**values, "_mass": moved, "_ratio": ratio}
     _check_reach(posterior, request, values, moved)
-    motion, facts, done = integrate_all(kept, reading, whole, at, damping, request)
+    motion, facts, done = integrate_all(
+        kept, reading, whole, at, damping, request, leftover
+    )
     lo, middle, hi = _band(motion, done)
     estimates = {
         name: {**vars(credible_interval(facts[name])), "driven_by": driver}
@@ -159,6 +164,20 @@ def _move(
         tuple(effect.name for effect in left),
         tuple(remarks(posterior, request.times, estimates, kept, left, tested)),
     )
+
+
+def _what_moves(posterior: Posterior, seed: int):
+    """Return the draws of one gear, and what a model of the force leaves of it.
+
+    Members of what was tested are no part of a gear that moves, and may be many.
+    """
+    if isinstance(posterior, DynamicPosterior):
+        return posterior.draws, None
+    values, untested = gear_values(posterior, seed)
+    own = {name: v for name, v in values.items() if name not in MEMBERS.values()}
+    if "gap_weights" in values:
+        own["gap_weights"] = values["gap_weights"]
+    return own, (posterior.problem, untested)
 
 
 def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:

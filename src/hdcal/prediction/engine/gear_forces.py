@@ -88,26 +88,34 @@ def gear_forces(
         force, _ = force_of(problem, value, records, factor=own, quantity="gear")
         if untested is None:
             return force
-        place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
-        left = acting(value, _leftover(problem, value, untested, place, pressed))
+        left = gear_leftover(problem, value, untested, as_read)
         return force + own * value.get(MODULUS, 1.0) * left
 
     factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
     return jax.vmap(of_draw, out_axes=1)(values, factor)
 
 
-def _leftover(problem: Problem, value: Values, untested: Untested, place, pressed):
-    """Return the bend and the fitted leftover of a draw at deformations [N].
+def gear_leftover(
+    problem: Problem, value: Values, untested: Untested, as_read: Float[Array, " n"]
+) -> Float[Array, " n"]:
+    """Return what the fitted leftover and the bend of a draw add to the force [N].
 
     The free shape is known, without force: between it and the nearer end of the tested
     range no bend grows.
+
+    Args:
+        problem: structure.
+        value: one draw.
+        untested: from `gear_values`.
+        as_read: deformation from the free shape, per mm as read.
     """
     own = jax.tree.map(lambda leaf: leaf[value[CAUSE]], untested)
+    place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
+    pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
     low, high = own.above.far, own.above.end
     known = jnp.clip(place, jnp.minimum(low, 0.0), jnp.maximum(high, 0.0))
     beyond = jnp.clip(place, low, high) + (place - known)
-    bend, _ = own.leftover(problem, value, beyond, pressed)
-    if problem.discrepancy is None:
-        return bend
-    _, fitted = own.leftover(problem, value, place, pressed)
-    return bend + fitted
+    left, _ = own.leftover(problem, value, beyond, pressed)
+    if problem.discrepancy is not None:
+        left = left + own.leftover(problem, value, place, pressed)[1]
+    return acting(value, left)
