@@ -12,15 +12,13 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.priors import Prior
-from hdcal.inference.diagnostics import Mixing
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION
 
 # Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
-MAX_RHAT = 1.01
-ESS_PER_CHAIN = 100
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
 # Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.

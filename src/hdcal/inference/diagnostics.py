@@ -17,6 +17,9 @@ MIN_CONTRACTION, CLEAR_CONTRACTION = 0.75, 0.95
 # Power-scaling sensitivity from which a prior or a likelihood matters.
 SENSITIVE = 0.05
 
+# What chains that have mixed show at most, and at least.
+MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
+
 Driver = Literal["data", "prior"]
 
 
@@ -110,6 +113,17 @@ def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
         split, bulk = _by_name(rhat(tree)), _by_name(ess(tree))
         tail = _by_name(ess(tree, method="tail"))
     return {name: Mixing(split[name], bulk[name], tail[name]) for name in draws}
+
+
+def have_mixed(draws: np.ndarray) -> bool:
+    """Tell whether chains mixed in every coordinate, (chain, draw, d)."""
+    found = mixing({str(i): draws[..., i] for i in range(draws.shape[-1])}).values()
+    need = ESS_PER_CHAIN * len(draws)
+    # A NaN, of draws that stand still, is neither.
+    return all(
+        one.rhat <= MAX_RHAT and min(one.ess_bulk, one.ess_tail) >= need
+        for one in found
+    )
 
 
 def _sensitivity(tree: xr.DataTree, group: str) -> dict[str, float]:

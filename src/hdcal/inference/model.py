@@ -69,11 +69,33 @@ def _sample_influence(prior: Prior, modulus):
     """Sample K·E₀, as read, under the prior of K, and return K."""
     if prior.family == "fixed":
         return sample_site("K", prior)
-    of_K = distribution(prior)
-    domain = of_K.support or dist.constraints.real
-    times_modulus = dist.transforms.AffineTransform(0.0, modulus, domain=domain)
-    product = numpyro.sample("_KE0", dist.TransformedDistribution(of_K, times_modulus))
+    product = numpyro.sample("_KE0", _scaled_and_moved(prior, modulus, 0.0))
     return numpyro.deterministic("K", product / modulus)
+
+
+def _scaled_and_moved(prior: Prior, scale, shift) -> dist.Distribution:
+    """Return the distribution of scale · parameter + shift."""
+    law = distribution(prior)
+    domain = law.support or dist.constraints.real
+    transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
+    return dist.TransformedDistribution(law, transform)
+
+
+def _sample_contact(problem: Problem, values: Mapping):
+    """Sample the point of first contact ω₀; beside slack, where it is taken up.
+
+    Rows of a gear that is pressed show ω₀ + c well, and neither ω₀ nor the slack c. The
+    coordinate of c is curved, and so would be the narrow ridge along which they trade.
+    A gear that is both pressed and pulled shows ω₀ itself.
+    """
+    name, slack = "deformation_offset", values.get("seating_slack.clearance")
+    prior = problem.priors[name]
+    if slack is None or prior.family == "fixed":
+        return sample_site(name, prior)
+    pressed = jnp.mean(jnp.sign(problem.rows.deformation))
+    taken = pressed * slack / problem.reading.radial_per_read
+    corner = numpyro.sample("_corner", _scaled_and_moved(prior, 1.0, taken))
+    return numpyro.deterministic(name, corner - taken)
 
 
 def _sample_correlation(prior: Prior):
@@ -151,7 +173,7 @@ def model(problem: Sampled) -> None:
 def _(problem: Problem) -> None:
     priors = problem.priors
     values = sample_stiffness(priors)
-    for name in ("alpha", "force_offset", "deformation_offset", "sigma"):
+    for name in ("alpha", "force_offset", "sigma"):
         values[name] = sample_site(name, priors[name])
     if problem.correlated:
         values[CORRELATION] = _sample_correlation(priors[CORRELATION])
@@ -159,6 +181,7 @@ def _(problem: Problem) -> None:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"
             values[name] = _sample_amplitude(problem, name)
+    values["deformation_offset"] = _sample_contact(problem, values)
     _sample_structure(problem, values)
     numpyro.deterministic("stiffness", stiffness(problem, values))
     numpyro.factor("force", log_likelihood(problem, values))

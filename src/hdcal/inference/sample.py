@@ -18,6 +18,7 @@ from numpyro.infer.hmc import hmc
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
 from hdcal.errors import Findings
+from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
@@ -26,9 +27,11 @@ from hdcal.inference.sampled_problem import Sampled
 Progress = Callable[[int, int], None]
 
 MAX_TREE_DEPTH = 10
-# Mean acceptance aimed at; each further value is for a run that still diverged.
+# Mean acceptance aimed at; each further value is for a run that was not sound.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
+# Draws of a chain over the effective ones that it needs, from which their lack tells.
+_TELLING = 4
 # Place of the divergences in what `_advance` keeps of a draw.
 _DIVERGING = 3
 # Chains start this many posterior sds apart, so that R-hat can see them disagree.
@@ -135,8 +138,9 @@ def sample(
 ) -> Draws:
     """Draw from the posterior.
 
-    A run with divergent trajectories is thrown away whole and repeated with shorter
-    steps; what is returned is one run, with the divergences it still has.
+    A run with divergent trajectories, or whose chains have not mixed, is thrown away
+    whole and repeated with shorter steps; what is returned is one run, with the faults
+    that it still has.
 
     Args:
         problem: the inference problem.
@@ -150,7 +154,7 @@ def sample(
     run = partial(_run, problem, whitening, key, chains, warmup, draws, progress)
     target, *shorter = TARGET_ACCEPTANCE
     kept = run(target)
-    while shorter and kept[_DIVERGING].any():
+    while shorter and not _sound(kept):
         target = shorter.pop(0)
         kept = run(target)
     standard, energy, potential_, diverging, steps, acceptance, step_size = kept
@@ -166,6 +170,16 @@ def sample(
         step_size=step_size,
         target_acceptance=target,
     )
+
+
+def _sound(kept) -> bool:
+    """Tell whether shorter steps would mend nothing."""
+    standard, diverging = kept[0], kept[_DIVERGING]
+    if diverging.any():
+        return False
+    # So few draws are no sign of the steps.
+    few = standard.shape[1] < _TELLING * ESS_PER_CHAIN
+    return few or have_mixed(standard)
 
 
 def _run(problem, whitening, key, chains, warmup, draws, progress, target):
