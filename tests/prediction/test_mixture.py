@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy import integrate, stats
+from scipy import stats
 
 from hdcal.prediction.engine.mixture import (
     Mixture,
@@ -22,40 +22,28 @@ SHARES = (1e-9, 0.01, 0.5, 0.93, 0.99, 1.0 - 1e-6)
 BELOW, ABOVE, QUANTILE = map(jax.jit, (Mixture.below, Mixture.above, Mixture.quantile))
 
 
-def mixture(step=0.0) -> Mixture:
-    return Mixture(
-        jnp.asarray(WEIGHT), jnp.asarray(MEAN), jnp.asarray(SD), step, step > 0
-    )
+def mixture() -> Mixture:
+    return Mixture(jnp.asarray(WEIGHT), jnp.asarray(MEAN), jnp.asarray(SD))
 
 
-def brute_below(row: int, force: float, step: float) -> float:
-    """Return the share by integration over the rounding."""
-
-    def smooth(shift):
-        return float(WEIGHT @ stats.norm.cdf((force - shift - MEAN[row]) / SD[row]))
-
-    if not step:
-        return smooth(0.0)
-    edges = [e for e in force - MEAN[row] if abs(e) < step / 2]
-    found = integrate.quad(smooth, -step / 2, step / 2, points=edges or None, limit=400)
-    return found[0] / step
-
-
-@pytest.mark.parametrize("step", [0.0, 0.01, 0.98])
-def test_shares_are_those_of_integration(step):
+def test_shares_are_those_of_their_parts():
     for force in (-3.0, 0.3, 2.1, 6.0):
         at = jnp.full(3, force)
-        below, above = BELOW(mixture(step), at), ABOVE(mixture(step), at)
-        for row in range(3):
-            expected = brute_below(row, force, step)
-            assert float(below[row]) == pytest.approx(expected, abs=1e-7)
+        below, above = BELOW(mixture(), at), ABOVE(mixture(), at)
+        expected = stats.norm.cdf((force - MEAN) / SD) @ WEIGHT
+        np.testing.assert_allclose(below, expected, atol=1e-12)
         np.testing.assert_allclose(below + above, 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("step", [0.0, 0.98])
+def test_an_error_beside_it_is_added():
+    wide = mixture().widened(0.7)
+    np.testing.assert_allclose(wide.sd, np.hypot(SD, 0.7))
+    np.testing.assert_array_equal(wide.mean, MEAN)
+
+
 @pytest.mark.parametrize("share", SHARES)
-def test_a_quantile_is_the_inverse_of_the_share(step, share):
-    found = mixture(step)
+def test_a_quantile_is_the_inverse_of_the_share(share):
+    found = mixture()
     place = QUANTILE(found, share)
     if share > 0.5:
         np.testing.assert_allclose(ABOVE(found, place), 1.0 - share, rtol=1e-7)
@@ -79,16 +67,12 @@ def test_a_population_without_scatter_is_one_force():
     assert float(ABOVE(alone, jnp.array([7.1]))[0]) == 0.0
 
 
-@pytest.mark.parametrize("step", [0.0, 0.98])
-def test_derivatives_of_quantiles_agree_with_differences(step):
+def test_derivatives_of_quantiles_agree_with_differences():
     share = jnp.array([0.01, 0.99])
 
     @jax.jit
     def of(scale):
-        rounded = step > 0
-        made = Mixture(
-            jnp.asarray(WEIGHT), MEAN[:2] * scale, SD[:2] * scale**2, step, rounded
-        )
+        made = Mixture(jnp.asarray(WEIGHT), MEAN[:2] * scale, SD[:2] * scale**2)
         return made.quantile(share)
 
     exact = jax.jit(jax.jacfwd(of))(1.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conjugate import SIGMA, conjugate_case, known_posterior, unit_stiffness
 from mirrored import mirrored
-from rigs import make_case, make_gear, make_records
+from rigs import make_case, make_records
 from scipy import stats
 
 import hdcal
@@ -111,23 +111,6 @@ def test_what_is_open_is_weighed_too():
         assert 1e-12 < true < 1e-2 and found.relative_error < 0.1
         assert found.probability == pytest.approx(true, rel=0.15)
     assert counted(warm, limit) < 1e-3 * true
-
-
-def test_rounding_is_part_of_a_reading():
-    rng, step = np.random.default_rng(4), 0.98
-    deformation = np.linspace(0.02, 0.54, 60)
-    exact_force = 205.0 * deformation - 1.0 + rng.normal(0.0, 0.2, 60)
-    rounded = step * np.round(exact_force / step)
-    case = make_case(make_records(deformation, rounded), make_gear(resolution=step))
-    (cause,) = causes_of(calibrate(case, chains=2, warmup=300, draws=400))
-    force = population_force(cause, AT, "readings")
-    limit = float(np.mean(np.asarray(force.along().centre()))) + 0.7
-    finer = replace(force, whose=replace(force.whose, rounded=False))
-    assert 0.005 < counted(force, limit) < 0.2
-    assert rare(force, limit).probability == pytest.approx(
-        counted(force, limit), rel=0.1
-    )
-    assert counted(finer, limit) < 0.5 * counted(force, limit)
 
 
 def test_at_every_temperature_it_is_refined():

@@ -1,4 +1,4 @@
-"""Forces of a population, given the parameters: a mixture of normals, rounded.
+"""Forces of a population, given the parameters: a mixture of normals.
 
 Of the kinds of scatter those that add up are normal and exact; those that do not
 (specimen, tolerances) are nodes of the mixture. Probabilities and quantiles of it are
@@ -18,8 +18,6 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array
 
-# Below this step, in sds, rounding only adds its variance: error 1e-10.
-_FINE = 0.02
 # What does not scatter at all still needs a width [N]: far below any reading.
 _LEAST_SD = 1e-9
 _MOST_STEPS = 80
@@ -34,15 +32,11 @@ class Mixture(eqx.Module):
         weight: of each component, sum 1.
         mean: [N].
         sd: [N].
-        step: width of the rounding, uniform over it [N].
-        rounded: whether there is any.
     """
 
     weight: Float[Array, "*b k"]
     mean: Float[Array, "*b k"]
     sd: Float[Array, "*b k"]
-    step: Float[Array, ""] | float = 0.0
-    rounded: bool = eqx.field(static=True, default=False)
 
     def below(self, force: Float[Array, "*b"]) -> Float[Array, "*b"]:
         """Return the share of the population whose force is at most this."""
@@ -56,23 +50,17 @@ class Mixture(eqx.Module):
         """Return the forces times the sense of loading, +1 or −1."""
         return replace(self, mean=sense * self.mean)
 
+    def widened(self, sd: Array | float) -> "Mixture":
+        """Return the forces plus an independent error of this sd [N]."""
+        return replace(self, sd=jnp.hypot(self.sd, sd))
+
     def centre(self) -> Float[Array, "*b"]:
         """Return the mean force [N]."""
         return jnp.sum(self.weight * self.mean, axis=-1)
 
     def _share(self, room):
         sd = jnp.maximum(self.sd, _LEAST_SD)
-        if not self.rounded:
-            return jnp.sum(self.weight * _phi(room / sd), axis=-1)
-        rounds = self.step > _FINE * sd
-        smooth = _phi(room / jnp.sqrt(sd**2 + self.step**2 / 12.0))
-        # The mean of Φ over the step, through its integral.
-        step = jnp.where(rounds, self.step, sd)
-        high, low = (room + 0.5 * step) / sd, (room - 0.5 * step) / sd
-        coarse = (_integral(high) - _integral(low)) * sd / step
-        # At a distance the integrals are nearly equal numbers; the share is then all.
-        coarse = jnp.where(low > 8.0, 1.0, coarse)
-        return jnp.sum(self.weight * jnp.where(rounds, coarse, smooth), axis=-1)
+        return jnp.sum(self.weight * _phi(room / sd), axis=-1)
 
     def quantile(self, share: Float[Array, "*b"] | float) -> Float[Array, "*b"]:
         """Return the force that this share does not exceed [N].
@@ -95,10 +83,6 @@ def _phi(z):
     return 0.5 * erfc(-z / np.sqrt(2.0))
 
 
-def _integral(z):
-    return z * _phi(z) + norm.pdf(z)
-
-
 def _side(mixture: Mixture, force, share):
     """Return the share on the side where it is the smaller, and the density."""
     upper = share > 0.5
@@ -116,13 +100,13 @@ def _solve(mixture: Mixture, share):
     score = ndtri(share)
     # The quantile of a mixture lies among those of its components.
     each = mixture.mean + score[..., None] * sd
-    counts, half = mixture.weight > 0.0, 0.5 * mixture.step
-    low = jnp.min(jnp.where(counts, each, np.inf), axis=-1) - half
-    high = jnp.max(jnp.where(counts, each, -np.inf), axis=-1) + half
+    counts = mixture.weight > 0.0
+    low = jnp.min(jnp.where(counts, each, np.inf), axis=-1)
+    high = jnp.max(jnp.where(counts, each, -np.inf), axis=-1)
     close = _CLOSE * jnp.min(sd, axis=-1)
     centre = mixture.centre()
     moment = mixture.weight * (sd**2 + (mixture.mean - centre[..., None]) ** 2)
-    spread = jnp.sqrt(jnp.sum(moment, axis=-1) + mixture.step**2 / 12.0)
+    spread = jnp.sqrt(jnp.sum(moment, axis=-1))
     tail_score = -jnp.abs(score)
 
     def step(state):
@@ -159,9 +143,7 @@ def pooled(parts: Sequence[tuple[Float[Array, " d"], Mixture]]) -> Mixture:
         weights.append((share[:, None] * jnp.broadcast_to(part.weight, shape)).ravel())
         means.append(part.mean.ravel())
         sds.append(jnp.broadcast_to(part.sd, shape).ravel())
-    first = parts[0][1]
-    weight, mean, sd = map(jnp.concatenate, (weights, means, sds))
-    return Mixture(weight, mean, sd, first.step, first.rounded)
+    return Mixture(*map(jnp.concatenate, (weights, means, sds)))
 
 
 def quantile_weights(

@@ -80,8 +80,14 @@ class PopulationForce:
         return self.cause.problem, self.cause.values, self.whose, self.conditions
 
     def mixture(self) -> Mixture:
-        """Return the mixture of every draw [draw, component]."""
+        """Return the mixture of every draw [draw, component], before rounding."""
         return mixtures(*self.traced)
+
+    @property
+    def rounding_sd(self) -> float:
+        """Sd that the steps of a reading add to it, wherever it lies in one [N]."""
+        step = float(self.cause.problem.step) if self.whose.rounded else 0.0
+        return step / 12.0**0.5
 
     @property
     def sense(self) -> LoadingSense:
@@ -157,8 +163,7 @@ def mixtures(
         return member_mixture(problem, value, whose, conditions)
 
     weight, mean, sd = jax.vmap(one)(values)
-    step = problem.step if whose.rounded else 0.0
-    return Mixture(weight, mean, sd, step, whose.rounded)
+    return Mixture(weight, mean, sd)
 
 
 def member_mixture(

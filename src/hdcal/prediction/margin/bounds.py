@@ -8,7 +8,7 @@ All of it is along the sense of loading; a `Level` has forces with their sign.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +22,7 @@ from hdcal.prediction.engine.loading_sense import (
 )
 from hdcal.prediction.engine.mixture import Mixture, pooled, weighted_quantile
 from hdcal.prediction.engine.population_force import PopulationForce
+from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import (
     INTERVAL,
@@ -45,7 +46,8 @@ class PopulationDraws:
         table: lower, upper and required quantile, centre [N] and the share above the
             limit; each [temperature, draw].
         weights: of the draws, sum 1.
-        predicted: quantiles of the predictive law [temperature, share] [N].
+        predicted: quantiles of the predictive law [temperature, share] [N]; the ends
+            and the middle are of what is shown, all else is before rounding.
     """
 
     sense: LoadingSense
@@ -73,7 +75,7 @@ def population_draws(
 ) -> PopulationDraws:
     """Return what every draw of every cause says at temperatures [°C]."""
     wanted = jnp.array([1.0 - criteria.content, criteria.content, criteria.required])
-    levels = jnp.array([*_TAILS, criteria.required])
+    tails, required = jnp.array(_TAILS), jnp.array([criteria.required])
     limit = jnp.asarray(
         np.inf if criteria.limit_force is None else criteria.limit_force
     )
@@ -83,8 +85,10 @@ def population_draws(
         found = [force.at(warm).along() for force in forces]
         each = [_each_draw(mixture, wanted, limit) for mixture in found]
         tables.append([np.concatenate(c) for c in zip(*each, strict=True)])
-        parts = list(zip(map(jnp.asarray, weights), found, strict=True))
-        predicted.append(np.asarray(_predicted(pooled(parts), levels)))
+        whole = pooled(list(zip(map(jnp.asarray, weights), found, strict=True)))
+        shown = whole.widened(forces[0].rounding_sd)
+        ahead = _predicted(shown, tails), _predicted(whole, required)
+        predicted.append(np.concatenate(ahead))
     names = ("lower", "upper", "required", "centre", "above")
     columns = {n: np.stack([t[i] for t in tables]) for i, n in enumerate(names)}
     weight = np.concatenate(weights)
@@ -125,6 +129,33 @@ def level_of(
         capacity_predictive_N=ahead[3],
         exceedance=_exceedance(table, draws.weights, criteria) if limited else None,
     )
+
+
+def shown(of: Level, grid: ReadingGrid, sense: LoadingSense) -> Level:
+    """Return a level whose bounds and capacities are readings.
+
+    Args:
+        of: the level before rounding.
+        grid: of the readings, along the sense.
+        sense: of loading.
+    """
+    least, most = ends_along(of.lower_bound_N, of.upper_bound_N, sense)
+    lower, upper = ends_along(grid.lower(least), grid.upper(most), sense)
+    return replace(
+        of,
+        lower_bound_N=lower,
+        upper_bound_N=upper,
+        capacity_N=grid.upper(of.capacity_N),
+        capacity_median_N=grid.upper(of.capacity_median_N),
+        capacity_predictive_N=grid.upper(of.capacity_predictive_N),
+    )
+
+
+def shown_model(of: ModelBound, grid: ReadingGrid, sense: LoadingSense) -> ModelBound:
+    """Return what one model says with bounds that are readings."""
+    least, most = ends_along(of.lower_bound_N, of.upper_bound_N, sense)
+    lower, upper = ends_along(grid.lower(least), grid.upper(most), sense)
+    return replace(of, lower_bound_N=lower, upper_bound_N=upper)
 
 
 def _exceedance(table, weights, criteria: Criteria) -> Exceedance:

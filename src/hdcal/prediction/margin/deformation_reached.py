@@ -102,8 +102,7 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
         def excess(deformation, row):
             there = replace(conditions, deformation=sense * deformation)
             parts = member_mixture(problem, value, whose, there)
-            step = problem.step if whose.rounded else 0.0
-            mixture = Mixture(*parts, step, whose.rounded).along(sense)
+            mixture = Mixture(*parts).along(sense)
             # Positive where the force does not get this far.
             short = shares[jnp.minimum(row, 1)] - mixture.below(given)
             return jnp.where(row == 2, mixture.centre() - given, short)

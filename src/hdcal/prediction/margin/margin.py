@@ -22,11 +22,14 @@ from hdcal.prediction.engine.forces import Quantity
 from hdcal.prediction.engine.loading_sense import LoadingSense, loading_sense
 from hdcal.prediction.engine.population import Population, widest
 from hdcal.prediction.engine.population_force import PopulationForce, population_force
+from hdcal.prediction.engine.reading_grid import reading_grid
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
     level_of,
     population_draws,
+    shown,
+    shown_model,
     worst_level,
 )
 from hdcal.prediction.margin.checks import check_margin, check_sign
@@ -120,13 +123,19 @@ def _margin(
     criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
     forces = _forces(causes, request, whose, sense)
+    rounded = forces[0].whose.rounded
+    grid = reading_grid(main.posterior.case, sense, rounded=rounded)
+    unrounded = criteria.before_rounding(grid)
     nodes = nodes_of(warm, main.posterior.case.records)
-    draws = population_draws(forces, nodes, criteria)
-    computed = _levels(draws, main, request, nodes, criteria)
+    draws = population_draws(forces, nodes, unrounded)
+    computed = _levels(draws, main, request, nodes, unrounded)
     check_sign(computed, request, criteria, sense)
     levels = levels_between(computed, warm, _tested(main, request, sense, warm))
-    levels = refined(levels, forces, criteria.limit_force, request.seed)
-    worst = with_likeliest(worst_level(draws, criteria, computed), levels)
+    levels = refined(levels, forces, unrounded.limit_force, request.seed)
+    worst = with_likeliest(worst_level(draws, unrounded, computed), levels)
+    models = refined_models(forces, draws, unrounded, worst, request.seed)
+    levels = tuple(shown(level, grid, sense) for level in levels)
+    worst = shown(worst, grid, sense)
     there = [force.at(worst.temperature_C) for force in forces]
     upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
@@ -148,14 +157,14 @@ def _margin(
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, sense, whose),
-        models=refined_models(forces, draws, criteria, worst, request.seed),
+        models=tuple(shown_model(model, grid, sense) for model in models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
         gradients=gradients(there, upper, criteria) if sensitivities else (),
         shares=variance_shares(there, request.seed) if sensitivities else (),
         beyond_tested=beyond_tested(forces[0].conditions),
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, computed, worst, criteria),
+        remarks=remarks(forces, computed, worst, criteria, grid),
     )
 
 

@@ -101,17 +101,14 @@ class _Target(eqx.Module):
         weight, mean, sd = member_mixture(
             self.problem, value, self.whose, self.conditions
         )
-        rounded = self.whose.rounded
-        step = self.problem.step if rounded else 0.0
-        sd = jnp.hypot(sd, blur)
-        return Mixture(weight, self.conditions.loading * mean, sd, step, rounded)
+        along = self.conditions.loading * mean
+        return Mixture(weight, along, jnp.hypot(sd, blur))
 
     def log_tail(self, point: Float[Array, " d"], sizes) -> Float[Array, ""]:
         """Return the log of about how much exceeds the limit, however little."""
         value = self.value(point, sizes, jax.random.key(0))
         found = self.mixture(value, self.blur)
-        sd = jnp.hypot(found.sd, found.step / np.sqrt(12.0))
-        tail = log_ndtr((found.mean - self.limit) / sd)
+        tail = log_ndtr((found.mean - self.limit) / found.sd)
         return logsumexp(jnp.log(found.weight) + tail)
 
     def terms(self, point: Float[Array, " d"], sizes, key):
@@ -128,8 +125,7 @@ class _Target(eqx.Module):
 
 def _heavy(found: Mixture, limit):
     """Return the share beyond, were the scatter Student's t of the same variance."""
-    sd = jnp.hypot(found.sd, found.step / np.sqrt(12.0))
-    z = (found.mean - limit) / sd * np.sqrt(_HEAVY / (_HEAVY - 2.0))
+    z = (found.mean - limit) / found.sd * np.sqrt(_HEAVY / (_HEAVY - 2.0))
     # The regularised incomplete beta function, for whole halves of the degrees.
     share = jax.scipy.special.betainc(_HEAVY / 2.0, 0.5, _HEAVY / (_HEAVY + z**2))
     return jnp.sum(found.weight * jnp.where(z < 0.0, 0.5 * share, 1.0 - 0.5 * share))
@@ -165,7 +161,7 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
 
     Args:
         force: as one cause expects it, at one temperature.
-        limit: along the sense of loading [N].
+        limit: along the sense of loading, of the force before it is rounded [N].
         seed: of the points.
     """
     problem = force.cause.problem

@@ -12,6 +12,7 @@ from hdcal.prediction.engine.conditions import beyond_tested, temperature_is_tes
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.engine.population_force import PopulationForce, bend_sd
+from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import FAR, Level
 
@@ -60,6 +61,15 @@ _AGAINST = (
 _NORMAL_TAILS = (
     "Such rare cases rest on the normal tails of noise and scatter, which no test of "
     "this size has seen."
+)
+_GRID = (
+    "Readings come in steps of {step:.3g} N: bounds and capacities are values that are "
+    "read, and the force itself may lie up to {half:.3g} N beyond them."
+)
+_NO_GRID = (
+    "Readings have steps of {step:.3g} N but lie on no one grid of such steps: bounds, "
+    "capacities and what exceeds them are for the worst place of a grid, {half:.3g} N "
+    "away."
 )
 _FAR_OUT = (
     " So far out a bound rests on that assumption, and its confidence with it: test "
@@ -144,6 +154,7 @@ def remarks(
     levels: Sequence[Level],
     worst: Level,
     criteria: Criteria,
+    grid: ReadingGrid,
 ) -> tuple[str, ...]:
     """Return sentences on what the numbers rest on.
 
@@ -152,10 +163,12 @@ def remarks(
         levels: the force at each temperature.
         worst: of all of them.
         criteria: what was to be kept.
+        grid: of the readings.
     """
     first = _main(forces)
     said = left_out_words([force.cause for force in forces])
     said += [*_signs(levels, first.sense), *_of_population(first)]
+    said += _of_steps(grid)
     # Where causes are averaged, what no model explains is one of them.
     alone = len(forces) == 1
     straight = all(force.cause.problem.discrepancy is None for force in forces)
@@ -169,6 +182,16 @@ def remarks(
     if used < total:
         said.append(f"{used} of {total} draws were used.")
     return tuple(dict.fromkeys(said))
+
+
+def _of_steps(grid: ReadingGrid) -> Iterator[str]:
+    """Say what the steps of the readings do to bounds and capacities."""
+    if grid.step == 0.0:
+        return
+    if grid.origin is None:
+        yield _NO_GRID.format(step=grid.step, half=0.5 * grid.step)
+    else:
+        yield _GRID.format(step=grid.step, half=0.5 * grid.step)
 
 
 def _signs(levels: Sequence[Level], sense: LoadingSense) -> Iterator[str]:

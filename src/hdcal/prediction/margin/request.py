@@ -9,6 +9,7 @@ from hdcal.data.case import Case
 from hdcal.prediction.engine.conditions import Direction, usual_temperature
 from hdcal.prediction.engine.forces import Quantity
 from hdcal.prediction.engine.population import Population
+from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.stated import Rule
 
 
@@ -40,6 +41,12 @@ class Criteria:
         """Return the same with the size of the capacity."""
         limit = self.limit_force
         return self if limit is None else replace(self, limit_force=abs(limit))
+
+    def before_rounding(self, grid: ReadingGrid) -> "Criteria":
+        """Return the same about the force before it is rounded; for a size."""
+        if self.limit_force is None:
+            return self
+        return replace(self, limit_force=grid.unrounded(self.limit_force))
 
 
 @dataclass(frozen=True)

@@ -38,12 +38,11 @@ class PredictiveLaw:
         """Return the law of the forces of all causes."""
         law = cls([], [], [])
         for force in forces:
-            mixture = force.mixture()
-            step = float(mixture.step) if mixture.rounded else 0.0
+            mixture = force.mixture().widened(force.rounding_sd)
             share = force.cause.weights[:, None] * np.asarray(mixture.weight)
             law.weight.append(np.broadcast_to(share, mixture.mean.shape))
             law.mean.append(np.asarray(mixture.mean))
-            law.sd.append(np.sqrt(np.asarray(mixture.sd) ** 2 + step**2 / 12.0))
+            law.sd.append(np.asarray(mixture.sd))
         return law
 
     def moments(self) -> tuple[float, float]:
