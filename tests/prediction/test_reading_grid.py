@@ -68,6 +68,15 @@ def test_the_grid_is_where_the_readings_are():
     assert reading_grid(rounded_case(0.3), 1, rounded=False).step == 0.0
 
 
+def test_a_slip_of_the_pen_leaves_the_grid():
+    case = rounded_case(0.3)
+    force = np.array(case.records.force)
+    force[::10] += 0.4 * STEP
+    slipped = replace(case, records=replace(case.records, force=force))
+    whole, some = (reading_grid(one, 1, rounded=True).origin for one in (case, slipped))
+    assert some == pytest.approx(whole, abs=1e-9)
+
+
 def test_readings_on_no_grid_are_bounded_wherever_it_lies():
     grid = reading_grid(rounded_case(off=0.4), 1, rounded=True)
     assert grid == ReadingGrid(STEP, None)

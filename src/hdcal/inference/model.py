@@ -27,6 +27,7 @@ from hdcal.physics.effect import parameters
 
 # What a correlation keeps away from 0 and 1.
 _OPEN = 1e-12
+CONTACT = "deformation_offset"
 
 
 def sample_site(name: str, prior: Prior):
@@ -82,20 +83,20 @@ def _scaled_and_moved(prior: Prior, scale, shift) -> dist.Distribution:
 
 
 def _sample_contact(problem: Problem, values: Mapping):
-    """Sample the point of first contact ω₀; beside slack, where it is taken up.
+    """Sample the point of first contact ω₀ beside slack: where that is taken up.
 
     Rows of a gear that is pressed show ω₀ + c well, and neither ω₀ nor the slack c. The
     coordinate of c is curved, and so would be the narrow ridge along which they trade.
     A gear that is both pressed and pulled shows ω₀ itself.
     """
-    name, slack = "deformation_offset", values.get("seating_slack.clearance")
-    prior = problem.priors[name]
-    if slack is None or prior.family == "fixed":
-        return sample_site(name, prior)
+    prior = problem.priors[CONTACT]
+    if prior.family == "fixed":
+        return sample_site(CONTACT, prior)
     pressed = jnp.mean(jnp.sign(problem.rows.deformation))
+    slack = values["seating_slack.clearance"]
     taken = pressed * slack / problem.reading.radial_per_read
     corner = numpyro.sample("_corner", _scaled_and_moved(prior, 1.0, taken))
-    return numpyro.deterministic(name, corner - taken)
+    return numpyro.deterministic(CONTACT, corner - taken)
 
 
 def _sample_correlation(prior: Prior):
@@ -173,15 +174,18 @@ def model(problem: Sampled) -> None:
 def _(problem: Problem) -> None:
     priors = problem.priors
     values = sample_stiffness(priors)
-    for name in ("alpha", "force_offset", "sigma"):
-        values[name] = sample_site(name, priors[name])
+    slack = any(effect.name == "seating_slack" for effect in problem.effects)
+    for name in ("alpha", "force_offset", CONTACT, "sigma"):
+        if not (slack and name == CONTACT):
+            values[name] = sample_site(name, priors[name])
     if problem.correlated:
         values[CORRELATION] = _sample_correlation(priors[CORRELATION])
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"
             values[name] = _sample_amplitude(problem, name)
-    values["deformation_offset"] = _sample_contact(problem, values)
+    if slack:
+        values[CONTACT] = _sample_contact(problem, values)
     _sample_structure(problem, values)
     numpyro.deterministic("stiffness", stiffness(problem, values))
     numpyro.factor("force", log_likelihood(problem, values))

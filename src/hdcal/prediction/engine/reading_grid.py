@@ -11,8 +11,9 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.prediction.engine.loading_sense import LoadingSense
 
-# Readings are on one grid where none is farther from it than this share of a step.
-_OFF = 0.1
+# Readings are on one grid where most are no farther from it than this share of a step:
+# a slip of the pen is not on it.
+_OFF, _MOST = 0.1, 0.75
 # A number that was typed is on the grid if it is nearer than this share of a step.
 _TYPED = 1e-6
 
@@ -64,8 +65,10 @@ def reading_grid(case: Case, sense: LoadingSense, *, rounded: bool) -> ReadingGr
     if not rounded:
         return ReadingGrid(0.0, None)
     step, force = case.gear.force_resolution, np.asarray(case.records.force)
-    turns = np.exp(2j * np.pi * force / step)
-    origin = float(np.angle(turns.mean())) / (2.0 * np.pi) * step
-    off = np.abs((force - origin) / step - np.round((force - origin) / step))
-    found = ReadingGrid(step, origin if off.max() <= _OFF else None)
+    centre = np.angle(np.exp(2j * np.pi * force / step).mean()) / (2.0 * np.pi)
+    away = force / step - centre
+    middle = np.median(away - np.round(away))
+    off = np.abs(away - np.round(away) - middle)
+    known = np.mean(off <= _OFF) >= _MOST
+    found = ReadingGrid(step, float((centre + middle) * step) if known else None)
     return found if sense > 0 else found.mirrored()
