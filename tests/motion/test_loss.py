@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moving import TRUTH, frictional_case, moving_case, moving_gear
-from short import TOO_SHORT
 
 from hdcal import InputError, Prior, calibrate_dynamic, respond
 from hdcal.inference import laplace
@@ -25,6 +24,8 @@ from hdcal.report.plain import as_json
 
 pytestmark = pytest.mark.computes
 
+# Enough to look at, far too few for their checks.
+FEW = {"chains": 2, "warmup": 100, "draws": 50}
 # Damping ratio and friction [N] of each truth, and the model that holds it.
 TRUTHS = {
     "viscous": (0.02, 0.0),
@@ -115,8 +116,8 @@ def test_a_stated_friction_of_any_family_is_taken():
 @pytest.fixture(scope="module")
 def posterior() -> DynamicPosterior:
     """A calibration with friction, of far too few draws for its checks."""
-    case = frictional_case(0, 0.01, 1.0, rows=120)
-    return calibrate_dynamic(case, effects=["coulomb_friction"], **TOO_SHORT)
+    case = frictional_case(0, 0.01, 1.0, rows=96)
+    return calibrate_dynamic(case, effects=["coulomb_friction"], **FEW)
 
 
 def test_the_friction_is_found_kept_and_taken_along(posterior, tmp_path):
