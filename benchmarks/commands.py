@@ -32,8 +32,9 @@ COMMANDS = {
     "--out {own}/margin --force",
     "margin of a load, two temperatures": "margin {own}/calibrate --deformation 0.4 "
     "--temperature 20,40 --quantity load",
-    "design": "design {own}/calibrate --window 0.38:0.42",
-    "study": "study {own}/calibrate --vary wall_thickness_mm=0.6:0.76:5",
+    "design": "design {own}/calibrate --window 0.38:0.42 --out {own}/design --force",
+    "study": "study {own}/calibrate --vary wall_thickness_mm=0.6:0.76:5 "
+    "--out {own}/study --force",
     "respond": "respond {own}/calibrate --force step --amplitude 40 --duration 0.02 "
     "--out {own}/respond --replace",
     f"track, {TRACKED} readings": "track {own}/calibrate",

@@ -51,7 +51,7 @@ def calibrate_with_gap(case):
 
 
 def calibrate_moving(case):
-    return motion_bands(calibrate_dynamic(case, **BRIEFLY))
+    return motion_bands(calibrate_dynamic(case, effects=(), **BRIEFLY))
 
 
 # Two numbers of rows of one bucket.

@@ -28,7 +28,7 @@ from hdcal.report.plain import as_json
 pytestmark = pytest.mark.computes
 
 # One shape and one length for all: the sampler is compiled once.
-SETTINGS = {"chains": 4, **SHORT}
+SETTINGS = {"chains": 4, "effects": (), **SHORT}
 SOUGHT = ("mass", "damping", "stiffness")
 # False-alarm probability of each statistical test; the seeds are fixed.
 LEVEL = 1e-3
@@ -162,7 +162,6 @@ def spoiled(**changes):
     [
         (spoiled(known=frozenset()), "no column holds the time"),
         (spoiled(time=np.repeat(np.arange(100.0), 2)), "not later than"),
-        (spoiled(temperature=np.linspace(20.0, 40.0, 200)), "runs over 20 K"),
         (spoiled(force_sd=np.full(200, 0.5)), "gives an sd of the force"),
         (replace(moving_case(0), run_labels=("1", "2")), "several runs"),
     ],

@@ -13,6 +13,7 @@ from hdcal.motion.respond import integrate
 from hdcal.motion.respond import respond as asked
 from hdcal.physics.linear_response import linear_response
 from hdcal.prediction.engine.gear_forces import gear_forces, gear_values
+from hdcal.prediction.engine.untested import PLACES
 
 # One number of points and draws for all: the integration is compiled once.
 SMALL = {"points": 101, "draws": 50, "duration": 0.02}
@@ -130,6 +131,15 @@ def test_beyond_what_was_tested_the_band_is_wider_and_inside_it_is_not():
     first = int(np.argmin(far.tested))
     assert width[: first // 2].max() < 1e-9
     assert width.max() > 1e-3
+
+
+def test_draws_that_are_kept_fill_what_is_open_evenly():
+    posterior = still_posterior()
+    for most in (50, 100, 128):
+        values, _ = gear_values(posterior, 0, most)
+        assert len(values["K"]) == most
+        for score in values[PLACES].T:
+            assert 0.4 <= np.mean(score > 0.0) <= 0.6
 
 
 def test_what_swings_faster_than_the_points_is_told():

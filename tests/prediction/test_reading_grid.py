@@ -27,8 +27,10 @@ def test_limits_and_bounds_are_those_of_rounded_forces(origin: float):
     grid, forces = ReadingGrid(STEP, origin), RNG.normal(80.0, 3.0, 20_000)
     shown = read(forces, origin)
     for limit in [*RNG.uniform(74.0, 86.0, 20), float(read(80.0, origin))]:
-        over = forces > grid.unrounded(limit)
-        np.testing.assert_array_equal(over, shown > limit + 1e-9)
+        over, nearest = forces > grid.unrounded(limit), float(read(limit, origin))
+        # Just below a reading it stands for that reading.
+        meant = max(limit, nearest) if nearest - limit <= 0.1 * STEP else limit
+        np.testing.assert_array_equal(over, shown > meant + 1e-9)
     for bound in RNG.uniform(74.0, 86.0, 20):
         upper, lower = grid.upper(bound), grid.lower(bound)
         assert np.mean(shown <= upper + 1e-9) >= np.mean(forces <= bound)
@@ -124,6 +126,41 @@ def test_bounds_are_readings_and_hold_what_they_promise(posterior):
     assert np.mean(shown <= worst.upper_bound_N - 1.5 * STEP) < 0.99
     assert worst.upper_bound_N - worst.capacity_median_N <= 1.5 * STEP
     assert any("come in steps of 0.98 N" in words for words in found.remarks)
+
+
+@pytest.mark.parametrize("rule", ["simple", "guarded"])
+def test_a_decision_does_not_contradict_its_risk(rule, posterior):
+    for limit in np.linspace(79.5, 83.5, 11):
+        asked = {"limit_force": limit, "rule": rule, "sensitivities": False}
+        found = hdcal.margin(posterior, AT, **asked).decision
+        risk = 0.5 if rule == "simple" else 0.025
+        if found.statement == "conforms":
+            assert found.false_accept_risk <= risk + 0.01, limit
+        elif found.statement == "does not conform":
+            assert found.false_accept_risk >= 1.0 - risk - 0.01, limit
+
+
+def test_a_limit_as_printed_is_the_reading_it_stands_for(posterior):
+    risks = [
+        hdcal.margin(
+            posterior, AT, limit_force=limit, sensitivities=False
+        ).worst.exceedance.probability
+        for limit in (82.3, 82.32, 82.36)
+    ]
+    assert risks[0] == risks[1] == risks[2]
+
+
+def test_the_deformation_reached_is_that_of_the_reading(posterior):
+    limit = 82.32
+    there = hdcal.margin(posterior, AT, given_force=limit, sensitivities=False).reached
+    for place in (there.lower_bound_mm, there.upper_bound_mm):
+        exact = 205.0 * place - 1.0
+        over = stats.norm.sf(limit + 0.5 * STEP, exact, 0.3)
+        assert 0.0 <= min(over, 1.0 - over) < 0.01
+    # A hair's breadth away from where one reading turns into the next.
+    near = there.lower_bound_mm - 1e-6
+    back = hdcal.margin(posterior, near, sensitivities=False).worst
+    assert back.upper_bound_N == pytest.approx(limit, abs=1e-6)
 
 
 def test_readings_on_no_grid_are_said(posterior):

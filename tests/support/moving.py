@@ -13,6 +13,7 @@ from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import problem_priors, unit_stiffness
+from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import linear_response
 
 TRUTH = {
@@ -57,6 +58,21 @@ def moving_case(seed: int, gear=None, truth=TRUTH, rows: int = 200):
     noise = np.random.default_rng(seed).normal(0.0, truth["deformation_sigma"], rows)
     read = clean + truth["deformation_offset"] + noise
     return make_case(make_records(read, force, **columns), case.gear)
+
+
+def frictional_case(seed, ratio, friction, gear=None, rows: int = 200):
+    """Return a case of a released gear with a damping ratio and dry friction [N]."""
+    truth = TRUTH | {"damping_ratio": ratio}
+    case = moving_case(seed, gear, truth, rows)
+    time, force = release(rows)
+    mass, damping, stiffness = motion(truth, case)
+    start = np.array([force[0] / stiffness, 0.0])
+    parts = mass, damping, stiffness
+    linear = np.asarray(linear_response(*parts, time, force, start))[:, 0]
+    rubbed = frictional_response(*parts, friction, time, force, start)
+    read = case.records.deformation - linear + np.asarray(rubbed)[:, 0]
+    known = {"known": {"time"}, "time": time}
+    return make_case(make_records(read, force, **known), case.gear)
 
 
 GEAR = """\

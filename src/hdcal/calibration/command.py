@@ -49,17 +49,18 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.sample import check_settings
 
+    if dynamic:
+        from hdcal.motion.loss import loss_effects as choose_effects
+    else:
+        from hdcal.calibration.calibrate import choose_effects
     with console.wrong as wrong:
-        for name in ("effects", "with_gap", "constant_noise") if dynamic else ():
+        for name in ("with_gap", "constant_noise") if dynamic else ():
             if settings.pop(name):
-                words = "does not go with --dynamic, whose model is linear"
+                words = "does not go with --dynamic, which has no such model"
                 wrong.append(Finding(name, words, "Leave it out"))
         size = ("chains", "warmup", "draws", "seed")
         wrong.attempt(check_settings, **{name: settings[name] for name in size})
-        if settings.get("effects"):
-            from hdcal.calibration.calibrate import choose_effects
-
-            wrong.attempt(choose_effects, settings["effects"])
+        wrong.attempt(choose_effects, settings["effects"])
         case = read_given(console, data, gear, columns, settings["theory"])
         # Said now, not after minutes of sampling.
         if out is None and case is not None:
@@ -70,6 +71,9 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
     if dynamic:
         from hdcal.motion.dynamic_calibration import calibrate_dynamic as sample
         from hdcal.motion.summary import dynamic_report as report
+
+        # With none given the data decide.
+        settings["effects"] = settings["effects"] or None
     else:
         from hdcal.calibration.calibrate import calibrate as sample
         from hdcal.calibration.summary import calibration_report as report

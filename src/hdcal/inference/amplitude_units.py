@@ -52,12 +52,26 @@ def amplitude_units(
         slopes = _slopes(effect, base, values, widest, padded, reading)
         for field, column in slopes.items():
             column = np.asarray(column)[: len(columns)]
-            fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
-            seen = np.linalg.norm(column - fitted)
-            finest = noise_sd / seen if seen > 0.0 else widest[field]
-            unit = min(widest[field], finest) or widest[field]
+            unit = finest(column, columns, noise_sd, widest[field])
             units[f"{effect.name}.{field}"] = unit
     return units
+
+
+def finest(
+    column: np.ndarray, columns: np.ndarray, noise_sd: float, widest: float
+) -> float:
+    """Return the standard error of an amplitude beside other parameters.
+
+    Args:
+        column: derivative of the mean reading by the amplitude, shape (n,).
+        columns: derivatives by the other parameters, to any scale, shape (n, p).
+        noise_sd: of the readings.
+        widest: prior sd of the amplitude, which its error never exceeds.
+    """
+    fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
+    seen = np.linalg.norm(column - fitted)
+    unit = noise_sd / float(seen) if seen > 0.0 else widest
+    return min(widest, unit) or widest
 
 
 @partial(jax.jit, static_argnames="effect")

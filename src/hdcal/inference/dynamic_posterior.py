@@ -3,12 +3,17 @@
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference import posterior_file
-from hdcal.inference.dynamic_problem import SITES, DynamicProblem, build_dynamic
+from hdcal.inference.dynamic_problem import (
+    DynamicProblem,
+    build_dynamic,
+    dynamic_sites,
+)
+from hdcal.inference.held import LOSS
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.problem import Problem
 
@@ -16,15 +21,16 @@ from hdcal.inference.problem import Problem
 class DynamicPosterior(Posterior):
     """A dynamic calibration: draws in code units, priors, checks and provenance.
 
-    It knows mass, damping and stiffness, and nothing of the zero of the force or of
-    effects: forces are predicted from a calibration of the gear at rest.
+    It knows mass, damping, stiffness and dry friction, and nothing of the zero of the
+    force or of other effects: forces are predicted from a calibration of the gear at
+    rest.
     """
 
     kind: ClassVar[str] = "dynamic"
 
     def sites(self, case, effects, with_gap) -> dict[str, tuple[int, ...]]:
         """Return the shape of each parameter that a draw holds."""
-        return dict.fromkeys(("E0", "K", *case.gear.gauge_priors, *SITES), ())
+        return dict.fromkeys(dynamic_sites(case, effects), ())
 
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
@@ -42,10 +48,16 @@ class DynamicPosterior(Posterior):
         remedy = "Take one of the gear at rest, or ask how the gear responds"
         raise InputError([Finding(self.case.name, words, remedy)])
 
+    @property
+    def loss(self) -> Mapping[str, float]:
+        """How probable each model of the loss is; empty where they were not weighed."""
+        found: Any = self.settings.get(LOSS)
+        return found or {}
+
     @cached_property
     def moving(self) -> DynamicProblem:
         """The inference problem that was sampled."""
-        return build_dynamic(self.case, self.priors, self.theory)
+        return build_dynamic(self.case, self.priors, self.theory, self.effects)
 
 
 def load_any(path: Path | str) -> Posterior:

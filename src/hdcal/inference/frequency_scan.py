@@ -11,7 +11,11 @@ import numpy as np
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_problem import DynamicProblem, stretch
+from hdcal.inference.dynamic_problem import (
+    DynamicProblem,
+    step_stiffness,
+    stretch,
+)
 from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import linear_response
 
@@ -30,11 +34,15 @@ def _residual(problem: DynamicProblem, frequency, ratio):
     """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and zero of the best fit."""
     real = measured(len(problem.time), problem.count)
     read = jnp.where(real, problem.deformation, 0.0)
+    alpha = problem.priors["alpha"]
+    stated = alpha.family in ("fixed", "normal", "lognormal")
+    middle = {"alpha": alpha.numbers[0] if stated else 0.0}
+    softening = step_stiffness(problem, middle, 1.0)
 
     def one(frequency, ratio):
-        # A mass of one over ω² has a stiffness of one.
+        # A mass of one over ω² has a mean stiffness of one.
         pace = 2.0 * jnp.pi * frequency
-        shape = (pace**-2, 2.0 * ratio / pace, 1.0, problem.time)
+        shape = (pace**-2, 2.0 * ratio / pace, softening, problem.time)
         none = jnp.zeros_like(problem.force)
         at_rest, moved = jnp.zeros(2), jnp.array([1.0, 0.0])
         columns = jnp.stack(

@@ -10,13 +10,16 @@ from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
 from hdcal.data.prior_checks import family_faults, range_faults, sign_faults
-from hdcal.data.typed_json import PART, RESULT, STRICT, Size, within
+from hdcal.data.typed_json import PART, RESULT, STRICT, Share, Size, within
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.hypotheses import HeldOrigin, LeftOut
 
 # The setting that holds the noise sd of the fit before sampling [N].
 PILOT_NOISE = "pilot_noise_N"
+# The setting that says how probable each model of the loss of a moving gear is.
+LOSS = "loss"
+LossModel = Literal["viscous", "dry friction", "both"]
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,7 @@ class HeldSettings:
     left_out: LeftOut | None = None
     # Of older files the pilot fit is made anew.
     pilot_noise_N: Size | None = None
+    loss: dict[LossModel, Share] | None = None
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ Position = dict[str, Any]
 
 # Largest share of the gradient that may be left, in posterior sds, at the mode.
 _TOLERANCE = 1e-6
+# A search among bends ends when so many steps gained less than this [nat].
+_STEPS, _LEAST_GAIN = 12, 1e-3
 
 
 class Whitening(eqx.Module):
@@ -185,10 +187,52 @@ def fit(
         jac=lambda u: expand(u)[1],
         hess=lambda u: expand(u)[2],
         options={"gtol": _TOLERANCE, "maxiter": 300, "max_trust_radius": 1e4},
+        # At a bend no gradient vanishes: the end is where nothing more is gained.
+        callback=_Patience() if problem.bent else None,
     )
     factor = scale[:, None] * _inverse_root(expand(found.x)[2])
     centre = _unflatten(place, flat + scale * found.x)
     return Whitening({name: np.asarray(v) for name, v in centre.items()}, factor)
+
+
+class _Patience:
+    """Ends a search whose last steps gained next to nothing."""
+
+    def __init__(self):
+        self._levels: list[float] = []
+
+    def __call__(self, *, intermediate_result: optimize.OptimizeResult) -> None:
+        """Look at one more step.
+
+        Raises:
+            StopIteration: it was the last one.
+        """
+        self._levels.append(float(intermediate_result.fun))
+        if len(self._levels) > _STEPS:
+            gained = self._levels[-1 - _STEPS] - self._levels[-1]
+            if gained < _LEAST_GAIN:
+                raise StopIteration
+
+
+def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
+    """Return the value of every sampled site at a position, as `fit` starts from it."""
+    found = constrain_fn(model, (problem,), {}, position)
+    return {name: float(value) for name, value in found.items()}
+
+
+def log_evidence(problem: Sampled, found: Whitening) -> float:
+    """Return the log probability of the data under a model, by Laplace's method.
+
+    As if the density were normal around its mode: −U + ½ d log 2π + log|factor|, U the
+    potential at the mode. An approximation, and of the one mode that was found.
+
+    Args:
+        problem: the inference problem.
+        found: its mode and curvature, from `fit`.
+    """
+    volume = np.linalg.slogdet(found.factor)[1]
+    volume += 0.5 * len(found.factor) * np.log(2.0 * np.pi)
+    return float(volume - potential(problem, found.centre))
 
 
 def _inverse_root(hessian: np.ndarray) -> np.ndarray:

@@ -37,18 +37,22 @@ def sample_site(name: str, prior: Prior):
     return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
 
 
-def _sample_amplitude(problem: Problem, name: str):
+def sample_amplitude(name: str, prior: Prior, unit: float | None):
     """Sample a parameter of an effect.
 
     A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
     resolve: linear where they see it, and a logarithm only below that. A plain
     logarithm stretches the neighbourhood of zero, where an absent effect has its
     posterior. The logistic density of u is taken off again, so the prior is exact.
+
+    Args:
+        name: of the parameter.
+        prior: of the parameter.
+        unit: of one that is half-normal.
     """
-    prior = problem.priors[name]
-    if prior.family != "half_normal":
+    if unit is None:
         return sample_site(name, prior)
-    unit, logistic = problem.units[name], dist.Logistic(0.0, 1.0)
+    logistic = dist.Logistic(0.0, 1.0)
     u = numpyro.sample(f"_{name}", logistic)
     size = unit * softplus(u)
     log_jacobian = jnp.log(unit) + log_sigmoid(u)
@@ -183,7 +187,8 @@ def _(problem: Problem) -> None:
     for effect in problem.effects:
         for field in parameters(effect):
             name = f"{effect.name}.{field}"
-            values[name] = _sample_amplitude(problem, name)
+            unit = problem.units.get(name)
+            values[name] = sample_amplitude(name, priors[name], unit)
     if slack:
         values[CONTACT] = _sample_contact(problem, values)
     _sample_structure(problem, values)

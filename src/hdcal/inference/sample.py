@@ -152,7 +152,8 @@ def sample(
         progress: called after every stretch.
     """
     run = partial(_run, problem, whitening, key, chains, warmup, draws, progress)
-    target, *shorter = TARGET_ACCEPTANCE
+    # Over bends long steps diverge: they are not even tried.
+    target, *shorter = TARGET_ACCEPTANCE[problem.bent :]
     kept = run(target)
     while shorter and not _sound(kept):
         target = shorter.pop(0)

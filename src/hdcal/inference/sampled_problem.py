@@ -19,6 +19,11 @@ class Sampled(eqx.Module):
 
     priors: eqx.AbstractVar[dict[str, Prior]]
 
+    @property
+    def bent(self) -> bool:
+        """Whether its density has bends, at which the gradient jumps."""
+        return False
+
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the prior of each parameter given the scales of one draw.
 

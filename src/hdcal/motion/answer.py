@@ -3,12 +3,29 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from hdcal.report.answer import Promise, Sentences
+from hdcal.report.answer import Probability, Promise, Sentences
 from hdcal.report.parameters import Interval, ParameterEstimate
 from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
 
 _ALWAYS = ["K", "E0", "alpha", "mass", "damping_ratio", "deformation_offset"]
 _ALWAYS += ["initial_deformation", "initial_velocity", "deformation_sigma"]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What takes the energy of a swing.
+
+    Attributes:
+        name: of a model with a probability of 0.9 or more that leaves only noise; None
+            where models were not weighed.
+        probabilities: of each model, the same before the data; empty without.
+        dry_share: of the energy that the largest swing loses, what dry friction takes;
+            None without friction in the model.
+    """
+
+    name: Literal["viscous", "dry friction", "both", "cannot tell"] | None
+    probabilities: dict[str, Probability]
+    dry_share: Interval | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +37,7 @@ class DynamicCalibrationAnswer(PosteriorAnswer):
         damping_ratio: ζ.
         natural_frequency_Hz: without damping.
         damped_frequency_Hz: with it.
+        loss: what takes the energy of a swing.
         assumptions: what the model takes for granted, in sentences.
     """
 
@@ -32,4 +50,5 @@ class DynamicCalibrationAnswer(PosteriorAnswer):
     damping_ratio: Interval
     natural_frequency_Hz: Interval
     damped_frequency_Hz: Interval
+    loss: Loss
     assumptions: Sentences

@@ -1,11 +1,11 @@
 """Calibrate mass, damping and stiffness against a gear that was seen to move."""
 
 import time
+from collections.abc import Sequence
 from functools import partial
 
 import jax
 import numpy as np
-from scipy import stats
 
 from hdcal.data.case import Case, Theory
 from hdcal.errors import Finding, InputError
@@ -19,28 +19,39 @@ from hdcal.inference.dynamic_problem import (
     build_dynamic,
     dynamic_site_priors,
     pointwise,
-    predict_motion,
 )
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.frequency_scan import scan
+from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
-from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.inference.sample import (
+    Draws,
+    Progress,
+    check_settings,
+    sample,
+)
+from hdcal.motion.loss import (
+    WHITE,
+    WHITENESS,
+    choose_loss,
+    loss_effects,
+    motion_slopes,
+    noise_probability,
+)
 
 FEWEST_ROWS = 20
-# Largest spread of temperature over a record that counts as one temperature [K].
-_ONE_TEMPERATURE = 5.0
 _PEAKS = 3
 # A second peak of the density lower by less than this [nat] was wrongly left out.
 _RIVAL = 7.0
 # Peaks nearer than this, in posterior sds of the first, are one.
 _SAME = 5.0
-_LAGS, _WHITE = 20, 1e-3
 _DERIVED = ("stiffness", "damping", "natural_frequency")
 
 
 def calibrate_dynamic(
     case: Case,
     *,
+    effects: Sequence[str] | None = None,
     theory: Theory | None = None,
     chains: int = 4,
     warmup: int = 1000,
@@ -48,14 +59,17 @@ def calibrate_dynamic(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> DynamicPosterior:
-    """Calibrate m ÿ + c ẏ + k y = F(t) against a measured time series.
+    """Calibrate m ÿ + c ẏ + k y = F(t), or with dry friction, against a time series.
 
     The force is the input: as read, without error, linear between the rows. The
     deformation is the output: y plus a zero of its own plus white noise. K and E₀
-    have the priors of the calibration at rest.
+    have the priors of the calibration at rest; k follows the temperature.
 
     Args:
-        case: from `read_case`; one run at one temperature, with time.
+        case: from `read_case`; one run, with time.
+        effects: `coulomb_friction`, or none for the linear model; by default the linear
+            model, and where that leaves more than noise the data name the loss, in
+            records of up to 4000 rows.
         theory: overrides the gear's theory.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain.
@@ -67,34 +81,44 @@ def calibrate_dynamic(
         The posterior; it may have failed its checks, see `Posterior.usable`.
 
     Raises:
-        InputError: the record is no time series that the model can be held against.
+        InputError: the record is no time series that the model can be held against, or
+            the model does not hold an effect.
     """
     check_settings(chains, warmup, draws, seed)
+    loss_effects(effects or ())
     check_motion(case)
     bound_executables()
     began = time.perf_counter()
     theory = theory or case.gear.theory
-    priors = dynamic_site_priors(case, theory)
-    problem = build_dynamic(case, priors, theory)
+    linear = build_dynamic(case, dynamic_site_priors(case, theory), theory)
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
-    whitening, rival = highest_peak(problem)
+    mode, rival = highest_peak(linear)
+    chosen = choose_loss(case, theory, linear, mode, effects)
+    problem, priors = chosen.problem, chosen.priors
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, whitening, of_draws, progress=progress, **size)
+    start = chosen.whitening
+    found = sample(problem, start, of_draws, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
-    own = _specifics(problem, found, rival)
+    own = _specifics(problem, found, (rival, *chosen.checks))
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings |= run_settings(found, began)
-    return DynamicPosterior(case, theory, (), priors, *parts, settings)
+    settings |= {LOSS: chosen.probabilities} if chosen.probabilities else {}
+    return DynamicPosterior(case, theory, problem.effects, priors, *parts, settings)
 
 
-def _specifics(problem: DynamicProblem, found: Draws, rival: Check) -> Specifics:
+def _specifics(
+    problem: DynamicProblem, found: Draws, checks: Sequence[Check]
+) -> Specifics:
     """Return what the model of the motion adds to what every calibration has."""
+    ratio = problem.priors["damping_ratio"]
+    undamped = ratio.family == "fixed" and float(ratio.numbers[0]) == 0.0
+    mixed = [name for name in _DERIVED if name != "damping" or not undamped]
     return Specifics(
         log_likelihood=_log_likelihood(problem, found),
         slopes=_slopes_in_sds(problem, found),
-        mixed={name: found.values[name] for name in _DERIVED},
+        mixed={name: found.values[name] for name in mixed},
         checks=[
-            rival,
+            *checks,
             whiteness_check(problem, found),
             sampling_rate_check(problem, found),
         ],
@@ -133,9 +157,6 @@ def check_motion(case: Case) -> None:
         )
     if rows < FEWEST_ROWS:
         find(f"holds {rows} rows of readings", f"At least {FEWEST_ROWS} are needed")
-    if np.ptp(records.temperature) > _ONE_TEMPERATURE:
-        words = f"the temperature runs over {np.ptp(records.temperature):.3g} K"
-        find(words, f"Keep it within {_ONE_TEMPERATURE:g} K, or split the record")
     if np.any(records.force_sd > 0.0):
         find("gives an sd of the force", "The force is taken as exact: leave it out")
     if findings:
@@ -167,15 +188,6 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
 
 
 _potential = jax.jit(laplace.potential)
-_predict = jax.jit(predict_motion)
-
-
-@jax.jit
-def _slopes(problem: DynamicProblem, values, part):
-    def mean(moved):
-        return predict_motion(problem, {**values, **moved})
-
-    return jax.jacfwd(mean)(part)
 
 
 @jax.jit
@@ -191,30 +203,16 @@ def _best_draw(found: Draws) -> dict[str, np.ndarray]:
 
 
 def whiteness_check(problem: DynamicProblem, found: Draws) -> Check:
-    """Warn where what is left over is no white noise: intervals are then too narrow.
-
-    The test is Ljung and Box's over twenty lags (fewer in short records).
-    """
-    name = "residuals are noise"
-    values = _best_draw(found)
-    left = problem.deformation - np.asarray(_predict(problem, values))
-    left = left[: problem.count]
-    left = left - left.mean()
-    rows = len(left)
-    lags = np.arange(1, min(_LAGS, rows // 4) + 1)
-    power = max(float(left @ left), np.finfo(float).tiny)
-    share = np.array([left[lag:] @ left[:-lag] for lag in lags]) / power
-    statistic = rows * (rows + 2) * np.sum(share**2 / (rows - lags))
-    p = float(stats.chi2.sf(statistic, len(lags)))
-    if p >= _WHITE:
-        return Check(
-            name, "passed", f"no correlation over {len(lags)} rows (p = {p:.2g})"
-        )
+    """Warn where what is left over is no white noise: intervals are then too narrow."""
+    p = noise_probability(problem, _best_draw(found))
+    if p >= WHITE:
+        return Check(WHITENESS, "passed", f"no correlation over rows (p = {p:.2g})")
+    model = "model with dry friction" if problem.effects else "linear model"
     words = (
         "what is left over is correlated from row to row "
-        f"(p = {p:.1g}): the linear model does not hold, the intervals are too narrow"
+        f"(p = {p:.1g}): the {model} does not hold, the intervals are too narrow"
     )
-    return Check(name, "warning", words)
+    return Check(WHITENESS, "warning", words)
 
 
 def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
@@ -239,6 +237,6 @@ def _slopes_in_sds(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarra
         for name, prior in problem.priors.items()
         if prior.family != "fixed" and name != "deformation_sigma"
     ]
-    slopes = _slopes(problem, values, {name: values[name] for name in names})
+    slopes = motion_slopes(problem, values, {name: values[name] for name in names})
     sd = float(values["deformation_sigma"])
     return {n: np.asarray(slope)[: problem.count] / sd for n, slope in slopes.items()}

@@ -1,17 +1,28 @@
 """A dynamic calibration as an answer, and all that its result folder holds."""
 
 from functools import cache
+from typing import Any, cast
 
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.dynamic_problem import FRICTION
 from hdcal.inference.posterior import FILE_NAME
-from hdcal.motion.answer import DynamicCalibrationAnswer
+from hdcal.motion.answer import DynamicCalibrationAnswer, Loss
 from hdcal.motion.bands import MotionBands, motion_bands
-from hdcal.motion.document import ASSUMPTIONS, headline, motion_document, next_steps
-from hdcal.report.parameters import credible_interval
+from hdcal.motion.document import (
+    assumptions,
+    headline,
+    motion_document,
+    next_steps,
+)
+from hdcal.motion.loss import LEFT_OVER, WHITENESS, dry_share, swing
+from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report
+
+# A model less probable than this is not named.
+_NAMED = 0.9
 
 
 def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
@@ -20,15 +31,45 @@ def dynamic_answer(posterior: DynamicPosterior) -> DynamicCalibrationAnswer:
     ratio, frequency = draws["damping_ratio"], draws["natural_frequency"]
     damped = frequency * np.sqrt(np.maximum(1.0 - ratio**2, 0.0))
     free = credible_interval(frequency)
-    entries = posterior_entries(posterior, headline(free), next_steps(posterior))
+    loss = found_loss(posterior)
+    steps = next_steps(posterior, loss)
+    entries = posterior_entries(posterior, headline(free, loss), steps)
     return DynamicCalibrationAnswer(
         **entries,
         damping_N_s_per_mm=credible_interval(draws["damping"]),
         damping_ratio=credible_interval(ratio),
         natural_frequency_Hz=free,
         damped_frequency_Hz=credible_interval(damped),
-        assumptions=ASSUMPTIONS,
+        loss=loss,
+        assumptions=assumptions(posterior),
     )
+
+
+def found_loss(posterior: DynamicPosterior) -> Loss:
+    """Return what takes the energy of a swing.
+
+    A model whose residuals are no noise is not the right one, however much more
+    probable it is than the others: then there is no name. The linear model whose
+    residuals are noise needs no comparison.
+    """
+    weighed = dict(posterior.loss)
+    likeliest = max(weighed, key=lambda name: weighed[name], default=None)
+    asked = LEFT_OVER if weighed else WHITENESS
+    noise = any(c.name == asked and c.outcome == "passed" for c in posterior.checks)
+    if likeliest and not (noise and weighed[likeliest] >= _NAMED):
+        likeliest = "cannot tell"
+    if not weighed and noise and not posterior.effects:
+        likeliest = "viscous"
+    share = _dry_share(posterior) if posterior.effects else None
+    return Loss(cast(Any, likeliest), weighed, share)
+
+
+def _dry_share(posterior: DynamicPosterior) -> Interval:
+    draws, problem = posterior.draws, posterior.moving
+    middle = {name: np.median(values, axis=0) for name, values in draws.items()}
+    size = swing(problem, middle)
+    parts = draws[FRICTION], draws["damping"], draws["natural_frequency"]
+    return credible_interval(dry_share(*parts, size))
 
 
 def dynamic_report(

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from hdcal.data.records import Array
 
 Scalar = Float[Array, ""] | float
+Steps = Scalar | Float[Array, " n-1"]
 # Below this |x| the functions of √x are summed as series, smooth through zero.
 _SMALL = 1e-4
 # Longer records are taken in stretches of so many steps, to bound the memory.
@@ -36,25 +37,30 @@ def _sine(x):
     return jnp.where(small, 1.0 - x * (1 / 6 - x * (1 / 120 - x / 5040)), far)
 
 
-def free_decay(
-    mass: Scalar, damping: Scalar, stiffness: Scalar, step: Float[Array, "*n"]
-) -> Float[Array, "*n 2 2"]:
+def decay_entries(
+    mass: Scalar, damping: Scalar, stiffness: Steps, step: Float[Array, "*n"]
+) -> tuple[Float[Array, "*n"], ...]:
     """Return the matrix that takes (y, ẏ) a time step further without a force.
 
-    exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)), γ = c/2m, x = (k/m − γ²) h²,
-    C = cos √x, S = sin √x / √x: one formula through critical damping.
+    Its four entries, row after row: exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)),
+    γ = c/2m, x = (k/m − γ²) h², C = cos √x, S = sin √x / √x: one formula through
+    critical damping.
 
     Args:
         mass: m [N·s²/mm].
         damping: c [N·s/mm].
-        stiffness: k [N/mm].
+        stiffness: k, of all steps or of each [N/mm].
         step: h [s].
     """
-    step, half = jnp.asarray(step), 0.5 * damping / mass
-    square = stiffness / mass
-    x = (square - half**2) * step**2
-    decay = jnp.exp(-half * step)
-    level, slope = decay * _cosine(x), decay * _sine(x) * step
+    level, slope, half, square = _decay(mass, damping, stiffness, step)
+    return level + half * slope, slope, -square * slope, level - half * slope
+
+
+def free_decay(
+    mass: Scalar, damping: Scalar, stiffness: Steps, step: Float[Array, "*n"]
+) -> Float[Array, "*n 2 2"]:
+    """Return the entries of `decay_entries` as matrices."""
+    level, slope, half, square = _decay(mass, damping, stiffness, step)
     rows = (
         jnp.stack([level + half * slope, slope], axis=-1),
         jnp.stack([-square * slope, level - half * slope], axis=-1),
@@ -62,10 +68,20 @@ def free_decay(
     return jnp.stack(rows, axis=-2)
 
 
+def _decay(mass, damping, stiffness, step):
+    """Return e^(−γh) C, e^(−γh) S h, γ and k/m."""
+    step, half = jnp.asarray(step), 0.5 * damping / mass
+    square = stiffness / mass
+    x = (square - half**2) * step**2
+    decay = jnp.exp(-half * step)
+    level, slope = decay * _cosine(x), decay * _sine(x) * step
+    return level, slope, half, square
+
+
 def linear_response(
     mass: Scalar,
     damping: Scalar,
-    stiffness: Scalar,
+    stiffness: Steps,
     time: Float[Array, " n"],
     force: Float[Array, " n"],
     start: Float[Array, "2"],
@@ -75,7 +91,7 @@ def linear_response(
     Args:
         mass: m [N·s²/mm].
         damping: c [N·s/mm].
-        stiffness: k [N/mm].
+        stiffness: k, of all steps or of each [N/mm].
         time: increasing, in steps of any size [s].
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
@@ -88,7 +104,7 @@ def linear_response(
 
 def _advance(known, time, force, start) -> Float[Array, "n-1 2"]:
     """Return the states at all rows but the first; mass, damping, stiffness known."""
-    mass, damping, stiffness = known
+    mass, damping, stiffness = known  # the stiffness of all steps, or of each
     step = jnp.diff(time)
     slope = jnp.diff(force) / step
     lag = damping * slope / stiffness**2
@@ -108,6 +124,8 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
     steps = len(time) - 1
     count = -(-steps // _STRETCH)
     spare = count * _STRETCH - steps
+    mass, damping, stiffness = known
+    stiffness = jnp.pad(jnp.broadcast_to(stiffness, steps), (0, spare), mode="edge")
     beyond = jnp.arange(1, spare + 1) * (time[-1] - time[-2])
     time = jnp.concatenate([time, time[-1] + beyond])
     force = jnp.pad(force, (0, spare), mode="edge")
@@ -115,10 +133,11 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
 
     @jax.checkpoint
     def stretch(state, part):
-        states = _advance(known, part[0], part[1], state)
+        states = _advance((mass, damping, part[0]), part[1], part[2], state)
         return states[-1], states
 
-    _, states = jax.lax.scan(stretch, start, (time[rows], force[rows]))
+    parts = stiffness.reshape(count, _STRETCH), time[rows], force[rows]
+    _, states = jax.lax.scan(stretch, start, parts)
     return jnp.concatenate([start[None], states.reshape(-1, 2)[:steps]])
 
 

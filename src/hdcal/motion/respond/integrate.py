@@ -48,13 +48,6 @@ class _Leftover(eqx.Module):
         return left[0] - left[1]
 
 
-def thinned(draws: dict[str, np.ndarray], count: int) -> dict[str, np.ndarray]:
-    """Return so many draws, taken evenly from all chains."""
-    total = len(draws["K"])
-    rows = np.linspace(0, total - 1, min(count, total)).astype(int)
-    return {name: values[rows] for name, values in draws.items()}
-
-
 def unseen(posterior: Posterior, values: dict, mass, seed: int):
     """Return mass and damping ratio of each draw, from data or from their priors."""
     if isinstance(posterior, DynamicPosterior):

@@ -19,12 +19,12 @@ from hdcal.inference.values import MEMBERS
 from hdcal.motion.respond.answer import COLUMNS
 from hdcal.motion.respond.document import remarks
 from hdcal.motion.respond.drivers import drivers, tested_rows
-from hdcal.motion.respond.integrate import integrate_all, thinned, unseen
+from hdcal.motion.respond.integrate import integrate_all, unseen
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.notebook import Shown
 from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
-from hdcal.prediction.engine.gear_forces import gear_values
+from hdcal.prediction.engine.gear_forces import evenly, gear_values
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
@@ -132,8 +132,7 @@ def _move(
     """Integrate every gear of the posterior, and say what its motion rests on."""
     usual = usual_temperature(posterior.case)
     at = usual if temperature is None else float(temperature)
-    values, leftover = _what_moves(posterior, seed)
-    values = thinned(values, draws)
+    values, leftover = _what_moves(posterior, draws, seed)
     moved, ratio = unseen(posterior, values, mass, seed)
     kept, left = acting(without_scatter(posterior.effects))
     reading = case_reading(posterior.case)
@@ -166,14 +165,16 @@ def _move(
     )
 
 
-def _what_moves(posterior: Posterior, seed: int):
-    """Return the draws of one gear, and what a model of the force leaves of it.
+def _what_moves(posterior: Posterior, draws: int, seed: int):
+    """Return so many draws of one gear, and what a model of the force leaves of it.
 
     Members of what was tested are no part of a gear that moves, and may be many.
     """
     if isinstance(posterior, DynamicPosterior):
-        return posterior.draws, None
-    values, untested = gear_values(posterior, seed)
+        every = posterior.draws
+        kept = evenly(len(every["K"]), draws)
+        return {name: values[kept] for name, values in every.items()}, None
+    values, untested = gear_values(posterior, seed, draws)
     own = {name: v for name, v in values.items() if name not in MEMBERS.values()}
     if "gap_weights" in values:
         own["gap_weights"] = values["gap_weights"]

@@ -21,22 +21,29 @@ from hdcal.prediction.engine.untested import SITES, Untested, spread_evenly, unt
 CAUSE, MODULUS = "_cause", "_modulus"
 
 
-def gear_values(posterior: Posterior, seed: int = 0) -> tuple[Values, Untested]:
+def gear_values(
+    posterior: Posterior, seed: int = 0, most: int | None = None
+) -> tuple[Values, Untested]:
     """Return draws with what they leave open, and what that is for each cause.
 
     Args:
         posterior: of one model, or a mixture.
         seed: of what the draws leave open.
+        most: draws to keep, taken evenly; all by default.
 
     Returns:
         The draws; every leaf of what is untested has an axis of causes first.
     """
-    values, causes = posterior.draws, causes_of(posterior)
-    levels = spread_evenly(len(values["K"]), SITES, seed)
+    every, causes = posterior.draws, causes_of(posterior)
+    total = len(every["K"])
+    kept = evenly(total, total if most is None else most)
+    values = {name: draws[kept] for name, draws in every.items()}
+    # Of what fills a space evenly, a part that was picked from it need not.
+    levels = spread_evenly(len(kept), SITES, seed)
     # A mixture has its causes in the order of its draws, alike in each chain.
     chains = posterior.tree["posterior"].sizes["chain"]
     sizes = [cause.size // chains for cause in causes]
-    index = np.tile(np.repeat(np.arange(len(causes)), sizes), chains)
+    index = np.tile(np.repeat(np.arange(len(causes)), sizes), chains)[kept]
     each = [untested_of(cause, levels[index == i]) for i, cause in enumerate(causes)]
     found: dict[str, np.ndarray] = {CAUSE: index}
     for name, first in each[0][1].items():
@@ -46,6 +53,11 @@ def gear_values(posterior: Posterior, seed: int = 0) -> tuple[Values, Untested]:
     parts = [untested for untested, _ in each]
     stacked = jax.tree.map(lambda *leaves: np.stack(leaves), *parts)
     return {**values, **found}, stacked
+
+
+def evenly(total: int, count: int) -> np.ndarray:
+    """Return the rows of so many draws, taken evenly from all chains."""
+    return np.linspace(0, total - 1, min(count, total)).astype(int)
 
 
 @jax.jit

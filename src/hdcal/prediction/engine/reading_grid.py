@@ -14,8 +14,8 @@ from hdcal.prediction.engine.loading_sense import LoadingSense
 # Readings are on one grid where most are no farther from it than this share of a step:
 # a slip of the pen is not on it.
 _OFF, _MOST = 0.1, 0.75
-# A number that was typed is on the grid if it is nearer than this share of a step.
-_TYPED = 1e-6
+# So few readings may lie on a grid by chance.
+_FEWEST = 8
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,13 @@ class ReadingGrid:
     origin: float | None
 
     def unrounded(self, limit: float) -> float:
-        """Return the force [N] up to which no reading exceeds a limit [N]."""
+        """Return the force [N] up to which no reading exceeds a limit [N].
+
+        A limit that is nearly a reading is that reading, as it was written or typed.
+        """
         if self.step == 0.0 or self.origin is None:
             return limit - 0.5 * self.step
-        steps = np.floor((limit - self.origin) / self.step + _TYPED)
+        steps = np.floor((limit - self.origin) / self.step + _OFF)
         return float(self.origin + self.step * (steps + 0.5))
 
     def upper(self, force: float) -> float:
@@ -69,6 +72,6 @@ def reading_grid(case: Case, sense: LoadingSense, *, rounded: bool) -> ReadingGr
     away = force / step - centre
     middle = np.median(away - np.round(away))
     off = np.abs(away - np.round(away) - middle)
-    known = np.mean(off <= _OFF) >= _MOST
+    known = len(force) >= _FEWEST and np.mean(off <= _OFF) >= _MOST
     found = ReadingGrid(step, float((centre + middle) * step) if known else None)
     return found if sense > 0 else found.mirrored()

@@ -133,23 +133,36 @@ def coverage_words(check: BudgetCheck) -> str:
     return f"k = {check.coverage_factor:.2f}, {law}"
 
 
-def rule_words(rule: Rule, limit: float, guard: float) -> str:
-    """Return a decision rule in words, as a certificate has to state it."""
+def rule_words(rule: Rule, limit: float, guard: float, most: float) -> str:
+    """Return a decision rule in words, as a certificate has to state it.
+
+    Args:
+        rule: guarded or simple.
+        limit: of what is asked for [N].
+        guard: guard band [N].
+        most: the force up to which no reading exceeds the limit [N].
+    """
     source = "ISO/IEC 17025, 7.8.6; ILAC-G8; JCGM 106"
+    steps = ""
+    if most != limit:
+        steps = (
+            f" No reading exceeds the limit of {limit:g} N up to a force of "
+            f"{most:g} N, with which the force before rounding is compared."
+        )
     if rule == "simple":
         return (
             f"Simple acceptance ({source}): the force conforms if its estimate is at "
-            f"most the limit, {limit:g} N, and does not conform otherwise. The "
+            f"most the limit, {most:g} N, and does not conform otherwise. The "
             "uncertainty is not taken into account: an estimate at the limit is "
-            "accepted with a risk of about 50 %."
+            f"accepted with a risk of about 50 %.{steps}"
         )
     return (
         f"Guarded acceptance ({source}): the force conforms if its estimate and the "
-        f"guard band w together are at most the limit, {limit:g} N; w = {guard:.3g} N "
+        f"guard band w together are at most the limit, {most:g} N; w = {guard:.3g} N "
         "is the expanded uncertainty, from the estimate to the end of the 95 % "
         "coverage interval. It does not conform if that whole interval lies beyond the "
         "limit. Between the two nothing is decided. An estimate at the acceptance "
-        "limit is accepted with a risk of 2.5 %."
+        f"limit is accepted with a risk of 2.5 %.{steps}"
     )
 
 

@@ -47,6 +47,7 @@ def decision(
     stated: StatedUncertainty,
     worst: Level,
     criteria: Criteria,
+    unrounded: Criteria,
     sense: LoadingSense,
     population: Population,
 ) -> Decision | None:
@@ -56,20 +57,22 @@ def decision(
         stated: its estimate and uncertainty.
         worst: how probable it is that it exceeds the limit.
         criteria: with the limit, a size, and the rule.
+        unrounded: the same about the force before it is rounded.
         sense: of loading.
         population: whose force; of gears there is a global risk too.
     """
     limit, risk = criteria.limit_force, worst.exceedance
-    if limit is None or risk is None:
+    most_force = unrounded.limit_force
+    if limit is None or most_force is None or risk is None:
         return None
     rule, estimate = criteria.rule or "guarded", sense * stated.estimate_N
     low, high = ends_along(stated.coverage_lo_N, stated.coverage_hi_N, sense)
-    statement, guard = decide(rule, limit, estimate, low, high)
-    most = limit - guard
+    statement, guard = decide(rule, most_force, estimate, low, high)
+    most = most_force - guard
     overall = None
     if population == "specimens" and stated.budget:
         sds = _production_and_measurement(stated)
-        overall = global_false_accept(estimate, *sds, limit, most)
+        overall = global_false_accept(estimate, *sds, most_force, most)
     wrong = risk.probability
     return Decision(
         rule=rule,
@@ -80,8 +83,8 @@ def decision(
         probability_of_conformity=1.0 - wrong,
         false_accept_risk=wrong,
         global_false_accept_risk=overall,
-        rule_words=rule_words(rule, limit, guard),
-        words=decision_words(estimate, limit, guard, statement, wrong, overall),
+        rule_words=rule_words(rule, limit, guard, most_force),
+        words=decision_words(estimate, most_force, guard, statement, wrong, overall),
     )
 
 

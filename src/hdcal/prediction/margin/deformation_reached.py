@@ -16,6 +16,7 @@ import optimistix as optx
 from hdcal.prediction.engine.loading_sense import ends_along, sense_of
 from hdcal.prediction.engine.mixture import Mixture, quantile_weights
 from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
+from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
 
 # The search ends at this multiple of the tested deformation: what lies beyond rests
@@ -57,6 +58,7 @@ def deformation_reached(
     forces: Sequence[PopulationForce],
     given: float,
     criteria: Criteria,
+    grid: ReadingGrid,
 ) -> DeformationReached:
     """Return the deformation at which the members need a force.
 
@@ -64,12 +66,14 @@ def deformation_reached(
         forces: of each cause, at the temperature in question.
         given: force [N], with its sign.
         criteria: content and confidence of the bounds.
+        grid: of the readings, along the sense of the force.
     """
     where, sense = forces[0].conditions, sense_of(given)
     low, high, warm = map(float, (where.low, where.high, where.temperature))
     ends = min(0.0, REACH * low), max(0.0, REACH * high)
     shares = jnp.array([criteria.content, 1.0 - criteria.content])
-    asked = abs(given), shares, ends_along(*ends, sense)
+    size = abs(given), grid.unrounded(abs(given))
+    asked = size, shares, ends_along(*ends, sense)
     parts = [_solve(*force.of_sense(sense).traced, *asked) for force in forces]
     found = np.concatenate(parts)
     weights = np.concatenate([force.cause.weights for force in forces])
@@ -93,9 +97,10 @@ def deformation_reached(
 def _solve(problem, values, whose, conditions, given, shares, ends):
     """Return deformations [draw, 3]: at both shares and for the mean, [mm].
 
-    Force, ends and what is returned are along the sense of loading.
+    Force, ends and what is returned are along the sense of loading; of the force the
+    second is what no larger one is read as it.
     """
-    (low, high), sense = ends, conditions.loading
+    (low, high), sense, (size, unrounded) = ends, conditions.loading, given
     method = optx.Bisection(rtol=0.0, atol=_CLOSE, flip=False)
 
     def of_draw(value):
@@ -104,8 +109,8 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
             parts = member_mixture(problem, value, whose, there)
             mixture = Mixture(*parts).along(sense)
             # Positive where the force does not get this far.
-            short = shares[jnp.minimum(row, 1)] - mixture.below(given)
-            return jnp.where(row == 2, mixture.centre() - given, short)
+            short = shares[jnp.minimum(row, 1)] - mixture.below(unrounded)
+            return jnp.where(row == 2, mixture.centre() - size, short)
 
         def solve(row):
             found = optx.root_find(

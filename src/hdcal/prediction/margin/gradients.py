@@ -39,7 +39,7 @@ class Gradient:
     Attributes:
         name: of the input, with its unit.
         value: where the derivative is taken.
-        bound_N: derivative of that bound [N per unit].
+        bound_N: derivative of that bound, before it is rounded [N per unit].
         force_N: derivative of the mean force, averaged over the draws [N per unit].
         bound_N_per_percent: change of the bound when the input grows by 1 % [N].
     """

@@ -19,10 +19,14 @@ from hdcal.prediction.engine.conditions import (
     is_tested,
 )
 from hdcal.prediction.engine.forces import Quantity
-from hdcal.prediction.engine.loading_sense import LoadingSense, loading_sense
+from hdcal.prediction.engine.loading_sense import (
+    LoadingSense,
+    loading_sense,
+    sense_of,
+)
 from hdcal.prediction.engine.population import Population, widest
 from hdcal.prediction.engine.population_force import PopulationForce, population_force
-from hdcal.prediction.engine.reading_grid import reading_grid
+from hdcal.prediction.engine.reading_grid import ReadingGrid, reading_grid
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.bounds import (
     PopulationDraws,
@@ -123,8 +127,7 @@ def _margin(
     criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
     forces = _forces(causes, request, whose, sense)
-    rounded = forces[0].whose.rounded
-    grid = reading_grid(main.posterior.case, sense, rounded=rounded)
+    grid = _grid(forces, sense)
     unrounded = criteria.before_rounding(grid)
     nodes = nodes_of(warm, main.posterior.case.records)
     draws = population_draws(forces, nodes, unrounded)
@@ -156,7 +159,7 @@ def _margin(
         levels=levels,
         worst=worst,
         reached=_reached(there, request, criteria),
-        decision=decision(stated, worst, criteria, sense, whose),
+        decision=decision(stated, worst, criteria, unrounded, sense, whose),
         models=tuple(shown_model(model, grid, sense) for model in models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
@@ -202,7 +205,17 @@ def _reached(
     there: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria
 ) -> DeformationReached | None:
     given = request.given_force
-    return None if given is None else deformation_reached(there, given, criteria)
+    if given is None:
+        return None
+    grid = _grid(there, sense_of(given))
+    return deformation_reached(there, given, criteria, grid)
+
+
+def _grid(forces: Sequence[PopulationForce], sense: LoadingSense) -> ReadingGrid:
+    """Return what readings are rounded to along a sense."""
+    first = forces[0]
+    case = first.cause.posterior.case
+    return reading_grid(case, sense, rounded=first.whose.rounded)
 
 
 def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:

@@ -64,7 +64,8 @@ _NORMAL_TAILS = (
 )
 _GRID = (
     "Readings come in steps of {step:.3g} N: bounds and capacities are values that are "
-    "read, and the force itself may lie up to {half:.3g} N beyond them."
+    "read, and the force itself may lie up to {half:.3g} N beyond them. U takes the "
+    "steps for an error that is anywhere in half a step."
 )
 _NO_GRID = (
     "Readings have steps of {step:.3g} N but lie on no one grid of such steps: bounds, "
