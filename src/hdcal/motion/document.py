@@ -88,8 +88,9 @@ def next_steps(posterior: DynamicPosterior, loss: Loss) -> list[str]:
         ]
     if loss.name in ("dry friction", "both") and not posterior.effects:
         return [
-            "Calibrate with the effect coulomb_friction, which takes minutes: without "
-            "it all friction counts as damping, and the intervals are too narrow."
+            "Calibrate with the effect coulomb_friction, which may take an hour: "
+            "without it all friction counts as damping, and the intervals are too "
+            "narrow."
         ]
     if loss.name == "cannot tell":
         return [

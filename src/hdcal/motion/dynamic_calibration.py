@@ -30,12 +30,13 @@ from hdcal.inference.sample import (
     check_settings,
     sample,
 )
+from hdcal.motion.friction_search import motion_slopes
 from hdcal.motion.loss import (
     WHITE,
     WHITENESS,
+    Chosen,
     choose_loss,
     loss_effects,
-    motion_slopes,
     noise_probability,
 )
 
@@ -61,15 +62,13 @@ def calibrate_dynamic(
 ) -> DynamicPosterior:
     """Calibrate m ÿ + c ẏ + k y = F(t), or with dry friction, against a time series.
 
-    The force is the input: as read, without error, linear between the rows. The
-    deformation is the output: y plus a zero of its own plus white noise. K and E₀
-    have the priors of the calibration at rest; k follows the temperature.
+    The force is the input, as read and linear between the rows; the deformation is the
+    output, y plus a zero of its own plus white noise; k follows the temperature.
 
     Args:
         case: from `read_case`; one run, with time.
-        effects: `coulomb_friction`, or none for the linear model; by default the linear
-            model, and where that leaves more than noise the data name the loss, in
-            records of up to 4000 rows.
+        effects: `coulomb_friction`, or none for the linear model; by default that one,
+            and where it leaves more than noise the loss is named beside it.
         theory: overrides the gear's theory.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain.
@@ -81,8 +80,7 @@ def calibrate_dynamic(
         The posterior; it may have failed its checks, see `Posterior.usable`.
 
     Raises:
-        InputError: the record is no time series that the model can be held against, or
-            the model does not hold an effect.
+        InputError: the record or an effect is none that the model can be held against.
     """
     check_settings(chains, warmup, draws, seed)
     loss_effects(effects or ())
@@ -90,20 +88,24 @@ def calibrate_dynamic(
     bound_executables()
     began = time.perf_counter()
     theory = theory or case.gear.theory
-    linear = build_dynamic(case, dynamic_site_priors(case, theory), theory)
-    of_draws, of_prior = jax.random.split(jax.random.key(seed))
-    mode, rival = highest_peak(linear)
-    chosen = choose_loss(case, theory, linear, mode, effects)
+    chosen, rival = _chosen(case, theory, effects)
     problem, priors = chosen.problem, chosen.priors
+    of_draws, of_prior = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    start = chosen.whitening
-    found = sample(problem, start, of_draws, progress=progress, **size)
+    found = sample(problem, chosen.whitening, of_draws, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
     own = _specifics(problem, found, (rival, *chosen.checks))
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings |= run_settings(found, began)
     settings |= {LOSS: chosen.probabilities} if chosen.probabilities else {}
     return DynamicPosterior(case, theory, problem.effects, priors, *parts, settings)
+
+
+def _chosen(case: Case, theory: Theory, effects) -> tuple[Chosen, Check]:
+    """Return the model to sample, and the check that it has one natural frequency."""
+    linear = build_dynamic(case, dynamic_site_priors(case, theory), theory)
+    mode, rival = highest_peak(linear)
+    return choose_loss(case, theory, linear, mode, effects), rival
 
 
 def _specifics(

@@ -1,17 +1,13 @@
 """What takes the energy of a swing: viscous damping, dry friction, or both.
 
 Where the linear model leaves more than noise, three models are weighed by their
-evidence, each as probable as the others before the data. The response with dry friction
-is continuous in its parameters but bent wherever one more swing begins, and a record
-that ends at rest has a peak of the density for each number of swings. A search begins
-with the largest swings alone, whose envelope has one peak, and takes the rest along
-step by step. To sample with friction takes minutes: unasked it is only named.
+evidence, each as probable as the others before the data. To sample with friction takes
+long: unasked it is only named.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import jax
 import numpy as np
 from scipy import stats
 
@@ -19,18 +15,13 @@ from hdcal.data.case import Case, Theory
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.amplitude_units import finest
 from hdcal.inference.checks import Check
-from hdcal.inference.distributions import frozen
 from hdcal.inference.dynamic_problem import (
-    FRICTION,
-    STOP,
     DynamicProblem,
     build_dynamic,
     dynamic_site_priors,
-    predict_motion,
-    stopping_distance,
 )
+from hdcal.motion.friction_search import FrictionSearch, predict
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.coulomb_friction import CoulombFriction
 
@@ -45,12 +36,6 @@ NOISE = 0.05
 _LAGS = 20
 _FRICTIONAL = (CoulombFriction,)
 _NO_DAMPING = Prior("fixed", (0.0,), "1", "dry friction alone explains the data")
-# Shares of the largest swing down to which the record is looked at, one by one.
-_SHARES = (0.5, 0.25, 0.1)
-# Shares of the loss that a search begins with as friction.
-_LITTLE, _MUCH = (0.005, 0.05, 0.2), 0.5
-# Share of a prior outside of which no search begins.
-_TAIL = 1e-3
 
 
 @dataclass(frozen=True)
@@ -111,7 +96,9 @@ def choose_loss(
     if effects is not None and not loss_effects(effects):
         return linear
     priors = dynamic_site_priors(case, theory, _FRICTIONAL)
-    start = _Start(viscous, mode, build_dynamic(case, priors, theory, _FRICTIONAL))
+    start = FrictionSearch(
+        viscous, mode, build_dynamic(case, priors, theory, _FRICTIONAL)
+    )
     both = Chosen(start.both, priors, start.fit_both(), {})
     if effects is not None:
         return both
@@ -166,152 +153,3 @@ def _too_long(rows: int) -> Check:
         f"this one of {rows}, all damping counts as viscous"
     )
     return Check("the loss is weighed", "note", words)
-
-
-class _Start:
-    """Where the searches with dry friction begin: at the mode of the linear model."""
-
-    def __init__(self, viscous: DynamicProblem, mode, both: DynamicProblem):
-        values = laplace.values_at(viscous, mode.centre)
-        self.values = values
-        self.sites = laplace.sites_at(viscous, mode.centre)
-        self.equivalent = equivalent_friction(viscous, values)
-        self.counts = _counts(viscous, float(values["natural_frequency"]))
-        self.both = _resolved(both, values)
-        without = {**both.priors, "damping_ratio": Prior("fixed", (0.0,))}
-        self.dry = replace(self.both, priors=without)
-
-    def fit_both(self) -> laplace.Whitening:
-        """Search from little friction at once, and from much of it by stages."""
-        shares = {share: self._shared(share) for share in (*_LITTLE, _MUCH)}
-        fits = [laplace.fit(self.both, shares[s]) for s in _LITTLE]
-        fits.append(_fit_by_stages(self.both, shares[_MUCH], self.counts))
-        levels = [float(laplace.potential(self.both, fit.centre)) for fit in fits]
-        return fits[int(np.argmin(levels))]
-
-    def fit_dry(self) -> laplace.Whitening:
-        """Search from all of the loss as friction."""
-        whole = self._at(self.dry, self.equivalent)
-        return _fit_by_stages(self.dry, whole, self.counts)
-
-    def _shared(self, share: float) -> dict[str, float]:
-        """Return where to start with a share of the loss as friction."""
-        ratio = (1.0 - share) * self.sites.get("damping_ratio", 0.0)
-        changed = {"damping_ratio": ratio}
-        return self._at(self.both, share * self.equivalent, changed)
-
-    def _at(self, problem: DynamicProblem, friction: float, changed=None) -> dict:
-        """Return the sites to start from with a friction [N]."""
-        sites = self.sites | (changed or {}) | _friction_site(problem, friction)
-        known = problem.priors
-        if known["initial_deformation"].family == "normal":
-            distance = stopping_distance(problem, self.values | {FRICTION: friction})
-            sites[STOP] = sites.pop("initial_deformation") + float(distance)
-        return {
-            name: value
-            for name, value in sites.items()
-            if name not in known or known[name].family != "fixed"
-        }
-
-
-@jax.jit
-def motion_slopes(problem: DynamicProblem, values, part):
-    """Return the derivatives of the mean reading by some of the values."""
-
-    def mean(moved):
-        return predict_motion(problem, {**values, **moved})
-
-    return jax.jacfwd(mean)(part)
-
-
-predict = jax.jit(predict_motion)
-
-
-def swing(problem: DynamicProblem, values) -> float:
-    """Return the largest swing: half the range of the modelled deformation [mm]."""
-    return 0.5 * float(np.ptp(np.asarray(predict(problem, values))[: problem.count]))
-
-
-def dry_share(friction, damping, frequency, swing):
-    """Return the share of the energy of a swing that dry friction takes [-].
-
-    4 f A against π c ω A² of a free swing of amplitude A.
-
-    Args:
-        friction: f [N].
-        damping: c [N·s/mm].
-        frequency: ω/2π [Hz].
-        swing: A [mm].
-    """
-    dry = 4.0 * friction
-    return dry / (dry + 2.0 * np.pi**2 * damping * frequency * swing)
-
-
-def equivalent_friction(problem: DynamicProblem, values) -> float:
-    """Return the friction that takes of the largest swing what damping does [N]."""
-    pace = 2.0 * np.pi * float(values["natural_frequency"])
-    return 0.25 * np.pi * float(values["damping"]) * pace * swing(problem, values)
-
-
-def _counts(problem: DynamicProblem, frequency: float) -> list[int]:
-    """Return up to which rows a search looks, one after the other; all at the end."""
-    read = np.asarray(problem.deformation)[: problem.count]
-    step = float(np.median(np.diff(problem.time[: problem.count])))
-    period = int(np.clip(round(1.0 / (frequency * step)), 2, len(read)))
-    windows = np.lib.stride_tricks.sliding_window_view(read, period)
-    sizes = np.ptp(windows, axis=1)
-    ends = {int(np.flatnonzero(sizes > s * sizes.max())[-1]) + period for s in _SHARES}
-    return sorted({*ends, problem.count})
-
-
-def _fit_by_stages(problem: DynamicProblem, start, counts) -> laplace.Whitening:
-    """Return the mode, found in the first rows first.
-
-    Args:
-        problem: data and priors.
-        start: sites whose value to start from.
-        counts: of the rows looked at, all of them last.
-    """
-    for count in counts[:-1]:
-        part = replace(problem, count=count)
-        start = laplace.sites_at(part, laplace.fit(part, start).centre)
-    return laplace.fit(problem, start)
-
-
-def _friction_site(problem: DynamicProblem, size: float) -> dict[str, float]:
-    """Return the sampled site of the friction at a size [N]."""
-    prior = problem.priors[FRICTION]
-    if prior.family == "fixed":
-        return {}
-    if FRICTION in problem.units:
-        ratio = max(size / problem.units[FRICTION], 1e-6)
-        return {f"_{FRICTION}": float(ratio + np.log(-np.expm1(-ratio)))}
-    # Outside of its support there is no density to climb.
-    ends = frozen(prior).ppf([_TAIL, 1.0 - _TAIL])
-    return {FRICTION: float(np.clip(size, *ends))}
-
-
-def _resolved(problem: DynamicProblem, values) -> DynamicProblem:
-    """Return the problem with the unit of friction that the data resolve.
-
-    Args:
-        problem: with dry friction.
-        values: of the linear model at its mode.
-    """
-    if FRICTION not in problem.units:
-        return problem
-    widest = problem.units[FRICTION]
-    values = {**values, FRICTION: 1e-3 * widest}
-    names = [
-        name
-        for name, prior in problem.priors.items()
-        if prior.family != "fixed" and name != "deformation_sigma"
-    ]
-    slopes = motion_slopes(problem, values, {name: values[name] for name in names})
-    slopes = {n: np.asarray(slope)[: problem.count] for n, slope in slopes.items()}
-    column = slopes.pop(FRICTION)
-    columns = np.stack(list(slopes.values()), axis=1)
-    columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
-    noise = float(values["deformation_sigma"])
-    unit = finest(column, columns, noise, widest)
-    return replace(problem, units={FRICTION: unit})

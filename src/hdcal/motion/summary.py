@@ -16,7 +16,8 @@ from hdcal.motion.document import (
     motion_document,
     next_steps,
 )
-from hdcal.motion.loss import LEFT_OVER, WHITENESS, dry_share, swing
+from hdcal.motion.friction_search import dry_share, swing
+from hdcal.motion.loss import LEFT_OVER, WHITENESS
 from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report

@@ -1,6 +1,7 @@
 """Margins: the force that a deformation needs, for how many of whom, how surely."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,7 +55,7 @@ from hdcal.prediction.margin.remarks import (
     remarks,
 )
 from hdcal.prediction.margin.request import Criteria, MarginRequest
-from hdcal.prediction.margin.result import FAR, Level, Margin
+from hdcal.prediction.margin.result import FAR, Level, Margin, ModelBound
 from hdcal.prediction.margin.stated import Rule
 from hdcal.prediction.margin.temperatures import levels_between, nodes_of
 from hdcal.prediction.margin.uncertainty import stated_uncertainty
@@ -120,27 +121,18 @@ def _margin(
     criteria: Criteria,
     sensitivities: bool,
 ) -> Margin:
-    main = likeliest(causes)
+    main, sense = likeliest(causes), loading_sense(causes, request.deformation)
     warm = request.temperatures(main.posterior.case)
-    sense = loading_sense(causes, request.deformation)
     check_margin(causes, request, warm, criteria, sense)
     criteria = criteria.of_size()
     whose = request.population or widest(main.problem)
     forces = _forces(causes, request, whose, sense)
     grid = _grid(forces, sense)
     unrounded = criteria.before_rounding(grid)
-    nodes = nodes_of(warm, main.posterior.case.records)
-    draws = population_draws(forces, nodes, unrounded)
-    computed = _levels(draws, main, request, nodes, unrounded)
-    check_sign(computed, request, criteria, sense)
-    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
-    levels = refined(levels, forces, unrounded.limit_force, request.seed)
-    worst = with_likeliest(worst_level(draws, unrounded, computed), levels)
-    models = refined_models(forces, draws, unrounded, worst, request.seed)
-    levels = tuple(shown(level, grid, sense) for level in levels)
-    worst = shown(worst, grid, sense)
+    found = _answered(forces, request, unrounded, warm)
+    check_sign(found.computed, request, criteria, sense)
+    worst = shown(found.worst, grid, sense)
     there = [force.at(worst.temperature_C) for force in forces]
-    upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
     return Margin(
         **vars(stated),
@@ -156,19 +148,52 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=levels,
+        levels=tuple(shown(level, grid, sense) for level in found.levels),
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, unrounded, sense, whose),
-        models=tuple(shown_model(model, grid, sense) for model in models),
+        models=tuple(shown_model(model, grid, sense) for model in found.models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
-        gradients=gradients(there, upper, criteria) if sensitivities else (),
+        gradients=gradients(there, found.upper, criteria) if sensitivities else (),
         shares=variance_shares(there, request.seed) if sensitivities else (),
         beyond_tested=beyond_tested(forces[0].conditions),
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, computed, worst, criteria, grid),
+        remarks=remarks(forces, found.computed, worst, criteria, grid),
     )
+
+
+class _Answered(NamedTuple):
+    """What holds at each temperature, of the force before it is rounded.
+
+    Attributes:
+        computed: at the computed temperatures.
+        levels: at all that were asked for.
+        worst: of all of them.
+        models: what each of several causes alone would say.
+        upper: of each draw the upper bound at the worst temperature [N].
+    """
+
+    computed: tuple[Level, ...]
+    levels: tuple[Level, ...]
+    worst: Level
+    models: tuple[ModelBound, ...]
+    upper: np.ndarray
+
+
+def _answered(
+    forces: Sequence[PopulationForce], request: MarginRequest, criteria: Criteria, warm
+) -> _Answered:
+    main, sense = likeliest([force.cause for force in forces]), forces[0].sense
+    nodes = nodes_of(warm, main.posterior.case.records)
+    draws = population_draws(forces, nodes, criteria)
+    computed = _levels(draws, main, request, nodes, criteria)
+    levels = levels_between(computed, warm, _tested(main, request, sense, warm))
+    levels = refined(levels, forces, criteria.limit_force, request.seed)
+    worst = with_likeliest(worst_level(draws, criteria, computed), levels)
+    models = refined_models(forces, draws, criteria, worst, request.seed)
+    upper = draws.table["upper"][list(nodes).index(worst.temperature_C)]
+    return _Answered(computed, levels, worst, models, upper)
 
 
 def _forces(
