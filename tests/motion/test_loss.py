@@ -52,7 +52,14 @@ def always(monkeypatch):
     monkeypatch.setattr(loss, "NOISE", 2.0)
 
 
-@pytest.mark.parametrize("name", TRUTHS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("viscous", marks=pytest.mark.slow),
+        pytest.param("dry friction", marks=pytest.mark.slow),
+        "both",
+    ],
+)
 def test_a_loss_is_named(name: str, always):
     ratio, friction = TRUTHS[name]
     found = chosen(frictional_case(100, ratio, friction))

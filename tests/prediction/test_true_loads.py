@@ -171,7 +171,7 @@ def test_a_slice_of_coverage(monkeypatch):
     held = coverage(TOLD, range(12))[:, :3]
     assert min(map(short, held.T)) > 1e-3
     # A displacement gauge's certificate does not say where the contact was.
-    load, _, reading = coverage(TOUCHED, range(6))[:, :3].T
+    load, _, reading = coverage(TOUCHED, range(8))[:, :3].T
     assert short(load) < 1e-3 < short(reading)
     # A few rigs flag gains that are ignored, if coarse, and no reading shows them.
     coarse = certificates.STATED.replace("expanded_percent = 1.0", COARSE)
@@ -179,7 +179,7 @@ def test_a_slice_of_coverage(monkeypatch):
     gear = certificates.gear_of(certificates.SIZES + coarse)
     contenders = {TOLD: gear, WRONG: replace(gear, gauge_priors={})}
     monkeypatch.setattr(certificates, "gears", lambda: contenders)
-    load, stiffness, reading = coverage(WRONG, range(10))[:, :3].T
+    load, stiffness, reading = coverage(WRONG, range(12))[:, :3].T
     assert max(short(load), short(stiffness)) < 1e-3 < short(reading)
 
 

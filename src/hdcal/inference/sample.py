@@ -31,7 +31,7 @@ MAX_TREE_DEPTH = 10
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
 # Draws of a chain over the effective ones that it needs, from which their lack tells.
-_TELLING = 4
+_TELLING = 8
 # Place of the divergences in what `_advance` keeps of a draw.
 _DIVERGING = 3
 # Chains start this many posterior sds apart, so that R-hat can see them disagree.
