@@ -17,24 +17,24 @@ def problem_of(rows: int):
     return build_dynamic(case, dynamic_site_priors(case, "ring"), "ring")
 
 
-def answers(parts, time, force, start):
+def answers(gear, time, force, start):
     """Return states and the gradient of their size."""
 
-    def size(parts, start):
-        states = response.linear_response(*parts, time, force, start)
+    def size(gear, start):
+        states = response.linear_response(gear, time, force, start)
         return (states[:, 0] ** 2).sum(), states
 
-    return jax.jacrev(size, argnums=(0, 1), has_aux=True)(parts, start)
+    return jax.jacrev(size, argnums=(0, 1), has_aux=True)(gear, start)
 
 
 def test_stretches_give_the_response_of_the_whole(monkeypatch):
     case = moving_case(0, rows=333)
     time, force = np.asarray(case.records.time), np.asarray(case.records.force)
     start = np.array([0.2, -3.0])
-    parts = motion(TRUTH, case)
-    whole = answers(parts, time, force, start)
+    gear = motion(TRUTH, case)
+    whole = answers(gear, time, force, start)
     monkeypatch.setattr(response, "_STRETCH", 50)
-    stretched = answers(parts, time, force, start)
+    stretched = answers(gear, time, force, start)
     for one, other in zip(jax.tree.leaves(whole), jax.tree.leaves(stretched), strict=1):
         np.testing.assert_allclose(other, one, rtol=1e-9, atol=1e-9)
 

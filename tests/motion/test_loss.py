@@ -119,8 +119,8 @@ def test_where_the_linear_model_leaves_noise_nothing_is_weighed():
     found = chosen(moving_case(0))
     assert found.problem.effects == () and not found.probabilities and not found.checks
     frictional = chosen(frictional_case(0, *TRUTHS["both"]), [])
-    left = loss.noise_probability(frictional.problem, loss._at_mode(frictional))
-    assert left < 1e-3
+    values = laplace.values_at(frictional.problem, frictional.whitening.centre)
+    assert loss.noise_probability(frictional.problem, values) < 1e-3
 
 
 def test_without_effects_nothing_is_weighed():
@@ -232,6 +232,5 @@ def test_a_file_with_probabilities_of_other_models_is_refused(posterior, tmp_pat
 def test_a_friction_left_out_is_told_by_the_damping():
     case = frictional_case(0, 0.01, 1.0)
     found = chosen(case, [])
-    _, stiffness = TRUTH["mass"], at_mode(found, "stiffness")
-    true = 2.0 * 0.01 * np.sqrt(stiffness * TRUTH["mass"])
+    true = 2.0 * 0.01 * np.sqrt(at_mode(found, "stiffness") * TRUTH["mass"])
     assert at_mode(found, "damping") > 3.0 * true

@@ -22,7 +22,7 @@ from hdcal.motion.answer import DynamicCalibrationAnswer
 from hdcal.motion.bands import motion_bands
 from hdcal.motion.dynamic_calibration import highest_peak
 from hdcal.motion.summary import dynamic_answer
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.report.plain import as_json
 
 pytestmark = pytest.mark.computes
@@ -190,7 +190,8 @@ def ambiguous():
     time = np.arange(200) / 4000.0
     force = np.zeros(200)
     force[0] = 30.0
-    clean = linear_response(4e-5, 2e-3, 195.0, time, force, np.zeros(2))[:, 0]
+    gear = LinearGear(4e-5, 2e-3, 195.0)
+    clean = linear_response(gear, time, force, np.zeros(2))[:, 0]
     read = np.asarray(clean) + np.random.default_rng(3).normal(0.0, 0.1, 200)
     records = make_records(read, force, known={"time"}, time=time)
     return replace(moving_case(0), records=records)

@@ -11,7 +11,7 @@ from hdcal import InputError, NotUsable, respond
 from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.motion.respond import integrate
 from hdcal.motion.respond import respond as asked
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.prediction.engine.gear_forces import gear_forces, gear_values
 from hdcal.prediction.engine.untested import PLACES
 
@@ -23,10 +23,10 @@ KNOWN = {"mass": TRUTH["mass"], "damping": 3e-3}
 def test_gears_that_are_known_move_as_the_exact_solution():
     posterior = still_posterior()
     found = respond(posterior, "step", amplitude=40.0, **KNOWN, **SMALL)
-    stiffness = motion(TRUTH, posterior.case)[2]
+    stiffness = motion(TRUTH, posterior.case).stiffness
     force = np.full(101, 40.0)
-    parts = (KNOWN["mass"], KNOWN["damping"], stiffness)
-    exact = linear_response(*parts, found.time_s, force, np.zeros(2))[:, 0]
+    linear = LinearGear(KNOWN["mass"], KNOWN["damping"], stiffness)
+    exact = linear_response(linear, found.time_s, force, np.zeros(2))[:, 0]
     assert found.deformation_median_mm == pytest.approx(np.asarray(exact), abs=1e-7)
     assert found.deformation_hi_mm - found.deformation_lo_mm == pytest.approx(
         np.zeros(101), abs=1e-9

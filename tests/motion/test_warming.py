@@ -31,11 +31,11 @@ def warming_case(seed: int, span: float = 20.0, known=("time", "temperature")):
     warm = 20.0 + span * time / time[-1]
     columns = {"known": set(known), "time": time, "temperature": warm}
     blank = make_case(make_records(np.zeros(ROWS), force, **columns), moving_gear())
-    mass, damping, stiffness = motion(TRUTH, blank)
+    mean = motion(TRUTH, blank)
     rise = 0.5 * (warm[1:] + warm[:-1]) - blank.gear.reference_temperature
-    start = np.array([force[0] / stiffness, 0.0])
-    softer = stiffness * (1.0 - ALPHA * rise)
-    clean = linear_response(mass, damping, softer, time, force, start)
+    start = np.array([force[0] / mean.stiffness, 0.0])
+    softer = mean._replace(stiffness=mean.stiffness * (1.0 - ALPHA * rise))
+    clean = linear_response(softer, time, force, start)
     read = np.asarray(clean)[:, 0] + TRUTH["deformation_offset"]
     read = read + rng.normal(0.0, TRUTH["deformation_sigma"], ROWS)
     return make_case(make_records(read, force, **columns), blank.gear)

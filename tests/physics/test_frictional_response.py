@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from hdcal.data.records import Geometry
 from hdcal.physics.frictional_response import frictional_response
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 
 Geometry(0.68, 40.0, 70.0, 62.0, 0.29)  # switches JAX to double precision
 MASS, STIFFNESS = 4e-5, 195.0
@@ -34,17 +34,17 @@ def slow_twin(friction: float, stiffness=lambda _: STIFFNESS) -> np.ndarray:
 
 
 def found(friction: float, stiffness=STIFFNESS, damping=DAMPING) -> np.ndarray:
-    parts = MASS, damping, stiffness, friction
-    return np.asarray(respond(*parts, TIME, FORCE, HELD))
+    gear = LinearGear(MASS, damping, stiffness)
+    return np.asarray(respond(gear, friction, TIME, FORCE, HELD))
 
 
 def test_without_friction_it_is_the_linear_response():
     rng = np.random.default_rng(0)
     time = np.cumsum(rng.uniform(1e-4, 4e-4, 150))
     force, start = rng.normal(0.0, 40.0, 150), np.array([0.1, -50.0])
-    parts = MASS, DAMPING, rng.uniform(190.0, 200.0, 149)
-    linear = jax.jit(linear_response)(*parts, time, force, start)
-    states = respond(*parts, 0.0, time, force, start)
+    gear = LinearGear(MASS, DAMPING, rng.uniform(190.0, 200.0, 149))
+    linear = jax.jit(linear_response)(gear, time, force, start)
+    states = respond(gear, 0.0, time, force, start)
     np.testing.assert_allclose(states, linear, rtol=0.0, atol=1e-9)
 
 
@@ -65,7 +65,8 @@ def test_a_stiffness_of_each_step_is_followed():
 def test_a_free_swing_loses_four_times_the_friction_and_then_rests():
     friction, start = 2.0, np.array([0.2, 0.0])
     time = np.arange(6000) * 1e-5
-    states = respond(MASS, 0.0, STIFFNESS, friction, time, 0.0 * time, start)
+    gear = LinearGear(MASS, 0.0, STIFFNESS)
+    states = respond(gear, friction, time, 0.0 * time, start)
     y = np.asarray(states)[:, 0]
     inner = (np.diff(np.sign(np.diff(y))) != 0).nonzero()[0] + 1
     tops = np.abs(np.r_[y[0], y[inner]])
@@ -80,7 +81,8 @@ def test_a_free_swing_loses_four_times_the_friction_and_then_rests():
 def test_a_held_gear_breaks_loose_when_the_force_exceeds_the_friction():
     time = np.linspace(0.0, 1.0, 2001)
     force = 10.0 * time
-    states = np.asarray(respond(MASS, 1.0, STIFFNESS, 3.0, time, force, np.zeros(2)))
+    gear = LinearGear(MASS, 1.0, STIFFNESS)
+    states = np.asarray(respond(gear, 3.0, time, force, np.zeros(2)))
     assert np.all(states[time < 0.2999, 0] == 0.0)
     # From there on it follows slowly: k y + c ẏ + f = F.
     slow = (force - 3.0 - 1.0 * 10.0 / STIFFNESS) / STIFFNESS
@@ -93,7 +95,9 @@ def test_gradients_and_hessians_are_those_of_differences(speed: float):
     at = jnp.array([MASS, DAMPING, STIFFNESS, 1.0])
 
     def size(parts):
-        return jnp.sum(frictional_response(*parts, TIME, FORCE, start)[:, 0] ** 2)
+        gear, friction = LinearGear(*parts[:3]), parts[3]
+        found = frictional_response(gear, friction, TIME, FORCE, start)
+        return jnp.sum(found[:, 0] ** 2)
 
     slope, bend = jax.jit(jax.grad(size)), jax.jit(jax.hessian(size))
     size = jax.jit(size)

@@ -19,7 +19,7 @@ from hdcal.physics.dynamics import (
     ring_mass,
 )
 from hdcal.physics.forcing import Chirp, SampledForce, Sine, Step
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.physics.theory import ring
 
 XB1 = Geometry(0.68, 40.0, 70.0, 62.0, 0.29)
@@ -83,8 +83,8 @@ def test_a_step_is_answered_as_in_the_textbook(ratio):
     expected = step_response(ratio, TIMES)
     assert worst(move(gear(ratio), Step(FORCE), TIMES)[:, 0], expected) < 1e-7
     force, rest = np.full(len(TIMES), FORCE), np.zeros(2)
-    parts = (MASS, gear(ratio).damping, STIFFNESS)
-    exact = exact_response(*parts, TIMES, force, rest)[:, 0]
+    linear = LinearGear(MASS, gear(ratio).damping, STIFFNESS)
+    exact = exact_response(linear, TIMES, force, rest)[:, 0]
     assert worst(exact, expected) < 1e-11
 
 
@@ -107,8 +107,8 @@ def test_a_sampled_force_is_followed_exactly_at_uneven_times(ratio):
     rng = np.random.default_rng(1)
     time = np.sort(rng.uniform(0.0, 0.05, 80))
     force = rng.normal(0.0, 40.0, 80)
-    parts = (MASS, gear(ratio).damping, STIFFNESS)
-    exact = exact_response(*parts, time, force, np.zeros(2))
+    linear = LinearGear(MASS, gear(ratio).damping, STIFFNESS)
+    exact = exact_response(linear, time, force, np.zeros(2))
     found = move(gear(ratio), SampledForce(time, force), time)
     assert worst(found[:, 0], exact[:, 0]) < 1e-6
     assert worst(found[:, 1], exact[:, 1]) < 1e-6
@@ -120,8 +120,8 @@ def test_the_exact_response_has_exact_gradients_through_critical_damping():
     @jax.jit
     def end(ratio):
         damping = 2.0 * ratio * jnp.sqrt(STIFFNESS * MASS)
-        parts = (MASS, damping, STIFFNESS, time, force, jnp.array([0.1, 0.0]))
-        return linear_response(*parts)[-1, 0]
+        linear = LinearGear(MASS, damping, STIFFNESS)
+        return linear_response(linear, time, force, jnp.array([0.1, 0.0]))[-1, 0]
 
     slope, h = jax.jit(jax.grad(end)), 1e-5
     for ratio in (0.02, 1.0, 3.0):

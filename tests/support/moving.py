@@ -14,7 +14,7 @@ from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.problem import problem_priors, unit_stiffness
 from hdcal.physics.frictional_response import frictional_response
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 
 TRUTH = {
     "K": 2.45,
@@ -39,11 +39,11 @@ def release(rows: int = 200, rate: float = 4000.0):
     return time, 40.0 * np.clip(1.0 - (time - held) / 1e-3, 0.0, 1.0)
 
 
-def motion(truth: dict, case) -> tuple[float, float, float]:
+def motion(truth: dict, case) -> LinearGear:
     """Return mass, damping and stiffness of a truth."""
     stiffness = truth["K"] * truth["E0"] * unit_stiffness(case, "ring")
     damping = 2.0 * truth["damping_ratio"] * np.sqrt(stiffness * truth["mass"])
-    return truth["mass"], damping, stiffness
+    return LinearGear(truth["mass"], damping, stiffness)
 
 
 def moving_case(seed: int, gear=None, truth=TRUTH, rows: int = 200):
@@ -52,9 +52,9 @@ def moving_case(seed: int, gear=None, truth=TRUTH, rows: int = 200):
     columns = {"known": {"time"}, "time": time}
     blank = make_records(np.zeros(rows), force, **columns)
     case = make_case(blank, gear or moving_gear())
-    parts = motion(truth, case)
-    start = np.array([force[0] / parts[2], 0.0])
-    clean = np.asarray(linear_response(*parts, time, force, start))[:, 0]
+    linear = motion(truth, case)
+    start = np.array([force[0] / linear.stiffness, 0.0])
+    clean = np.asarray(linear_response(linear, time, force, start))[:, 0]
     noise = np.random.default_rng(seed).normal(0.0, truth["deformation_sigma"], rows)
     read = clean + truth["deformation_offset"] + noise
     return make_case(make_records(read, force, **columns), case.gear)
@@ -65,12 +65,11 @@ def frictional_case(seed, ratio, friction, gear=None, rows: int = 200):
     truth = TRUTH | {"damping_ratio": ratio}
     case = moving_case(seed, gear, truth, rows)
     time, force = release(rows)
-    mass, damping, stiffness = motion(truth, case)
-    start = np.array([force[0] / stiffness, 0.0])
-    parts = mass, damping, stiffness
-    linear = np.asarray(linear_response(*parts, time, force, start))[:, 0]
-    rubbed = frictional_response(*parts, friction, time, force, start)
-    read = case.records.deformation - linear + np.asarray(rubbed)[:, 0]
+    linear = motion(truth, case)
+    start = np.array([force[0] / linear.stiffness, 0.0])
+    smooth = np.asarray(linear_response(linear, time, force, start))[:, 0]
+    rubbed = frictional_response(linear, friction, time, force, start)
+    read = case.records.deformation - smooth + np.asarray(rubbed)[:, 0]
     known = {"known": {"time"}, "time": time}
     return make_case(make_records(read, force, **known), case.gear)
 

@@ -151,9 +151,9 @@ def test_errors_that_are_taken_as_independent_are_flagged(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("places", [[0.81], PLACES])
 def test_a_common_error_is_never_averaged_away_in_long_streams(places):
-    stiffness, reading, alarms = followed(single(), places, 200, 2000)
-    # Chance of as few at 95 %; over 500 streams at one place it was 93.0 %.
-    assert stats.binom.cdf(round(200 * stiffness), 200, 0.95) > 1e-3
+    stiffness, reading, alarms = followed(single(), places, 500, 2000)
+    # Chance of as few at 95 %.
+    assert stats.binom.cdf(round(500 * stiffness), 500, 0.95) > 1e-3
     assert reading == pytest.approx(0.95, abs=0.003)
     assert 1.0 / 1.5 < alarms < 1.5
 

@@ -40,7 +40,7 @@ from hdcal.physics.dynamics import natural_frequency, ring_mass
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.coulomb_friction import CoulombFriction
 from hdcal.physics.frictional_response import frictional_response
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 
 # In the order in which they are sampled and reported; K and E0 come first.
 SITES = (
@@ -193,15 +193,15 @@ def predict_states(problem: DynamicProblem, values: Values) -> Float[Array, "n 2
     """Return deformation [mm] and speed [mm/s] at the padded rows."""
     own = oscillation(problem, values)
     start = jnp.stack([values["initial_deformation"], values["initial_velocity"]])
-    parts = (
+    gear = LinearGear(
         with_gains(values, values["mass"]),
         with_gains(values, own["damping"]),
         with_gains(values, step_stiffness(problem, values, own["warm_stiffness"])),
     )
     if problem.effects:
         friction = values[FRICTION]
-        return frictional_response(*parts, friction, problem.time, problem.force, start)
-    return linear_response(*parts, problem.time, problem.force, start)
+        return frictional_response(gear, friction, problem.time, problem.force, start)
+    return linear_response(gear, problem.time, problem.force, start)
 
 
 def step_stiffness(problem: DynamicProblem, values: Values, mean):

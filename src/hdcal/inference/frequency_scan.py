@@ -17,7 +17,7 @@ from hdcal.inference.dynamic_problem import (
     stretch,
 )
 from hdcal.inference.padding import measured
-from hdcal.physics.linear_response import linear_response
+from hdcal.physics.linear_response import LinearGear, linear_response
 
 _RATIOS = np.array([0.005, 0.03, 0.2])
 # Frequencies are scanned in steps of this share of one over the duration.
@@ -42,14 +42,14 @@ def _residual(problem: DynamicProblem, frequency, ratio):
     def one(frequency, ratio):
         # A mass of one over ω² has a mean stiffness of one.
         pace = 2.0 * jnp.pi * frequency
-        shape = (pace**-2, 2.0 * ratio / pace, softening, problem.time)
+        gear, time = LinearGear(pace**-2, 2.0 * ratio / pace, softening), problem.time
         none = jnp.zeros_like(problem.force)
         at_rest, moved = jnp.zeros(2), jnp.array([1.0, 0.0])
         columns = jnp.stack(
             [
-                linear_response(*shape, problem.force, at_rest)[:, 0],
-                linear_response(*shape, none, moved)[:, 0],
-                linear_response(*shape, none, jnp.stack([0.0, pace]))[:, 0],
+                linear_response(gear, time, problem.force, at_rest)[:, 0],
+                linear_response(gear, time, none, moved)[:, 0],
+                linear_response(gear, time, none, jnp.stack([0.0, pace]))[:, 0],
                 jnp.ones_like(none),
             ],
             axis=1,

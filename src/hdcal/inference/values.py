@@ -31,8 +31,9 @@ MEMBERS = {
 MEMBER_SD = {"run": "run_offset_sd", "specimen": "specimen_sd"}
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
-# Least noise sd that rounded readings can tell from none, in steps.
-LEAST_NOISE = 0.1
+# Least noise sd that rounded readings can tell from none, in steps; twice as much noise
+# is raised by 5e-4 of it.
+LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
 def site_shapes(
@@ -130,11 +131,15 @@ def predict_rows(
 def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
     """Add Sheppard's variance of the rounding to the noise.
 
-    Where rounding has its exact likelihood, add the least noise that such readings
+    Where rounding has its exact likelihood, the noise is at least what such readings
     can tell from none: without any the likelihood has walls that no sampler passes.
+    The smooth maximum leaves larger noise as it is, for what is predicted from it.
     """
-    variance = (LEAST_NOISE * step) ** 2 if rounded else step**2 / 12.0
-    return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + variance))
+    if not rounded:
+        return Noise(noise.log_weight, jnp.sqrt(noise.sd**2 + step**2 / 12.0))
+    logs = jnp.log(noise.sd), jnp.log(LEAST_NOISE * step)
+    power = jnp.logaddexp(*(_SHARPNESS * log for log in logs))
+    return Noise(noise.log_weight, jnp.exp(power / _SHARPNESS))
 
 
 def block_coefficients(

@@ -234,11 +234,5 @@ def sampling_rate_check(problem: DynamicProblem, found: Draws) -> Check:
 def _slopes_in_sds(problem: DynamicProblem, found: Draws) -> dict[str, np.ndarray]:
     """Return by how much each parameter moves the measured rows, in noise sds."""
     values = _best_draw(found)
-    names = [
-        name
-        for name, prior in problem.priors.items()
-        if prior.family != "fixed" and name != "deformation_sigma"
-    ]
-    slopes = motion_slopes(problem, values, {name: values[name] for name in names})
     sd = float(values["deformation_sigma"])
-    return {n: np.asarray(slope)[: problem.count] / sd for n, slope in slopes.items()}
+    return {name: slope / sd for name, slope in motion_slopes(problem, values).items()}

@@ -77,14 +77,23 @@ class FrictionSearch:
         }
 
 
-@jax.jit
-def motion_slopes(problem: DynamicProblem, values, part):
-    """Return the derivatives of the mean reading by some of the values."""
+def motion_slopes(problem: DynamicProblem, values) -> dict[str, np.ndarray]:
+    """Return the derivative of the mean reading by each free parameter, (rows,)."""
+    free = {
+        name: values[name]
+        for name, prior in problem.priors.items()
+        if prior.family != "fixed" and name != "deformation_sigma"
+    }
+    slopes = _slopes(problem, values, free)
+    return {n: np.asarray(slope)[: problem.count] for n, slope in slopes.items()}
 
+
+@jax.jit
+def _slopes(problem: DynamicProblem, values, free):
     def mean(moved):
         return predict_motion(problem, {**values, **moved})
 
-    return jax.jacfwd(mean)(part)
+    return jax.jacfwd(mean)(free)
 
 
 predict = jax.jit(predict_motion)
@@ -165,13 +174,7 @@ def _resolved(problem: DynamicProblem, values) -> DynamicProblem:
         return problem
     widest = problem.units[FRICTION]
     values = {**values, FRICTION: 1e-3 * widest}
-    names = [
-        name
-        for name, prior in problem.priors.items()
-        if prior.family != "fixed" and name != "deformation_sigma"
-    ]
-    slopes = motion_slopes(problem, values, {name: values[name] for name in names})
-    slopes = {n: np.asarray(slope)[: problem.count] for n, slope in slopes.items()}
+    slopes = motion_slopes(problem, values)
     column = slopes.pop(FRICTION)
     columns = np.stack(list(slopes.values()), axis=1)
     columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)

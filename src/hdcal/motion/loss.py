@@ -35,7 +35,6 @@ WHITE = 1e-3
 NOISE = 0.05
 _LAGS = 20
 _FRICTIONAL = (CoulombFriction,)
-_NO_DAMPING = Prior("fixed", (0.0,), "1", "dry friction alone explains the data")
 
 
 @dataclass(frozen=True)
@@ -78,18 +77,19 @@ def choose_loss(
     mode: laplace.Whitening,
     effects: Sequence[str] | None,
 ) -> Chosen:
-    """Return the model to sample: the one asked for, or what the evidence says.
+    """Return the model to sample: the linear one, unless friction is asked for.
 
     Args:
         case: of the record.
         theory: which stiffness K multiplies.
         viscous: the linear model.
         mode: its mode and curvature.
-        effects: asked for; None to weigh where the linear model leaves more than noise.
+        effects: asked for; None to weigh what else takes the energy, where the linear
+            model leaves more than noise.
     """
     own = dynamic_site_priors(case, theory)
     linear = Chosen(viscous, own, mode, {})
-    if effects is None and noise_probability(viscous, _at_mode(linear)) >= NOISE:
+    if effects is None and _noise_at(viscous, mode) >= NOISE:
         return linear
     if effects is None and viscous.count > MOST_ROWS:
         return replace(linear, checks=(_too_long(viscous.count),))
@@ -99,29 +99,24 @@ def choose_loss(
     start = FrictionSearch(
         viscous, mode, build_dynamic(case, priors, theory, _FRICTIONAL)
     )
-    both = Chosen(start.both, priors, start.fit_both(), {})
+    both = start.both, start.fit_both()
     if effects is not None:
-        return both
-    without = priors | {"damping_ratio": _NO_DAMPING}
-    dry = Chosen(start.dry, without, start.fit_dry(), {})
+        return Chosen(both[0], priors, both[1], {})
     models = {
-        "viscous": linear,
-        "dry friction": dry,
+        "viscous": (viscous, mode),
+        "dry friction": (start.dry, start.fit_dry()),
         "both": both,
     }
-    evidence = {
-        n: laplace.log_evidence(m.problem, m.whitening) for n, m in models.items()
-    }
+    evidence = {name: laplace.log_evidence(*fit) for name, fit in models.items()}
     weights = {n: np.exp(e - max(evidence.values())) for n, e in evidence.items()}
     shares = {n: float(w / sum(weights.values())) for n, w in weights.items()}
     likeliest = max(shares, key=lambda name: shares[name])
-    found = models[likeliest]
-    left = _left_over(likeliest, noise_probability(found.problem, _at_mode(found)))
+    left = _left_over(likeliest, _noise_at(*models[likeliest]))
     return replace(linear, probabilities=shares, checks=(left,))
 
 
-def _at_mode(found: Chosen) -> dict:
-    return laplace.values_at(found.problem, found.whitening.centre)
+def _noise_at(problem: DynamicProblem, mode: laplace.Whitening) -> float:
+    return noise_probability(problem, laplace.values_at(problem, mode.centre))
 
 
 def noise_probability(problem: DynamicProblem, values) -> float:

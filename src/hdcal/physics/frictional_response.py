@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.physics.linear_response import Scalar, decay_entries
+from hdcal.physics.linear_response import LinearGear, Scalar, decay_entries
 
 # Steps towards the time of a turn before the last one: enough also where the force
 # jumps from row to row. One is enough for a gear that swings freely.
@@ -54,9 +54,7 @@ class _Step(NamedTuple):
 
 
 def frictional_response(
-    mass: Scalar,
-    damping: Scalar,
-    stiffness: Scalar | Float[Array, " n-1"],
+    gear: LinearGear,
     friction: Scalar,
     time: Float[Array, " n"],
     force: Float[Array, " n"],
@@ -65,23 +63,21 @@ def frictional_response(
     """Return deformation [mm] and speed [mm/s] at the rows, row after row.
 
     Args:
-        mass: m [N·s²/mm].
-        damping: c [N·s/mm].
-        stiffness: k, of all steps or of each [N/mm].
+        gear: that answers.
         friction: f [N].
         time: increasing, in steps shorter than half a period [s].
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
     """
-    gear = _Gear(mass, damping, friction)
+    same = _Gear(gear.mass, gear.damping, friction)
 
     # A gradient computes each step anew: quicker than to keep some forty numbers of it.
     @jax.checkpoint
     def advance(state, step):
-        state = _advance(gear, step, state)
+        state = _advance(same, step, state)
         return state, jnp.stack(state)
 
-    steps = _steps(gear, stiffness, time, force)
+    steps = _steps(same, gear.stiffness, time, force)
     _, states = jax.lax.scan(advance, (start[0], start[1]), steps)
     return jnp.concatenate([start[None], states])
 
@@ -91,7 +87,7 @@ def _steps(gear: _Gear, stiffness, time, force) -> _Step:
     length = jnp.diff(time)
     slope = jnp.diff(force) / length
     stiffness = jnp.broadcast_to(stiffness, length.shape)
-    matrix = decay_entries(gear.mass, gear.damping, stiffness, length)
+    matrix = decay_entries(LinearGear(gear.mass, gear.damping, stiffness), length)
     level, rate = _following(gear, stiffness, slope, force[:-1])
     kept = _applied(matrix, (level, rate))
     gain = level + rate * length - kept[0], rate - kept[1]
@@ -125,7 +121,7 @@ def _moved(gear: _Gear, step: _Step, state: State, sense, force, after) -> State
     """
     acting = force - sense * gear.friction
     level, rate = _following(gear, step.stiffness, step.slope, acting)
-    matrix = decay_entries(gear.mass, gear.damping, step.stiffness, after)
+    matrix = decay_entries(LinearGear(gear.mass, gear.damping, step.stiffness), after)
     swing = _applied(matrix, (state[0] - level, state[1] - rate))
     return level + rate * after + swing[0], rate + swing[1]
 

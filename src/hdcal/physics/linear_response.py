@@ -6,6 +6,7 @@ step size enters, and neither damping nor time steps need be of any kind.
 """
 
 import math
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +15,6 @@ from jaxtyping import Float
 from hdcal.data.records import Array
 
 Scalar = Float[Array, ""] | float
-Steps = Scalar | Float[Array, " n-1"]
 # Below this |x| the functions of √x are summed as series, smooth through zero.
 _SMALL = 1e-4
 # Longer records are taken in stretches of so many steps, to bound the memory.
@@ -37,51 +37,38 @@ def _sine(x):
     return jnp.where(small, 1.0 - x * (1 / 6 - x * (1 / 120 - x / 5040)), far)
 
 
+class LinearGear(NamedTuple):
+    """What answers a force: m ÿ + c ẏ + k y.
+
+    Attributes:
+        mass: m [N·s²/mm].
+        damping: c [N·s/mm].
+        stiffness: k, of all steps or of each [N/mm].
+    """
+
+    mass: Scalar
+    damping: Scalar
+    stiffness: Scalar | Float[Array, " n-1"]
+
+
 def decay_entries(
-    mass: Scalar, damping: Scalar, stiffness: Steps, step: Float[Array, "*n"]
+    gear: LinearGear, step: Float[Array, "*n"]
 ) -> tuple[Float[Array, "*n"], ...]:
-    """Return the matrix that takes (y, ẏ) a time step further without a force.
+    """Return the matrix that takes (y, ẏ) a time step [s] further without a force.
 
     Its four entries, row after row: exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)),
     γ = c/2m, x = (k/m − γ²) h², C = cos √x, S = sin √x / √x: one formula through
     critical damping.
-
-    Args:
-        mass: m [N·s²/mm].
-        damping: c [N·s/mm].
-        stiffness: k, of all steps or of each [N/mm].
-        step: h [s].
     """
-    level, slope, half, square = _decay(mass, damping, stiffness, step)
-    return level + half * slope, slope, -square * slope, level - half * slope
-
-
-def free_decay(
-    mass: Scalar, damping: Scalar, stiffness: Steps, step: Float[Array, "*n"]
-) -> Float[Array, "*n 2 2"]:
-    """Return the entries of `decay_entries` as matrices."""
-    level, slope, half, square = _decay(mass, damping, stiffness, step)
-    rows = (
-        jnp.stack([level + half * slope, slope], axis=-1),
-        jnp.stack([-square * slope, level - half * slope], axis=-1),
-    )
-    return jnp.stack(rows, axis=-2)
-
-
-def _decay(mass, damping, stiffness, step):
-    """Return e^(−γh) C, e^(−γh) S h, γ and k/m."""
-    step, half = jnp.asarray(step), 0.5 * damping / mass
-    square = stiffness / mass
+    half, square = 0.5 * gear.damping / gear.mass, gear.stiffness / gear.mass
     x = (square - half**2) * step**2
     decay = jnp.exp(-half * step)
     level, slope = decay * _cosine(x), decay * _sine(x) * step
-    return level, slope, half, square
+    return level + half * slope, slope, -square * slope, level - half * slope
 
 
 def linear_response(
-    mass: Scalar,
-    damping: Scalar,
-    stiffness: Steps,
+    gear: LinearGear,
     time: Float[Array, " n"],
     force: Float[Array, " n"],
     start: Float[Array, "2"],
@@ -89,33 +76,30 @@ def linear_response(
     """Return deformation [mm] and speed [mm/s] at the rows.
 
     Args:
-        mass: m [N·s²/mm].
-        damping: c [N·s/mm].
-        stiffness: k, of all steps or of each [N/mm].
+        gear: that answers.
         time: increasing, in steps of any size [s].
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
     """
-    known = mass, damping, stiffness
     if len(time) > 2 * _STRETCH:
-        return _in_stretches(known, time, force, start)
-    return jnp.concatenate([start[None], _advance(known, time, force, start)])
+        return _in_stretches(gear, time, force, start)
+    return jnp.concatenate([start[None], _advance(gear, time, force, start)])
 
 
-def _advance(known, time, force, start) -> Float[Array, "n-1 2"]:
-    """Return the states at all rows but the first; mass, damping, stiffness known."""
-    mass, damping, stiffness = known  # the stiffness of all steps, or of each
-    step = jnp.diff(time)
+def _advance(gear: LinearGear, time, force, start) -> Float[Array, "n-1 2"]:
+    """Return the states at all rows but the first."""
+    step, stiffness = jnp.diff(time), gear.stiffness
     slope = jnp.diff(force) / step
-    lag = damping * slope / stiffness**2
+    lag = gear.damping * slope / stiffness**2
     before = jnp.stack([force[:-1] / stiffness - lag, slope / stiffness], axis=-1)
     after = jnp.stack([force[1:] / stiffness - lag, slope / stiffness], axis=-1)
-    matrix = free_decay(mass, damping, stiffness, step)
+    entries = decay_entries(gear, step)
+    matrix = jnp.stack(entries, axis=-1).reshape(-1, 2, 2)
     gain = after - jnp.einsum("nij,nj->ni", matrix, before)
     return _follow(matrix, gain, start)
 
 
-def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
+def _in_stretches(gear: LinearGear, time, force, start) -> Float[Array, "n 2"]:
     """Return all states, stretch after stretch; a gradient computes each anew.
 
     Of the record only the states are kept for a gradient, where otherwise some thirty
@@ -124,8 +108,8 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
     steps = len(time) - 1
     count = -(-steps // _STRETCH)
     spare = count * _STRETCH - steps
-    mass, damping, stiffness = known
-    stiffness = jnp.pad(jnp.broadcast_to(stiffness, steps), (0, spare), mode="edge")
+    stiffness = jnp.broadcast_to(gear.stiffness, steps)
+    stiffness = jnp.pad(stiffness, (0, spare), mode="edge")
     beyond = jnp.arange(1, spare + 1) * (time[-1] - time[-2])
     time = jnp.concatenate([time, time[-1] + beyond])
     force = jnp.pad(force, (0, spare), mode="edge")
@@ -133,7 +117,9 @@ def _in_stretches(known, time, force, start) -> Float[Array, "n 2"]:
 
     @jax.checkpoint
     def stretch(state, part):
-        states = _advance((mass, damping, part[0]), part[1], part[2], state)
+        stiffness, time, force = part
+        here = gear._replace(stiffness=stiffness)
+        states = _advance(here, time, force, state)
         return states[-1], states
 
     parts = stiffness.reshape(count, _STRETCH), time[rows], force[rows]

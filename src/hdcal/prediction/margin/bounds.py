@@ -9,6 +9,7 @@ All of it is along the sense of loading; a `Level` has forces with their sign.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -35,6 +36,7 @@ from hdcal.prediction.margin.result import (
 # The least probability and the least distance to 1 that a number can hold.
 LEAST, LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
 _TAILS = (0.5 * (1.0 - INTERVAL), 0.5, 0.5 * (1.0 + INTERVAL))
+_Bounded = TypeVar("_Bounded", Level, ModelBound)
 
 
 @dataclass(frozen=True)
@@ -139,20 +141,16 @@ def shown(of: Level, grid: ReadingGrid, sense: LoadingSense) -> Level:
         grid: of the readings, along the sense.
         sense: of loading.
     """
-    least, most = ends_along(of.lower_bound_N, of.upper_bound_N, sense)
-    lower, upper = ends_along(grid.lower(least), grid.upper(most), sense)
     return replace(
-        of,
-        lower_bound_N=lower,
-        upper_bound_N=upper,
+        shown_bounds(of, grid, sense),
         capacity_N=grid.upper(of.capacity_N),
         capacity_median_N=grid.upper(of.capacity_median_N),
         capacity_predictive_N=grid.upper(of.capacity_predictive_N),
     )
 
 
-def shown_model(of: ModelBound, grid: ReadingGrid, sense: LoadingSense) -> ModelBound:
-    """Return what one model says with bounds that are readings."""
+def shown_bounds(of: _Bounded, grid: ReadingGrid, sense: LoadingSense) -> _Bounded:
+    """Return the same with bounds that are readings."""
     least, most = ends_along(of.lower_bound_N, of.upper_bound_N, sense)
     lower, upper = ends_along(grid.lower(least), grid.upper(most), sense)
     return replace(of, lower_bound_N=lower, upper_bound_N=upper)

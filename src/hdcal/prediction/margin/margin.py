@@ -34,7 +34,7 @@ from hdcal.prediction.margin.bounds import (
     level_of,
     population_draws,
     shown,
-    shown_model,
+    shown_bounds,
     worst_level,
 )
 from hdcal.prediction.margin.checks import check_margin, check_sign
@@ -152,7 +152,7 @@ def _margin(
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, unrounded, sense, whose),
-        models=tuple(shown_model(model, grid, sense) for model in found.models),
+        models=tuple(shown_bounds(model, grid, sense) for model in found.models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
         gradients=gradients(there, found.upper, criteria) if sensitivities else (),
