@@ -13,7 +13,12 @@ from hdcal.prediction.engine.growth import Growth, bend_covariance, fit_growths
 from hdcal.prediction.margin.margin import Margin
 
 QUICK = {"sensitivities": False}
-LAW = jax.jit(Growth.law)
+
+
+@jax.jit
+def law(growth: Growth, places, size, noise):
+    """Return mean and sd of a bend of a size."""
+    return growth.of_size(size, noise).at(places)[:2]
 
 
 def covariance(one, other):
@@ -34,7 +39,7 @@ def test_the_bend_is_that_of_a_dense_process(turned: bool):
     below, above = fit_growths(cause)
     growth = (below if turned else above).growth
     asked = np.array([0.52, 0.6, 0.9]) if not turned else np.array([0.02, -0.1, -0.4])
-    mean, sd = LAW(growth, asked, 7.0, 0.6)
+    mean, sd = law(growth, asked, 7.0, 0.6)
 
     place, new = ((at - ends[1]) / (ends[0] - ends[1]) for at in (x, asked))
     lines, over = (np.stack([np.ones_like(t), t], axis=1) for t in (place, new))

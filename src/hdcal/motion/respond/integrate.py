@@ -26,8 +26,8 @@ from hdcal.physics.dynamics import (
 )
 from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
-from hdcal.prediction.engine.gear_forces import gear_leftover
-from hdcal.prediction.engine.untested import Untested
+from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
+from hdcal.prediction.engine.untested import Bends, Untested
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.
@@ -39,13 +39,14 @@ class _Leftover(eqx.Module):
 
     problem: Problem
     value: Values
-    untested: Untested
+    bends: Bends
+    unloaded: Scalar = 0.0
 
     def __call__(self, deformation: Scalar) -> Scalar:
         """Return it at a deformation as read from the unloaded gear [N]."""
-        places = jnp.stack([deformation, jnp.zeros_like(deformation)])
-        left = gear_leftover(self.problem, self.value, self.untested, places)
-        return left[0] - left[1]
+        place = jnp.reshape(deformation, 1)
+        left = gear_leftover(self.problem, self.value, self.bends, place)
+        return left[0] - self.unloaded
 
 
 def unseen(posterior: Posterior, values: dict, mass, seed: int):
@@ -78,7 +79,11 @@ def _each(
     """Return motion, facts and whether each draw of a batch came through."""
 
     def one(value):
-        left = leftover and _Leftover(leftover[0], value, leftover[1])
+        left = None
+        if leftover is not None:
+            problem, untested = leftover
+            left = _Leftover(problem, value, gear_bends(untested, value))
+            left = replace(left, unloaded=left(0.0))
         effects = tuple(_with_values(effect, value) for effect in kept)
         stiffness = value["stiffness"] / reading.radial_per_read
         base = Base(stiffness, value["alpha"], 0.0, 0.0, 1.0)

@@ -14,7 +14,13 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.forces import force_of, grid_records
-from hdcal.prediction.engine.untested import SITES, Untested, spread_evenly, untested_of
+from hdcal.prediction.engine.untested import (
+    SITES,
+    Bends,
+    Untested,
+    spread_evenly,
+    untested_of,
+)
 
 # Sites of a draw: which of the causes it is of, and its modulus over that of the tested
 # gear where another material was drawn.
@@ -100,15 +106,21 @@ def gear_forces(
         force, _ = force_of(problem, value, records, factor=own, quantity="gear")
         if untested is None:
             return force
-        left = gear_leftover(problem, value, untested, as_read)
+        bends = gear_bends(untested, value)
+        left = gear_leftover(problem, value, bends, as_read)
         return force + own * value.get(MODULUS, 1.0) * left
 
     factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
     return jax.vmap(of_draw, out_axes=1)(values, factor)
 
 
+def gear_bends(untested: Untested, value: Values) -> Bends:
+    """Return what may bend the force of one draw, by its own cause."""
+    return jax.tree.map(lambda leaf: leaf[value[CAUSE]], untested).bends(value)
+
+
 def gear_leftover(
-    problem: Problem, value: Values, untested: Untested, as_read: Float[Array, " n"]
+    problem: Problem, value: Values, bends: Bends, as_read: Float[Array, " n"]
 ) -> Float[Array, " n"]:
     """Return what the fitted leftover and the bend of a draw add to the force [N].
 
@@ -118,16 +130,15 @@ def gear_leftover(
     Args:
         problem: structure.
         value: one draw.
-        untested: from `gear_values`.
+        bends: of the same draw, from `gear_bends`.
         as_read: deformation from the free shape, per mm as read.
     """
-    own = jax.tree.map(lambda leaf: leaf[value[CAUSE]], untested)
     place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
     pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
-    low, high = own.above.far, own.above.end
+    low, high = bends.above.growth.far, bends.above.growth.end
     known = jnp.clip(place, jnp.minimum(low, 0.0), jnp.maximum(high, 0.0))
     beyond = jnp.clip(place, low, high) + (place - known)
-    left, _ = own.leftover(problem, value, beyond, pressed)
+    left, _ = bends.leftover(problem, value, beyond, pressed)
     if problem.discrepancy is not None:
-        left = left + own.leftover(problem, value, place, pressed)[1]
+        left = left + bends.leftover(problem, value, place, pressed)[1]
     return acting(value, left)

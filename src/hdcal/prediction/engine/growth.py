@@ -66,20 +66,14 @@ class Growth(eqx.Module):
         """Return how much of the bend is in: none where it was tested."""
         return -jnp.expm1(-((self.beyond(deformation) / _FADE) ** 2))
 
-    def law(self, deformation, size, noise):
-        """Return mean and sd of the bend, each (n,) [N].
+    def of_size(self, size, noise) -> "BendLaw":
+        """Return the law of a bend of this size [N], with the noise that goes with it.
 
         Args:
-            deformation: as read [mm], shape (n,).
             size: of the bend [N].
             noise: sd of a reading that goes with it [N].
         """
-        place = 1.0 + self.beyond(deformation)
-        powers = jnp.stack([jnp.ones_like(place), place, place**2], axis=1)
-        found, known = self.given(size, noise)
-        free = _variance(place) - jnp.sum(powers @ known * powers, axis=1)
-        # The root of zero has no derivative.
-        return powers @ found, size * jnp.sqrt(jnp.maximum(free, 0.0) + 1e-24)
+        return BendLaw(self, size, *self.given(size, noise))
 
     def given(self, size, noise):
         """Return what the rows say of a bend, by 1, t and t².
@@ -95,6 +89,36 @@ class Growth(eqx.Module):
         spread = size**2 * self.strength + noise**2
         found = size**2 * (self.ties @ (self.found / spread))
         return found, self.line + size**2 * (self.ties / spread) @ self.ties.T
+
+
+class BendLaw(eqx.Module):
+    """The law of a bend of known size beyond one end.
+
+    Attributes:
+        growth: what the rows say of a bend there.
+        size: of the bend [N].
+        found: its mean, by 1, t and t² [N].
+        known: by their products, what a bend of size 1 has less of variance.
+    """
+
+    growth: Growth
+    size: Float[Array, ""] | float
+    found: Float[Array, " 3"]
+    known: Float[Array, "3 3"]
+
+    def at(self, deformation):
+        """Return mean and sd of the bend [N], and how much of it is in [-]; each (n,).
+
+        Args:
+            deformation: as read [mm], shape (n,).
+        """
+        t = 1.0 + self.growth.beyond(deformation)
+        # Not as matrices: small ones of many draws are slow to multiply.
+        taken = sum(self.known[i, j] * t ** (i + j) for i in range(3) for j in range(3))
+        mean = sum(self.found[i] * t**i for i in range(3))
+        # The root of zero has no derivative.
+        sd = self.size * jnp.sqrt(jnp.maximum(_variance(t) - taken, 0.0) + 1e-24)
+        return mean, sd, self.growth.share(deformation)
 
 
 def _variance(place):

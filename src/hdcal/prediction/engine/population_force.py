@@ -251,7 +251,7 @@ def bend_sd(force: PopulationForce) -> float:
     at = jnp.reshape(jnp.asarray(where.deformation, float), 1)
 
     def one(value):
-        mean, sd, share = where.untested.bend_law(value, at)
+        mean, sd, share = where.untested.bends(value).law(at)
         return share * mean, share * sd
 
     mean, sd = map(np.asarray, jax.vmap(one)(values))
@@ -265,6 +265,7 @@ def leftover(
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)
     if quantity == "load":
         at, _ = shown(value, at, 0.0)
-    bend, fitted = conditions.untested.leftover(problem, value, at, conditions.loading)
+    bends = conditions.untested.bends(value)
+    bend, fitted = bends.leftover(problem, value, at, conditions.loading)
     left = (bend + fitted)[0]
     return acting(value, left) if quantity == "load" else left

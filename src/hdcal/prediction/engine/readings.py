@@ -42,7 +42,8 @@ def readings(
         of_run, of_specimen, of_noise = jax.random.split(key, 3)
         zero, moved = untested.drift(value, records.temperature, loading)
         mean, noise = force_of(problem, value, records, zero=zero, moved=moved)
-        bend, fitted = untested.leftover(problem, value, at, loading)
+        bends = untested.bends(value)
+        bend, fitted = bends.leftover(problem, value, at, loading)
         other, factor = 0.0, 1.0
         if problem.runs:
             sd = new_member_sd(value["run_offset_sd"], problem.runs)

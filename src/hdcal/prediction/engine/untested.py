@@ -19,7 +19,7 @@ from hdcal.inference.values import Values
 from hdcal.physics.effects.thermal_expansion import ThermalExpansion
 from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
-from hdcal.prediction.engine.growth import Growth, fit_growths
+from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths
 
 # Sites of a draw beside those of the posterior: size of the bend and its noise beyond
 # each end, and standard normal scores of the bend, the zero and the frame.
@@ -67,20 +67,36 @@ class Untested(eqx.Module):
             for (mean, sd), score in ((self.zero, zero), (self.frame, frame))
         )
 
-    def bend_law(self, value: Values, deformation):
+    def bends(self, value: Values) -> "Bends":
+        """Return what may bend the force of one draw, which has its scores."""
+        below, above = value[BENDS]
+        return Bends(
+            self.below.of_size(*below), self.above.of_size(*above), value[PLACES][0]
+        )
+
+
+class Bends(eqx.Module):
+    """What may bend the force of one draw: computed once for all deformations.
+
+    Attributes:
+        below: the bend beyond the low end of the tested deformation.
+        above: and beyond the high one.
+        score: place of the draw in both, a standard normal score.
+    """
+
+    below: BendLaw
+    above: BendLaw
+    score: Float[Array, ""] | float
+
+    def law(self, deformation):
         """Return mean and sd of the bend [N], and how much of it is in [-]; each (n,).
 
         Args:
-            value: one draw.
             deformation: as read [mm], shape (n,).
         """
-        sides = self.below, self.above
-        laws = [
-            (*side.law(deformation, size, noise), side.share(deformation))
-            for side, (size, noise) in zip(sides, value[BENDS], strict=True)
-        ]
-        over = jnp.asarray(deformation) > self.above.far
-        return tuple(jnp.where(over, *pair) for pair in zip(*laws[::-1], strict=True))
+        over = jnp.asarray(deformation) > self.above.growth.far
+        sides = self.above.at(deformation), self.below.at(deformation)
+        return tuple(jnp.where(over, *pair) for pair in zip(*sides, strict=True))
 
     def leftover(self, problem: Problem, value: Values, deformation, loading):
         """Return the bend and the fitted leftover discrepancy of a draw [N], (n,) each.
@@ -90,15 +106,16 @@ class Untested(eqx.Module):
 
         Args:
             problem: structure.
-            value: one draw, with its scores.
+            value: the same draw.
             deformation: as read [mm], shape (n,).
             loading: sense of loading, along which the score is.
         """
-        mean, sd, share = self.bend_law(value, deformation)
-        bend = share * (mean + sd * loading * value[PLACES][0])
+        mean, sd, share = self.law(deformation)
+        bend = share * (mean + sd * loading * self.score)
         if problem.discrepancy is None or "gap_weights" not in value:
             return bend, jnp.zeros_like(bend)
-        inside = jnp.clip(deformation, self.above.far, self.below.far)
+        low, high = self.above.growth.far, self.below.growth.far
+        inside = jnp.clip(deformation, low, high)
         fitted = problem.discrepancy.columns(inside) @ value["gap_weights"]
         return bend, (1.0 - share) * fitted
 

@@ -91,7 +91,7 @@ def _scatter(problem, values, whose, conditions):
         _, (log_weight, sd) = member_force(
             problem, value, whose.quantity, conditions, 1.0
         )
-        mean, width, share = conditions.untested.bend_law(value, at)
+        mean, width, share = conditions.untested.bends(value).law(at)
         noise = jnp.sum(jnp.exp(log_weight) * sd**2)
         return noise, (share * mean)[0], (share * width)[0]
 

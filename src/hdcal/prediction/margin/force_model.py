@@ -65,7 +65,8 @@ class ForceModel(eqx.Module):
         quantity = self.whose.quantity
         force, _ = member_force(self.problem, value, quantity, there, factor)
         at = jnp.reshape(jnp.asarray(there.deformation, float), 1)
-        _, fitted = untested.leftover(self.problem, value, at, there.loading)
+        bends = untested.bends(value)
+        _, fitted = bends.leftover(self.problem, value, at, there.loading)
         return force + fitted[0] + sum(more.get(name, 0.0) for name in _ADDED)
 
     def _value(self, moved) -> dict:
