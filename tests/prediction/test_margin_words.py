@@ -98,3 +98,12 @@ def test_the_stated_probability_belongs_to_its_index(posterior):
     (said,) = (words for words in answer(found) if words.startswith("One future"))
     assert f"a probability of {chance(risk.probability)}" in said
     assert f"{risk.beta:.2f}" in said
+
+
+def test_what_nobody_can_know_is_said_once(posterior):
+    found = hdcal.margin(posterior, 0.4, limit_force=84.0, sensitivities=False)
+    risk = replace(found.worst.exceedance, lo=1e-14, at_confidence=1e-13)
+    rare = replace(found, worst=replace(found.worst, exceedance=risk))
+    (said,) = (words for words in answer(rare) if words.startswith("One future"))
+    assert f"is at most {chance(risk.hi)} (95" in said
+    assert "confidence it is less than 1e-12" in said

@@ -26,10 +26,11 @@ def read(force, origin: float):
 def test_limits_and_bounds_are_those_of_rounded_forces(origin: float):
     grid, forces = ReadingGrid(STEP, origin), RNG.normal(80.0, 3.0, 20_000)
     shown = read(forces, origin)
-    for limit in [*RNG.uniform(74.0, 86.0, 20), float(read(80.0, origin))]:
+    readings = read(RNG.uniform(74.0, 86.0, 20), origin)
+    for limit in [*RNG.uniform(74.0, 86.0, 50), *readings, *np.round(readings, 1)]:
         over, nearest = forces > grid.unrounded(limit), float(read(limit, origin))
-        # Just below a reading it stands for that reading.
-        meant = max(limit, nearest) if nearest - limit <= 0.1 * STEP else limit
+        # Written with fewer digits it stands for that reading.
+        meant = nearest if round(nearest, 1) == limit else limit
         np.testing.assert_array_equal(over, shown > meant + 1e-9)
     for bound in RNG.uniform(74.0, 86.0, 20):
         upper, lower = grid.upper(bound), grid.lower(bound)

@@ -93,6 +93,11 @@ def dynamic_priors() -> dict[str, Prior]:
 
 def effect_priors() -> dict[str, Prior]:
     """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
+    return _shipped_effects().copy()
+
+
+@cache
+def _shipped_effects() -> dict[str, Prior]:
     toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
     return read_effect_priors(toml.table, "", toml)
 

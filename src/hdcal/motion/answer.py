@@ -16,8 +16,9 @@ class Loss:
     """What takes the energy of a swing.
 
     Attributes:
-        name: of a model with a probability of 0.9 or more that leaves only noise; None
-            where models were not weighed.
+        name: of a model with a probability of 0.9 or more, or of the linear model that
+            leaves noise where dry friction would show; None where no model leaves only
+            noise, and where nobody looked.
         probabilities: of each model, the same before the data; empty without.
         dry_share: of the energy that the largest swing loses, what dry friction takes;
             None without friction in the model.

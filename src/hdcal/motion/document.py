@@ -63,9 +63,15 @@ def loss_words(loss: Loss) -> str:
         share = f"; dry friction takes {part} of what the largest swing loses"
     sure = percent(max(loss.probabilities.values(), default=None))
     if loss.name == "viscous" and not loss.probabilities:
-        return "Its swings die out by viscous damping: what that leaves is noise."
+        return (
+            "Its swings die out by viscous damping: what that leaves is noise, and dry "
+            "friction would show."
+        )
     if loss.name == "viscous":
-        return f"Its swings die out by viscous damping (probability {sure}){share}."
+        return (
+            f"Its swings die out by viscous damping (probability {sure}, beside dry "
+            f"friction and both){share}."
+        )
     if loss.name == "dry friction":
         return f"Its swings die out by dry friction alone (probability {sure})."
     if loss.name == "both":
@@ -76,6 +82,12 @@ def loss_words(loss: Loss) -> str:
     if loss.name == "cannot tell":
         each = ", ".join(f"{n} {percent(p)}" for n, p in loss.probabilities.items())
         return f"What its swings die out by cannot be told ({each}){share}."
+    if loss.probabilities:
+        each = ", ".join(loss.probabilities)
+        return (
+            "What its swings die out by has no name here: the likeliest of "
+            f"{each} leaves more than noise."
+        )
     return f"Dry friction was asked for{share}." if share else ""
 
 

@@ -50,7 +50,7 @@ class FrictionSearch:
         fits = [laplace.fit(self.both, shares[s]) for s in _LITTLE]
         fits.append(_fit_by_stages(self.both, shares[_MUCH], self.counts))
         levels = [float(laplace.potential(self.both, fit.centre)) for fit in fits]
-        return fits[int(np.argmin(levels))]
+        return fits[int(np.nanargmin(levels))]
 
     def fit_dry(self) -> laplace.Whitening:
         """Search from all of the loss as friction."""
@@ -60,7 +60,7 @@ class FrictionSearch:
     def _shared(self, share: float) -> dict[str, float]:
         """Return where to start with a share of the loss as friction."""
         ratio = (1.0 - share) * self.sites.get("damping_ratio", 0.0)
-        changed = {"damping_ratio": ratio}
+        changed = {"damping_ratio": _inside(self.both.priors["damping_ratio"], ratio)}
         return self._at(self.both, share * self.equivalent, changed)
 
     def _at(self, problem: DynamicProblem, friction: float, changed=None) -> dict:
@@ -125,6 +125,27 @@ def equivalent_friction(problem: DynamicProblem, values) -> float:
     return 0.25 * np.pi * float(values["damping"]) * pace * swing(problem, values)
 
 
+def rubbing_contrast(viscous: DynamicProblem, frictional: DynamicProblem, values):
+    """Return how far a gear that only rubs lies from the linear model [noise sds].
+
+    It loses of the largest swing what the linear gear does; what other parameters of
+    that would make up for is taken off, to first order.
+
+    Args:
+        viscous: the linear model.
+        frictional: the same with dry friction.
+        values: of the linear model at its mode.
+    """
+    friction = equivalent_friction(viscous, values)
+    rubbing = {**values, "damping_ratio": 0.0, FRICTION: friction}
+    away = predict(frictional, rubbing) - predict(viscous, values)
+    away = np.asarray(away)[: viscous.count]
+    columns = np.stack(list(motion_slopes(viscous, values).values()), axis=1)
+    columns = columns / (np.linalg.norm(columns, axis=0) + 1e-300)
+    away = away - columns @ np.linalg.lstsq(columns, away, rcond=None)[0]
+    return float(np.linalg.norm(away) / values["deformation_sigma"])
+
+
 def _counts(problem: DynamicProblem, frequency: float) -> list[int]:
     """Return up to which rows a search looks, one after the other; all at the end."""
     read = np.asarray(problem.deformation)[: problem.count]
@@ -132,7 +153,7 @@ def _counts(problem: DynamicProblem, frequency: float) -> list[int]:
     period = int(np.clip(round(1.0 / (frequency * step)), 2, len(read)))
     windows = np.lib.stride_tricks.sliding_window_view(read, period)
     sizes = np.ptp(windows, axis=1)
-    ends = {int(np.flatnonzero(sizes > s * sizes.max())[-1]) + period for s in _SHARES}
+    ends = {int(np.flatnonzero(sizes >= s * sizes.max())[-1]) + period for s in _SHARES}
     return sorted({*ends, problem.count})
 
 
@@ -158,9 +179,17 @@ def _friction_site(problem: DynamicProblem, size: float) -> dict[str, float]:
     if FRICTION in problem.units:
         ratio = max(size / problem.units[FRICTION], 1e-6)
         return {f"_{FRICTION}": float(ratio + np.log(-np.expm1(-ratio)))}
-    # Outside of its support there is no density to climb.
-    ends = frozen(prior).ppf([_TAIL, 1.0 - _TAIL])
-    return {FRICTION: float(np.clip(size, *ends))}
+    return {FRICTION: _inside(prior, size)}
+
+
+def _inside(prior: Prior, value: float) -> float:
+    """Return the value, or what is nearest to it in the support of its prior.
+
+    Outside of it there is no density to climb.
+    """
+    if prior.family == "fixed":
+        return value
+    return float(np.clip(value, *frozen(prior).ppf([_TAIL, 1.0 - _TAIL])))
 
 
 def _resolved(problem: DynamicProblem, values) -> DynamicProblem:

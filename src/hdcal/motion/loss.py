@@ -21,7 +21,11 @@ from hdcal.inference.dynamic_problem import (
     build_dynamic,
     dynamic_site_priors,
 )
-from hdcal.motion.friction_search import FrictionSearch, predict
+from hdcal.motion.friction_search import (
+    FrictionSearch,
+    predict,
+    rubbing_contrast,
+)
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.coulomb_friction import CoulombFriction
 
@@ -30,9 +34,13 @@ MOST_ROWS = 4000
 # Names of the checks without which no model is named: of what was sampled, and of what
 # was weighed. Residuals less probable than this are not noise.
 WHITENESS, LEFT_OVER = "residuals are noise", "the likeliest loss leaves noise"
+# And of what else was looked for.
+LOOKED = "dry friction would show"
+_NOBODY = "nobody looked for dry friction, all damping counts as viscous"
 WHITE = 1e-3
-# With residuals of the linear model as likely as this nothing else is looked for.
-NOISE = 0.05
+# Where the linear model leaves noise and a gear that only rubs would differ from it by
+# this many noise sds, nothing else is looked for.
+PLAIN = 20.0
 _LAGS = 20
 _FRICTIONAL = (CoulombFriction,)
 
@@ -84,35 +92,64 @@ def choose_loss(
         theory: which stiffness K multiplies.
         viscous: the linear model.
         mode: its mode and curvature.
-        effects: asked for; None to weigh what else takes the energy, where the linear
-            model leaves more than noise.
+        effects: asked for; None to weigh what else takes the energy, unless the linear
+            model leaves noise and a gear that rubs would show.
+
+    Raises:
+        InputError: rows are too far apart for a model with friction.
     """
-    own = dynamic_site_priors(case, theory)
-    linear = Chosen(viscous, own, mode, {})
-    if effects is None and _noise_at(viscous, mode) >= NOISE:
-        return linear
-    if effects is None and viscous.count > MOST_ROWS:
-        return replace(linear, checks=(_too_long(viscous.count),))
+    linear = Chosen(viscous, dynamic_site_priors(case, theory), mode, {})
     if effects is not None and not loss_effects(effects):
         return linear
+    values = laplace.values_at(viscous, mode.centre)
+    gap = _gap(viscous, float(values["natural_frequency"]))
+    if gap and effects is not None:
+        raise InputError([Finding(case.name, gap, "Leave coulomb_friction out")])
+    if gap:
+        return replace(linear, checks=(Check(LOOKED, "note", f"{_NOBODY}: {gap}"),))
     priors = dynamic_site_priors(case, theory, _FRICTIONAL)
-    start = FrictionSearch(
-        viscous, mode, build_dynamic(case, priors, theory, _FRICTIONAL)
-    )
-    both = start.both, start.fit_both()
+    frictional = build_dynamic(case, priors, theory, _FRICTIONAL)
     if effects is not None:
-        return Chosen(both[0], priors, both[1], {})
-    models = {
-        "viscous": (viscous, mode),
-        "dry friction": (start.dry, start.fit_dry()),
-        "both": both,
-    }
+        search = FrictionSearch(viscous, mode, frictional)
+        return Chosen(search.both, priors, search.fit_both(), {})
+    contrast = rubbing_contrast(viscous, frictional, values)
+    if contrast >= PLAIN and noise_probability(viscous, values) >= WHITE:
+        words = f"a gear that only rubs would differ by {contrast:.2g} noise sds"
+        return replace(linear, checks=(Check(LOOKED, "passed", words),))
+    if viscous.count > MOST_ROWS:
+        words = f"{_NOBODY}: more than {MOST_ROWS} rows, {viscous.count}"
+        return replace(linear, checks=(Check(LOOKED, "note", words),))
+    return _weighed(linear, frictional)
+
+
+def _weighed(linear: Chosen, frictional: DynamicProblem) -> Chosen:
+    """Return the linear model with the probability of each model of the loss."""
+    search = FrictionSearch(linear.problem, linear.whitening, frictional)
+    models = {"viscous": (linear.problem, linear.whitening)}
+    # What the gear file states of the damping ratio no model may contradict.
+    if frictional.priors["damping_ratio"].family != "fixed":
+        models["dry friction"] = search.dry, search.fit_dry()
+    models["both"] = search.both, search.fit_both()
     evidence = {name: laplace.log_evidence(*fit) for name, fit in models.items()}
     weights = {n: np.exp(e - max(evidence.values())) for n, e in evidence.items()}
     shares = {n: float(w / sum(weights.values())) for n, w in weights.items()}
     likeliest = max(shares, key=lambda name: shares[name])
-    left = _left_over(likeliest, _noise_at(*models[likeliest]))
-    return replace(linear, probabilities=shares, checks=(left,))
+    checks = [_left_over(likeliest, _noise_at(*models[likeliest]))]
+    if likeliest != "viscous":
+        words = (
+            "what was sampled is the linear model, in which friction counts as "
+            "damping: its intervals are too narrow"
+        )
+        checks.append(Check("the loss is in the model", "warning", words))
+    return replace(linear, probabilities=shares, checks=tuple(checks))
+
+
+def _gap(problem: DynamicProblem, frequency: float) -> str:
+    """Return what is wrong where rows are half a period apart or more, else nothing."""
+    longest = float(np.max(np.diff(problem.time[: problem.count])))
+    if longest * frequency < 0.5:
+        return ""
+    return f"rows are up to {longest:.3g} s apart, which is half a period or more"
 
 
 def _noise_at(problem: DynamicProblem, mode: laplace.Whitening) -> float:
@@ -140,11 +177,3 @@ def _left_over(name: str, p: float) -> Check:
         return Check(LEFT_OVER, "passed", f"{name}: no correlation (p = {p:.2g})")
     words = f"with {name} what is left over is correlated from row to row (p = {p:.1g})"
     return Check(LEFT_OVER, "warning", f"{words}: no loss is named")
-
-
-def _too_long(rows: int) -> Check:
-    words = (
-        f"nobody looked for dry friction: in records of more than {MOST_ROWS} rows, as "
-        f"this one of {rows}, all damping counts as viscous"
-    )
-    return Check("the loss is weighed", "note", words)

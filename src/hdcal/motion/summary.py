@@ -17,7 +17,7 @@ from hdcal.motion.document import (
     next_steps,
 )
 from hdcal.motion.friction_search import dry_share, swing
-from hdcal.motion.loss import LEFT_OVER, WHITENESS
+from hdcal.motion.loss import LEFT_OVER, LOOKED, WHITENESS
 from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report
@@ -51,15 +51,16 @@ def found_loss(posterior: DynamicPosterior) -> Loss:
 
     A model whose residuals are no noise is not the right one, however much more
     probable it is than the others: then there is no name. The linear model whose
-    residuals are noise needs no comparison.
+    residuals are noise needs no comparison where dry friction would have shown.
     """
     weighed = dict(posterior.loss)
     likeliest = max(weighed, key=lambda name: weighed[name], default=None)
-    asked = LEFT_OVER if weighed else WHITENESS
-    noise = any(c.name == asked and c.outcome == "passed" for c in posterior.checks)
-    if likeliest and not (noise and weighed[likeliest] >= _NAMED):
+    passed = {check.name for check in posterior.checks if check.outcome == "passed"}
+    if likeliest and weighed[likeliest] < _NAMED:
         likeliest = "cannot tell"
-    if not weighed and noise and not posterior.effects:
+    if weighed and LEFT_OVER not in passed:
+        likeliest = None
+    if not weighed and {WHITENESS, LOOKED} <= passed:
         likeliest = "viscous"
     share = _dry_share(posterior) if posterior.effects else None
     return Loss(cast(Any, likeliest), weighed, share)

@@ -1,9 +1,11 @@
-"""The exact response with dry friction: m ÿ + c ẏ + k y + f sgn ẏ = F(t).
+"""The response with dry friction: m ÿ + c ẏ + k y + f sgn ẏ = F(t).
 
 While the gear moves one way friction is a constant force: the motion is that of
 `linear_response`, in closed form, until the gear turns. There it rests as long as
 |F − k y| ≤ f. Within one time step the gear moves, rests and moves on, each of them for
-any time or none; steps must therefore be shorter than half a period.
+any time or none; steps must therefore be shorter than half a period. A gear that turns
+and turns back within one step, as a force that jumps from row to row can make it, is
+taken to go on.
 """
 
 from typing import NamedTuple

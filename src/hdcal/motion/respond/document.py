@@ -19,6 +19,8 @@ from hdcal.report.words import estimate
 if TYPE_CHECKING:
     from hdcal.motion.respond.respond import Response
 
+# Points in a period that show its peak, and the band, to the eye.
+_PER_PERIOD = 10
 _FROM_PRIORS = {"mass_kg": "mass", "damping_N_s_per_mm": "damping"}
 
 
@@ -96,11 +98,11 @@ def remarks(
         yield "Frequency, damping and stiffness are those without the effects."
     step = float(np.median(np.diff(times)))
     highest = estimates["natural_frequency_Hz"]["hi"]
-    if 2.0 * highest * step > 1.0:
+    if highest * step > 1.0 / _PER_PERIOD:
         yield (
-            f"A natural frequency of up to {highest:.4g} Hz swings faster than the "
-            f"{1.0 / step:.4g} times per second show: use more points or a shorter "
-            "duration."
+            f"A natural frequency of up to {highest:.4g} Hz swings too fast for the "
+            f"{1.0 / step:.4g} times per second, fewer than {_PER_PERIOD} in a period: "
+            "for its peaks use more points or a shorter duration."
         )
     if len(posterior.case.specimen_labels) > 1:
         yield "The stiffness is the mean of the tested gears, not of a new one."

@@ -5,6 +5,7 @@ to which no reading exceeds it, and a bound goes out as the reading of that forc
 """
 
 from dataclasses import dataclass, replace
+from decimal import Decimal
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from hdcal.prediction.engine.loading_sense import LoadingSense
 # Readings are on one grid where most are no farther from it than this share of a step:
 # a slip of the pen is not on it.
 _OFF, _MOST = 0.1, 0.75
+# Share of a step by which a reading may miss its grid for want of binary digits.
+_EXACT = 1e-9
 # So few readings may lie on a grid by chance.
 _FEWEST = 8
 
@@ -34,11 +37,13 @@ class ReadingGrid:
     def unrounded(self, limit: float) -> float:
         """Return the force [N] up to which no reading exceeds a limit [N].
 
-        A limit that is nearly a reading is that reading, as it was written or typed.
+        A limit that is a reading but for digits that were not written is that reading.
         """
         if self.step == 0.0 or self.origin is None:
             return limit - 0.5 * self.step
-        steps = np.floor((limit - self.origin) / self.step + _OFF)
+        _, _, last = Decimal(repr(float(limit))).as_tuple()
+        unwritten = min(0.5 * 10.0 ** int(last), _OFF * self.step)
+        steps = np.floor((limit - self.origin + unwritten) / self.step + _EXACT)
         return float(self.origin + self.step * (steps + 0.5))
 
     def upper(self, force: float) -> float:

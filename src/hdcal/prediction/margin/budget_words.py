@@ -177,7 +177,9 @@ def decision_words(
     """Return a decision in words; all forces are along the sense of loading."""
     than = f"the limit {limit:g} N"
     if guard > 0.0:
-        than = f"the acceptance limit {newtons(limit - guard)} = {limit:g} N − w"
+        # No estimate above the limit may seem to lie below it.
+        most = np.floor(10.0 * (limit - guard)) / 10.0
+        than = f"the acceptance limit {newtons(most)} = {limit:g} N − w"
     side = "at most" if statement == "conforms" else "above"
     if statement == "does not conform" and guard > 0.0:
         than = f"the limit {limit:g} N by more than its uncertainty"
@@ -200,7 +202,7 @@ def stated_words(stated: StatedUncertainty) -> str:
     """Return a result as it is stated: estimate, uncertainty, factor, coverage."""
     half, sd = stated.expanded_uncertainty_N, stated.combined_standard_uncertainty_N
     words = (
-        f"{_digits(stated.estimate_N, half)} N ± {_digits(half, half)} N (k = "
+        f"{_digits(stated.estimate_N, half)} N ± {_upwards(half)} N (k = "
         f"{stated.coverage_factor:.2f}, 95 % coverage), u = {_digits(sd, sd)} N"
     )
     if stated.linear_budget_valid:
@@ -208,6 +210,12 @@ def stated_words(stated: StatedUncertainty) -> str:
     ends = stated.coverage_lo_N, stated.coverage_hi_N
     low, high = (_digits(end, half) for end in ends)
     return f"{words}; by Monte Carlo, whose coverage interval is {low} … {high} N."
+
+
+def _upwards(uncertainty: float) -> str:
+    """Return two digits of an uncertainty, never less than it (GUM, 7.2.6)."""
+    unit = 10.0 ** (np.floor(np.log10(uncertainty)) - 1.0)
+    return _digits(unit * np.ceil(uncertainty / unit - 1e-9), uncertainty)
 
 
 def _digits(value: float, uncertainty: float) -> str:

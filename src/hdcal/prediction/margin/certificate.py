@@ -68,7 +68,7 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
             Section("Conditions and method", [_asked(found)]),
             Section("Uncertainty budget", _budget(found)),
             *_decision(found),
-            Section(_UNTESTED, [Sentences(list(_untested(found)))]),
+            Section(_UNTESTED, [Sentences(list(_untested(found, posterior)))]),
         ],
         provenance=[("date of issue", issued.isoformat()), ("signature", "")],
     )
@@ -144,10 +144,13 @@ def _decision(found: MarginAnswer) -> Iterator[Section]:
         yield Section("Decision and its rule", words)
 
 
-def _untested(found: MarginAnswer) -> Iterator[str]:
+def _untested(found: MarginAnswer, posterior: Posterior) -> Iterator[str]:
     yield from found.extrapolated
-    if not found.extrapolated:
+    if not found.extrapolated and "temperature" in posterior.case.records.known:
         yield "Deformation, temperature and direction lie within what was tested."
+    elif not found.extrapolated:
+        yield "Deformation and direction lie within what was tested."
+        yield "The temperature of the test was not measured: the reference is assumed."
     if found.population != "specimens":
         yield "Other gears: nothing here says how much they differ from this one."
     if found.population == "readings":

@@ -123,6 +123,12 @@ def _refined(
     )
 
 
+def _times(factor: float) -> str:
+    if factor >= 1e6:
+        return "more than a million times"
+    return f"{float(f'{factor:.2g}'):g} times"
+
+
 def rests_on(found: Rare) -> str:
     """Say what a rare exceedance rests on."""
     error = f"{100.0 * found.relative_error:.0f} %"
@@ -133,12 +139,11 @@ def rests_on(found: Rare) -> str:
     if found.heavy_tailed > _TOLD:
         rests.append(
             "the normal law of the scatter (by Student's t of five degrees of freedom "
-            f"it were {found.heavy_tailed:.2g} times as probable)"
+            f"it were {_times(found.heavy_tailed)} as probable)"
         )
     moved = found.without_prior
     if moved > _TOLD or moved < 1.0 / _TOLD:
         rests.append(
-            "the prior of the noise (without one it were "
-            f"{moved:.2g} times as probable)"
+            f"the prior of the noise (without one it were {_times(moved)} as probable)"
         )
     return f"{told}." + (f" It rests on {' and on '.join(rests)}." if rests else "")

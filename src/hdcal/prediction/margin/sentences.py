@@ -188,11 +188,13 @@ def _capacity(found: Margin) -> Iterator[str]:
         assert found.limit_force_N is not None
         yield _enough(found, found.limit_force_N)
         yield from _exceedance(found, level.exceedance)
+    likely, does = newtons(level.capacity_median_N), newtons(level.capacity_N)
+    also = f"{likely} is as likely as not to do; {does} does with {sure} confidence."
+    if likely == does:
+        also = f"{does} does with {sure} confidence; less is more likely not to do."
     yield (
         f"To hold {100.0 * found.required_probability:.8g} % of "
-        f"{_many(found)}{in_tension(found)}, a capacity of "
-        f"{newtons(level.capacity_median_N)} is as likely as not to do; "
-        f"{newtons(level.capacity_N)} does with {sure} confidence."
+        f"{_many(found)}{in_tension(found)}, a capacity of {also}"
     )
 
 
@@ -228,13 +230,16 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         return
     low, high = chance(risk.lo), chance(risk.hi)
     span = f"is {high}" if low == high else f"lies between {low} and {high}"
+    if risk.lo < _RAREST <= risk.hi:
+        span = f"is at most {high}"
+    most = chance(risk.at_confidence)
+    most = most if risk.at_confidence < _RAREST else f"below {most}"
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
         f"β = {index(risk.beta)}. The share of {_many(found)} that do {span} "
         "(95 % credible interval); "
         + (
-            f"with {sure} confidence it is below {chance(risk.at_confidence)}, β "
-            f"{index(risk.beta_at_confidence)}."
+            f"with {sure} confidence it is {most}, β {index(risk.beta_at_confidence)}."
             if risk.at_confidence < _NEARLY_ALL
             else f"at {sure} confidence it may be all of them."
         )
