@@ -64,12 +64,8 @@ def frictional_response(
 ) -> Float[Array, "n 2"]:
     """Return deformation [mm] and speed [mm/s] at the rows, row after row.
 
-    Args:
-        gear: that answers.
-        friction: f [N].
-        time: increasing, in steps shorter than half a period [s].
-        force: at the rows [N], linear between them.
-        start: deformation and speed at the first row.
+    Arguments are those of `linear_response`, with steps shorter than half a period, and
+    the friction f [N].
     """
     same = _Gear(gear.mass, gear.damping, friction)
 
