@@ -96,6 +96,18 @@ def test_it_says_which_certificates_are_part_of_it():
     assert "part of the model: zero of the load cell; not stated, so no" in words
 
 
+def test_a_temperature_that_nobody_measured_is_not_called_tested():
+    posterior = single(size=400)
+    found = margin_answer(hdcal.margin(posterior, 0.4, **ASKED), posterior, seed=3)
+    records = posterior.case.records
+    for known, said in ((set(), False), ({"temperature"}, True)):
+        case = replace(posterior.case, records=replace(records, known=frozenset(known)))
+        own = replace(posterior, case=case)
+        words = words_of(certificate_page(found, own, ISSUED))
+        assert ("temperature and direction lie within" in words) == said
+        assert ("temperature of the test was not measured" in words) != said
+
+
 def hdcal_version() -> str:
     from hdcal.data.versions import versions
 

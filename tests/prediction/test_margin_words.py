@@ -8,7 +8,13 @@ import pytest
 from posteriors import batch, single
 
 import hdcal
-from hdcal.prediction.margin.sentences import answer, chance, headline
+from hdcal.prediction.margin.budget_words import stated_words
+from hdcal.prediction.margin.sentences import (
+    answer,
+    chance,
+    headline,
+    newtons_down,
+)
 
 
 @pytest.fixture(scope="module")
@@ -107,3 +113,24 @@ def test_what_nobody_can_know_is_said_once(posterior):
     (said,) = (words for words in answer(rare) if words.startswith("One future"))
     assert f"is at most {chance(risk.hi)} (95" in said
     assert "confidence it is less than 1e-12" in said
+
+
+def test_what_may_be_accepted_is_never_rounded_up():
+    for value, words in (
+        (88.85, "88.8 N"),
+        (88.8, "88.8 N"),
+        (5.6789, "5.678 N"),
+        (0.05, "0.05 N"),
+        (0.0, "0 N"),
+        (-0.04567, "-0.04567 N"),
+        (-88.85, "-88.9 N"),
+        (23456.0, "2.345e+04 N"),
+    ):
+        assert newtons_down(value) == words
+
+
+def test_an_uncertainty_is_never_rounded_down(posterior):
+    found = hdcal.margin(posterior, 0.4)
+    for size, words in ((1.146, "1.2"), (1.2, "1.2"), (0.0801, "0.081"), (0.0, "0")):
+        said = stated_words(replace(found, expanded_uncertainty_N=size))
+        assert f"± {words} N" in said

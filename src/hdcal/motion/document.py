@@ -68,9 +68,10 @@ def loss_words(loss: Loss) -> str:
             "friction would show."
         )
     if loss.name == "viscous":
+        others = " and ".join(name for name in loss.probabilities if name != loss.name)
         return (
-            f"Its swings die out by viscous damping (probability {sure}, beside dry "
-            f"friction and both){share}."
+            f"Its swings die out by viscous damping (probability {sure}, beside "
+            f"{others}){share}."
         )
     if loss.name == "dry friction":
         return f"Its swings die out by dry friction alone (probability {sure})."

@@ -68,7 +68,7 @@ def calibrate_dynamic(
     Args:
         case: from `read_case`; one run, with time.
         effects: `coulomb_friction`, or none for the linear model; by default that one,
-            and where it leaves more than noise the loss is named beside it.
+            and the loss is named beside it where the record can tell.
         theory: overrides the gear's theory.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain.

@@ -1,8 +1,8 @@
 """What takes the energy of a swing: viscous damping, dry friction, or both.
 
-Where the linear model leaves more than noise, three models are weighed by their
-evidence, each as probable as the others before the data. To sample with friction takes
-long: unasked it is only named.
+Where the linear model leaves more than noise, or noise would hide a gear that rubs,
+three models are weighed by their evidence, each as probable as the others before the
+data. To sample with friction takes long: unasked it is only named.
 """
 
 from collections.abc import Sequence

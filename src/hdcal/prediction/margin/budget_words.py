@@ -5,7 +5,12 @@ import numpy as np
 from hdcal.prediction.budget.linear import LinearCheck, coverage_factor
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component
-from hdcal.prediction.margin.sentences import chance, input_label, newtons
+from hdcal.prediction.margin.sentences import (
+    chance,
+    input_label,
+    newtons,
+    newtons_down,
+)
 from hdcal.prediction.margin.stated import (
     BudgetCheck,
     Rule,
@@ -178,8 +183,7 @@ def decision_words(
     than = f"the limit {limit:g} N"
     if guard > 0.0:
         # No estimate above the limit may seem to lie below it.
-        most = np.floor(10.0 * (limit - guard)) / 10.0
-        than = f"the acceptance limit {newtons(most)} = {limit:g} N − w"
+        than = f"the acceptance limit {newtons_down(limit - guard)} = {limit:g} N − w"
     side = "at most" if statement == "conforms" else "above"
     if statement == "does not conform" and guard > 0.0:
         than = f"the limit {limit:g} N by more than its uncertainty"
@@ -214,6 +218,8 @@ def stated_words(stated: StatedUncertainty) -> str:
 
 def _upwards(uncertainty: float) -> str:
     """Return two digits of an uncertainty, never less than it (GUM, 7.2.6)."""
+    if uncertainty == 0.0:
+        return _digits(uncertainty, uncertainty)
     unit = 10.0 ** (np.floor(np.log10(uncertainty)) - 1.0)
     return _digits(unit * np.ceil(uncertainty / unit - 1e-9), uncertainty)
 

@@ -1,5 +1,6 @@
 """A margin in sentences that need no statistics to be understood."""
 
+import math
 from collections.abc import Iterator
 
 from hdcal.prediction.margin.result import (
@@ -139,6 +140,16 @@ def _where(found: Margin) -> str:
 def newtons(value: float) -> str:
     """Return a force to four digits."""
     return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
+
+
+def newtons_down(value: float) -> str:
+    """Return a force to the same digits, never more than it."""
+    if value == 0.0:
+        return newtons(value)
+    last = 0.1
+    if not 10.0 <= abs(value) < 1e4:
+        last = 10.0 ** (math.floor(math.log10(abs(value))) - 3.0)
+    return newtons(last * math.floor(value / last + 1e-9))
 
 
 def _at_most(found: Margin, of: Level | ModelBound) -> str:
