@@ -20,7 +20,7 @@ class WarmFriction(hdcal.Effect):
 
     name: ClassVar[str] = "warm_friction"
     stage: ClassVar[str] = "force"
-    family: ClassVar[str] = "friction"
+    groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"temperature", "unloading"})
     symmetry: ClassVar[str] = "none"
 

@@ -14,7 +14,7 @@ class QuadraticGauge(hdcal.Effect):
 
     name: ClassVar[str] = "quadratic_gauge"
     stage: ClassVar[str] = "deformation"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up",)
     symmetry: ClassVar[str] = "even"
 
     error: float = hdcal.parameter(

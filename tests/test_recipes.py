@@ -81,7 +81,7 @@ def test_an_effect(tree: Path):
 
             name: ClassVar[str] = "grease_cling"
             stage: ClassVar[Stage] = "sensor"
-            family: ClassVar[str] = "thermal zero"
+            groups: ClassVar[tuple[str, ...]] = ("zero over temperature",)
             needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
             symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 

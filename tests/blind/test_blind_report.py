@@ -24,7 +24,7 @@ from hdcal.physics.registry import EFFECTS
 from hdcal.report.saving.contents import STAMP
 
 WIDTHS = {"phone": PHONE, "desk": DESK, "paper": PAPER}
-FAMILIES = {name: effect.family for name, effect in EFFECTS.items()}
+FAMILIES = {name: effect.groups[0] for name, effect in EFFECTS.items()}
 NAUGHTY = (
     '<script>alert("x")</script> $\\frac{a}{b}$ \x1b[31m \N{RIGHT-TO-LEFT OVERRIDE}'
 )

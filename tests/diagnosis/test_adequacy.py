@@ -1,4 +1,4 @@
-"""A likely cause that leaves more than noise loses to what the library lacks."""
+"""What resembles a cause and is none is not called one."""
 
 from dataclasses import replace
 
@@ -8,20 +8,7 @@ from diagnosis_cases import NOISE, judged, rich, simulated
 from rigs import make_case
 
 from hdcal.diagnosis.adequacy import sign_odds
-from hdcal.diagnosis.model_posterior import ModelPosterior, move_to_unknown
 from hdcal.evidence.quantisation import rounding_step
-
-BEFORE = {"none": 0.1, "unknown": 0.1, "a": 0.6, "a+b": 0.2}
-
-
-def test_what_a_test_takes_away_goes_to_unknown():
-    before = ModelPosterior(BEFORE, {"a": 0.8, "b": 0.2}, np.ones(1), {})
-    after = move_to_unknown(before, {"a": 0.5})
-    assert after.probabilities["a"] == pytest.approx(0.3)
-    assert after.probabilities["unknown"] == pytest.approx(0.4)
-    assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert after.inclusion == pytest.approx({"a": 0.5, "b": 0.2})
-    assert move_to_unknown(before, {}).probabilities == pytest.approx(BEFORE)
 
 
 def changed(change, seed: int = 3):
@@ -61,7 +48,7 @@ def struck(rows, signs):
 def test_a_burst_is_not_outliers():
     """Twelve readings one after the other, all too high, have one cause."""
     which = changed(struck(np.arange(65, 77), np.ones(12))).which
-    assert which.inclusion["outliers"] < 0.5
+    assert which.verdict not in ("named", "group")
     scattered = np.arange(8, 180, 15)
     signs = np.resize([1.0, -1.0, -1.0], len(scattered))
     assert changed(struck(scattered, signs)).which.effect == "outliers"

@@ -9,13 +9,12 @@ from diagnosis_cases import judged, rich, simulated
 from rigs import make_case, ramp
 
 from hdcal.data.prior import Prior
-from hdcal.diagnosis import detection, next_run
+from hdcal.diagnosis import detection, next_run, weighing
 from hdcal.diagnosis import diagnose as module
 from hdcal.diagnosis.candidate_runs import candidate_runs
 from hdcal.diagnosis.refit import Refits
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.evidence.residual_test import residual_test
-from hdcal.evidence.row_means import average_rows
 from hdcal.inference.hypotheses import LeftOut
 from hdcal.physics.registry import EFFECTS
 
@@ -131,7 +130,7 @@ def test_a_gap_that_is_seen_is_not_put_down_to_rounding(curved):
 
 
 def test_the_rows_of_a_mean_are_told(monkeypatch):
-    monkeypatch.setattr(module, "average_rows", lambda case: average_rows(case, 60))
+    monkeypatch.setattr(weighing, "MOST_ROWS", 60)
     verdict = judged(simulated(rich()))
     assert verdict.averaged_rows == 3
     assert len(verdict.where.records.force) < 180 == len(verdict.case.records.force)

@@ -12,9 +12,9 @@ from schema_checks import obeys
 from verdicts import KINDS, named
 
 from hdcal.diagnosis.answer import VerdictAnswer, WhereAnswer
+from hdcal.diagnosis.gap import Cell
 from hdcal.diagnosis.places import places
 from hdcal.diagnosis.summary import verdict_answer
-from hdcal.diagnosis.verdict import Cell
 from hdcal.diagnosis.words import NO_PROOF, PROPORTIONAL
 from hdcal.report.answer import json_schema
 from hdcal.report.parameters import Interval

@@ -8,7 +8,6 @@ from hdcal.diagnosis.model_posterior import (
     ModelPosterior,
     log_priors,
     model_posterior,
-    verdict_word,
 )
 from hdcal.errors import InputError
 from hdcal.physics.registry import EFFECTS
@@ -25,24 +24,6 @@ def handmade(**share) -> ModelPosterior:
     return ModelPosterior(share, inclusion, np.ones(1), {})
 
 
-@pytest.mark.parametrize(
-    ("share", "detected", "word"),
-    [
-        ({"none": 0.02, "unknown": 0.03, "a": 0.95}, True, "named"),
-        ({"none": 0.02, "unknown": 0.03, "a": 0.95}, False, "none"),
-        ({"none": 0.5, "unknown": 0.0, "a": 0.5}, True, "none"),
-        ({"none": 0.49, "unknown": 0.0, "a": 0.51}, True, "ambiguous"),
-        ({"none": 0.1, "unknown": 0.5, "a": 0.4}, True, "unknown"),
-        ({"none": 0.0, "unknown": 0.1, "a": 0.5, "a__b": 0.4}, True, "named"),
-        ({"none": 0.0, "unknown": 0.1, "a": 0.5, "b": 0.4}, True, "ambiguous"),
-        ({"none": 0.0, "unknown": 0.11, "a": 0.89}, True, "ambiguous"),
-        ({"none": 0.3, "unknown": 0.7}, True, "unknown"),
-    ],
-)
-def test_one_word_for_a_table(share, detected, word):
-    assert verdict_word(handmade(**share), detected) == word
-
-
 def test_the_smallest_set_holds_ninety_per_cent():
     found = handmade(none=0.05, unknown=0.02, a=0.6, b=0.2, a__c=0.13)
     assert found.smallest_set == ("a", "b", "c")
@@ -50,14 +31,46 @@ def test_the_smallest_set_holds_ninety_per_cent():
     assert handmade(none=0.2, unknown=0.0, a=0.8).smallest_set == ("a", "none")
 
 
+def test_a_remainder_is_no_cause_of_its_own():
+    found = handmade(none=0.05, unknown=0.01, a__unknown=0.94)
+    assert found.smallest_set == ("a",)
+    assert handmade(none=0.05, unknown=0.55, a=0.4).smallest_set == ("unknown", "a")
+
+
 def test_priors_sum_to_one_and_groups_keep_their_share():
     names = ["none", "unknown", "a", "b", "c", "a+b", "a+c", "b+c"]
+    names += ["a+unknown", "b+unknown", "c+unknown"]
     prior = dict(zip(names, np.exp(log_priors(names)), strict=True))
     assert sum(prior.values()) == pytest.approx(1.0)
     assert prior["none"] == pytest.approx(0.5)
     assert prior["unknown"] == pytest.approx(0.1)
-    assert sum(v for n, v in prior.items() if "+" in n) == pytest.approx(0.03)
+    rest = sum(v for n, v in prior.items() if n.endswith("+unknown"))
+    assert rest == pytest.approx(0.1)
+    pairs = sum(v for n, v in prior.items() if "+" in n) - rest
+    assert pairs == pytest.approx(0.03)
     assert prior["a"] == pytest.approx(prior["b"])
+
+
+def test_noise_has_its_odds_beside_whatever_goes_on_in_the_mean():
+    names = ["none", "unknown", "a", "b", "a+b", "a+unknown", "n"]
+    names += ["n+unknown", "a+n", "b+n"]
+    prior = dict(zip(names, np.exp(log_priors(names, ["n"])), strict=True))
+    assert sum(prior.values()) == pytest.approx(1.0)
+    for alone, beside in (("none", "n"), ("unknown", "n+unknown"), ("a", "a+n")):
+        assert prior[beside] == pytest.approx(0.02 * prior[alone])
+    # No remainder was looked for beside b: half of that prior is unused.
+    assert prior["a+unknown"] == pytest.approx(0.1 * prior["none"])
+
+
+def test_an_effect_that_does_not_carry_the_gap_is_only_in_the_way():
+    table = {"none": [0.0], "unknown": [1.0], "a": [-50.0], "a+unknown": [9.0]}
+    table = {name: np.array(value) for name, value in table.items()}
+    whole, half = model_posterior(table), model_posterior(table, {"a": 0.25})
+    share = whole.probabilities["a+unknown"]
+    assert half.probabilities["a+unknown"] == pytest.approx(0.25 * share)
+    moved = half.probabilities["unknown"] - whole.probabilities["unknown"]
+    assert moved == pytest.approx(0.75 * share)
+    assert half.inclusion["a"] == pytest.approx(0.25 * whole.inclusion["a"])
 
 
 def test_weighing_is_bayes_rule():

@@ -61,8 +61,8 @@ def test_noise_seldom_alarms(correlation):
 def test_evidences_that_know_no_serial_noise_alarm(monkeypatch):
     # As many as before, so that nothing is compiled anew.
     monkeypatch.setattr(prepare_module, "CORRELATIONS", (0.0,) * len(CORRELATIONS))
-    found = alarms.__wrapped__(0.5, 25)
-    assert stats.binomtest(found, 25, 0.05, "greater").pvalue < LEVEL, found
+    found = alarms.__wrapped__(0.5, 40)
+    assert stats.binomtest(found, 40, 0.05, "greater").pvalue < LEVEL, found
 
 
 def drawn(seed: int):

@@ -19,7 +19,7 @@ class ThermalZero(Effect):
 
     name: ClassVar[str] = "broken"
     stage: ClassVar[str] = "sensor"
-    family: ClassVar[str] = "lies"
+    groups: ClassVar[tuple[str, ...]] = ("rig",)
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
     symmetry: ClassVar[str] = "even"
 

@@ -11,6 +11,7 @@ from hdcal import EFFECTS
 from hdcal.data.priors import effect_priors
 from hdcal.data.units import to_code
 from hdcal.physics.effect import parameters
+from hdcal.physics.groups import GROUPS
 
 DOCS = Path(__file__).parents[2] / "docs" / "effects"
 STAGES = ("deformation", "force", "sensor", "noise")
@@ -22,7 +23,7 @@ def test_the_declaration_is_complete(name, loading):
     assert effect.name == name
     assert effect.stage in STAGES
     assert effect.symmetry in ("odd", "even", "none")
-    assert effect.family
+    assert effect.groups and {*effect.groups} <= GROUPS.keys()
     assert effect.needs <= loading.known | BEYOND_RECORDS
     declared = parameters(effect)
     assert list(declared) == [field.name for field in dataclasses.fields(effect)]

@@ -28,7 +28,7 @@ def test_recovered_from_its_own_data(name, loading, base, reading):
     has to be told from the effect. A change of stiffness with temperature is told
     from the modulus by the material alone, so there its alpha is believed.
     """
-    believed = EFFECTS[name].family == "thermal stiffness"
+    believed = "slope over temperature" in EFFECTS[name].groups
     unknown = [base.sigma] if name not in SIGMA_KNOWN else []
     core = (base.stiffness, base.alpha, base.force_offset)
     truth = (typical(name), *core, *unknown)

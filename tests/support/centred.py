@@ -12,7 +12,7 @@ class Centred(Effect):
 
     name: ClassVar[str] = "centred"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "drift"
+    groups: ClassVar[tuple[str, ...]] = ("zero over temperature",)
 
     size: float = parameter("N/mm", "force over the mean", typical=1.0, null=0.0)
 

@@ -8,17 +8,14 @@ from rigs import cycles, make_case, make_records
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.budget import Budget, BudgetPart
+from hdcal.diagnosis.gap import Cell, CovariateShare, Gap, Where
 from hdcal.diagnosis.verdict import (
     Amplitude,
-    Cell,
     Closure,
-    CovariateShare,
-    Gap,
     LadderEntry,
     NextRun,
     NotTestable,
     Verdict,
-    Where,
     Which,
 )
 from hdcal.diagnosis.where import about

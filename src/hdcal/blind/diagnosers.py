@@ -109,7 +109,7 @@ def _span(interval: Interval) -> Quantiles:
 
 def families() -> dict[str, str]:
     """Return the family of every effect of the library."""
-    return {name: effect.family for name, effect in EFFECTS.items()}
+    return {name: effect.groups[0] for name, effect in EFFECTS.items()}
 
 
 def withheld_from(*libraries: str | None) -> str | None:
@@ -129,7 +129,8 @@ def fingerprint(library: str | None = None) -> dict[str, Any]:
     """
     thresholds = {
         name: getattr(model_posterior, name)
-        for name in ("PRIOR_NONE", "PRIOR_UNKNOWN", "PRIOR_PAIRS", "NAMED")
+        for name in dir(model_posterior)
+        if name.startswith("PRIOR_") or name in ("NAMED", "CARRIES")
     }
     considered = choose_library(library).items()
     return {
@@ -148,7 +149,7 @@ def _of(data: Any) -> str:
 def _declared(effect: type[Effect]) -> dict[str, Any]:
     return {
         "stage": effect.stage,
-        "family": effect.family,
+        "family": effect.groups[0],
         "symmetry": effect.symmetry,
         "needs": sorted(effect.needs),
         "parameters": sorted(parameters(effect)),

@@ -76,7 +76,7 @@ class CaseAnswer:
 
     Attributes:
         case: name of the case.
-        verdict: none, named, ambiguous or unknown.
+        verdict: none, named, group, ambiguous or unknown.
         effect: most probable effect, None where nothing is named.
         second_effect: another that is present beside it.
         set: smallest set of hypotheses with 90 %, most probable first.
@@ -93,7 +93,7 @@ class CaseAnswer:
     __pydantic_config__ = STRICT
 
     case: str
-    verdict: Literal["none", "named", "ambiguous", "unknown"]
+    verdict: Literal["none", "named", "group", "ambiguous", "unknown"]
     effect: Name | None
     second_effect: Name | None
     set: tuple[Name, ...]

@@ -48,7 +48,7 @@ def fit_each(
         library: effects to fit, by name.
         noise_sd: against which the base's priors count [N]; by default the pilot's.
     """
-    prepared = prepare(case, effect_priors(), noise_sd)
+    prepared = prepare(case, effect_priors(case.gear.full_scale), noise_sd)
     base = _base(prepared)
     reading = prepared.rows.reading
     rows = len(reading)

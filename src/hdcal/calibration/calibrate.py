@@ -171,7 +171,7 @@ def calibrate(
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
-    theory, shipped = theory or case.gear.theory, _shipped(chosen, effects)
+    theory, shipped = theory or case.gear.theory, _shipped(case, chosen, effects)
     priors = problem_priors(case, chosen, shipped, theory)
     model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
     problem = build_problem(case, shipped, chosen, **model)
@@ -220,10 +220,12 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
-def _shipped(chosen: Sequence[type[Effect]], names: Sequence[str]) -> dict[str, Prior]:
+def _shipped(
+    case: Case, chosen: Sequence[type[Effect]], names: Sequence[str]
+) -> dict[str, Prior]:
     """Return the priors of effects; wide where readings showed that noise grows."""
     shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in names
-    return effect_priors() | (_SHOWN if shown else {})
+    return effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
 
 
 def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:

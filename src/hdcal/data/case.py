@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
@@ -35,6 +36,7 @@ class Gear:
         density: of the material [N·s²/mm⁴], None where its file says nothing of it.
         gauge_priors: of the gauges' gains and the thermometer's offset, those that a
             certificate states: keys of `GAUGE_UNITS`.
+        full_scale: largest readings, of which shipped priors are shares.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Gear:
     dynamic_priors: dict[str, Prior] = field(default_factory=dict)
     density: float | None = None
     gauge_priors: dict[str, Prior] = field(default_factory=dict)
+    full_scale: FullScale = REFERENCE
 
 
 @dataclass(frozen=True, repr=False)

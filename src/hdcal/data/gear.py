@@ -7,8 +7,9 @@ from typing import Any, get_args
 
 from hdcal.data.case import Gear, Theory
 from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
+from hdcal.data.full_scale import FullScale
 from hdcal.data.gear_schema import GearFile, check_schema, size_findings
-from hdcal.data.prior import Prior, scaled
+from hdcal.data.prior import Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.priors import (
     DYNAMIC_UNITS,
@@ -26,8 +27,7 @@ from hdcal.data.records import Geometry
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
-# Full scale for which shipped priors in newtons are written [N], and which these are.
-FULL_SCALE = 100.0
+# Shipped priors of the base model that are written for a full scale.
 IN_NEWTONS = ("force_offset", "sigma", "run_offset_sd", "gap_sd")
 
 
@@ -108,27 +108,23 @@ def _assemble(
     )
 
 
-def at_full_scale(gear: Gear, full_scale: float) -> Gear:
-    """Return a gear whose shipped priors in newtons are those of its own rig.
+def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
+    """Return a gear whose shipped priors are those of its own rig.
 
-    They are written for a full scale of `FULL_SCALE`; what the gear file states stays.
-
-    Args:
-        gear: from `read_gear`.
-        full_scale: largest force that is read [N]; nothing changes at none.
+    What the gear file states stays. The zero of the deformation is found by hand
+    whatever the stroke, and keeps its own size.
     """
-    if not full_scale > 0.0:
-        return gear
-    shipped, ratio = rig_priors(), full_scale / FULL_SCALE
+    shipped = rig_priors()
 
     def own(table: dict[str, Prior]) -> dict[str, Prior]:
         return table | {
-            name: scaled(shipped[name], ratio)
+            name: full_scale.own(shipped[name])
             for name in IN_NEWTONS
             if name in table and table[name].source == shipped[name].source
         }
 
-    return replace(gear, priors=own(gear.priors), scale_priors=own(gear.scale_priors))
+    tables = {"priors": own(gear.priors), "scale_priors": own(gear.scale_priors)}
+    return replace(gear, full_scale=full_scale, **tables)
 
 
 def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Prior]:

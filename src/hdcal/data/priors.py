@@ -4,6 +4,7 @@ from functools import cache
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior as Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
@@ -91,9 +92,13 @@ def dynamic_priors() -> dict[str, Prior]:
     return _shipped("dynamics").copy()
 
 
-def effect_priors() -> dict[str, Prior]:
-    """Shipped priors of the effects' parameters, keyed `effect.parameter`."""
-    return _shipped_effects().copy()
+def effect_priors(full_scale: FullScale = REFERENCE) -> dict[str, Prior]:
+    """Shipped priors of the effects' parameters, keyed `effect.parameter`.
+
+    Args:
+        full_scale: of the rig on which the effects act.
+    """
+    return {name: full_scale.own(prior) for name, prior in _shipped_effects().items()}
 
 
 @cache

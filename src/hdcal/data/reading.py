@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
+from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, read_gear
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
@@ -58,7 +59,7 @@ def read_case(
     motion = _motion(measured)
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
-        gear=at_full_scale(found, _full_scale(measured)),
+        gear=at_full_scale(found, _full_scale(measured, found)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
@@ -72,10 +73,15 @@ def read_case(
     )
 
 
-def _full_scale(measured: Measurements) -> float:
-    """Return the largest force read [N]; one reading in a hundred may be wild."""
-    sizes = np.abs(measured.columns.values["force"])
-    return float(np.quantile(sizes, 0.99, method="higher"))
+def _full_scale(measured: Measurements, gear: Gear) -> FullScale:
+    """Return the largest readings; one in a hundred may be wild."""
+    force, deformation = (
+        float(np.quantile(np.abs(measured.columns.values[name]), 0.99, method="higher"))
+        for name in ("force", "deformation")
+    )
+    radial = deformation * (0.5 if gear.reading == "diametral" else 1.0)
+    # Where nothing was read but zeros, nothing is known of the scale.
+    return FullScale(force or REFERENCE.force, radial or REFERENCE.deformation)
 
 
 def _motion(measured: Measurements) -> Motion:

@@ -84,6 +84,22 @@ def to_code(unit: str) -> tuple[float, str]:
     Raises:
         UnitError: the text is not a product of known mechanical units.
     """
+    factor, powers = _product(unit)
+    return factor, _name(powers)
+
+
+def unit_powers(unit: str) -> tuple[int, ...]:
+    """Return the powers of N, mm, s and K in a unit.
+
+    Raises:
+        UnitError: as `to_code`.
+    """
+    return tuple(map(int, _product(unit)[1]))
+
+
+@cache
+def _product(unit: str) -> tuple[float, np.ndarray]:
+    """Scale of a product of units, and its powers of the code units."""
     if len(unit) > 60:
         raise UnitError("the unit is longer than any unit can be")
     factor, powers = 1.0, np.zeros(len(_CODE_UNITS), int)
@@ -99,7 +115,7 @@ def to_code(unit: str) -> tuple[float, str]:
         powers += sign * own
     if not (0.0 < factor < math.inf):
         raise UnitError(f"'{unit}' is not a usable scale")
-    return factor, _name(powers)
+    return factor, powers
 
 
 def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:

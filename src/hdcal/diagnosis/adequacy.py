@@ -1,75 +1,66 @@
-"""Does the likeliest cause leave only noise? If not, something else is at work.
+"""Does the likeliest cause leave only noise? If not, less is said of it.
 
 Evidence compares hypotheses with each other; all of them may be wrong. So the residual
-test is repeated on the readings beside each likely hypothesis, its shape free to
-differ as far as evidence allows. A small p-value moves probability to "unknown".
+test is repeated on the readings beside the likeliest hypothesis, its shape free to
+differ as far as evidence allows. It moves no probability.
 """
-
-from dataclasses import replace
 
 import numpy as np
 from scipy.special import betainc, betaln
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.model_posterior import ModelPosterior, move_to_unknown
 from hdcal.diagnosis.where import declared_directions
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.linear_rows import whiten
-from hdcal.evidence.piecewise_effect import TOLERANCES
-from hdcal.evidence.prepare import PreparedCase, with_relative_noise
+from hdcal.evidence.prepare import with_relative_noise
+from hdcal.evidence.remainder_evidence import beside_effects
 from hdcal.evidence.residual_test import residual_test
 
-# Hypotheses as likely as this are tested, with this many draws of pure noise.
-_LIKELY, _DRAWS = 0.1, 600
-# Odds, before the data, of something that resembles an effect but is none.
-_RESEMBLES = 0.07
-# The amplitude is as good as free: it may be this many times what was found.
-_FREE = 3.0
+# Draws of pure noise for one hypothesis.
+_DRAWS = 600
 # Readings with a noise this much larger than the middle one are noisy.
 _NOISY = 1.2
+# A hypothesis with a smaller p-value, or noise in bursts of higher odds, leaves more
+# than noise.
+_LEAST, _BURSTS = 0.01, 10.0
 
 
-def move_inadequate_to_unknown(
+def leaves_more_than_noise(
     evidence: CaseEvidence,
-    posterior: ModelPosterior,
+    hypothesis: str,
     case: Case,
     correlation: float,
     rng: np.random.Generator,
-) -> ModelPosterior:
-    """Move probability to unknown from hypotheses that leave more than noise.
+) -> bool:
+    """Tell whether something is left beside a hypothesis that holds nothing unknown.
 
-    `correlation` is the AR(1) coefficient of the noise.
-
-    Source:
-        T. Sellke, M. J. Bayarri and J. O. Berger, The American Statistician 55 (2001):
-        a p-value speaks for its hypothesis with odds of at least −e p ln p.
+    Args:
+        evidence: of the case.
+        hypothesis: effects joined with +.
+        case: for its labels.
+        correlation: AR(1) coefficient of the noise.
+        rng: of the draws of pure noise.
     """
-    kept = {}
-    for name, share in posterior.probabilities.items():
-        names = name.split("+")
-        # Rounding in steps above the noise leaves a pattern that is no effect.
-        if share < _LIKELY or {NONE, UNKNOWN, QUANTISATION} & {*names}:
-            continue
-        p = _p_value(evidence, names, case, correlation, rng)
-        odds = -np.e * p * np.log(p) if p < np.exp(-1.0) else 1.0
-        odds /= max(1.0, _burst_odds(evidence, names, correlation))
-        # Where there is no surprise nothing is moved.
-        kept[name] = min(1.0, odds * (1.0 + _RESEMBLES) / (odds + _RESEMBLES))
-    return move_to_unknown(posterior, kept)
+    names = hypothesis.split("+")
+    # Rounding in steps above the noise leaves a pattern that is no effect.
+    if {NONE, UNKNOWN, QUANTISATION} & {*names}:
+        return False
+    if _burst_odds(evidence, names, correlation) > _BURSTS:
+        return True
+    return _p_value(evidence, names, case, correlation, rng) < _LEAST
 
 
 def _p_value(
     evidence: CaseEvidence, names: list[str], case: Case, correlation: float, rng
 ) -> float:
     """Return the p-value of the mean beside a hypothesis at its best fit."""
-    prepared = evidence.prepared
+    prepared = beside_effects(evidence, names)
     for name in names:
         if name in evidence.noise:
             noise = evidence.noise[name].relative_sd
             prepared = with_relative_noise(prepared, noise)
-    prepared = _beside(evidence, prepared, names, correlation)
     _, directions = declared_directions(evidence, case)
     tested = residual_test(prepared, correlation, directions, rng, draws=_DRAWS)
     return tested.mean_p_value
@@ -112,25 +103,3 @@ def sign_odds(same: int, pairs: int) -> float:
     other = pairs - same
     whole = betaln(same + 1, other + 1) + np.log(betainc(other + 1, same + 1, 0.5))
     return float(np.exp(whole + (pairs + 1) * np.log(2.0)))
-
-
-def _beside(
-    evidence: CaseEvidence, prepared: PreparedCase, names: list[str], correlation: float
-) -> PreparedCase:
-    """Return the case whose base model also holds what effects may add."""
-    rows, design = prepared.rows, design_of(evidence, names)
-    if not len(design.columns):
-        return prepared
-    fit = fit_design(rows, design, prepared.noise_sd, correlation)
-    width = rows.base.shape[1]
-    added = fit.contribution(width)
-    size = np.abs(fit.mean[width : width + len(design.columns)])
-    free = _FREE * size[:, None] * design.columns
-    loose = TOLERANCES[-1] * added * rows.tolerance
-    columns = np.concatenate([rows.base, free.T, loose.T], axis=1)
-    precision = np.full(columns.shape[1], prepared.noise_sd**2)
-    precision[:width] = rows.precision
-    rest = replace(
-        rows, reading=rows.reading - design.offset, base=columns, precision=precision
-    )
-    return replace(prepared, rows=rest)

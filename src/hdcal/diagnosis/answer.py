@@ -4,14 +4,8 @@ from dataclasses import dataclass, field
 from typing import Annotated, ClassVar, Literal
 
 from hdcal.diagnosis.budget import Budget
-from hdcal.diagnosis.verdict import (
-    Cell,
-    Closure,
-    CovariateShare,
-    Gap,
-    NextRun,
-    Which,
-)
+from hdcal.diagnosis.gap import Cell, CovariateShare, Gap, Seen
+from hdcal.diagnosis.verdict import Closure, NextRun, Which
 from hdcal.errors import Finding
 from hdcal.inference.hypotheses import LeftOut
 from hdcal.report.answer import (
@@ -96,16 +90,17 @@ class VerdictAnswer(Answer):
             _inside("which", {"effect": {"type": "null"}}),
         ),
         _if(
-            _inside("which", {"verdict": {"enum": ["named", "ambiguous"]}}),
+            _inside("which", {"verdict": {"enum": ["named", "group", "ambiguous"]}}),
             _inside("which", {"effect": {"type": "string"}}),
         ),
     )
 
-    schema: Literal["hdcal.verdict/1"] = "hdcal.verdict/1"
+    schema: Literal["hdcal.verdict/2"] = "hdcal.verdict/2"
     answer: Sentences
     limits: Sentences
     interval: float
     gap: Gap
+    seen: tuple[Seen, ...]
     where: WhereAnswer
     which: Which
     shrink: Closure

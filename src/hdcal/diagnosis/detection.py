@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.diagnosis.adequacy import move_inadequate_to_unknown
+from hdcal.diagnosis.gap import Gap, Where
 from hdcal.diagnosis.model_posterior import ModelPosterior
-from hdcal.diagnosis.verdict import Gap, Where
 from hdcal.diagnosis.where import (
     FALSE_ALARM,
     declared_directions,
@@ -32,8 +31,7 @@ class Detection:
     """Outcome of the search for a gap.
 
     Attributes:
-        posterior: over hypotheses; where there is a gap, those that leave more than
-            noise have lost probability to unknown.
+        posterior: over hypotheses.
         correlation: posterior mean of the noise's AR(1) coefficient.
         where: the residual test and the smooth gap in values for people.
         noise_sd: of a reading beside the base model [N].
@@ -80,7 +78,7 @@ def detect_gap(
     case: Case,
     rng: np.random.Generator,
 ) -> Detection:
-    """Test the base model; where it fails, test the hypotheses and fit a smooth gap."""
+    """Test the base model; where it fails, fit a smooth gap."""
     prepared = evidence.prepared
     correlation = float(posterior.correlation @ prepared.rows.correlations)
     cells, directions = declared_directions(evidence, case)
@@ -90,10 +88,6 @@ def detect_gap(
     if not (significant or rounded):
         where = describe_where(evidence, case, cells, tested, None)
         return Detection(posterior, correlation, where, tested.noise_sd)
-    # Draws of its own: what follows does not depend on how many were tested.
-    posterior = move_inadequate_to_unknown(
-        evidence, posterior, case, correlation, rng.spawn(1)[0]
-    )
     basis = additive_basis(prepared)
     smooth = fit_smooth_gap(prepared, basis, correlation, rng)
     where = describe_where(evidence, case, cells, tested, smooth)

@@ -7,10 +7,8 @@ import numpy as np
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
-from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
-from hdcal.diagnosis.model_posterior import ModelPosterior, model_posterior
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.refit import (
     MOST_LEFT_OUT,
@@ -19,21 +17,18 @@ from hdcal.diagnosis.refit import (
     refit,
     with_sampled_size,
 )
+from hdcal.diagnosis.seen import what_is_seen
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
+from hdcal.diagnosis.weighing import weigh
 from hdcal.diagnosis.which import identify_cause
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import CaseEvidence
-from hdcal.evidence.compute_evidence import compute_evidence
-from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
-from hdcal.evidence.row_means import average_rows
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.words import hypothesis, percent
 
-# Changes of the stiffness, and of the log of the noise, that move no evidence much.
-_SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 _NO_GAP = "no gap is detected, so that there is nothing to close"
 _NO_CAUSE = "that nothing is missing remains the most probable hypothesis"
 
@@ -60,13 +55,15 @@ def diagnose(
     """
     _check(case, library, seed)
     rng = np.random.default_rng(seed)
-    averaged, group, library = _averaged(case, library)
-    evidence, posterior = _evidence_and_posterior(averaged, library)
+    # Draws of its own: what follows does not depend on how many there were.
+    weighed = weigh(case, library, rng.spawn(1)[0])
+    averaged, library = weighed.case, weighed.library
+    evidence, posterior = weighed.evidence, weighed.posterior
     found = detect_gap(evidence, posterior, averaged, rng)
-    which = identify_cause(evidence, found.posterior, found.detected, library, rng)
+    which = identify_cause(evidence, found, averaged, library, rng)
     closed = _closure(evidence, which, found, rng)
-    fits = refit(case, found.posterior, library, seed, progress, quick=quick)
-    runs, no_run = rank_runs(evidence, found.posterior, library, rng)
+    fits = refit(case, posterior, library, seed, progress, quick=quick)
+    runs, no_run = rank_runs(evidence, posterior, library, rng)
     return Verdict(
         case=case,
         gap=found.gap(case, closed.ladder[-1].rms_N if closed.ladder else None),
@@ -78,23 +75,14 @@ def diagnose(
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),
-        notes=tuple(_notes(evidence, fits, group)),
+        notes=tuple(_notes(evidence, fits, weighed.averaged_rows)),
         reasons=failure_reasons(fits),
-        averaged_rows=group,
+        averaged_rows=weighed.averaged_rows,
         no_run=no_run,
+        seen=what_is_seen(evidence, averaged),
         seed=seed,
         quick=quick,
     )
-
-
-def _averaged(
-    case: Case, library: Mapping[str, type[Effect]]
-) -> tuple[Case, int, dict[str, type[Effect]]]:
-    """Return means of rows, of how many each, and the effects that these can show."""
-    averaged, group = average_rows(case)
-    # They say nothing of the noise of single rows.
-    shown = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
-    return averaged, group, shown
 
 
 def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
@@ -114,31 +102,6 @@ def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     words = "the force does not grow with the deformation"
     remedy = "check the signs of both columns and that the load cell was connected"
     raise InputError([Finding(case.name, words, remedy)])
-
-
-def _evidence_and_posterior(
-    case: Case, library: dict[str, type[Effect]]
-) -> tuple[CaseEvidence, ModelPosterior]:
-    """Compare the hypotheses, a second time where a large effect has bent the first.
-
-    Effects act about a stiffness and the base's priors count against a noise: first
-    those of rough fits, which a large effect has biased, then those beside the
-    likeliest hypothesis.
-    """
-    priors = effect_priors()
-    evidence = compute_evidence(case, library, priors)
-    posterior = model_posterior(evidence.table)
-    names = [name for name in posterior.top.split("+") if name in evidence.effects]
-    prepared = evidence.prepared
-    stiffness, noise_sd = stiffness_and_noise_beside(evidence, names)
-    moved = abs(stiffness / float(prepared.base.stiffness) - 1.0) > _SAME_STIFFNESS
-    noisier = abs(np.log(noise_sd / prepared.noise_sd)) > _SAME_NOISE
-    if stiffness <= 0.0 or noise_sd <= 0.0 or not (moved or noisier):
-        return evidence, posterior
-    evidence = compute_evidence(
-        case, library, priors, stiffness=stiffness, noise_sd=noise_sd
-    )
-    return evidence, model_posterior(evidence.table)
 
 
 def _closure(

@@ -2,7 +2,12 @@
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.sections import shrink_section, where_section, which_section
+from hdcal.diagnosis.sections import (
+    seen_section,
+    shrink_section,
+    where_section,
+    which_section,
+)
 from hdcal.diagnosis.words import nothing_suspected
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
@@ -57,6 +62,7 @@ def verdict_document(
         answers=found.answer[1 : len(found.answer) - (found.next_step is not None)],
         next_steps=[] if found.next_step is None else [found.next_step],
         sections=[
+            seen_section(found),
             where_section(found),
             which_section(found),
             shrink_section(found.shrink),

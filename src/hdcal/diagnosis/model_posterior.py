@@ -1,16 +1,22 @@
-"""From evidences to a posterior over hypotheses, and from there to a verdict."""
+"""From evidences to a posterior over hypotheses."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.diagnosis.verdict import VerdictWord
-from hdcal.evidence.case_evidence import NONE, UNKNOWN
+from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence, with_remainder
 
-# Prior probabilities of none, unknown and all pairs; the effects share the rest.
-PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_PAIRS = 0.5, 0.1, 0.03
+# Prior probabilities of none, unknown, all effects with a remainder and all pairs;
+# the effects alone share the rest.
+PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_REMAINDER, PRIOR_PAIRS = 0.5, 0.1, 0.1, 0.03
+# Odds of each effect on the noise, whatever goes on in the mean.
+PRIOR_NOISE = 0.02
 NAMED = 0.9
+# An effect is the cause where it closes this share of the gap; below it something
+# unknown is, with the effect beside it.
+CARRIES = 0.7
 
 
 @dataclass(frozen=True)
@@ -40,44 +46,78 @@ class ModelPosterior:
         found: list[str] = []
         total = 0.0
         for name, share in sorted(self.probabilities.items(), key=lambda kv: -kv[1]):
-            found += [part for part in name.split("+") if part not in found]
+            parts = [n for n in name.split("+") if n != UNKNOWN or name == UNKNOWN]
+            found += [part for part in parts if part not in found]
             total += share
             if total >= NAMED:
                 break
         return tuple(found)
 
 
-def log_priors(names: list[str]) -> np.ndarray:
+def log_priors(names: Sequence[str], noise: Iterable[str] = ()) -> np.ndarray:
     """Return the log prior probability of each hypothesis; they sum to 1.
 
     Args:
-        names: none, unknown, effects, and pairs joined with +.
+        names: none, unknown, effects, and with + pairs and effects with a remainder.
+        noise: which of the effects are on the noise.
     """
-    pairs = sum("+" in name for name in names)
-    singles = len(names) - pairs - 2
-    free = 1.0 - PRIOR_NONE - PRIOR_UNKNOWN - PRIOR_PAIRS
-
-    def chance(name: str) -> float:
-        if name in (NONE, UNKNOWN):
-            return PRIOR_NONE if name == NONE else PRIOR_UNKNOWN
-        return PRIOR_PAIRS / pairs if "+" in name else free / singles
-
-    prior = np.array([chance(name) for name in names])
+    noise = {*noise}
+    shares = {
+        "none": PRIOR_NONE,
+        "unknown": PRIOR_UNKNOWN,
+        "remainder": PRIOR_REMAINDER,
+        "pair": PRIOR_PAIRS,
+        "effect": 1.0 - PRIOR_NONE - PRIOR_UNKNOWN - PRIOR_REMAINDER - PRIOR_PAIRS,
+    }
+    parts = [{*name.split("+")} for name in names]
+    kinds = [_kind(each - noise) for each in parts]
+    counts = Counter(
+        kind for kind, each in zip(kinds, parts, strict=True) if not each & noise
+    )
+    # Effects beside which no remainder was looked for have none of that prior.
+    counts["remainder"] = max(counts["effect"], counts["remainder"])
+    prior = np.array(
+        [
+            shares[kind] / max(counts[kind], 1) * PRIOR_NOISE ** len(each & noise)
+            for kind, each in zip(kinds, parts, strict=True)
+        ]
+    )
     return np.log(prior / prior.sum())
 
 
-def model_posterior(table: Mapping[str, np.ndarray]) -> ModelPosterior:
+def _kind(mean: set[str]) -> str:
+    """Return which kind of hypothesis on the mean this is."""
+    if not mean or mean == {NONE}:
+        return "none"
+    if UNKNOWN in mean:
+        return "unknown" if len(mean) == 1 else "remainder"
+    return "effect" if len(mean) == 1 else "pair"
+
+
+def model_posterior(
+    table: Mapping[str, np.ndarray],
+    carried: Mapping[str, float] | None = None,
+    noise: Iterable[str] = (),
+) -> ModelPosterior:
     """Return the posterior over hypotheses.
 
     Args:
         table: log evidence of each by AR(1) coefficient, all of which are equally
             probable before the data.
+        carried: of an effect with a remainder, the probability that the effect carries
+            the gap; as far as it does not, the cause is unknown.
+        noise: which of the effects are on the noise.
     """
     names = list(table)
-    joint = np.stack([table[name] for name in names]) + log_priors(names)[:, None]
+    prior = log_priors(names, noise)[:, None]
+    joint = np.stack([table[name] for name in names]) + prior
     joint = np.exp(joint - np.max(joint))
     joint = joint / joint.sum()
     share = dict(zip(names, joint.sum(axis=1).tolist(), strict=True))
+    for effect, chance in (carried or {}).items():
+        name = with_remainder(effect)
+        share[UNKNOWN] += (1.0 - chance) * share[name]
+        share[name] *= chance
     effects = [n for n in names if n not in (NONE, UNKNOWN) and "+" not in n]
     whole = {n: float(np.logaddexp.reduce(v)) for n, v in table.items()}
     return ModelPosterior(
@@ -88,38 +128,19 @@ def model_posterior(table: Mapping[str, np.ndarray]) -> ModelPosterior:
     )
 
 
+def posterior_of(evidence: CaseEvidence) -> ModelPosterior:
+    """Return the posterior over the hypotheses of a case."""
+    return model_posterior(evidence.table, carried(evidence), evidence.on_noise)
+
+
+def carried(evidence: CaseEvidence) -> dict[str, float]:
+    """Return the probability that each effect carries the gap beside a remainder."""
+    return {n: float(np.mean(c >= CARRIES)) for n, c in evidence.closed.items()}
+
+
 def _inclusion(share: Mapping[str, float], effects: Iterable[str]) -> dict[str, float]:
     """Return the probability of each effect over singles and pairs."""
     return {
         effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
         for effect in effects
     }
-
-
-def move_to_unknown(
-    posterior: ModelPosterior, kept: Mapping[str, float]
-) -> ModelPosterior:
-    """Return the posterior with a part of some hypotheses moved to unknown.
-
-    Args:
-        posterior: over hypotheses.
-        kept: share of its probability that a hypothesis keeps, by name.
-    """
-    share = {n: p * kept.get(n, 1.0) for n, p in posterior.probabilities.items()}
-    share[UNKNOWN] += sum(posterior.probabilities.values()) - sum(share.values())
-    inclusion = _inclusion(share, posterior.inclusion)
-    return replace(posterior, probabilities=share, inclusion=inclusion)
-
-
-def verdict_word(posterior: ModelPosterior, detected: bool) -> VerdictWord:
-    """Return the verdict in one word."""
-    share = posterior.probabilities
-    if not detected or share[NONE] >= 0.5:
-        return "none"
-    if posterior.top == UNKNOWN:
-        return "unknown"
-    return (
-        "named"
-        if max(posterior.inclusion.values(), default=0.0) >= NAMED
-        else "ambiguous"
-    )

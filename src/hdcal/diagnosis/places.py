@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from hdcal.diagnosis.answer import WhereAnswer
-from hdcal.diagnosis.verdict import Cell
+from hdcal.diagnosis.gap import Cell
 from hdcal.report.words import known, with_unit
 
 _PREPOSITIONS = {

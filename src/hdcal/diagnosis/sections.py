@@ -3,8 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.verdict import Cell, Closure, Gap
-from hdcal.diagnosis.words import held_out, one_reading
+from hdcal.diagnosis.cause_words import held_out
+from hdcal.diagnosis.gap import Cell, Gap
+from hdcal.diagnosis.verdict import Closure
+from hdcal.diagnosis.words import one_reading
 from hdcal.report.document import (
     Block,
     Facts,
@@ -27,6 +29,32 @@ from hdcal.report.words import (
 )
 
 _MOST_ROWS = 12
+
+
+def seen_section(found: VerdictAnswer) -> Section:
+    """Return what the readings show, whatever its cause."""
+    heading = "What is seen"
+    if not found.seen:
+        words = "Nothing of what readings of this program can show stands out."
+        return Section(heading, [Text(words)])
+    rows = [
+        [
+            each.statement,
+            *estimate(each.size_N),
+            number(each.p_value),
+            "yes" if each.material else "no",
+        ]
+        for each in found.seen
+    ]
+    numbers = ("size [N]", "90 % interval", "p")
+    note = (
+        "Size: from the lowest to the highest place of what slope and zero cannot take "
+        "up. Intervals hold all together; p counts all that was looked for. The "
+        "clearest comes first, the others are what it leaves. It matters from a "
+        "thousandth of the largest force on."
+    )
+    table = Table(["seen", *numbers, "matters"], rows, frozenset(numbers))
+    return Section(heading, [table, Text(note, soft=True)], brief=True)
 
 
 def where_section(found: VerdictAnswer) -> Section:

@@ -33,6 +33,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         limits=(),
         interval=INTERVAL,
         gap=verdict.gap,
+        seen=verdict.seen,
         where=WhereAnswer(
             where.p_value, where.statistics, where.shares, where.regions, where.cells
         ),

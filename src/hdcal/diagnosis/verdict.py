@@ -3,117 +3,21 @@
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-import numpy as np
-
 from hdcal.data.case import Case
-from hdcal.data.records import Records
 from hdcal.diagnosis.budget import Budget
+from hdcal.diagnosis.gap import Gap, Seen, Where
 from hdcal.inference.hypotheses import LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
-from hdcal.report.answer import Count, EffectName, Probability, Promise, Real, Words
+from hdcal.report.answer import EffectName, Probability, Promise, Real, Words
 from hdcal.report.parameters import Interval
 
-VerdictWord = Literal["none", "named", "ambiguous", "unknown"]
+VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
 _PAIR = "^[A-Za-z_][A-Za-z0-9_]*(\\+[A-Za-z_][A-Za-z0-9_]*)?$"
 Chances = Annotated[
     dict[str, Probability],
     Promise(required=["none", "unknown"], propertyNames={"pattern": _PAIR}),
 ]
-
-
-@dataclass(frozen=True)
-class Gap:
-    """Whether model and measurement part, and by how much.
-
-    Attributes:
-        detected: the residual test is significant at 5 %.
-        probability: posterior probability that anything is missing (1 − P(none)).
-        rms_N: root mean square of the gap at the tested rows, 90 % interval; NaN
-            where none is detected.
-        noise_sd_N: of a reading, without the gap.
-        share_of_full_scale: rms over the largest tested force [-].
-        autocorrelation: posterior mean of the noise's AR(1) coefficient [-].
-        rounding_N: step of rounded readings, where nothing else is detected.
-    """
-
-    detected: bool
-    probability: Probability
-    rms_N: Interval
-    noise_sd_N: Real
-    share_of_full_scale: Real
-    autocorrelation: Real
-    rounding_N: Real | None = None
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One pre-declared cell of the rows and the mean residual in it.
-
-    Attributes:
-        covariate: deformation, temperature, time, angle, direction, run, specimen
-            or a product such as `direction × deformation`.
-        label: for people, such as "0.36 … 0.54 mm" or "unloading".
-        from_: lower end in `unit`; NaN for labels.
-        to: upper end; NaN for labels.
-        unit: mm, °C, s, rad or "".
-        rows: number of rows.
-        bias_N: mean reading minus calibrated model, with the simultaneous 95 % band of
-            noise around it.
-        z: bias over its standard error under no gap.
-        share: of the squared gap that lies in this cell [-].
-    """
-
-    covariate: Words
-    label: str
-    from_: Real
-    to: Real
-    unit: str
-    rows: Count
-    bias_N: Interval
-    z: Real
-    share: Real
-
-    @property
-    def hot(self) -> bool:
-        """Whether the bias leaves the simultaneous band."""
-        return self.bias_N.lo > 0.0 or self.bias_N.hi < 0.0
-
-
-@dataclass(frozen=True)
-class CovariateShare:
-    """Part of the gap's variance along one covariate, 90 % interval."""
-
-    covariate: Words
-    share: Interval
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where the gap lies.
-
-    Attributes:
-        p_value: family-wise, of the residual test.
-        statistics: largest |z| over the cells and of the noise's shape, by name.
-        cells: every pre-declared cell.
-        shares: of the gap's variance by covariate; empty when no gap is detected.
-        residual_N: reading minus calibrated base model, shape (n,).
-        gap_N: smooth part of it (posterior mean), shape (n,).
-        records: the rows that were looked at: the case's own, or means of neighbours.
-    """
-
-    p_value: float
-    statistics: dict[str, float]
-    cells: tuple[Cell, ...]
-    shares: tuple[CovariateShare, ...]
-    residual_N: np.ndarray
-    gap_N: np.ndarray
-    records: Records
-
-    @property
-    def regions(self) -> tuple[Cell, ...]:
-        """Return the hot cells, largest |z| first."""
-        return tuple(sorted((c for c in self.cells if c.hot), key=lambda c: -abs(c.z)))
 
 
 @dataclass(frozen=True)
@@ -134,11 +38,24 @@ class NotTestable:
 
 
 @dataclass(frozen=True)
+class Remainder:
+    """What lies beside the leading effect and is in no library.
+
+    Attributes:
+        probability: that there is some, given the effect.
+        share: of the gap that it is, by rms, 90 % interval.
+    """
+
+    probability: Probability
+    share: Interval
+
+
+@dataclass(frozen=True)
 class Which:
     """Which unmodelled effect causes the gap.
 
     Attributes:
-        verdict: none, named, ambiguous or unknown.
+        verdict: none, named, group, ambiguous or unknown.
         effect: top effect by inclusion; None for none and unknown.
         second_effect: another with inclusion of 90 % or more.
         set: effects of the smallest set of hypotheses with 90 %, most probable first.
@@ -151,6 +68,13 @@ class Which:
         inseparable: pairs of effects that this loading can never tell apart.
         sensitivity: top inclusion for amplitude priors ⅓ and 3 times as wide.
         stability: share of block-bootstrap samples with the same top hypothesis.
+        group: leading group of causes; several joined by a slash where this loading
+            cannot part them. None for none and unknown.
+        group_members: effects of it.
+        group_probability: that the cause is one of them.
+        groups: probability of each group; an effect may be in two.
+        remainder: beside `effect`; None without one.
+        doubted: the likeliest hypothesis leaves more than noise.
     """
 
     verdict: VerdictWord
@@ -166,6 +90,12 @@ class Which:
     inseparable: tuple[tuple[EffectName, EffectName], ...]
     sensitivity: dict[str, Real]
     stability: Probability | None
+    group: Words | None = None
+    group_members: Annotated[tuple[EffectName, ...], Promise(uniqueItems=True)] = ()
+    group_probability: Probability | None = None
+    groups: dict[str, Probability] = field(default_factory=dict)
+    remainder: Remainder | None = None
+    doubted: bool = False
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -243,6 +173,7 @@ class Verdict(Shown):
         reasons: why the result must not be used; empty when it may.
         averaged_rows: rows in each mean that was diagnosed; 1 is single rows.
         no_run: why `next_test` is empty.
+        seen: what readings show, the clearest first.
         seed: of the simulations and the sampler.
         quick: nothing was sampled.
     """
@@ -261,6 +192,7 @@ class Verdict(Shown):
     reasons: tuple[str, ...] = ()
     averaged_rows: int = 1
     no_run: str = ""
+    seen: tuple[Seen, ...] = ()
     seed: int = 0
     quick: bool = False
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.declared_cells import DeclaredCell, declare_cells
-from hdcal.diagnosis.verdict import Cell, CovariateShare, Where
+from hdcal.diagnosis.gap import Cell, CovariateShare, Where
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.local_structure import direction_families
 from hdcal.evidence.residual_test import Directions, ResidualTest

@@ -4,15 +4,28 @@ from itertools import combinations, starmap
 
 import numpy as np
 
+from hdcal.data.case import Case
 from hdcal.diagnosis.amplitude import amplitude_of
+from hdcal.diagnosis.detection import Detection
+from hdcal.diagnosis.groups import (
+    group_probabilities,
+    leading_group,
+)
+from hdcal.diagnosis.levels import doubted, verdict_word
 from hdcal.diagnosis.model_posterior import (
     NAMED,
     ModelPosterior,
+    carried,
     model_posterior,
-    verdict_word,
 )
-from hdcal.diagnosis.verdict import NotTestable, Which
-from hdcal.evidence.case_evidence import LEAST_SEEN, NONE, CaseEvidence
+from hdcal.diagnosis.verdict import NotTestable, Remainder, Which
+from hdcal.diagnosis.where import interval
+from hdcal.evidence.case_evidence import (
+    LEAST_SEEN,
+    NONE,
+    CaseEvidence,
+    with_remainder,
+)
 from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
@@ -24,21 +37,24 @@ _ALIKE = 0.8
 
 def identify_cause(
     evidence: CaseEvidence,
-    posterior: ModelPosterior,
-    detected: bool,
+    found: Detection,
+    case: Case,
     library: dict[str, type[Effect]],
     rng: np.random.Generator,
 ) -> Which:
     """Return the verdict on the cause."""
-    word = verdict_word(posterior, detected)
+    posterior, alike = found.posterior, inseparable(evidence)
+    group = leading_group(posterior, library, alike)
     ranked = sorted(posterior.inclusion, key=lambda n: -posterior.inclusion[n])
-    named = word in ("named", "ambiguous") and bool(ranked)
-    effect = ranked[0] if named else None
+    doubt = doubted(evidence, found, case, rng.spawn(1)[0])
+    word = verdict_word(evidence, found, library, group, alike, doubt=doubt)
+    suspected = word in ("named", "group", "ambiguous") and bool(ranked)
+    effect = ranked[0] if suspected else None
     others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED]
     return Which(
         verdict=word,
         effect=effect,
-        second_effect=others[0] if named and others else None,
+        second_effect=others[0] if suspected and others else None,
         set=posterior.smallest_set if word != "none" else (NONE,),
         probabilities=posterior.probabilities,
         inclusion=posterior.inclusion,
@@ -46,10 +62,27 @@ def identify_cause(
         amplitude=amplitude_of(evidence, effect, library, rng) if effect else None,
         not_testable=tuple(starmap(NotTestable, evidence.not_testable.items())),
         not_excited=evidence.not_excited,
-        inseparable=inseparable(evidence),
+        inseparable=alike,
+        group=group.name if group and suspected else None,
+        group_members=group.members if group and suspected else (),
+        group_probability=group.probability if group and suspected else None,
+        groups=group_probabilities(posterior, library),
+        remainder=_remainder(evidence, posterior, effect),
+        doubted=doubt,
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,
     )
+
+
+def _remainder(
+    evidence: CaseEvidence, posterior: ModelPosterior, effect: str | None
+) -> Remainder | None:
+    """Return what lies beside the leading effect; None without one."""
+    if effect not in evidence.closed:
+        return None
+    chance = posterior.probabilities[with_remainder(effect)]
+    share = interval(1.0 - evidence.closed[effect])
+    return Remainder(chance / max(posterior.inclusion[effect], chance, 1e-300), share)
 
 
 def inseparable(evidence: CaseEvidence) -> tuple[tuple[str, str], ...]:
@@ -90,7 +123,8 @@ def sensitivity(evidence: CaseEvidence, effect: str) -> dict[str, float]:
             name: value + sum(moved.get(part, 0.0) for part in name.split("+"))
             for name, value in evidence.table.items()
         }
-        result[word] = float(model_posterior(table).inclusion[effect])
+        moved_posterior = model_posterior(table, carried(evidence), evidence.on_noise)
+        result[word] = float(moved_posterior.inclusion[effect])
     return result
 
 

@@ -4,31 +4,23 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.places import places
-from hdcal.diagnosis.verdict import Closure, Which
+from hdcal.diagnosis.cause_words import ambiguous, group_of_causes, named, unknown
+from hdcal.diagnosis.seen_words import p_words
+from hdcal.diagnosis.verdict import Which
 from hdcal.report.words import (
-    estimate,
-    hypothesis,
     known,
     label,
     newton,
-    or_zero,
     percent,
-    percent_span,
-    with_unit,
 )
 
 _MOST_PAIRS = 4
-# Statistics of the test that look at the scatter alone.
-_SCATTER = ("p_spread", "p_tails")
 PROPORTIONAL = "An effect proportional to deformation is a wrong K, not a gap."
 NO_PROOF = (
     "Closing the gap is not proof of cause: another effect of the same shape would "
     "close it as well."
 )
 
-# From this probability on, what is the most probable is said without a reserve.
-_SURE = 0.9
 # A gap of r noise sds in n rows is detected nine times in ten from r √n = 4.2 on.
 _DETECTABLE = 4.2
 
@@ -62,8 +54,13 @@ def answer(found: VerdictAnswer) -> list[str]:
 
 
 def _sentences(found: VerdictAnswer) -> list[str]:
-    say = {"none": _none, "named": _named, "ambiguous": _ambiguous}
-    return list(say.get(found.which.verdict, _unknown)(found))
+    say = {
+        "none": _none,
+        "named": named,
+        "group": group_of_causes,
+        "ambiguous": ambiguous,
+    }
+    return list(say.get(found.which.verdict, unknown)(found))
 
 
 def count_words(found: Mapping[str, VerdictAnswer]) -> str:
@@ -124,7 +121,7 @@ def _none(found: VerdictAnswer) -> Iterator[str]:
     if gap.detected:
         yield (
             "Something departs slightly from pure noise (p = "
-            f"{_p(found.where.p_value)}), but that the model lacks nothing "
+            f"{p_words(found.where.p_value)}), but that the model lacks nothing "
             f"remains the most probable ({percent(chance)}); {noise}."
         )
     else:
@@ -149,117 +146,3 @@ def _unseen(found: VerdictAnswer) -> str:
     low, high = newton(min(widths)), newton(max(widths))
     span = low if low == high else f"{low.removesuffix(' N')} … {high}"
     return f"{small}, or of less than {span} in one range of deformation"
-
-
-def _named(found: VerdictAnswer) -> Iterator[str]:
-    which = found.which
-    assert which.effect is not None
-    yield _where(found)
-    cause = _with_chance(which, which.effect)
-    if which.second_effect:
-        cause += f" together with {_with_chance(which, which.second_effect)}"
-    size = which.amplitude
-    if size is None:
-        yield f"Most likely cause: {cause}."
-    else:
-        middle, span = estimate(size)
-        middle = with_unit(middle, size.unit)
-        name = label(size.parameter.rpartition(".")[2])
-        yield f"Most likely cause: {cause}; its {name} is {middle} ({span})."
-    yield from _shrinks(found, "it" if not which.second_effect else "them")
-
-
-def _ambiguous(found: VerdictAnswer) -> Iterator[str]:
-    which = found.which
-    yield _where(found)
-    causes = ", ".join(_with_chance(which, name) for name in which.set)
-    yield f"The cause cannot be told with this data; it may be {causes}."
-    yield from _shrinks(found, label(which.effect or which.set[0]))
-
-
-def _unknown(found: VerdictAnswer) -> Iterator[str]:
-    chances = found.which.probabilities
-    chance = chances.get("unknown")
-    others = [name for name in chances if name != "unknown"]
-    yield _where(found)
-    if not others or not known(chance) or chance >= _SURE:
-        yield (
-            "Nothing in the library explains it: most likely the cause lies outside "
-            f"({percent(chance)})."
-        )
-    else:
-        best = max(others, key=lambda name: or_zero(chances[name]))
-        yield (
-            f"The cause may lie outside the library ({percent(chance)}); next comes "
-            f"{hypothesis(best)} ({percent(chances[best])})."
-        )
-    yield from _shrinks(found, "the best correction there is")
-
-
-def _with_chance(which: Which, name: str) -> str:
-    chance = which.inclusion.get(name, which.probabilities.get(name))
-    return f"{hypothesis(name)} ({percent(chance)})"
-
-
-def _shrinks(found: VerdictAnswer, what: str) -> Iterator[str]:
-    shrink = found.shrink
-    closed = shrink.closed
-    if closed is None or not known(closed.median):
-        return
-    if closed.median <= 0.0:
-        yield f"Adding {what} does not shrink the gap on {held_out(shrink)}."
-        return
-    share = percent_span(closed)
-    yield f"Adding {what} removes {share} of the gap on {held_out(shrink)}."
-
-
-def held_out(shrink: Closure) -> str:
-    """Return what the correction was tried on, such as half-cycles not fitted to."""
-    name = shrink.held_out
-    one = name.removeprefix("leave-one-").removesuffix("-out")
-    if not one or one == name:
-        return "readings that it was not fitted to"
-    many = f"{one.replace('_', ' ')}{'es' if one.endswith('ch') else 's'}"
-    return f"{many} that it was not fitted to"
-
-
-def _where(found: VerdictAnswer) -> str:
-    step, found_places = found.gap.rounding_N, list(places(found.where))
-    if known(step):
-        return (
-            f"The readings are rounded to steps of {newton(step)}; nothing else sets "
-            "them apart from the model."
-        )
-    if not found_places:
-        return _nowhere(found)
-    first, *rest = (
-        f"{newton(abs(bias))} {'higher' if bias > 0.0 else 'lower'}"
-        + ("" if index else " than the calibrated model")
-        + f" {words}"
-        for index, (words, bias) in enumerate(found_places)
-    )
-    more = "".join(f", and {text}" for text in rest)
-    return f"The measured force is up to {first}{more}."
-
-
-def _nowhere(found: VerdictAnswer) -> str:
-    """Say that no single range is off."""
-    where = found.where
-    p = _p(where.p_value)
-    chances = {n: v for n, v in where.statistics.items() if n.startswith("p_")}
-    if min(chances, key=lambda n: or_zero(chances[n]), default="") in _SCATTER:
-        return (
-            f"The readings depart from the model (p = {p}), but no range of them is "
-            "off on average: the departure is in their scatter."
-        )
-    size = newton(found.gap.rms_N.median)
-    return (
-        f"The readings depart from the model by {size} rms (p = {p}), but no "
-        "single range of them by enough to point at it."
-    )
-
-
-def _p(value: float | None) -> str:
-    if not known(value):
-        return "–"
-    return "below 0.001" if value < 0.001 else f"{value:.2g}"

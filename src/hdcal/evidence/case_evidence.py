@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.evidence.noise_evidence import NoiseEvidence
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
@@ -15,6 +16,8 @@ from hdcal.inference.hypotheses import UNKNOWN as UNKNOWN
 QUANTISATION = "quantisation"
 # Squared length in noise sds below which an effect of large physical size is unseen.
 LEAST_SEEN = 6.0
+# Correlations of less weight than this take no part in what is costly.
+LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,8 @@ class CaseEvidence:
         not_testable: effect → features that the records lack.
         not_excited: effects that this loading cannot show at a physical size.
         accounted: effects that the gear file already accounts for.
+        closed: of each effect beside which a remainder was looked for, draws of the
+            share of the gap that it closes, shape (d,).
     """
 
     prepared: PreparedCase
@@ -50,11 +55,49 @@ class CaseEvidence:
     not_testable: dict[str, tuple[str, ...]] = field(default_factory=dict)
     not_excited: tuple[str, ...] = ()
     accounted: tuple[str, ...] = ()
+    closed: dict[str, Float[np.ndarray, " d"]] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that take part."""
         return tuple(n for n in self.table if n not in (NONE, UNKNOWN) and "+" not in n)
+
+    @property
+    def on_noise(self) -> tuple[str, ...]:
+        """Names of the effects that take part on the noise."""
+        return tuple(n for n in self.effects if n in self.noise or n == QUANTISATION)
+
+    @property
+    def likeliest_kernel(self) -> str:
+        """Kernel along which unknown structure is most probable."""
+        by_name = self.subspaces.by_correlation
+        return max(
+            self.kernel_names, key=lambda name: np.logaddexp.reduce(by_name(name))
+        )
+
+    @property
+    def likeliest_correlation(self) -> float:
+        """AR(1) coefficient that the hypotheses together make most probable."""
+        whole = np.stack(list(self.table.values()))
+        index = int(np.argmax(np.logaddexp.reduce(whole, axis=0)))
+        return float(self.prepared.rows.correlations[index])
+
+    @property
+    def likely_correlations(self) -> np.ndarray:
+        """Indices of the AR(1) coefficients that are not next to impossible."""
+        return np.flatnonzero(self.weight_of_correlations >= LEAST_WEIGHT)
+
+    @property
+    def weight_of_correlations(self) -> np.ndarray:
+        """Weight of each AR(1) coefficient, by the best hypothesis at each."""
+        best = np.max(np.stack(list(self.table.values())), axis=0)
+        weight = np.exp(best - np.max(best))
+        return weight / weight.sum()
+
+
+def with_remainder(effect: str) -> str:
+    """Return the name of an effect with an unknown remainder beside it."""
+    return f"{effect}+{UNKNOWN}"
 
 
 def pair_name(one: str, other: str) -> str:

@@ -17,6 +17,7 @@ from hdcal.evidence.case_evidence import (
 from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.noise_evidence import NoiseEvidence, noise_evidence
 from hdcal.evidence.pair_evidence import pair_evidence
+from hdcal.evidence.parameter_grid import SCALES
 from hdcal.evidence.piecewise_effect import PiecewiseEffect, piecewise_effect
 from hdcal.evidence.prepare import PreparedCase, prepare, with_relative_noise
 from hdcal.evidence.quantisation import quantisation_evidence
@@ -137,8 +138,11 @@ def _noise_table(
 
 
 def _seen(prepared: PreparedCase, curves: np.ndarray) -> bool:
-    """Tell whether one of the shapes (s, j, n) of a large effect leaves enough."""
-    flat = curves.reshape(-1, curves.shape[-1])
+    """Tell whether one of the shapes (s, j, n) of an effect can leave enough.
+
+    At the widest of its priors, which is as large as a rig may have it.
+    """
+    flat = SCALES[-1] * curves.reshape(-1, curves.shape[-1])
     left = remove_base(prepared.rows, flat) * prepared.rows.weight
     squares = np.sum(left.reshape(curves.shape) ** 2, axis=(1, 2))
     return bool(np.max(squares) >= LEAST_SEEN * prepared.noise_sd**2)

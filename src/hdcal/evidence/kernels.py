@@ -60,6 +60,11 @@ def _alone(records: Records) -> dict[str, np.ndarray]:
     if "temperature" in records.known and levels > 1:
         table = cosines(scale_to_unit(records.temperature))
         found["temperature"] = table[: max(1, levels - 1)]
+    if "rates" in records.known:
+        # With its sign: what drags on loading pulls on unloading.
+        speed = np.asarray(records.rate)
+        levels = len(np.unique(np.round(speed / np.max(np.abs(speed)), 2)))
+        found["rate"] = cosines(scale_to_unit(speed))[: max(1, levels - 1)]
     found["order in run"] = cosines(place_in_run(records.run))
     if len(np.unique(records.run)) > 1:
         found["order"] = cosines(np.linspace(-1.0, 1.0, len(records.force)))

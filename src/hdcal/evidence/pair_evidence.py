@@ -17,8 +17,6 @@ from hdcal.evidence.single_evidence import SingleEvidence, single_evidence
 from hdcal.evidence.subspaces import mean_evidence
 from hdcal.physics.effect import Effect
 
-# Correlations of less posterior weight than this take no part in pairs.
-_LEAST_WEIGHT = 0.02
 # Effects beside which the shape of the noise is looked at anew.
 _BESIDE = 2
 
@@ -50,11 +48,8 @@ def _piecewise_pairs(evidence: CaseEvidence) -> dict[str, np.ndarray]:
     """Return pairs of effects with one amplitude each."""
     if len(evidence.piecewise) < 2:
         return {}
-    alone = np.stack(list(evidence.table.values()))
-    weight = np.exp(np.max(alone, axis=0) - np.max(alone))
-    weight = weight / weight.sum()
     pairs: dict[str, np.ndarray] = {}
-    for index in np.flatnonzero(weight >= _LEAST_WEIGHT):
+    for index in evidence.likely_correlations:
         both = piecewise_pair_evidence(
             evidence.prepared.rows,
             evidence.single,
@@ -63,7 +58,7 @@ def _piecewise_pairs(evidence: CaseEvidence) -> dict[str, np.ndarray]:
             int(index),
         )
         for names, value in both.items():
-            impossible = np.full(len(weight), -np.inf)
+            impossible = np.full_like(evidence.table[NONE], -np.inf)
             pairs.setdefault(pair_name(*names), impossible)[index] = value
     return pairs
 

@@ -14,15 +14,15 @@ from hdcal.physics.effect import Effect, parameters
 # not linear in its amplitude has many cells at each of them, and gets fewer.
 SHAPE_POINTS = {"linear": (25, 7, 4), "cells": (7, 4, 3), "subspace": (15, 5, 3)}
 # Edges of the amplitude's cells reach from the first to the last, in prior sds.
-SMALLEST, LARGEST = 1.0 / 64.0, 16.0
+SMALLEST, LARGEST = 1.0 / 64.0, 32.0
 # Ratio of neighbouring edges: an effect that is linear in its amplitude needs cells
 # only because the tolerance of its shape grows with it.
 COARSE, FINE = 2.0, 2.0**0.5
 # How much narrower or wider than stated the prior of a zero-centred amplitude may be,
 # and with which probability: sizes on a rig are known to a factor of some only, and
 # small ones are as ordinary as large ones.
-SCALES = np.array([0.1, 1.0 / 3.0, 1.0, 3.0])
-SCALE_WEIGHTS = np.array([0.2, 0.25, 0.35, 0.2])
+SCALES = np.array([0.1, 1.0 / 3.0, 1.0, 3.0, 10.0])
+SCALE_WEIGHTS = np.array([0.15, 0.2, 0.3, 0.2, 0.15])
 
 
 @dataclass(frozen=True)

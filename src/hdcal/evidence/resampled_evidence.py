@@ -54,7 +54,7 @@ def _products(evidence: CaseEvidence, weight: np.ndarray):
         weight: how often each row counts, [sample, row].
     """
     rows, effects = evidence.prepared.rows, evidence.piecewise
-    correlation = _likeliest_correlation(evidence)
+    correlation = evidence.likeliest_correlation
     nothing = np.zeros((1, len(rows.reading)))
     offsets = np.concatenate([nothing, *(each.offsets for each in effects)])
     slopes = np.concatenate([nothing, *(each.slopes for each in effects)])
@@ -77,9 +77,3 @@ def _products(evidence: CaseEvidence, weight: np.ndarray):
         weight @ (left * slope) - np.sum(xe * xu, axis=1),
         weight @ slope**2 - np.sum(xu**2, axis=1),
     )
-
-
-def _likeliest_correlation(evidence: CaseEvidence) -> float:
-    whole = np.stack(list(evidence.table.values()))
-    index = int(np.argmax(np.logaddexp.reduce(whole, axis=0)))
-    return float(evidence.prepared.rows.correlations[index])

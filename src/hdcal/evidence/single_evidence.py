@@ -75,6 +75,24 @@ class SingleEvidence:
     products: PieceProducts
     starts: np.ndarray
 
+    def likeliest(self, name: str, at: int) -> tuple[int, float, float]:
+        """Return where most of an effect's evidence is at a correlation.
+
+        Args:
+            name: of the effect.
+            at: index of the correlation.
+
+        Returns:
+            Its piece, from 0, the size of its amplitude and the tolerance of its shape.
+        """
+        index = self.names.index(name)
+        parts = [part.of(index) for part in self.parts]
+        part = max(parts, key=lambda p: p.log_evidence[at].max())
+        cell, cells = int(np.argmax(part.log_evidence[at])), part.cells
+        size = np.clip(part.mean[at, cell], cells.low[cell], cells.high[cell])
+        piece = int(cells.piece[cell] - self.starts[index])
+        return piece, float(abs(size)), float(cells.tolerance[cell])
+
     def by_correlation(self, name: str) -> np.ndarray:
         """Return the log evidence of an effect, [correlation]."""
         index = self.names.index(name)

@@ -20,6 +20,7 @@ COVARIATES = {
     "order in run": "time",
     "order": "time",
     "angle": "angle",
+    "rate": "rate",
     "direction": "direction",
     "deformation × direction": "direction",
     "deformation × temperature": "temperature",

@@ -20,7 +20,7 @@ from hdcal.physics.scatter import Scatter, scores
 # Columns of a subspace; members beyond it are kept by their largest directions.
 WIDTH = 24
 # Steps of the scale of a subspace of unknown size, as factors of its prior sd.
-_STEPS = 2.0 ** np.arange(-5.0, 3.0)
+_STEPS = 2.0 ** np.arange(-5.0, 5.0)
 
 _scores = jax.jit(scores)
 

@@ -127,7 +127,7 @@ def dynamic_site_priors(
         InputError: the moved mass has none.
     """
     gear = case.gear
-    table = {**effect_priors(), **gear.effect_priors, **gear.priors}
+    table = {**effect_priors(gear.full_scale), **gear.effect_priors, **gear.priors}
     table |= {**gear.dynamic_priors, **gear.gauge_priors}
     table["mass"] = mass_prior(gear, case_reading(case).radial_per_read)
     table["K"] = influence_prior(case, theory)

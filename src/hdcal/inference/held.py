@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from hdcal.data.case import Theory
 from hdcal.data.certificates import can_state
+from hdcal.data.full_scale import REFERENCE
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
@@ -59,6 +60,19 @@ class HeldGeometry:
 
 
 @dataclass(frozen=True)
+class HeldFullScale:
+    """The largest readings [N, mm]."""
+
+    __pydantic_config__: ClassVar = STRICT
+    force: Size = REFERENCE.force
+    deformation: Size = REFERENCE.deformation
+
+    def __post_init__(self) -> None:
+        if not (self.force > 0.0 and self.deformation > 0.0):
+            raise ValueError("has a full scale that no rig has")
+
+
+@dataclass(frozen=True)
 class HeldGear:
     """A gear; lengths in mm. Its numbers are those that a gear file may hold."""
 
@@ -80,6 +94,8 @@ class HeldGear:
     dynamic_priors: Priors = field(default_factory=dict)
     density: Annotated[float, within("density")] | None = None
     gauge_priors: Priors = field(default_factory=dict)
+    # Before it was held, priors of effects were those of one rig.
+    full_scale: HeldFullScale = field(default_factory=HeldFullScale)
 
     def __post_init__(self) -> None:
         step = self.force_resolution

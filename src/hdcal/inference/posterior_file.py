@@ -3,13 +3,14 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from hdcal.data.case import Case, Gear
+from hdcal.data.full_scale import FullScale
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.typed_json import typed_text
@@ -75,6 +76,7 @@ def describe_case(case: Case) -> str:
     geometry = {
         f.name: float(getattr(gear["geometry"], f.name)) for f in fields(Geometry)
     }
+    gear["full_scale"] = asdict(gear["full_scale"])
     for table in _TABLES:
         gear[table] = {name: describe_prior(p) for name, p in gear[table].items()}
     return json.dumps(
@@ -105,6 +107,7 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     # A file without it is of before correlation was inferred: there was none.
     gear["scale_priors"].setdefault(CORRELATION, Prior("fixed", (0.0,), "1"))
     gear["geometry"] = Geometry(**vars(held.gear.geometry))
+    gear["full_scale"] = FullScale(**vars(held.gear.full_scale))
     rows = {name: constant[name].to_numpy() for name in UNITS}
     rows["force"] = force.to_numpy()
     check_rows(rows, len(held.run_labels), len(held.specimen_labels))

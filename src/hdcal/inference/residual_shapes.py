@@ -27,12 +27,16 @@ class Structure:
         p_value: of the t test, adjusted for the number of shapes tried.
         size_N: RMS of the shape [N].
         words: one sentence for people.
+        coefficient: of the shape's column [N]; NaN of what has none.
+        error: standard error of it [N].
     """
 
     name: str
     p_value: float
     size_N: float
     words: str
+    coefficient: float = np.nan
+    error: float = np.nan
 
 
 @dataclass(frozen=True)
@@ -134,14 +138,16 @@ def find_structure(
         tests = _tests(data.residual, columns, orthonormal(absorbed), noise)
         if not tests:
             break
-        p, part, left, name = min(tests, key=lambda test: test[0])
+        p, part, error, left, name = min(tests, key=lambda test: test[0])
         p = min(1.0, p * len(tests))
         if p > FALSE_ALARM:
             break
         rms = float(abs(part) * np.sqrt(np.mean((left[: len(sd)] * sd) ** 2)))
         column, up, down = shapes.pop(name)
         words = f"The residuals {up if part > 0.0 else down} ({rms:.2g} N rms)."
-        found.append(Structure(name, p, rms, words))
+        # What is left of the column is of unit length.
+        length = float(left @ column)
+        found.append(Structure(name, p, rms, words, part / length, error / length))
         absorbed = np.column_stack([absorbed, column])
     return tuple(found)
 
@@ -159,7 +165,7 @@ def _tests(
     columns: dict[str, np.ndarray],
     basis: np.ndarray,
     noise: Correlated | None,
-) -> list[tuple[float, float, np.ndarray, str]]:
+) -> list[tuple[float, float, float, np.ndarray, str]]:
     """Test each column beside what is absorbed, by generalised least squares.
 
     Where neighbours may err alike the p value is that given ρ, averaged over what the
@@ -172,8 +178,9 @@ def _tests(
         noise: how neighbours may err alike.
 
     Returns:
-        p value, coefficient of the unit-length remainder, that remainder and the name,
-        of what the model does not absorb; nothing where too few rows are left.
+        p value, coefficient of the unit-length remainder and its standard error, that
+        remainder and the name, of what the model does not absorb; nothing where too
+        few rows are left.
     """
 
     def beside(part):
@@ -200,9 +207,10 @@ def _tests(
         rest = np.maximum(left[:, -1, -1] - tied**2 / own, np.finfo(float).tiny)
         log_chance = log_weight - 0.5 * (np.log(own) + free * np.log(rest))
         chance = special.softmax(log_chance)
-        t = np.abs(tied) / np.sqrt(own * rest / free)
-        p, part = chance @ (2.0 * stats.t.sf(t, free)), chance @ (tied / own)
-        tests.append((float(p), float(part), unit, name))
+        error = np.sqrt(rest / (free * own))
+        p = chance @ (2.0 * stats.t.sf(np.abs(tied) / (own * error), free))
+        part = chance @ (tied / own)
+        tests.append((float(p), float(part), float(chance @ error), unit, name))
     return tests
 
 

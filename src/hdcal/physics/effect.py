@@ -84,7 +84,7 @@ class Effect(eqx.Module):
         name: key of the registry and prefix of the posterior sites.
         stage: where in the measurement chain it acts.
         needs: features of the records without which it cannot be tested.
-        family: effects of one family look alike.
+        groups: of `physics.groups`; those of one look alike or have one remedy.
         symmetry: how the contribution answers to tension instead of compression,
             `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
         mixture: whether a reading's noise becomes more than one normal.
@@ -95,7 +95,7 @@ class Effect(eqx.Module):
 
     name: AbstractClassVar[str]
     stage: AbstractClassVar[Stage]
-    family: AbstractClassVar[str]
+    groups: AbstractClassVar[tuple[str, ...]]
     needs: ClassVar[frozenset[str]] = frozenset()
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
     mixture: ClassVar[bool] = False

@@ -1,7 +1,8 @@
 """Which full scale a stream that begins with priors is taken to have."""
 
 from hdcal.data.case import Gear
-from hdcal.data.gear import FULL_SCALE, IN_NEWTONS, at_full_scale
+from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.gear import IN_NEWTONS, at_full_scale
 from hdcal.inference.posterior import Posterior
 
 # Of the leftover discrepancy a stream makes no use.
@@ -22,7 +23,7 @@ class AssumedFullScale:
     def __init__(self, known: Posterior | Gear):
         self._names, self._largest = "", 0.0
         if isinstance(known, Gear):
-            other = at_full_scale(known, 2.0 * FULL_SCALE)
+            other = at_full_scale(known, FullScale(2.0 * REFERENCE.force))
             own, moved = (g.priors | g.scale_priors for g in (known, other))
             shipped = [name for name in IN_NEWTONS if own[name] != moved[name]]
             self._names = ", ".join(name for name in shipped if name != _UNUSED)
@@ -37,15 +38,17 @@ class AssumedFullScale:
             return []
         return [
             f"the priors of {self._names} are those of a rig that reads up to "
-            f"{FULL_SCALE:g} N; the table [priors] of the gear file may state others"
+            f"{REFERENCE.force:g} N; the table [priors] of the gear file may state "
+            "others"
         ]
 
     def at_end(self) -> str:
         """Return what the readings say against it, to end a sentence; else nothing."""
-        ratio = self._largest / FULL_SCALE
+        ratio = self._largest / REFERENCE.force
         if not self._names or not self._largest or 1.0 / _ALIKE < ratio < _ALIKE:
             return ""
         return (
             f"; the largest force is {self._largest:.3g} N, but the priors of "
-            f"{self._names} are for {FULL_SCALE:g} N: state them in the gear file"
+            f"{self._names} are for {REFERENCE.force:g} N: state them in the gear "
+            "file"
         )

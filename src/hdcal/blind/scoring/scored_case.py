@@ -49,10 +49,13 @@ class ScoredCase:
 
     @cached_property
     def probabilities(self) -> dict[str, float]:
-        """Of all hypotheses, pairs with their parts in alphabetical order."""
+        """Of all hypotheses, pairs with their parts in alphabetical order.
+
+        What an effect leaves over says nothing of which effect it is.
+        """
         found: dict[str, float] = {}
         for name, value in self.answer.probabilities.items():
-            name = sorted_parts(name)
+            name = sorted_parts(without_remainder(name))
             found[name] = found.get(name, 0.0) + value
         return found
 
@@ -110,6 +113,11 @@ def null_cases(cases: Cases, noise: str) -> list[ScoredCase]:
     """Return the cases without a gap in one kind of noise, serial up to .5."""
     own = [c for c in cases if c.label.kind == "null" and c.label.noise == noise]
     return [c for c in own if noise != "ar" or c.label.correlation <= 0.5 + 1e-9]
+
+
+def without_remainder(name: str) -> str:
+    """Return a hypothesis less what it leaves unknown beside an effect."""
+    return "+".join(p for p in name.split("+") if p != UNKNOWN) or name
 
 
 def sorted_parts(name: str) -> str:

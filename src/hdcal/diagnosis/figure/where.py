@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from hdcal.diagnosis.verdict import Cell, Verdict
+from hdcal.diagnosis.gap import Cell
+from hdcal.diagnosis.verdict import Verdict
 from hdcal.report.canvas import (
     BLUE,
     DARK,

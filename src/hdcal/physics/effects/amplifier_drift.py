@@ -16,7 +16,7 @@ class AmplifierDrift(Effect):
 
     name: ClassVar[str] = "amplifier_drift"
     stage: ClassVar[Stage] = "sensor"
-    family: ClassVar[str] = "drift"
+    groups: ClassVar[tuple[str, ...]] = ("rate or time",)
     needs: ClassVar[frozenset[str]] = frozenset({"time"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 

@@ -21,7 +21,7 @@ class ChargeLeakage(Effect):
 
     name: ClassVar[str] = "charge_leakage"
     stage: ClassVar[Stage] = "sensor"
-    family: ClassVar[str] = "drift"
+    groups: ClassVar[tuple[str, ...]] = ("rate or time",)
     needs: ClassVar[frozenset[str]] = frozenset({"time"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
 

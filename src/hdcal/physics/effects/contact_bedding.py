@@ -22,7 +22,7 @@ class ContactBedding(Effect):
 
     name: ClassVar[str] = "contact_bedding"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up",)
     acts_at_once: ClassVar[bool] = True
 
     closure: Float[Array, ""] | float = parameter(

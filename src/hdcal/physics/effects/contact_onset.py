@@ -20,7 +20,7 @@ class ContactOnset(Effect):
 
     name: ClassVar[str] = "contact_onset"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up",)
     acts_at_once: ClassVar[bool] = True
 
     ratio: Float[Array, ""] | float = parameter(

@@ -16,7 +16,7 @@ class CoulombFriction(Effect):
 
     name: ClassVar[str] = "coulomb_friction"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "friction"
+    groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
     acts_at_once: ClassVar[bool] = True

@@ -19,7 +19,7 @@ class DisplacementNonlinearity(Effect):
 
     name: ClassVar[str] = "displacement_nonlinearity"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up", "curve down")
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 
     curvature: Float[Array, ""] | float = parameter(

@@ -23,7 +23,7 @@ class ForceSaturation(Effect):
 
     name: ClassVar[str] = "force_saturation"
     stage: ClassVar[Stage] = "sensor"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve down",)
 
     curvature: Float[Array, ""] | float = parameter(
         "1/N^2",

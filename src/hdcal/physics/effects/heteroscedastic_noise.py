@@ -17,7 +17,7 @@ class HeteroscedasticNoise(Effect):
 
     name: ClassVar[str] = "heteroscedastic_noise"
     stage: ClassVar[Stage] = "noise"
-    family: ClassVar[str] = "noise"
+    groups: ClassVar[tuple[str, ...]] = ("noise",)
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 
     share: Float[Array, ""] | float = parameter(

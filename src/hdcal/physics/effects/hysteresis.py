@@ -25,7 +25,7 @@ class Hysteresis(Effect):
 
     name: ClassVar[str] = "hysteresis"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "friction"
+    groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
 

@@ -22,7 +22,7 @@ class LargeDeflection(Effect):
 
     name: ClassVar[str] = "large_deflection"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve down",)
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
     acts_at_once: ClassVar[bool] = True
 

@@ -21,7 +21,7 @@ class Outliers(Effect):
 
     name: ClassVar[str] = "outliers"
     stage: ClassVar[Stage] = "noise"
-    family: ClassVar[str] = "noise"
+    groups: ClassVar[tuple[str, ...]] = ("noise",)
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
     mixture: ClassVar[bool] = True
 

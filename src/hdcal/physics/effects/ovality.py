@@ -23,7 +23,7 @@ class Ovality(Effect):
 
     name: ClassVar[str] = "ovality"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "angle"
+    groups: ClassVar[tuple[str, ...]] = ("angle",)
     needs: ClassVar[frozenset[str]] = frozenset({"angle"})
 
     cos_1: Float[Array, ""] | float = _share("stiffness, once per turn, cosine", 0.015)

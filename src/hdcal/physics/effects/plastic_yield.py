@@ -22,7 +22,7 @@ class PlasticYield(Effect):
 
     name: ClassVar[str] = "plastic_yield"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
 

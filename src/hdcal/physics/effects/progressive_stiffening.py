@@ -20,7 +20,7 @@ class ProgressiveStiffening(Effect):
 
     name: ClassVar[str] = "progressive_stiffening"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up",)
     acts_at_once: ClassVar[bool] = True
 
     slope: Float[Array, ""] | float = parameter(

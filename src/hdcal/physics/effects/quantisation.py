@@ -17,7 +17,7 @@ class Quantisation(Effect):
 
     name: ClassVar[str] = "quantisation"
     stage: ClassVar[Stage] = "noise"
-    family: ClassVar[str] = "noise"
+    groups: ClassVar[tuple[str, ...]] = ("noise",)
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 
     step: Float[Array, ""] | float = parameter(

@@ -20,7 +20,7 @@ class Relaxation(Effect):
 
     name: ClassVar[str] = "relaxation"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "drift"
+    groups: ClassVar[tuple[str, ...]] = ("rate or time",)
     needs: ClassVar[frozenset[str]] = frozenset({"time", "holds"})
 
     share: Float[Array, ""] | float = parameter(

@@ -16,7 +16,7 @@ class RigCompliance(Effect):
 
     name: ClassVar[str] = "rig_compliance"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "stiffness"
+    groups: ClassVar[tuple[str, ...]] = ("rig",)
     # No table of readings on the gear holds it, so nothing here is ever tested:
     # the readings are those of a softer gear.
     needs: ClassVar[frozenset[str]] = frozenset({"bare_rig"})

@@ -18,7 +18,7 @@ class RunOffset(Scatter):
 
     name: ClassVar[str] = "run_offset"
     stage: ClassVar[Stage] = "sensor"
-    family: ClassVar[str] = "scatter"
+    groups: ClassVar[tuple[str, ...]] = ("mounting or gear",)
     needs: ClassVar[frozenset[str]] = frozenset({"runs"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
     members: ClassVar[Kind] = "run"

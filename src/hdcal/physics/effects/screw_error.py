@@ -20,7 +20,7 @@ class ScrewError(Effect):
 
     name: ClassVar[str] = "screw_error"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "periodic"
+    groups: ClassVar[tuple[str, ...]] = ("screw",)
     # The phase belongs to the screw, whichever way the gear is loaded.
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
 

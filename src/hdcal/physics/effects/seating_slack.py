@@ -22,7 +22,7 @@ class SeatingSlack(Effect):
 
     name: ClassVar[str] = "seating_slack"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "curvature"
+    groups: ClassVar[tuple[str, ...]] = ("curve up",)
     acts_at_once: ClassVar[bool] = True
 
     clearance: Float[Array, ""] | float = parameter(

@@ -17,7 +17,7 @@ class SpecimenVariation(Scatter):
 
     name: ClassVar[str] = "specimen_variation"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "scatter"
+    groups: ClassVar[tuple[str, ...]] = ("mounting or gear",)
     needs: ClassVar[frozenset[str]] = frozenset({"specimens"})
     members: ClassVar[Kind] = "specimen"
 

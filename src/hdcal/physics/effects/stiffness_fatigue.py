@@ -18,7 +18,7 @@ class StiffnessFatigue(Effect):
 
     name: ClassVar[str] = "stiffness_fatigue"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "drift"
+    groups: ClassVar[tuple[str, ...]] = ("mounting or gear",)
     needs: ClassVar[frozenset[str]] = frozenset({"cycles"})
 
     loss: Float[Array, ""] | float = parameter(

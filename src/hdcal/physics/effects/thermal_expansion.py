@@ -16,7 +16,7 @@ class ThermalExpansion(Effect):
 
     name: ClassVar[str] = "thermal_expansion"
     stage: ClassVar[Stage] = "deformation"
-    family: ClassVar[str] = "thermal zero"
+    groups: ClassVar[tuple[str, ...]] = ("zero over temperature",)
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 

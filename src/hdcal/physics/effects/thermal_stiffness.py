@@ -18,7 +18,7 @@ class ThermalStiffness(Effect):
 
     name: ClassVar[str] = "thermal_stiffness"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "thermal stiffness"
+    groups: ClassVar[tuple[str, ...]] = ("slope over temperature",)
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
     acts_at_once: ClassVar[bool] = True
 

@@ -16,7 +16,7 @@ class ThermalZeroDrift(Effect):
 
     name: ClassVar[str] = "thermal_zero_drift"
     stage: ClassVar[Stage] = "sensor"
-    family: ClassVar[str] = "thermal zero"
+    groups: ClassVar[tuple[str, ...]] = ("zero over temperature",)
     needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
 

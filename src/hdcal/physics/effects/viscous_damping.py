@@ -16,7 +16,7 @@ class ViscousDamping(Effect):
 
     name: ClassVar[str] = "viscous_damping"
     stage: ClassVar[Stage] = "force"
-    family: ClassVar[str] = "friction"
+    groups: ClassVar[tuple[str, ...]] = ("rate or time",)
     needs: ClassVar[frozenset[str]] = frozenset({"rates"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
     acts_at_once: ClassVar[bool] = True

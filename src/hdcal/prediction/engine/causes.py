@@ -13,7 +13,14 @@ from hdcal.data.regular_file import why_not_readable
 from hdcal.data.typed_json import typed
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.distributions import distribution
-from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN, HeldOrigin, LeftOut
+from hdcal.inference.hypotheses import (
+    LEFT_OUT,
+    NONE,
+    ORIGIN,
+    UNKNOWN,
+    HeldOrigin,
+    LeftOut,
+)
 from hdcal.inference.mixed_posterior import models_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -21,7 +28,8 @@ from hdcal.inference.values import POSITIVE, Values
 from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
-SCHEMA = "hdcal.verdict/1"
+# The older one lacks levels and remainders; its posteriors are read alike.
+SCHEMAS = ("hdcal.verdict/2", "hdcal.verdict/1")
 _LARGEST_VERDICT = 64 << 20
 # Of probability that is left out, less than this is the rounding of a sum.
 _ROUNDING = 1e-6
@@ -64,7 +72,8 @@ class Cause:
     def name(self) -> str:
         """What the model is called among the hypotheses of a diagnosis."""
         effects = "+".join(sorted(effect.name for effect in self.posterior.effects))
-        return effects or ("none" if self.problem.discrepancy is None else "unknown")
+        rest = UNKNOWN if self.problem.discrepancy is not None else ""
+        return "+".join(filter(None, (effects, rest))) or NONE
 
     def driver(self, name: str) -> Driver:
         """Return whether data or prior determine a parameter."""
@@ -231,12 +240,12 @@ def _read_verdict(path: Path) -> dict:
     try:
         found = json.loads(path.read_text("utf-8"))
         schema = str(found["schema"])
-        if schema == SCHEMA and _is_whole(found):
+        if schema in SCHEMAS and _is_whole(found):
             return found
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        schema = SCHEMA
-    if schema != SCHEMA:
-        words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMA}"
+        schema = SCHEMAS[0]
+    if schema not in SCHEMAS:
+        words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMAS[0]}"
         remedy = "Use the hdcal that wrote it, or diagnose again"
     raise InputError([Finding(str(path), words, remedy)])
 

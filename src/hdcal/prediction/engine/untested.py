@@ -4,6 +4,8 @@ Nothing of it is scatter: beyond the tested deformation a bend may grow, beyond 
 tested temperatures the rig may drift, for every member alike.
 """
 
+from dataclasses import replace
+
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +13,7 @@ from jaxtyping import Float
 from scipy.special import ndtri
 from scipy.stats import qmc
 
+from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Array
 from hdcal.inference.distributions import moments
@@ -153,7 +156,11 @@ def untested_of(cause: Cause, levels: np.ndarray) -> tuple[Untested, dict]:
     records = cause.posterior.case.records
     below, above = fit_growths(cause)
     known = {effect.name for effect in cause.posterior.effects}
-    priors = {**effect_priors(), **cause.posterior.case.gear.effect_priors}
+    gear = cause.posterior.case.gear
+    # A frame expands by its own length, however short the stroke.
+    stroke = max(gear.full_scale.deformation, REFERENCE.deformation)
+    scale = replace(gear.full_scale, deformation=stroke)
+    priors = {**effect_priors(scale), **gear.effect_priors}
     zero, frame = (
         (0.0, 0.0) if effect.name in known else moments(priors[f"{effect.name}.slope"])
         for effect in (ThermalZeroDrift, ThermalExpansion)

@@ -1,0 +1,30 @@
+"""The full scale of a rig, of which shipped priors in newtons and mm are shares."""
+
+from dataclasses import dataclass
+
+from hdcal.data.prior import Prior, scaled
+from hdcal.data.units import unit_powers
+
+
+@dataclass(frozen=True)
+class FullScale:
+    """The largest readings of a rig; by default those that priors are written for.
+
+    Attributes:
+        force: largest force [N].
+        deformation: largest radial deformation [mm].
+    """
+
+    force: float = 100.0
+    deformation: float = 0.5
+
+    def own(self, prior: Prior) -> Prior:
+        """Return a shipped prior, written for the default, as it is on this rig."""
+        force, length, _, _ = unit_powers(prior.unit or "1")
+        ratio = (self.force / REFERENCE.force) ** force
+        ratio *= (self.deformation / REFERENCE.deformation) ** length
+        # What has no force and no length in it, such as a share, has no scale.
+        return prior if ratio == 1.0 else scaled(prior, ratio)
+
+
+REFERENCE = FullScale()

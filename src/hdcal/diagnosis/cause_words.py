@@ -1,0 +1,128 @@
+"""What is said of the cause of a gap, in sentences."""
+
+from collections.abc import Iterator
+
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.groups import JOINED
+from hdcal.diagnosis.seen_words import capital, what_is_seen
+from hdcal.diagnosis.verdict import Closure, Which
+from hdcal.physics.groups import GROUPS
+from hdcal.report.words import (
+    estimate,
+    hypothesis,
+    known,
+    label,
+    or_zero,
+    percent,
+    percent_span,
+    with_unit,
+)
+
+# From this probability on, what is the most probable is said without a reserve.
+_SURE = 0.9
+# Members of a group below this are not listed.
+_WORTH_SAYING = 0.01
+
+
+def named(found: VerdictAnswer) -> Iterator[str]:
+    """Yield what is said of a cause that is named."""
+    which = found.which
+    assert which.effect is not None
+    yield what_is_seen(found)
+    cause = _with_chance(which, which.effect)
+    if which.second_effect:
+        cause += f" together with {_with_chance(which, which.second_effect)}"
+    size = which.amplitude
+    if size is None:
+        yield f"Most likely cause: {cause}."
+    else:
+        middle, span = estimate(size)
+        middle = with_unit(middle, size.unit)
+        name = label(size.parameter.rpartition(".")[2])
+        yield f"Most likely cause: {cause}; its {name} is {middle} ({span})."
+    yield from _beside(which, label(which.effect))
+    yield from _shrinks(found, "it" if not which.second_effect else "them")
+
+
+def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
+    """Yield what is said where a group of causes is all that can be named."""
+    which = found.which
+    assert which.effect is not None and which.group is not None
+    yield what_is_seen(found)
+    own = [GROUPS[name] for name in which.group.split(JOINED) if name in GROUPS]
+    meaning = ", or ".join(group.meaning for group in own) or which.group
+    likely = [n for n in which.group_members if which.inclusion[n] >= _WORTH_SAYING]
+    ranked = sorted(likely, key=lambda name: -which.inclusion[name])
+    causes = ", ".join(_with_chance(which, name) for name in ranked)
+    yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
+    for group in own[:1]:
+        yield f"Against any of these: {group.remedy}."
+    yield from _beside(which, label(which.effect))
+    yield from _shrinks(found, label(which.effect))
+
+
+def ambiguous(found: VerdictAnswer) -> Iterator[str]:
+    """Yield what is said of several causes."""
+    which = found.which
+    yield what_is_seen(found)
+    causes = ", ".join(_with_chance(which, name) for name in which.set)
+    yield f"The cause cannot be told with this data; it may be {causes}."
+    yield from _shrinks(found, label(which.effect or which.set[0]))
+
+
+def unknown(found: VerdictAnswer) -> Iterator[str]:
+    """Yield what is said where the library has no cause."""
+    chances = found.which.probabilities
+    chance = chances.get("unknown")
+    others = [name for name in chances if name != "unknown"]
+    yield what_is_seen(found)
+    if not others or not known(chance) or chance >= _SURE:
+        yield (
+            "Nothing in the library explains it: most likely the cause lies outside "
+            f"({percent(chance)})."
+        )
+    else:
+        best = max(others, key=lambda name: or_zero(chances[name]))
+        yield (
+            f"The cause may lie outside the library ({percent(chance)}); next comes "
+            f"{hypothesis(best)} ({percent(chances[best])})."
+        )
+    yield from _shrinks(found, "the best correction there is")
+
+
+def _beside(which: Which, what: str) -> Iterator[str]:
+    """Say what lies beside a cause, where it is likely."""
+    rest = which.remainder
+    if rest is None or not known(rest.probability) or rest.probability < 0.5:
+        return
+    yield (
+        f"Beside {what} lies something that is not in the library "
+        f"({percent(rest.probability)}): {percent_span(rest.share)} of the gap."
+    )
+
+
+def _with_chance(which: Which, name: str) -> str:
+    chance = which.inclusion.get(name, which.probabilities.get(name))
+    return f"{hypothesis(name)} ({percent(chance)})"
+
+
+def _shrinks(found: VerdictAnswer, what: str) -> Iterator[str]:
+    shrink = found.shrink
+    closed = shrink.closed
+    if closed is None or not known(closed.median):
+        return
+    if closed.median <= 0.0:
+        yield f"Adding {what} does not shrink the gap on {held_out(shrink)}."
+        return
+    share = percent_span(closed)
+    yield f"Adding {what} removes {share} of the gap on {held_out(shrink)}."
+
+
+def held_out(shrink: Closure) -> str:
+    """Return what the correction was tried on, such as half-cycles not fitted to."""
+    name = shrink.held_out
+    one = name.removeprefix("leave-one-").removesuffix("-out")
+    if not one or one == name:
+        return "readings that it was not fitted to"
+    many = f"{one.replace('_', ' ')}{'es' if one.endswith('ch') else 's'}"
+    return f"{many} that it was not fitted to"

@@ -1,0 +1,74 @@
+"""How much of a cause is said: the effect, its group, or only what is seen.
+
+Probabilities compare hypotheses with each other. A level asks for more than that, and
+what fails one is said on the next: nothing here moves a probability.
+"""
+
+from collections.abc import Container, Mapping
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.diagnosis.adequacy import leaves_more_than_noise
+from hdcal.diagnosis.detection import Detection
+from hdcal.diagnosis.groups import LeadingGroup, identified
+from hdcal.diagnosis.model_posterior import CARRIES, NAMED
+from hdcal.diagnosis.verdict import VerdictWord
+from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
+from hdcal.evidence.remainder_evidence import closed_by
+from hdcal.physics.effect import Effect
+
+Pairs = tuple[tuple[str, str], ...]
+
+
+def doubted(
+    evidence: CaseEvidence, found: Detection, case: Case, rng: np.random.Generator
+) -> bool:
+    """Tell whether the likeliest hypothesis leaves more than noise."""
+    top, correlation = found.posterior.top, found.correlation
+    return found.detected and leaves_more_than_noise(
+        evidence, top, case, correlation, rng
+    )
+
+
+def verdict_word(
+    evidence: CaseEvidence,
+    found: Detection,
+    library: Mapping[str, type[Effect]],
+    group: LeadingGroup | None,
+    inseparable: Pairs,
+    *,
+    doubt: bool,
+) -> VerdictWord:
+    """Return the verdict in one word: as much as the data carry.
+
+    Args:
+        evidence: of the case.
+        found: whether there is a gap, and the posterior over hypotheses.
+        library: effects by name.
+        group: the most probable one.
+        inseparable: pairs of effects that this loading can never tell apart.
+        doubt: the likeliest hypothesis leaves more than noise.
+    """
+    posterior = found.posterior
+    if not found.detected or posterior.probabilities[NONE] >= 0.5:
+        return "none"
+    if posterior.top == UNKNOWN:
+        return "unknown"
+    inclusion = posterior.inclusion
+    best = max(inclusion, key=lambda name: inclusion[name])
+    sure = {name for name, chance in inclusion.items() if chance >= NAMED}
+
+    def carry(names: Container[str]) -> bool:
+        return closed_by(evidence, posterior.top.split("+"), names) >= CARRIES
+
+    # A rival that this loading can never exclude is not excluded by a name.
+    rival = any(best in pair for pair in inseparable)
+    alone = identified(posterior, library, best) >= NAMED
+    if alone and not rival and not doubt and carry(sure):
+        return "named"
+    if group is None or group.probability < NAMED:
+        return "ambiguous"
+    # Noise that leaves more than noise is none.
+    hollow = doubt and (not sure or best in evidence.on_noise)
+    return "group" if not hollow and carry({*group.members, *sure}) else "ambiguous"

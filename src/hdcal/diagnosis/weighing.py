@@ -1,0 +1,94 @@
+"""From a case to the evidence of every hypothesis: which rows, about which model.
+
+Rows between which nothing can change are one observation. Where neighbours err alike as
+far as the hypotheses can take it, they are such rows: a logger read faster than the rig
+moves, and their means say as much. Slow physics is then no longer taken for noise.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.priors import effect_priors
+from hdcal.diagnosis.model_posterior import ModelPosterior, posterior_of
+from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
+from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
+from hdcal.evidence.remainder_evidence import with_remainders
+from hdcal.evidence.row_means import MOST_ROWS, average_rows
+from hdcal.physics.effect import Effect
+
+# Changes of the stiffness, and of the log of the noise, that move no evidence much.
+_SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
+# Neighbours are averaged while the largest correlation is more probable than not, this
+# many at a time, and no fewer rows than this are left.
+_AT_A_TIME, _FEWEST = 3, 100
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What was weighed.
+
+    Attributes:
+        case: the case, or means of its neighbouring rows.
+        averaged_rows: rows in each mean; 1 is single rows.
+        library: effects that these rows can show.
+        evidence: of every hypothesis.
+        posterior: over them.
+    """
+
+    case: Case
+    averaged_rows: int
+    library: dict[str, type[Effect]]
+    evidence: CaseEvidence
+    posterior: ModelPosterior
+
+
+def weigh(
+    case: Case, library: Mapping[str, type[Effect]], rng: np.random.Generator
+) -> Weighed:
+    """Weigh all hypotheses, on means of rows where single ones say no more.
+
+    Args:
+        case: data and gear.
+        library: effects to consider, by name.
+        rng: of the draws of shares.
+    """
+    rows = len(case.records.force)
+    most = min(rows, MOST_ROWS)
+    while True:
+        averaged, group = average_rows(case, most)
+        # Means say nothing of the noise of single rows.
+        shown = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
+        evidence = _final_evidence(averaged, shown)
+        at_the_end = posterior_of(evidence).correlation[-1] > 0.5
+        most = rows // (_AT_A_TIME * group)
+        if not at_the_end or most < _FEWEST:
+            break
+    evidence = with_remainders(evidence, rng)
+    return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
+
+
+def _final_evidence(case: Case, library: dict[str, type[Effect]]) -> CaseEvidence:
+    """Compare the hypotheses, a second time where a large effect has bent the first.
+
+    Effects act about a stiffness and the base's priors count against a noise: first
+    those of rough fits, which a large effect has biased, then those beside the
+    likeliest hypothesis.
+    """
+    priors = effect_priors(case.gear.full_scale)
+    evidence = compute_evidence(case, library, priors)
+    top = posterior_of(evidence).top
+    names = [name for name in top.split("+") if name in evidence.effects]
+    names += [evidence.likeliest_kernel] if top == UNKNOWN else []
+    prepared = evidence.prepared
+    stiffness, noise_sd = stiffness_and_noise_beside(evidence, names)
+    moved = abs(stiffness / float(prepared.base.stiffness) - 1.0) > _SAME_STIFFNESS
+    noisier = abs(np.log(noise_sd / prepared.noise_sd)) > _SAME_NOISE
+    if stiffness <= 0.0 or noise_sd <= 0.0 or not (moved or noisier):
+        return evidence
+    return compute_evidence(
+        case, library, priors, stiffness=stiffness, noise_sd=noise_sd
+    )
