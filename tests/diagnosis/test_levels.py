@@ -44,7 +44,7 @@ def word(monkeypatch):
             SimpleNamespace(posterior=posterior, detected=detected),
             LIBRARY,
             leading_group(posterior, LIBRARY, alike),
-            alike,
+            rival=bool(alike),
             doubt=doubt,
         )
 

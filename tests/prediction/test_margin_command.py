@@ -206,7 +206,7 @@ def swap_models(folder: Path) -> None:
 
 def other_version(folder: Path) -> None:
     file = folder / "verdict.json"
-    file.write_text(file.read_text().replace("hdcal.verdict/1", "hdcal.verdict/7"))
+    file.write_text(file.read_text().replace("hdcal.verdict/2", "hdcal.verdict/7"))
 
 
 def no_verdict(folder: Path) -> None:

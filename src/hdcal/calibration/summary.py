@@ -48,7 +48,10 @@ def calibration_answer(
         **entries,
         K_by_theory=K_by_theory(posterior),
         K_note=ARTICLE_NOTE,
-        residuals=tuple(ResidualShape(**vars(shape)) for shape in found),
+        residuals=tuple(
+            ResidualShape(each.name, each.p_value, each.size_N, each.words)
+            for each in found
+        ),
         next_steps=steps,
         effects=tuple(effect.name for effect in posterior.effects),
         with_gap=bool(posterior.settings["with_gap"]),

@@ -57,8 +57,19 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
     for group in own[:1]:
         yield f"Against any of these: {group.remedy}."
+    yield from _looks_the_same(which)
     yield from _beside(which, label(which.effect))
     yield from _shrinks(found, label(which.effect))
+
+
+def _looks_the_same(which: Which) -> Iterator[str]:
+    """Say what would look the same and cannot be tested here."""
+    if which.lookalikes:
+        told = [
+            f"{label(each.effect)} (needs {', '.join(each.needs)})"
+            for each in which.lookalikes
+        ]
+        yield f"This loading would not tell it from {', '.join(told)}."
 
 
 def ambiguous(found: VerdictAnswer) -> Iterator[str]:
@@ -67,6 +78,7 @@ def ambiguous(found: VerdictAnswer) -> Iterator[str]:
     yield what_is_seen(found)
     causes = ", ".join(_with_chance(which, name) for name in which.set)
     yield f"The cause cannot be told with this data; it may be {causes}."
+    yield from _looks_the_same(which)
     yield from _shrinks(found, label(which.effect or which.set[0]))
 
 

@@ -18,8 +18,6 @@ from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
 from hdcal.evidence.remainder_evidence import closed_by
 from hdcal.physics.effect import Effect
 
-Pairs = tuple[tuple[str, str], ...]
-
 
 def doubted(
     evidence: CaseEvidence, found: Detection, case: Case, rng: np.random.Generator
@@ -36,8 +34,8 @@ def verdict_word(
     found: Detection,
     library: Mapping[str, type[Effect]],
     group: LeadingGroup | None,
-    inseparable: Pairs,
     *,
+    rival: bool,
     doubt: bool,
 ) -> VerdictWord:
     """Return the verdict in one word: as much as the data carry.
@@ -47,7 +45,7 @@ def verdict_word(
         found: whether there is a gap, and the posterior over hypotheses.
         library: effects by name.
         group: the most probable one.
-        inseparable: pairs of effects that this loading can never tell apart.
+        rival: there is one that this loading can never tell from the likeliest effect.
         doubt: the likeliest hypothesis leaves more than noise.
     """
     posterior = found.posterior
@@ -62,9 +60,8 @@ def verdict_word(
     def carry(names: Container[str]) -> bool:
         return closed_by(evidence, posterior.top.split("+"), names) >= CARRIES
 
-    # A rival that this loading can never exclude is not excluded by a name.
-    rival = any(best in pair for pair in inseparable)
     alone = identified(posterior, library, best) >= NAMED
+    # A rival that this loading can never exclude is not excluded by a name.
     if alone and not rival and not doubt and carry(sure):
         return "named"
     if group is None or group.probability < NAMED:

@@ -75,6 +75,8 @@ class Which:
         groups: probability of each group; an effect may be in two.
         remainder: beside `effect`; None without one.
         doubted: the likeliest hypothesis leaves more than noise.
+        lookalikes: effects that these records cannot show and that would look like
+            `effect` in them.
     """
 
     verdict: VerdictWord
@@ -96,6 +98,7 @@ class Which:
     groups: dict[str, Probability] = field(default_factory=dict)
     remainder: Remainder | None = None
     doubted: bool = False
+    lookalikes: tuple[NotTestable, ...] = ()
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from hdcal.diagnosis.groups import (
     leading_group,
 )
 from hdcal.diagnosis.levels import doubted, verdict_word
+from hdcal.diagnosis.lookalikes import ALIKE, untestable_lookalikes
 from hdcal.diagnosis.model_posterior import (
     NAMED,
     ModelPosterior,
@@ -31,9 +32,6 @@ from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
 
-# Squared correlation, beside the base model, from which two shapes look alike.
-_ALIKE = 0.8
-
 
 def identify_cause(
     evidence: CaseEvidence,
@@ -47,7 +45,9 @@ def identify_cause(
     group = leading_group(posterior, library, alike)
     ranked = sorted(posterior.inclusion, key=lambda n: -posterior.inclusion[n])
     doubt = doubted(evidence, found, case, rng.spawn(1)[0])
-    word = verdict_word(evidence, found, library, group, alike, doubt=doubt)
+    unseen = untestable_lookalikes(evidence, ranked[0], library) if ranked else ()
+    rival = bool(unseen) or any(ranked[0] in pair for pair in alike if ranked)
+    word = verdict_word(evidence, found, library, group, rival=rival, doubt=doubt)
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = ranked[0] if suspected else None
     others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED]
@@ -69,6 +69,7 @@ def identify_cause(
         groups=group_probabilities(posterior, library),
         remainder=_remainder(evidence, posterior, effect),
         doubted=doubt,
+        lookalikes=unseen if suspected else (),
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,
     )
@@ -103,7 +104,7 @@ def inseparable(evidence: CaseEvidence) -> tuple[tuple[str, str], ...]:
         size_a, size_b = np.sum(a**2, axis=1), np.sum(b**2, axis=1)
         share = (a @ b.T) ** 2 / np.maximum(size_a[:, None] * size_b, 1e-300)
         apart = np.minimum(size_a[:, None], size_b) * (1.0 - share)
-        alike = np.min(share) > _ALIKE
+        alike = np.min(share) > ALIKE
         if alike and np.max(apart) < LEAST_SEEN * noise**2:
             pairs.append((one, two))
     return tuple(pairs)

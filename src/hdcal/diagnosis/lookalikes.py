@@ -1,0 +1,52 @@
+"""Effects that these records cannot test and that would look like the leading one."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hdcal.diagnosis.verdict import NotTestable
+from hdcal.evidence.case_evidence import LEAST_SEEN, CaseEvidence
+from hdcal.evidence.hypothesis_design import fitted_curve
+from hdcal.evidence.linear_rows import remove_base
+from hdcal.evidence.piecewise_effect import piecewise_effect
+from hdcal.evidence.subspaces import is_subspace
+from hdcal.physics.effect import Effect
+
+# Squared correlation, beside the base model, from which two shapes look alike.
+ALIKE = 0.8
+
+
+def untestable_lookalikes(
+    evidence: CaseEvidence, effect: str, library: Mapping[str, type[Effect]]
+) -> tuple[NotTestable, ...]:
+    """Return effects that would bend the readings as the leading one does.
+
+    What sets them apart needs another loading, so that no evidence excludes them: a
+    wall that yields is a sensor that saturates until it is unloaded.
+
+    Args:
+        evidence: of the case.
+        effect: that leads.
+        library: effects by name.
+    """
+    if effect not in evidence.single.names:
+        return ()
+    prepared = evidence.prepared
+    rows, noise = prepared.rows, prepared.noise_sd
+    (curve,) = remove_base(rows, fitted_curve(evidence, effect)[None]) * rows.weight
+    size = float(curve @ curve)
+    found = []
+    for name, needs in evidence.not_testable.items():
+        if library[name].stage == "noise" or is_subspace(library[name], prepared):
+            continue
+        shapes = piecewise_effect(library[name], prepared).large
+        left = remove_base(rows, shapes) * rows.weight
+        squares = np.sum(left**2, axis=1)
+        # What leaves nothing beside the base, such as a drift without temperatures.
+        seen = squares > LEAST_SEEN * noise**2
+        if not seen.any():
+            continue
+        alike = float(np.max((left[seen] @ curve) ** 2 / (squares[seen] * size)))
+        if alike > ALIKE and (1.0 - alike) * size < LEAST_SEEN * noise**2:
+            found.append(NotTestable(name, needs))
+    return tuple(found)
