@@ -1,7 +1,12 @@
 """What another loading would be needed to exclude is not excluded by a name."""
 
+from dataclasses import replace
+
+import numpy as np
 from diagnosis_cases import judged, rich, simulated
 from rigs import ramp
+
+from hdcal.physics.registry import EFFECTS
 
 SATURATES = {"force_saturation": {"curvature": 3e-6}}
 
@@ -24,3 +29,34 @@ def test_unloading_tells_them_apart():
     which = judged(simulated(rich(), SATURATES, seed=3)).which
     assert "curve down" in (which.group or "")
     assert not names(which)
+
+
+def rounded(case, step: float):
+    force = step * np.round(np.asarray(case.records.force) / step)
+    return replace(case, records=replace(case.records, force=force))
+
+
+def test_a_coarse_display_does_not_name_what_fine_readings_do_not():
+    which = judged(rounded(simulated(ramp(60), SATURATES, seed=3), 0.5)).which
+    assert which.verdict != "named"
+    assert which.effect != "quantisation"
+
+
+def test_behind_a_coarse_display_the_unknown_stays_unknown():
+    case = simulated(rich(), seed=5)
+    w, t = np.asarray(case.records.deformation), np.asarray(case.records.time)
+    swing = 5.0 * (w / 0.54) * np.sin(2.0 * np.pi * t / (0.37 * t.max()))
+    case = replace(
+        case, records=replace(case.records, force=case.records.force + swing)
+    )
+    names = ("coulomb_friction", "quantisation", "thermal_zero_drift", "hysteresis")
+    library = {name: EFFECTS[name] for name in names}
+    assert judged(case, library=library).which.verdict == "unknown"
+    assert judged(rounded(case, 0.98), library=library).which.verdict == "unknown"
+
+
+def test_a_kink_upwards_is_no_yield():
+    kink = {"contact_onset": {"ratio": 0.3, "onset": 0.3}}
+    which = judged(simulated(ramp(60), kink, seed=3)).which
+    assert which.effect in ("contact_onset", "progressive_stiffening")
+    assert "plastic_yield" not in names(which)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
-from rigs import cycles, make_case
+from rigs import cycles, make_case, make_records, ramp
 
 from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.seen import what_is_seen
@@ -94,3 +94,28 @@ def test_through_zero_nothing_is_called_unloading():
     force = np.asarray(case.records.force) - 195.0 * shift
     moved = replace(case.records, deformation=w - shift, force=force)
     assert "decreases than while" in seen(replace(case, records=moved))[0].statement
+
+
+def test_few_rows_alarm_as_seldom():
+    """Of 200 ramps of six rows, 1 % due: seven or more would come once in 200."""
+    alarms = [bool(seen(simulated(ramp(6), seed=seed))) for seed in range(200)]
+    assert sum(alarms) < 7
+
+
+def test_one_mounting_that_is_off_is_told():
+    records = simulated(cycles(48), seed=3).records
+    run = np.repeat([0, 1, 2], 16)
+    force = np.asarray(records.force) + 4.0 * (run == 1)
+    (first, *_) = seen(make_case(replace(records, force=force, run=run)))
+    assert "the zero of run 1 lies" in first.statement
+    assert "higher than that of the others" in first.statement
+
+
+def test_a_toe_is_told_whether_or_not_it_begins_at_zero():
+    for start in (0.0, 1e-6):
+        w = np.linspace(start, 0.54, 40)
+        force = 195.0 * w + np.where(np.arange(40) < 4, 3.0, 0.0)
+        noise = 0.3 * np.random.default_rng(1).normal(size=40)
+        (first, *_) = seen(make_case(make_records(w, force + noise)))
+        assert "at small deformations" in first.statement
+        assert first.size_N.median < 8.0

@@ -12,6 +12,8 @@ from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
+# Of a screw and of a radius: whatever is read.
+_FACTS = ("screw_error.pitch", "large_deflection.curvature")
 
 # What a prior table may speak of: name -> its unit inside hdcal.
 MODEL_UNITS = {
@@ -98,7 +100,10 @@ def effect_priors(full_scale: FullScale = REFERENCE) -> dict[str, Prior]:
     Args:
         full_scale: of the rig on which the effects act.
     """
-    return {name: full_scale.own(prior) for name, prior in _shipped_effects().items()}
+    return {
+        name: prior if name in _FACTS else full_scale.own(prior)
+        for name, prior in _shipped_effects().items()
+    }
 
 
 @cache

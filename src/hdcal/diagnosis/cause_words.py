@@ -55,8 +55,9 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
-    for group in own[:1]:
-        yield f"Against any of these: {group.remedy}."
+    for group in own:
+        what = "any of these" if len(own) == 1 else f"that {group.meaning}"
+        yield f"Against {what}: {group.remedy}."
     yield from _looks_the_same(which)
     yield from _beside(which, label(which.effect))
     yield from _shrinks(found, label(which.effect))

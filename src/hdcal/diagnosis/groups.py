@@ -1,6 +1,6 @@
 """Which group of causes leads: effects that this loading cannot tell apart."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 from hdcal.diagnosis.model_posterior import ModelPosterior
@@ -8,6 +8,8 @@ from hdcal.physics.effect import Effect
 
 # Members of a group that are this probable within it have a say in what looks alike.
 _PLAUSIBLE = 0.1
+# What is more likely than not.
+_LIKELY = 0.5
 JOINED = " / "
 
 
@@ -57,10 +59,25 @@ def identified(
     return total
 
 
+def ranked_effects(posterior: ModelPosterior, on_noise: Container[str]) -> list[str]:
+    """Return the effects, the most probable first.
+
+    What moves the mean goes before what shapes the noise where it is more likely than
+    not: a coarse display is no cause of a bend.
+    """
+
+    def order(name: str) -> tuple[bool, float]:
+        chance = posterior.inclusion[name]
+        return name in on_noise or chance < _LIKELY, -chance
+
+    return sorted(posterior.inclusion, key=order)
+
+
 def leading_group(
     posterior: ModelPosterior,
     library: Mapping[str, type[Effect]],
     inseparable: tuple[tuple[str, str], ...],
+    on_noise: Container[str] = (),
 ) -> LeadingGroup | None:
     """Return the most probable group, joined by what looks like its likely members.
 
@@ -68,11 +85,18 @@ def leading_group(
         posterior: over hypotheses.
         library: effects by name.
         inseparable: pairs of effects that this loading can never tell apart.
+        on_noise: effects that shape the noise only.
     """
     members = _members(posterior, library)
     if not members:
         return None
-    name = max(members, key=lambda group: _probability(posterior, members[group]))
+    chances = {group: _probability(posterior, own) for group, own in members.items()}
+    moving = {
+        group: chance
+        for group, chance in chances.items()
+        if chance >= _LIKELY and any(n not in on_noise for n in members[group])
+    }
+    name = max(moving or chances, key=lambda group: chances[group])
     own = members[name]
     most = max(posterior.inclusion[effect] for effect in own)
     likely = {n for n in own if posterior.inclusion[n] >= _PLAUSIBLE * most}

@@ -11,7 +11,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.diagnosis.adequacy import leaves_more_than_noise
 from hdcal.diagnosis.detection import Detection
-from hdcal.diagnosis.groups import LeadingGroup, identified
+from hdcal.diagnosis.groups import LeadingGroup, identified, ranked_effects
 from hdcal.diagnosis.model_posterior import CARRIES, NAMED
 from hdcal.diagnosis.verdict import VerdictWord
 from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
@@ -54,7 +54,7 @@ def verdict_word(
     if posterior.top == UNKNOWN:
         return "unknown"
     inclusion = posterior.inclusion
-    best = max(inclusion, key=lambda name: inclusion[name])
+    best = ranked_effects(posterior, evidence.on_noise)[0]
     sure = {name for name, chance in inclusion.items() if chance >= NAMED}
 
     def carry(names: Container[str]) -> bool:

@@ -39,14 +39,18 @@ def untestable_lookalikes(
     for name, needs in evidence.not_testable.items():
         if library[name].stage == "noise" or is_subspace(library[name], prepared):
             continue
-        shapes = piecewise_effect(library[name], prepared).large
-        left = remove_base(rows, shapes) * rows.weight
+        other = piecewise_effect(library[name], prepared)
+        left = remove_base(rows, other.large) * rows.weight
         squares = np.sum(left**2, axis=1)
         # What leaves nothing beside the base, such as a drift without temperatures.
         seen = squares > LEAST_SEEN * noise**2
         if not seen.any():
             continue
-        alike = float(np.max((left[seen] @ curve) ** 2 / (squares[seen] * size)))
+        along = left[seen] @ curve
+        if other.grid.one_sided:
+            # It bends one way only.
+            along = np.maximum(along, 0.0)
+        alike = float(np.max(along**2 / (squares[seen] * size)))
         if alike > ALIKE and (1.0 - alike) * size < LEAST_SEEN * noise**2:
             found.append(NotTestable(name, needs))
     return tuple(found)

@@ -25,7 +25,7 @@ class ModelPosterior:
 
     Attributes:
         probabilities: of each hypothesis; sum to 1.
-        inclusion: of each effect over singles and pairs.
+        inclusion: of each effect over all hypotheses that hold it.
         correlation: posterior over the AR(1) coefficients, shape (r,).
         log_evidence: relative to none [nat].
     """

@@ -47,7 +47,8 @@ class Contrast:
         column: how, shape (n,).
         ways: the words for {way} where the coefficient is positive, and negative.
         words: a statement with {way} and {size}.
-        beside: what it is the swing off a straight line of; None for its own swing.
+        beside: over which it is the swing off a straight line; None for its own.
+        share: of the swing that is told.
     """
 
     covariate: str
@@ -55,6 +56,7 @@ class Contrast:
     ways: tuple[str, str]
     words: str
     beside: np.ndarray | None = None
+    share: float = 1.0
 
     @property
     def swing(self) -> float:
@@ -64,7 +66,7 @@ class Contrast:
             column = column - np.polyval(
                 np.polyfit(self.beside, column, 1), self.beside
             )
-        return float(np.ptp(column))
+        return self.share * float(np.ptp(column))
 
 
 def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
@@ -99,8 +101,8 @@ def _whitened(
     """Bring readings, base and contrasts to noise sds; slope and zero are free."""
     base = prepared.rows.base
     width = base.shape[1]
-    below = np.diag(np.where(np.arange(width) < 2, 0.0, 1.0))
-    nothing = np.zeros(width)
+    below = np.eye(width)[2:]
+    nothing = np.zeros(width - 2)
     return Whitened(
         residual=np.concatenate([sign * prepared.rows.reading / sd, nothing]),
         absorbed=np.vstack([base / sd[:, None], below]),
@@ -129,7 +131,7 @@ def _contrasts(records: Records, case: Case, *, both: bool) -> Iterator[Contrast
     """Yield what records may show; of `both` compression and tension."""
     deformation = np.asarray(records.deformation)
     x = deformation / np.max(np.abs(deformation))
-    yield from _along_the_stroke(x)
+    yield from _along_the_stroke(x, both=both)
     yield Contrast(
         "direction",
         np.asarray(records.sense, float),
@@ -146,26 +148,31 @@ def _contrasts(records: Records, case: Case, *, both: bool) -> Iterator[Contrast
     yield from _of_members(records, case, x)
 
 
-def _along_the_stroke(x: np.ndarray) -> Iterator[Contrast]:
-    side, depth = np.sign(x), np.abs(x)
+def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
+    side, depth = np.sign(x) if both else np.ones_like(x), np.abs(x)
+    # Through zero a curve swings to both sides; what is told is that of one.
+    share = 0.5 if both else 1.0
     yield Contrast(
         "deformation",
         side * depth**2,
         ("stiffens", "softens"),
         "the curve {way} with the deformation, {size} off a straight line",
         beside=x,
+        share=share,
     )
     yield Contrast(
         "deformation",
         side * np.maximum(_TOE - depth, 0.0),
         ("high", "low"),
         "at small deformations the force lies {size} too {way}",
+        share=share,
     )
     yield Contrast(
         "deformation",
         side * np.maximum(depth - _HEAD, 0.0),
         ("up", "down"),
         "at the largest deformations the force turns {way} by {size}",
+        share=share,
     )
 
 
@@ -175,24 +182,28 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         np.asarray(records.rate),
         ("more", "less"),
         "a faster movement takes {way} force, by {size} over the speeds tested",
+        beside=x,
     )
     yield Contrast(
         "time",
         _held(records),
         ("rises", "falls"),
         "while the deformation is held the force {way} by {size}",
+        beside=x,
     )
     yield Contrast(
         "time",
         np.asarray(records.time),
         ("up", "down"),
         "the force drifts {way} by {size} within a run",
+        beside=x,
     )
     yield Contrast(
         "order",
         np.linspace(0.0, 1.0, len(x)),
         ("rises", "falls"),
         "from the first reading to the last the force {way} by {size}",
+        beside=x,
     )
     yield Contrast(
         "order",
@@ -219,6 +230,7 @@ def _over_temperature(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         warm,
         ("rises", "falls"),
         "the zero {way} with temperature, by {size} over the range tested",
+        beside=x,
     )
     yield Contrast(
         "temperature",
@@ -246,6 +258,14 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             (np.asarray(records.run) >= k).astype(float),
             ("up", "down"),
             f"the zero steps {{way}} by {{size}} from run {runs[k - 1]} to {runs[k]}",
+        )
+    # The first and the last against the others are steps.
+    for k in range(1, len(runs) - 1 if len(runs) <= _MOST_MEMBERS else 0):
+        yield Contrast(
+            "run",
+            (np.asarray(records.run) == k).astype(float),
+            ("higher", "lower"),
+            f"the zero of run {runs[k]} lies {{size}} {{way}} than that of the others",
         )
     for k in range(len(gears) if 1 < len(gears) <= _MOST_MEMBERS else 0):
         yield Contrast(

@@ -60,7 +60,7 @@ class Which:
         second_effect: another with inclusion of 90 % or more.
         set: effects of the smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; sum to 1.
-        inclusion: of each effect over singles and pairs.
+        inclusion: of each effect over all hypotheses that hold it.
         log_evidence: of each hypothesis, relative to none [nat].
         amplitude: of `effect`; None without one.
         not_testable: effects that these records cannot show.

@@ -64,7 +64,7 @@ def weigh(
         shown = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
         evidence = _final_evidence(averaged, shown)
         at_the_end = posterior_of(evidence).correlation[-1] > 0.5
-        most = rows // (_AT_A_TIME * group)
+        most = -(-rows // (_AT_A_TIME * group))
         if not at_the_end or most < _FEWEST:
             break
     evidence = with_remainders(evidence, rng)

@@ -10,10 +10,12 @@ from hdcal.diagnosis.detection import Detection
 from hdcal.diagnosis.groups import (
     group_probabilities,
     leading_group,
+    ranked_effects,
 )
 from hdcal.diagnosis.levels import doubted, verdict_word
 from hdcal.diagnosis.lookalikes import ALIKE, untestable_lookalikes
 from hdcal.diagnosis.model_posterior import (
+    CARRIES,
     NAMED,
     ModelPosterior,
     carried,
@@ -42,11 +44,13 @@ def identify_cause(
 ) -> Which:
     """Return the verdict on the cause."""
     posterior, alike = found.posterior, inseparable(evidence)
-    group = leading_group(posterior, library, alike)
-    ranked = sorted(posterior.inclusion, key=lambda n: -posterior.inclusion[n])
+    noise = evidence.on_noise
+    group = leading_group(posterior, library, alike, noise)
+    ranked = ranked_effects(posterior, noise)
     doubt = doubted(evidence, found, case, rng.spawn(1)[0])
     unseen = untestable_lookalikes(evidence, ranked[0], library) if ranked else ()
-    rival = bool(unseen) or any(ranked[0] in pair for pair in alike if ranked)
+    named = {n for n in ranked[:2] if posterior.inclusion[n] >= NAMED}
+    rival = bool(unseen) or any(named & {*pair} for pair in alike)
     word = verdict_word(evidence, found, library, group, rival=rival, doubt=doubt)
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = ranked[0] if suspected else None
@@ -79,10 +83,12 @@ def _remainder(
     evidence: CaseEvidence, posterior: ModelPosterior, effect: str | None
 ) -> Remainder | None:
     """Return what lies beside the leading effect; None without one."""
-    if effect not in evidence.closed:
+    closed = evidence.closed.get(effect or "", np.zeros(0))
+    closed = closed[closed >= CARRIES]
+    if effect is None or not len(closed):
         return None
     chance = posterior.probabilities[with_remainder(effect)]
-    share = interval(1.0 - evidence.closed[effect])
+    share = interval(1.0 - closed)
     return Remainder(chance / max(posterior.inclusion[effect], chance, 1e-300), share)
 
 
@@ -98,11 +104,16 @@ def inseparable(evidence: CaseEvidence) -> tuple[tuple[str, str], ...]:
         for each in evidence.piecewise
         if each.name in evidence.table
     }
+    sided = {each.name for each in evidence.piecewise if each.grid.one_sided}
     pairs = []
     for one, two in combinations(left, 2):
         a, b = left[one], left[two]
+        along = a @ b.T
+        if {one, two} <= sided:
+            # Both bend one way only.
+            along = np.maximum(along, 0.0)
         size_a, size_b = np.sum(a**2, axis=1), np.sum(b**2, axis=1)
-        share = (a @ b.T) ** 2 / np.maximum(size_a[:, None] * size_b, 1e-300)
+        share = along**2 / np.maximum(size_a[:, None] * size_b, 1e-300)
         apart = np.minimum(size_a[:, None], size_b) * (1.0 - share)
         alike = np.min(share) > ALIKE
         if alike and np.max(apart) < LEAST_SEEN * noise**2:

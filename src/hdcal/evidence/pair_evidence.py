@@ -6,7 +6,14 @@ from itertools import combinations
 
 import numpy as np
 
-from hdcal.evidence.case_evidence import NONE, QUANTISATION, CaseEvidence, pair_name
+from hdcal.evidence.case_evidence import (
+    NONE,
+    QUANTISATION,
+    UNKNOWN,
+    CaseEvidence,
+    pair_name,
+    with_remainder,
+)
 from hdcal.evidence.closed_form import subspace_evidence
 from hdcal.evidence.hypothesis_design import fitted_curve
 from hdcal.evidence.inner_products import subspace_products
@@ -41,6 +48,7 @@ def pair_evidence(
         gain = table[QUANTISATION] - table[NONE]
         others = [*mean, *evidence.noise]
         pairs |= {pair_name(QUANTISATION, n): table[n] + gain for n in others}
+        pairs[with_remainder(QUANTISATION)] = table[UNKNOWN] + gain
     return pairs
 
 

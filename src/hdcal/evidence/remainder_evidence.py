@@ -47,23 +47,25 @@ def with_remainders(evidence: CaseEvidence, rng: np.random.Generator) -> CaseEvi
     on_mean.sort(key=lambda name: -np.logaddexp.reduce(table[name]))
     for name in on_mean[:_MOST]:
         beside = beside_effects(evidence, [name])
-        gain, kernels = _gain(evidence, beside)
-        closed[name] = _shares(evidence, beside, kernels, rng)
+        gain, kernels, counts = _gain(evidence, beside)
+        closed[name] = _shares(evidence, beside, kernels, counts, rng)
         every[with_remainder(name)] = table[name] + gain
     # An effect on the noise carries nothing of a gap in the mean.
+    closed |= {name: np.zeros(_DRAWS) for name in evidence.on_noise}
     for name, effect in evidence.noise.items():
-        gain, _ = _gain(
+        gain, _, _ = _gain(
             evidence, with_relative_noise(evidence.prepared, effect.relative_sd)
         )
-        closed[name] = np.zeros(_DRAWS)
         every[with_remainder(name)] = table[name] + gain
     return replace(evidence, table=table | every, closed=closed)
 
 
 def _gain(
     evidence: CaseEvidence, case: PreparedCase
-) -> tuple[np.ndarray, SubspaceEvidence]:
+) -> tuple[np.ndarray, SubspaceEvidence, dict[str, float]]:
     """Return log evidence of unknown structure less that without, [correlation].
+
+    And the kernels, with the log of the number that each was chosen from.
 
     Args:
         evidence: for the kernels that its rows can show.
@@ -87,7 +89,7 @@ def _gain(
     own = {name: counts.get(name, 0.0) for name in kernels}
     gain = np.full(len(every), -np.inf)
     gain[likely] = unknown_evidence(found, own, none) - none
-    return gain - np.log(weight[likely].sum()), found
+    return gain - np.log(weight[likely].sum()), found, own
 
 
 def beside_effects(evidence: CaseEvidence, names: Sequence[str]) -> PreparedCase:
@@ -138,6 +140,7 @@ def _shares(
     evidence: CaseEvidence,
     beside: PreparedCase,
     kernels: SubspaceEvidence,
+    log_counts: dict[str, float],
     rng: np.random.Generator,
 ) -> np.ndarray:
     """Return draws of the share of the visible gap that an effect closes, (d,).
@@ -146,6 +149,7 @@ def _shares(
     """
     own, rows = evidence.prepared, beside.rows
     whole = np.logaddexp.reduce(kernels.log_evidence, axis=(0, 2))
+    whole -= np.array([log_counts[name] for name in kernels.names])
     best = kernels.names[int(np.argmax(whole))]
     columns = kernels.columns[kernels.of(best)[0]]
     columns = columns[np.any(columns != 0.0, axis=1)]
