@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hdcal.diagnosis import levels
-from hdcal.diagnosis.groups import group_probabilities, leading_group
+from hdcal.diagnosis.groups import group_probabilities, leading_group, ranked_effects
 from hdcal.diagnosis.model_posterior import ModelPosterior
 
 LIBRARY = {
@@ -43,6 +43,7 @@ def word(monkeypatch):
             SimpleNamespace(on_noise=("wild",)),
             SimpleNamespace(posterior=posterior, detected=detected),
             LIBRARY,
+            ranked_effects(posterior, ("wild",))[0],
             leading_group(posterior, LIBRARY, alike),
             rival=bool(alike),
             doubt=doubt,

@@ -9,12 +9,8 @@ from posteriors import batch, single
 
 import hdcal
 from hdcal.prediction.margin.budget_words import stated_words
-from hdcal.prediction.margin.sentences import (
-    answer,
-    chance,
-    headline,
-    newtons_down,
-)
+from hdcal.prediction.margin.number_words import chance, newtons_down
+from hdcal.prediction.margin.sentences import answer, headline
 
 
 @pytest.fixture(scope="module")

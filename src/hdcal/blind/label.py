@@ -81,7 +81,7 @@ class CaseAnswer:
         second_effect: another that is present beside it.
         set: smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; they sum to 1.
-        inclusion: of each effect over singles and pairs.
+        inclusion: of each effect over all hypotheses that hold it.
         detected: whether the residual test found a gap.
         p_value: of the residual test.
         gap: RMS of the gap, quantiles .5, .05, .95 [N].

@@ -4,10 +4,11 @@ from collections.abc import Iterator
 
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.groups import JOINED
-from hdcal.diagnosis.seen_words import capital, what_is_seen
-from hdcal.diagnosis.verdict import Closure, Which
+from hdcal.diagnosis.seen_words import what_is_seen
+from hdcal.diagnosis.verdict import Closure, NotTestable, Which
 from hdcal.physics.groups import GROUPS
 from hdcal.report.words import (
+    capital,
     estimate,
     hypothesis,
     known,
@@ -66,11 +67,13 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
 def _looks_the_same(which: Which) -> Iterator[str]:
     """Say what would look the same and cannot be tested here."""
     if which.lookalikes:
-        told = [
-            f"{label(each.effect)} (needs {', '.join(each.needs)})"
-            for each in which.lookalikes
-        ]
-        yield f"This loading would not tell it from {', '.join(told)}."
+        told = ", ".join(map(with_needs, which.lookalikes))
+        yield f"This loading would not tell it from {told}."
+
+
+def with_needs(untestable: NotTestable) -> str:
+    """Return an effect with what it would need to be tested."""
+    return f"{label(untestable.effect)} (needs {', '.join(untestable.needs)})"
 
 
 def ambiguous(found: VerdictAnswer) -> Iterator[str]:

@@ -6,12 +6,8 @@ what fails one is said on the next: nothing here moves a probability.
 
 from collections.abc import Container, Mapping
 
-import numpy as np
-
-from hdcal.data.case import Case
-from hdcal.diagnosis.adequacy import leaves_more_than_noise
 from hdcal.diagnosis.detection import Detection
-from hdcal.diagnosis.groups import LeadingGroup, identified, ranked_effects
+from hdcal.diagnosis.groups import LeadingGroup, identified
 from hdcal.diagnosis.model_posterior import CARRIES, NAMED
 from hdcal.diagnosis.verdict import VerdictWord
 from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
@@ -19,20 +15,11 @@ from hdcal.evidence.remainder_evidence import closed_by
 from hdcal.physics.effect import Effect
 
 
-def doubted(
-    evidence: CaseEvidence, found: Detection, case: Case, rng: np.random.Generator
-) -> bool:
-    """Tell whether the likeliest hypothesis leaves more than noise."""
-    top, correlation = found.posterior.top, found.correlation
-    return found.detected and leaves_more_than_noise(
-        evidence, top, case, correlation, rng
-    )
-
-
 def verdict_word(
     evidence: CaseEvidence,
     found: Detection,
     library: Mapping[str, type[Effect]],
+    best: str,
     group: LeadingGroup | None,
     *,
     rival: bool,
@@ -44,6 +31,7 @@ def verdict_word(
         evidence: of the case.
         found: whether there is a gap, and the posterior over hypotheses.
         library: effects by name.
+        best: the effect that leads.
         group: the most probable one.
         rival: there is one that this loading can never tell from the likeliest effect.
         doubt: the likeliest hypothesis leaves more than noise.
@@ -54,7 +42,6 @@ def verdict_word(
     if posterior.top == UNKNOWN:
         return "unknown"
     inclusion = posterior.inclusion
-    best = ranked_effects(posterior, evidence.on_noise)[0]
     sure = {name for name, chance in inclusion.items() if chance >= NAMED}
 
     def carry(names: Container[str]) -> bool:

@@ -139,7 +139,7 @@ def carried(evidence: CaseEvidence) -> dict[str, float]:
 
 
 def _inclusion(share: Mapping[str, float], effects: Iterable[str]) -> dict[str, float]:
-    """Return the probability of each effect over singles and pairs."""
+    """Return the probability of each effect over all hypotheses that hold it."""
     return {
         effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
         for effect in effects

@@ -147,8 +147,8 @@ def which_section(found: VerdictAnswer) -> Section:
     rest = f"{others} less probable ones are in verdict.json. " if others > 0 else ""
     note = (
         f"Bold: the fewest that make up 90 %. {rest}An effect stands here alone; the "
-        "answer's percentage counts its pairs too. Log evidence in nats: three are a "
-        "factor of twenty."
+        "answer's percentage counts all that hold it. Log evidence in nats: three are "
+        "a factor of twenty."
     )
     caption = (
         "Every hypothesis was weighed against the same data. “Something outside the "

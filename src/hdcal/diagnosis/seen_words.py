@@ -2,7 +2,7 @@
 
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.places import places
-from hdcal.report.words import known, newton, or_zero
+from hdcal.report.words import capital, known, newton, or_zero
 
 # Things seen that the answer tells; the report has all.
 _MOST_SEEN = 3
@@ -62,8 +62,3 @@ def p_words(value: float | None) -> str:
     if not known(value):
         return "–"
     return "below 0.001" if value < 0.001 else f"{value:.2g}"
-
-
-def capital(text: str) -> str:
-    """Return a sentence that begins with a capital."""
-    return text[:1].upper() + text[1:]

@@ -5,6 +5,7 @@ from itertools import combinations, starmap
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.diagnosis.adequacy import leaves_more_than_noise
 from hdcal.diagnosis.amplitude import amplitude_of
 from hdcal.diagnosis.detection import Detection
 from hdcal.diagnosis.groups import (
@@ -12,7 +13,7 @@ from hdcal.diagnosis.groups import (
     leading_group,
     ranked_effects,
 )
-from hdcal.diagnosis.levels import doubted, verdict_word
+from hdcal.diagnosis.levels import verdict_word
 from hdcal.diagnosis.lookalikes import ALIKE, untestable_lookalikes
 from hdcal.diagnosis.model_posterior import (
     CARRIES,
@@ -47,14 +48,17 @@ def identify_cause(
     noise = evidence.on_noise
     group = leading_group(posterior, library, alike, noise)
     ranked = ranked_effects(posterior, noise)
-    doubt = doubted(evidence, found, case, rng.spawn(1)[0])
-    unseen = untestable_lookalikes(evidence, ranked[0], library) if ranked else ()
-    named = {n for n in ranked[:2] if posterior.inclusion[n] >= NAMED}
-    rival = bool(unseen) or any(named & {*pair} for pair in alike)
-    word = verdict_word(evidence, found, library, group, rival=rival, doubt=doubt)
-    suspected = word in ("named", "group", "ambiguous") and bool(ranked)
-    effect = ranked[0] if suspected else None
+    doubt = found.detected and leaves_more_than_noise(
+        evidence, posterior.top, case, found.correlation, rng.spawn(1)[0]
+    )
+    best = ranked[0] if ranked else ""
+    unseen = untestable_lookalikes(evidence, best, library)
     others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED]
+    said = {best, *others[:1]}
+    rival = bool(unseen) or any(said & {*pair} for pair in alike)
+    word = verdict_word(evidence, found, library, best, group, rival=rival, doubt=doubt)
+    suspected = word in ("named", "group", "ambiguous") and bool(ranked)
+    effect = best if suspected else None
     return Which(
         verdict=word,
         effect=effect,

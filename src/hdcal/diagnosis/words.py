@@ -4,7 +4,13 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from hdcal.diagnosis.answer import VerdictAnswer
-from hdcal.diagnosis.cause_words import ambiguous, group_of_causes, named, unknown
+from hdcal.diagnosis.cause_words import (
+    ambiguous,
+    group_of_causes,
+    named,
+    unknown,
+    with_needs,
+)
 from hdcal.diagnosis.seen_words import p_words
 from hdcal.diagnosis.verdict import Which
 from hdcal.report.words import (
@@ -88,11 +94,8 @@ def limits(found: VerdictAnswer) -> list[str]:
 
 def _blind(which: Which) -> Iterator[str]:
     if which.not_testable:
-        lacking = [
-            f"{label(item.effect)} (needs {', '.join(item.needs)})"
-            for item in which.not_testable
-        ]
-        yield f"Not testable with this data: {'; '.join(lacking)}."
+        lacking = "; ".join(map(with_needs, which.not_testable))
+        yield f"Not testable with this data: {lacking}."
     if which.not_excited:
         names = ", ".join(map(label, which.not_excited))
         yield f"Too small to show in this program at a physical size: {names}."

@@ -17,7 +17,7 @@ QUANTISATION = "quantisation"
 # Squared length in noise sds below which an effect of large physical size is unseen.
 LEAST_SEEN = 6.0
 # Correlations of less weight than this take no part in what is costly.
-LEAST_WEIGHT = 0.02
+_LEAST_WEIGHT = 0.02
 
 
 @dataclass(frozen=True)
@@ -77,15 +77,14 @@ class CaseEvidence:
 
     @property
     def likeliest_correlation(self) -> float:
-        """AR(1) coefficient that the hypotheses together make most probable."""
-        whole = np.stack(list(self.table.values()))
-        index = int(np.argmax(np.logaddexp.reduce(whole, axis=0)))
+        """The most probable AR(1) coefficient."""
+        index = int(np.argmax(self.weight_of_correlations))
         return float(self.prepared.rows.correlations[index])
 
     @property
     def likely_correlations(self) -> np.ndarray:
         """Indices of the AR(1) coefficients that are not next to impossible."""
-        return np.flatnonzero(self.weight_of_correlations >= LEAST_WEIGHT)
+        return np.flatnonzero(self.weight_of_correlations >= _LEAST_WEIGHT)
 
     @property
     def weight_of_correlations(self) -> np.ndarray:

@@ -157,8 +157,7 @@ def _shares(
     scale = np.full(count, kernels.likeliest(best)[1])
     nothing = np.zeros(len(rows.reading))
     design = DesignMatrix(nothing, columns, np.zeros(count), scale, {})
-    joined = join_designs([design], len(nothing))
-    fit = fit_design(rows, joined, own.noise_sd, evidence.likeliest_correlation)
+    fit = fit_design(rows, design, own.noise_sd, evidence.likeliest_correlation)
     draws = rng.multivariate_normal(
         fit.mean, fit.covariance, _DRAWS, check_valid="ignore", method="eigh"
     )

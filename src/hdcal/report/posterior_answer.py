@@ -15,6 +15,7 @@ from hdcal.report.parameters import (
     credible_interval,
     parameter_estimates,
 )
+from hdcal.report.words import capital
 
 _OneOrMore = Annotated[int, Promise(minimum=1)]
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
@@ -129,9 +130,7 @@ def _failed(posterior: Posterior) -> str:
 def _warnings(posterior: Posterior) -> tuple[str, ...]:
     """Return the warnings of the checks as sentences."""
     return tuple(
-        check.words[:1].upper() + check.words[1:]
-        for check in posterior.checks
-        if check.outcome == "warning"
+        capital(check.words) for check in posterior.checks if check.outcome == "warning"
     )
 
 

@@ -123,7 +123,12 @@ def with_labels(sentences: Sequence[str], names: Iterable[str]) -> list[str]:
     longest = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
     name = re.compile(rf"(?<![\w./])(?:{longest})(?![\w.]\w|\w)")
     told = (name.sub(lambda found: label(found[0]), words) for words in sentences)
-    return [words[:1].upper() + words[1:] for words in told]
+    return [capital(words) for words in told]
+
+
+def capital(text: str) -> str:
+    """Return a sentence with its first letter capital, the others as they are."""
+    return text[:1].upper() + text[1:]
 
 
 _HYPOTHESES = {"none": "no gap", "unknown": "something outside the library"}

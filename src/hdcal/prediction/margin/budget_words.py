@@ -5,12 +5,8 @@ import numpy as np
 from hdcal.prediction.budget.linear import LinearCheck, coverage_factor
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component
-from hdcal.prediction.margin.sentences import (
-    chance,
-    input_label,
-    newtons,
-    newtons_down,
-)
+from hdcal.prediction.margin.number_words import chance, newtons, newtons_down
+from hdcal.prediction.margin.sentences import input_label
 from hdcal.prediction.margin.stated import (
     BudgetCheck,
     Rule,

@@ -9,11 +9,11 @@ from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED
 from hdcal.prediction.margin.budget_words import stated_words
 from hdcal.prediction.margin.document import budget_table
-from hdcal.prediction.margin.sentences import capital, measurand
+from hdcal.prediction.margin.sentences import measurand
 from hdcal.report.document import Block, Document, Facts, Section, Sentences, Text
 from hdcal.report.html import html_page
 from hdcal.report.provenance import data_rows, gear_rows
-from hdcal.report.words import hypothesis
+from hdcal.report.words import capital, hypothesis
 
 FILE, TEMPLATE = "certificate.html", "certificate.html.j2"
 _UNTESTED = "What was not tested, and what the result rests on"

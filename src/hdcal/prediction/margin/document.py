@@ -5,19 +5,16 @@ from dataclasses import replace
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget_words import coverage_words, stated_words
+from hdcal.prediction.margin.number_words import chance, index, newtons
 from hdcal.prediction.margin.result import Level, Margin
 from hdcal.prediction.margin.sentences import (
     answer,
     bound_name,
-    capital,
-    chance,
     headline,
     in_tension,
-    index,
     input_label,
     larger_bound,
     measurand,
-    newtons,
     next_steps,
 )
 from hdcal.prediction.margin.temperatures import shown_levels
@@ -32,7 +29,7 @@ from hdcal.report.document import (
 )
 from hdcal.report.parameters import Interval
 from hdcal.report.provenance import gear_rows
-from hdcal.report.words import estimate, hypothesis, number
+from hdcal.report.words import capital, estimate, hypothesis, number
 
 # A component with less of the variance than this is not shown by itself.
 _SMALL = 1e-3

@@ -1,8 +1,14 @@
 """A margin in sentences that need no statistics to be understood."""
 
-import math
 from collections.abc import Iterator
 
+from hdcal.prediction.margin.number_words import (
+    NEARLY_ALL,
+    RAREST,
+    chance,
+    index,
+    newtons,
+)
 from hdcal.prediction.margin.result import (
     FAR,
     Exceedance,
@@ -32,10 +38,6 @@ _INPUTS = {
     "E0_GPa": "Young's modulus E₀",
     "K": "influence coefficient K",
 }
-# Rarer than this nobody can say; the words then say so.
-_RAREST = 1e-12
-# A share from here on is as good as all.
-_NEARLY_ALL = 0.999
 
 
 def member_word(found: Margin) -> str:
@@ -59,26 +61,6 @@ def input_label(name: str) -> str:
 def bound_name(found: Margin) -> str:
     """Return content and confidence as people write them: 99/95."""
     return f"{100.0 * found.content:.6g}/{100.0 * found.confidence:.6g}"
-
-
-def chance(probability: float) -> str:
-    """Return a probability; never one that nobody can know."""
-    if probability < _RAREST:
-        return f"less than {_RAREST:.0e}"
-    if probability > _NEARLY_ALL:
-        return "more than 99.9 %"
-    if probability > 0.9:
-        return f"{100.0 * probability:.1f} %"
-    if probability >= 0.001:
-        return f"{100.0 * probability:.2g} %"
-    return f"{probability:.1e}"
-
-
-def index(beta: float) -> str:
-    """Return a reliability index; beyond ± 7 no probability can be known."""
-    if beta > 7.0:
-        return "above 7"
-    return "below −7" if beta < -7.0 else f"{beta:.2f}"
 
 
 def in_tension(found: Margin) -> str:
@@ -137,21 +119,6 @@ def _where(found: Margin) -> str:
     return f"over {min(warm):g} … {max(warm):g} °C"
 
 
-def newtons(value: float) -> str:
-    """Return a force to four digits."""
-    return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
-
-
-def newtons_down(value: float) -> str:
-    """Return a force to the same digits, never more than it."""
-    if value == 0.0:
-        return newtons(value)
-    last = 0.1
-    if not 10.0 <= abs(value) < 1e4:
-        last = 10.0 ** (math.floor(math.log10(abs(value))) - 3.0)
-    return newtons(last * math.floor(value / last + 1e-9))
-
-
 def _at_most(found: Margin, of: Level | ModelBound) -> str:
     """Return the size of the force that most do not need more than."""
     return newtons(sizes_needed(of, found.loading_sense)[1]) + in_tension(found)
@@ -186,11 +153,6 @@ def _force(found: Margin) -> Iterator[str]:
 
 def _lower(text: str) -> str:
     return text[:1].lower() + text[1:]
-
-
-def capital(text: str) -> str:
-    """Return a sentence with its first letter capital."""
-    return text[:1].upper() + text[1:]
 
 
 def _capacity(found: Margin) -> Iterator[str]:
@@ -233,7 +195,7 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     more = f"more than {found.limit_force_N:g} N{in_tension(found)}"
     one = f"One future {member_word(found)} needs {more}"
     sure = _percent(found.confidence)
-    if max(risk.hi, risk.probability) < _RAREST:
+    if max(risk.hi, risk.probability) < RAREST:
         rarest = chance(risk.probability)
         yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
         if risk.rests_on:
@@ -241,17 +203,17 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
         return
     low, high = chance(risk.lo), chance(risk.hi)
     span = f"is {high}" if low == high else f"lies between {low} and {high}"
-    if risk.lo < _RAREST <= risk.hi:
+    if risk.lo < RAREST <= risk.hi:
         span = f"is at most {high}"
     most = chance(risk.at_confidence)
-    most = most if risk.at_confidence < _RAREST else f"below {most}"
+    most = most if risk.at_confidence < RAREST else f"below {most}"
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
         f"β = {index(risk.beta)}. The share of {_many(found)} that do {span} "
         "(95 % credible interval); "
         + (
             f"with {sure} confidence it is {most}, β {index(risk.beta_at_confidence)}."
-            if risk.at_confidence < _NEARLY_ALL
+            if risk.at_confidence < NEARLY_ALL
             else f"at {sure} confidence it may be all of them."
         )
     )
