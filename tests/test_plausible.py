@@ -61,12 +61,14 @@ def gear_key(key: str, value, folder: Path) -> None:
     read_gear(folder / "gear.toml")
 
 
-def prior(key: str, value, folder: Path, family="fixed", size="value", rest="") -> None:
+def prior(
+    key: str, value, folder: Path, family="fixed", size="value", rest="", gear=""
+) -> None:
     """Read a gear file with one such prior."""
     name = key.rpartition(".")[2]
     unit = f', unit = "{UNITS[name]}"' if name in UNITS else ""
     entry = f'{key} = {{ family = "{family}", {size} = {value!r}{rest}{unit} }}'
-    (folder / "gear.toml").write_text(f"{GEAR}[priors]\n{entry}\n")
+    (folder / "gear.toml").write_text(f"{GEAR}{gear}[priors]\n{entry}\n")
     read_gear(folder / "gear.toml")
 
 
@@ -104,6 +106,8 @@ def read_entries() -> Iterator[tuple[str, str, Callable]]:
     ):
         place = f"priors.{name}.value"
         yield NAMES.get(name, name), place, partial(prior, name)
+    spring = partial(prior, "K", gear='theory = "spring"\n')
+    yield "spring_stiffness", "priors.K.value", spring
     effect = "seating_slack.clearance"
     yield "effect", f"priors.{effect}.value", partial(prior, effect)
     spread = {"family": "lognormal", "size": "log_sd", "rest": ", median = 2.0"}

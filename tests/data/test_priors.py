@@ -7,6 +7,7 @@ from hdcal.data.prior import FAMILIES
 from hdcal.data.priors import (
     MODEL_UNITS,
     SCALE_UNITS,
+    SPRING_UNITS,
     effect_priors,
     material_names,
     material_priors,
@@ -42,7 +43,8 @@ def test_a_material_is_plausible(name):
 
 def test_the_rig():
     found = rig_priors()
-    assert set(found) == set(MODEL_UNITS | SCALE_UNITS) - {"E0", "alpha"}
+    shipped = MODEL_UNITS | SCALE_UNITS | SPRING_UNITS
+    assert set(found) == set(shipped) - {"E0", "alpha"}
     assert found["K"].numbers == (2.0, 0.46)
     assert all(prior.source for prior in found.values())
 

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from hdcal.data.theory_names import Theory
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.report.answer import Promise, Sentences, Words
 from hdcal.report.parameters import Interval, ParameterEstimate
 from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
+_SIZED = [name for name in get_args(Theory) if name != SPRING]
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,7 @@ class CalibrationAnswer(PosteriorAnswer):
     """What `hdcal calibrate` answers; summary.json.
 
     Attributes:
-        K_by_theory: the one posterior seen through every formula.
+        K_by_theory: the one posterior seen through every formula; None of a spring.
         K_note: what to think of K under `article`.
         residuals: shapes found in them.
         next_steps: what would make the answer better, most urgent first.
@@ -47,9 +48,7 @@ class CalibrationAnswer(PosteriorAnswer):
         dict[str, ParameterEstimate],
         Promise(required=_ALWAYS, propertyNames=PARAMETER_NAMES),
     ]
-    K_by_theory: Annotated[
-        Mapping[str, Interval | None], Promise(required=list(get_args(Theory)))
-    ]
+    K_by_theory: Annotated[Mapping[str, Interval | None], Promise(required=_SIZED)]
     K_note: str
     residuals: tuple[ResidualShape, ...]
     next_steps: Sentences

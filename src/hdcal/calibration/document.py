@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer
-from hdcal.data.theory_names import THEORY_WORDS
+from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.checks import PLAUSIBLE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
@@ -19,7 +19,7 @@ from hdcal.report.document import (
     Text,
     notices,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import Interval, measured
 from hdcal.report.posterior_sections import (
     check_section,
     parameter_section,
@@ -104,8 +104,8 @@ def calibration_document(
         ],
         sections=[
             _bands(found),
-            parameter_section(found.parameters),
-            _theories(found),
+            parameter_section(measured(found.parameters, found.gear.theory)),
+            *_theories(found),
             _residuals(found),
             check_section(found.checks),
             Section("Data", [Facts(data_rows(posterior.case))]),
@@ -119,18 +119,19 @@ def calibration_document(
 
 
 def _answers(found: CalibrationAnswer) -> Iterator[str]:
-    middle, span = estimate(found.parameters["K"])
-    yield (
-        f"Influence coefficient under “{found.gear.theory}”: K = {middle}, 95 % "
-        f"credible interval {span}."
-    )
+    if found.gear.theory != SPRING:
+        middle, span = estimate(found.parameters["K"])
+        yield (
+            f"Influence coefficient under “{found.gear.theory}”: K = {middle}, 95 % "
+            f"credible interval {span}."
+        )
     for driver, words in (
         ("data", "Decided by the data"),
         ("prior", "Not decided without the prior"),
     ):
         names = [
             label(name)
-            for name, one in found.parameters.items()
+            for name, one in measured(found.parameters, found.gear.theory).items()
             if one.driven_by == driver
         ]
         if names:
@@ -155,7 +156,9 @@ def _bands(found: CalibrationAnswer) -> Section:
     )
 
 
-def _theories(found: CalibrationAnswer) -> Section:
+def _theories(found: CalibrationAnswer) -> Iterator[Section]:
+    if found.gear.theory == SPRING:
+        return
     names = list(found.K_by_theory)
     rows = []
     for name, K in found.K_by_theory.items():
@@ -172,7 +175,7 @@ def _theories(found: CalibrationAnswer) -> Section:
         "Data identify the stiffness only, that is K times the theory's stiffness; the "
         "rows are one posterior seen through three formulas."
     )
-    return Section("K under each theory", [table, Text(one), Text(found.K_note)])
+    yield Section("K under each theory", [table, Text(one), Text(found.K_note)])
 
 
 def _residuals(found: CalibrationAnswer) -> Section:

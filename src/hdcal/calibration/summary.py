@@ -9,6 +9,7 @@ from hdcal.calibration.document import (
     headline,
     next_steps,
 )
+from hdcal.data.theory_names import SPRING
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
@@ -92,13 +93,19 @@ def calibration_report(
     )
 
 
-def K_by_theory(posterior: Posterior) -> dict[str, Interval]:
-    """Return K under every theory from the one posterior: K_a k_a = K_b k_b."""
+def K_by_theory(posterior: Posterior) -> dict[str, Interval | None]:
+    """Return K under every theory from the one posterior: K_a k_a = K_b k_b.
+
+    None where there are no sizes: the stiffness of a spring is no factor of a theory.
+    """
     geometry = posterior.case.gear.geometry
+    sized = {name: theory for name, theory in THEORIES.items() if name != SPRING}
+    if posterior.theory == SPRING:
+        return dict.fromkeys(sized)
     own = float(THEORIES[posterior.theory](geometry, 1.0))
     return {
         name: credible_interval(
             posterior.draws["K"] * (own / float(theory(geometry, 1.0)))
         )
-        for name, theory in THEORIES.items()
+        for name, theory in sized.items()
     }

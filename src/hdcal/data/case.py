@@ -1,5 +1,6 @@
 """What one calibration is about: a gear, how it was read, and the records."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -56,6 +57,16 @@ class Gear:
     density: float | None = None
     gauge_priors: dict[str, Prior] = field(default_factory=dict)
     full_scale: FullScale = REFERENCE
+
+    @property
+    def reach(self) -> float:
+        """Deformation as read that no gear of this radius reaches [mm].
+
+        Infinite where no radius is known.
+        """
+        radius = float(self.geometry.radius)
+        as_read = radius * (2.0 if self.reading == "diametral" else 1.0)
+        return math.inf if math.isnan(as_read) else as_read
 
 
 @dataclass(frozen=True, repr=False)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from hdcal.data.plausible import range_of
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.units import unit_powers
 
@@ -25,6 +26,13 @@ class FullScale:
         ratio *= (self.deformation / REFERENCE.deformation) ** length
         # What has no force and no length in it, such as a share, has no scale.
         return prior if ratio == 1.0 else scaled(prior, ratio)
+
+    def own_stiffness(self, prior: Prior) -> Prior:
+        """Return the shipped stiffness of a spring as `own` does, within its range."""
+        median, log_sd = self.own(prior).numbers
+        known = range_of("spring_stiffness")
+        within = min(max(float(median), known.low), known.high)
+        return Prior(prior.family, (within, log_sd), prior.unit, prior.source)
 
 
 REFERENCE = FullScale()

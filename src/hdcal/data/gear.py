@@ -1,14 +1,15 @@
 """Read the gear file: sizes, how it was measured, and what is believed of it."""
 
+import math
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
-from hdcal.data.case import Gear, Theory
+from hdcal.data.case import Gear
 from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
 from hdcal.data.full_scale import FullScale
-from hdcal.data.gear_schema import GearFile, check_schema, size_findings
+from hdcal.data.gear_schema import GearFile, GearTable, check_schema, size_findings
 from hdcal.data.prior import Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.priors import (
@@ -16,6 +17,7 @@ from hdcal.data.priors import (
     MATERIAL_UNITS,
     MODEL_UNITS,
     SCALE_UNITS,
+    SPRING_UNITS,
     dynamic_priors,
     material_names,
     material_priors,
@@ -24,11 +26,16 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.data.records import Geometry
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 # Shipped priors of the base model that are written for a full scale.
 IN_NEWTONS = ("force_offset", "sigma", "run_offset_sd", "gap_sd")
+# The material of a spring that names none.
+NO_MATERIAL = "not stated"
+# That of any other gear that names none.
+_MATERIAL = "steel"
 
 
 def read_gear(
@@ -40,7 +47,9 @@ def read_gear(
     of the gear file. The certificate of a displacement gauge replaces no prior: it
     adds to the error of the contact point.
     An influence coefficient K in the file refers to the theory in the file, the
-    shipped one to `ring`.
+    shipped one to `ring`. Under `spring` there is a shipped stiffness instead, sizes
+    that are not in the file are NaN, and a material says how the stiffness changes
+    with temperature.
 
     Args:
         path: the TOML file.
@@ -54,12 +63,14 @@ def read_gear(
     toml = read_toml(path, str(path))
     with Findings() as wrong:
         model = wrong.attempt(check_schema, toml)
-        wrong += size_findings(toml)
+        wrong += size_findings(toml, theory)
         if theory is not None and theory not in get_args(Theory):
             remedy = did_you_mean(theory, list(get_args(Theory)))
             wrong.append(Finding("theory", f"unknown theory '{theory}'", remedy))
-        facts = wrong.attempt(_material, toml, path.parent, material)
-        given = wrong.attempt(_given_priors, toml)
+        spring = _in_gear(toml, "theory", theory) == SPRING
+        facts = wrong.attempt(_material, toml, path.parent, material, spring=spring)
+        given = wrong.attempt(_given_priors, toml, spring=spring)
+        wrong += _of_another_theory(toml, theory)
     assert model is not None and facts is not None and given is not None
     return _assemble(model, theory, facts, given, path, toml)
 
@@ -80,25 +91,18 @@ def _assemble(
         contact = (rig_priors() | given)["deformation_offset"]
         merged["deformation_offset"] = contact_as_read(contact, gauge)
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
-    geometry = Geometry(
-        wall_thickness=sizes.wall_thickness_mm,
-        radius=sizes.radius_mm,
-        length=sizes.length_mm,
-        load_height=sizes.load_height_mm or sizes.length_mm,
-        poisson=float(facts["poisson"].numbers[0]),
-    )
     chosen: Any = theory or sizes.theory
     return Gear(
         name=sizes.name or path.stem,
-        geometry=geometry,
-        material=sizes.material,
+        geometry=_geometry(sizes, facts),
+        material=sizes.material or (NO_MATERIAL if chosen == SPRING else _MATERIAL),
         theory=chosen,
         reading=measurement.deformation,
         reference_temperature=measurement.reference_temperature_C,
         force_resolution=measurement.force_resolution_N or 0.0,
         nominal_deformation=sizes.nominal_deformation_mm,
         priors={name: merged[name] for name in MODEL_UNITS},
-        K_theory=sizes.theory if "K" in given else "ring",
+        K_theory=_theory_of_K(sizes, chosen, given),
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
         effect_priors=effects,
@@ -106,6 +110,26 @@ def _assemble(
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
         gauge_priors={name: stated[name] for name in GAUGE_UNITS if name in stated},
     )
+
+
+def _geometry(sizes: GearTable, facts: dict[str, Prior]) -> Geometry:
+    """Return the sizes; those that a spring does not state are NaN."""
+    stated = {
+        "wall_thickness": sizes.wall_thickness_mm,
+        "radius": sizes.radius_mm,
+        "length": sizes.length_mm,
+        "load_height": sizes.load_height_mm or sizes.length_mm,
+        "poisson": float(facts["poisson"].numbers[0]) if "poisson" in facts else None,
+    }
+    return Geometry(
+        **{name: math.nan if size is None else size for name, size in stated.items()}
+    )
+
+
+def _theory_of_K(sizes: GearTable, chosen: Theory, given: dict[str, Prior]) -> Theory:
+    if chosen == SPRING:
+        return SPRING
+    return sizes.theory if "K" in given else "ring"
 
 
 def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
@@ -123,14 +147,39 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
             if name in table and table[name].source == shipped[name].source
         }
 
+    stiffness = shipped["spring_stiffness"]
+    if gear.priors["K"].source == stiffness.source:
+        own_K = {"K": full_scale.own_stiffness(stiffness)}
+        gear = replace(gear, priors=gear.priors | own_K)
     tables = {"priors": own(gear.priors), "scale_priors": own(gear.scale_priors)}
     return replace(gear, full_scale=full_scale, **tables)
 
 
-def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Prior]:
-    """Priors and facts of the material that the gear file names, or of a given one."""
+def _in_gear(toml: TomlFile, key: str, given: Any = None) -> Any:
+    """Return what the table [gear] holds, whatever that is; what is given wins."""
     table = toml.table.get("gear")
-    name = table.get("material", "steel") if isinstance(table, dict) else "steel"
+    return given or (table.get(key) if isinstance(table, dict) else None)
+
+
+def _material(
+    toml: TomlFile, folder: Path, given: Path | None, *, spring: bool
+) -> dict[str, Prior]:
+    """Priors and facts of the material, with the modulus of the theory `spring`."""
+    own = {}
+    if spring:
+        shipped = rig_priors()
+        own = {"E0": shipped["spring_modulus"], "K": shipped["spring_stiffness"]}
+        if _in_gear(toml, "material") is None:
+            return own | {"alpha": shipped["spring_alpha"]}
+    return _named_material(toml, folder, given) | own
+
+
+def _named_material(
+    toml: TomlFile, folder: Path, given: Path | None
+) -> dict[str, Prior]:
+    """Priors and facts of the material that the gear file names, or of a given one."""
+    name = _in_gear(toml, "material")
+    name = _MATERIAL if name is None else name
     if not isinstance(name, str) or not 0 < len(name) <= 1000:
         return {}  # reported with the other types
     shipped = material_names()
@@ -157,17 +206,34 @@ def _material(toml: TomlFile, folder: Path, given: Path | None) -> dict[str, Pri
     return facts
 
 
-def _given_priors(toml: TomlFile) -> tuple[dict[str, Prior], dict[str, Prior]]:
+def _of_another_theory(toml: TomlFile, theory: str | None) -> list[Finding]:
+    """Say so where K is given under a theory that cannot be carried over."""
+    own, table = _in_gear(toml, "theory") or "ring", toml.table.get("priors")
+    given = isinstance(table, dict) and "K" in table
+    if not given or theory is None or (theory == SPRING) == (own == SPRING):
+        return []
+    words = f"is given under the theory '{own}', which says nothing of '{theory}'"
+    return [toml.finding(words, f"Keep the theory '{own}'", "priors.K")]
+
+
+def _given_priors(
+    toml: TomlFile, *, spring: bool
+) -> tuple[dict[str, Prior], dict[str, Prior]]:
     """Priors of the table [priors]: the gear's and the rig's, and the effects'."""
     given: dict[str, Prior] = {}
     tables: dict[str, dict] = {}
     units = MODEL_UNITS | SCALE_UNITS | DYNAMIC_UNITS
+    if spring:
+        units = units | {"K": SPRING_UNITS["spring_stiffness"]}
     table = toml.table.get("priors")
     with Findings() as wrong:
         for name, entry in table.items() if isinstance(table, dict) else ():
             key = f"priors.{name}"
             effect, dot, parameter = name.partition(".")
-            if name in units:
+            if name == "E0" and spring:
+                words = "has no meaning under the theory 'spring'"
+                wrong.append(toml.finding(words, "Leave it out: K is in N/mm", key))
+            elif name in units:
                 if prior := wrong.attempt(read_prior, entry, key, toml, units[name]):
                     given[name] = prior
             elif dot:

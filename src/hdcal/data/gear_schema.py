@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from hdcal.data.case import Theory
 from hdcal.data.certificates import (
     DeformationCertificate,
     ForceCertificate,
@@ -16,6 +15,7 @@ from hdcal.data.certificates import (
     certificate_faults,
 )
 from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.typed_json import within
 from hdcal.errors import Finding, Findings, InputError
@@ -24,19 +24,21 @@ _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=Fal
 
 
 _Size = Annotated[float, within("size")]
+# What no theory but `SPRING` can do without.
+SIZES_NEEDED = ("wall_thickness_mm", "radius_mm", "length_mm")
 
 
 class GearTable(BaseModel):
-    """The table [gear]; lengths in mm."""
+    """The table [gear]; lengths in mm. Its sizes may be missing from a spring alone."""
 
     model_config = _STRICT
     name: Annotated[str, Field(max_length=200)] = ""
-    wall_thickness_mm: _Size
-    radius_mm: _Size
-    length_mm: _Size
+    wall_thickness_mm: _Size | None = None
+    radius_mm: _Size | None = None
+    length_mm: _Size | None = None
     nominal_deformation_mm: _Size | None = None
     load_height_mm: _Size | None = None
-    material: Annotated[str, Field(min_length=1, max_length=1000)] = "steel"
+    material: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
     theory: Theory = "ring"
 
 
@@ -139,18 +141,31 @@ def _example(key: str) -> str:
     return examples.get(name, f"{name} = … (a number)")
 
 
-def size_findings(toml: TomlFile) -> list[Finding]:
-    """Relations between sizes; checked on what is there, whatever else is wrong."""
+def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
+    """Sizes that are missing, and relations between those that are there.
+
+    Checked whatever else is wrong.
+
+    Args:
+        toml: the gear file.
+        theory: overrides the one in the file.
+    """
     table = toml.table.get("gear")
     if not isinstance(table, dict):
         return []
+    missing = [name for name in SIZES_NEEDED if name not in table]
     size = {
         name.removesuffix("_mm"): value
         for name, value in table.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
         if range_of("size").holds(value)
     }
-    return [
+    lacking = [
+        toml.finding("is missing", f"Add it: {_example(name)}", f"gear.{name}")
+        for name in missing
+        if (theory or table.get("theory")) != SPRING
+    ]
+    return lacking + [
         toml.finding(words, remedy, f"gear.{name}_mm")
         for name, words, remedy in size_faults(size)
     ]

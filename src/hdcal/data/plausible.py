@@ -68,6 +68,7 @@ RANGES = {
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
     "K": Range(1e-6, 1e6, "", "a millionth to a million times the theory"),
+    "spring_stiffness": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
     "E0": Range(1e-6, 1e7, "MPa", _STEEL),
     "alpha": Range(-1.0, 1.0, "1/K", "nothing loses all of its stiffness in a kelvin"),
     "sigma": Range(1e-15, 1e9, "N", _SCATTER),
@@ -135,6 +136,8 @@ NAMES = {
     "rates": "rate",
     "degrees": "degree",
     "mass_ratio": "K",
+    "spring_alpha": "alpha",
+    "spring_modulus": "E0",
 }
 
 

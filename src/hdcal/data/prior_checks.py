@@ -11,6 +11,7 @@ _SIGNED = (
     "alpha",
     "force_offset",
     "deformation_offset",
+    "spring_alpha",
     "cte",
     "initial_deformation",
     "initial_velocity",
@@ -51,6 +52,15 @@ def family_faults(family: str, numbers: Sequence[float]) -> list[Fault]:
     if family == "uniform" and not faults and numbers[0] >= numbers[1]:
         faults.append(Fault("low", "low is not below high", "Exchange them"))
     return faults
+
+
+def quantity_of_K(unit: str | None) -> str:
+    """Return which range K has: of a factor, or of the stiffness that it itself is.
+
+    Args:
+        unit: of its prior.
+    """
+    return "spring_stiffness" if unit == "N/mm" else "K"
 
 
 def sign_faults(family: str, numbers: Sequence[float], parameter: str) -> list[Fault]:

@@ -5,7 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from hdcal.data.prior import FAMILIES, Prior, scaled
-from hdcal.data.prior_checks import Fault, family_faults, range_faults, sign_faults
+from hdcal.data.prior_checks import (
+    Fault,
+    family_faults,
+    quantity_of_K,
+    range_faults,
+    sign_faults,
+)
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.units import UnitError, to_code
 from hdcal.errors import Findings, InputError
@@ -50,6 +56,8 @@ def read_prior(
     scale, name = conversion
     # Without a unit of its own it is a parameter of an effect.
     parameter = "effect" if unit is None else key.rpartition(".")[2]
+    if parameter == "K":
+        parameter = quantity_of_K(unit)
     if unit is not None:
         _raise_faults(sign_faults(family, numbers, parameter), key, toml)
     if family == "beta" and scale != 1.0:

@@ -24,6 +24,12 @@ MODEL_UNITS = {
     "deformation_offset": "mm",
     "sigma": "N",
 }
+# What the theory `spring` has for K, E0 and alpha.
+SPRING_UNITS = {
+    "spring_stiffness": "N/mm",
+    "spring_modulus": "MPa",
+    "spring_alpha": "1/K",
+}
 SCALE_UNITS = {
     "run_offset_sd": "N",
     "specimen_sd": "1",
@@ -79,13 +85,16 @@ def read_priors(
 @cache
 def _shipped(name: str) -> dict[str, Prior]:
     moving = DYNAMIC_UNITS | {"mass_ratio": "1"}
-    units = {"rig": MODEL_UNITS | SCALE_UNITS, "dynamics": moving}
+    units = {"rig": MODEL_UNITS | SCALE_UNITS | SPRING_UNITS, "dynamics": moving}
     source = priors_folder() / f"{name}.toml"
     return read_priors(source, units.get(name, MATERIAL_UNITS))
 
 
 def rig_priors() -> dict[str, Prior]:
-    """Shipped priors of what is not the material: `MODEL_UNITS` and `SCALE_UNITS`."""
+    """Shipped priors of what is not the material.
+
+    Keys of `MODEL_UNITS`, `SCALE_UNITS` and `SPRING_UNITS`.
+    """
     return _shipped("rig").copy()
 
 

@@ -123,9 +123,8 @@ def _known(measured: Measurements) -> frozenset[str]:
 
 
 def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
-    limit = float(gear.geometry.radius) * (2 if gear.reading == "diametral" else 1)
     size = np.abs(columns.values["deformation"])
-    if size.max() < limit:
+    if size.max() < gear.reach:
         return []
     words = (
         f"a deformation of {size.max():g} mm on a radius of {gear.geometry.radius:g} mm"

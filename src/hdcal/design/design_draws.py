@@ -11,7 +11,7 @@ from typing import Literal
 import jax
 import numpy as np
 
-from hdcal.data.case import Gear, Theory
+from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.data.prior import scaled
 from hdcal.data.priors import (
@@ -20,8 +20,9 @@ from hdcal.data.priors import (
     material_priors,
 )
 from hdcal.data.records import Geometry, Records
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.design.materials import read_material
-from hdcal.errors import Findings
+from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -209,10 +210,15 @@ def design_draws(
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: the seed is none.
+        InputError: the seed is none, or there are no sizes to design with.
     """
+    theory = source.theory
     with Findings() as wrong:
         wrong += implausible("seed", seed)
+        if theory == SPRING:
+            words = "has no sizes, and a design changes sizes"
+            remedy = "Calibrate with the sizes of the gear and another theory"
+            wrong.append(Finding(f"theory '{theory}'", words, remedy))
     if isinstance(source, Posterior):
         return _calibrated(source, seed)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)

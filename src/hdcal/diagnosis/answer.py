@@ -106,7 +106,7 @@ class VerdictAnswer(Answer):
     shrink: Closure
     next_test: tuple[NextRun, ...]
     next_test_reason: str
-    budget: Budget
+    budget: Budget | None
     refits: tuple[Refit, ...]
     left_out: LeftOut | None = None
     library: tuple[EffectName, ...]

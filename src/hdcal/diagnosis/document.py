@@ -1,5 +1,7 @@
 """The report of a diagnosis; the sentences of its answer are in `words`."""
 
+from collections.abc import Iterator
+
 from hdcal.data.case import Case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.sections import (
@@ -19,7 +21,7 @@ from hdcal.report.document import (
     Table,
     Text,
 )
-from hdcal.report.parameters import parameter_estimates
+from hdcal.report.parameters import measured, parameter_estimates
 from hdcal.report.posterior_sections import driver_tag, parameter_table
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
@@ -67,7 +69,7 @@ def verdict_document(
             which_section(found),
             shrink_section(found.shrink),
             _next_runs(found),
-            _budget(found),
+            *_budget(found),
             _corrected(found, refit),
             Section("What this cannot say", [Sentences(found.limits)], brief=True),
             *([Section("Remarks", [Sentences(found.notes)], True)] * bool(found.notes)),
@@ -105,8 +107,10 @@ def _next_runs(found: VerdictAnswer) -> Section:
     return Section(heading, [table, Text(note, soft=True)], brief=True)
 
 
-def _budget(found: VerdictAnswer) -> Section:
+def _budget(found: VerdictAnswer) -> Iterator[Section]:
     budget = found.budget
+    if budget is None:
+        return
     middle, span = estimate(budget.K)
     words = (
         f"K by the {budget.formula} formula, at the prior's mean modulus, is {middle}, "
@@ -126,7 +130,7 @@ def _budget(found: VerdictAnswer) -> Section:
     numbers = ("factor", "90 % interval", "before the data")
     columns = ["part of K", *numbers, "driven by", "what would tell it"]
     table = [Table(columns, rows, frozenset(numbers))] if rows else []
-    return Section("Why K is not 1", [Text(words), *table])
+    yield Section("Why K is not 1", [Text(words), *table])
 
 
 def _fitted_beside(found: VerdictAnswer) -> str:
@@ -153,7 +157,7 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
     blocks = [
         Text(words),
         Picture("bands", shows, caption),
-        parameter_table(parameter_estimates(posterior)),
+        parameter_table(measured(parameter_estimates(posterior), posterior.theory)),
         Text(note, soft=True),
     ]
     return Section(heading, blocks)

@@ -167,7 +167,7 @@ class Verdict(Shown):
         which: what causes it.
         shrink: how far it closes once the effect is added.
         next_test: runs that would tell more, best first.
-        budget: of the scale factor K.
+        budget: of the scale factor K; None where K is the stiffness itself.
         posteriors: calibrated models by hypothesis (effects joined with +), with the
             probability that weighs their bands, sum 1; empty with `quick`.
         left_out: probability without a model of its own, and which one carries it.
@@ -187,7 +187,7 @@ class Verdict(Shown):
     which: Which
     shrink: Closure
     next_test: tuple[NextRun, ...]
-    budget: Budget
+    budget: Budget | None
     posteriors: dict[str, tuple[float, Posterior]]
     library: tuple[str, ...]
     left_out: LeftOut | None = None

@@ -13,10 +13,11 @@ import numpy as np
 import numpyro
 from jaxtyping import Float
 
-from hdcal.data.case import Case, Gear, Theory
+from hdcal.data.case import Case, Gear
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Array
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
@@ -100,6 +101,9 @@ def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
     """
     if "mass" in gear.dynamic_priors:
         return gear.dynamic_priors["mass"]
+    if gear.theory == SPRING:
+        words = "a spring has no sizes, so nothing is known of the moved mass"
+        raise InputError([Finding(gear.name, words, "Add mass to its [priors]")])
     if gear.density is None or "mass_ratio" not in gear.dynamic_priors:
         words = "no density of the material is known, so nor is the moved mass"
         remedy = "Add [density] to the material, or mass to the gear file's [priors]"

@@ -1,16 +1,22 @@
 """What the attributes of a posterior file hold as JSON, typed: whoever wrote it."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Annotated, Any, ClassVar, Literal
 
-from hdcal.data.case import Theory
 from hdcal.data.certificates import can_state
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import FAMILIES
-from hdcal.data.prior_checks import family_faults, range_faults, sign_faults
+from hdcal.data.prior_checks import (
+    family_faults,
+    quantity_of_K,
+    range_faults,
+    sign_faults,
+)
+from hdcal.data.records import Geometry
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.typed_json import PART, RESULT, STRICT, Share, Size, within
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
@@ -45,18 +51,20 @@ class HeldPrior:
 
 Priors = dict[str, HeldPrior]
 _Size = Annotated[float, within("size")]
+# With Poisson's ratio.
+_SIZES = len(fields(Geometry))
 
 
 @dataclass(frozen=True)
 class HeldGeometry:
-    """Sizes of a gear [mm], as `Geometry` has them."""
+    """Sizes of a gear [mm], as `Geometry` has them; None for what a spring has not."""
 
     __pydantic_config__: ClassVar = STRICT
-    wall_thickness: _Size
-    radius: _Size
-    length: _Size
-    load_height: _Size
-    poisson: Annotated[float, within("poisson")]
+    wall_thickness: _Size | None
+    radius: _Size | None
+    length: _Size | None
+    load_height: _Size | None
+    poisson: Annotated[float, within("poisson")] | None
 
 
 @dataclass(frozen=True)
@@ -101,7 +109,10 @@ class HeldGear:
         step = self.force_resolution
         if step != 0.0 and not range_of("force_resolution").holds(step):
             raise ValueError("has a rounding step that no scale has")
-        size = asdict(self.geometry)
+        size = {n: one for n, one in asdict(self.geometry).items() if one is not None}
+        theories = {self.theory, self.K_theory}
+        if theories != {SPRING} and (SPRING in theories or len(size) < _SIZES):
+            raise ValueError("lacks the sizes of its theory")
         if self.nominal_deformation is not None:
             size["nominal_deformation"] = self.nominal_deformation
         if size_faults(size):
@@ -115,7 +126,8 @@ class HeldGear:
         for name, prior in (
             self.priors | self.scale_priors | self.dynamic_priors
         ).items():
-            given = prior.family, prior.numbers, name
+            quantity = quantity_of_K(prior.unit) if name == "K" else name
+            given = prior.family, prior.numbers, quantity
             if sign_faults(*given) or range_faults(*given):
                 raise ValueError("has priors that no gear has")
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -73,9 +74,9 @@ _TABLES = (
 def describe_case(case: Case) -> str:
     """Return everything of a case but its rows, as JSON."""
     gear = {f.name: getattr(case.gear, f.name) for f in fields(Gear)}
-    geometry = {
-        f.name: float(getattr(gear["geometry"], f.name)) for f in fields(Geometry)
-    }
+    read = gear["geometry"]
+    sizes = {f.name: float(getattr(read, f.name)) for f in fields(Geometry)}
+    geometry = {n: None if math.isnan(size) else size for n, size in sizes.items()}
     gear["full_scale"] = asdict(gear["full_scale"])
     for table in _TABLES:
         gear[table] = {name: describe_prior(p) for name, p in gear[table].items()}
@@ -106,7 +107,10 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
         gear[table] = restore_priors(gear[table])
     # A file without it is of before correlation was inferred: there was none.
     gear["scale_priors"].setdefault(CORRELATION, Prior("fixed", (0.0,), "1"))
-    gear["geometry"] = Geometry(**vars(held.gear.geometry))
+    sizes = vars(held.gear.geometry)
+    gear["geometry"] = Geometry(
+        **{name: math.nan if size is None else size for name, size in sizes.items()}
+    )
     gear["full_scale"] = FullScale(**vars(held.gear.full_scale))
     rows = {name: constant[name].to_numpy() for name in UNITS}
     rows["force"] = force.to_numpy()

@@ -7,11 +7,12 @@ import jax
 import numpy as np
 from jaxtyping import Float, Int
 
-from hdcal.data.case import Case, Theory
+from hdcal.data.case import Case
 from hdcal.data.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
@@ -162,8 +163,16 @@ def problem_priors(
 
 
 def influence_prior(case: Case, theory: Theory) -> Prior:
-    """Return the prior of K carried over to a theory: K_a k_a = K_b k_b."""
+    """Return the prior of K carried over to a theory: K_a k_a = K_b k_b.
+
+    Raises:
+        InputError: one of both is `spring`, whose modulus is another.
+    """
     gear = case.gear
+    if (theory == SPRING) != (gear.K_theory == SPRING):
+        words = f"the gear was read with '{gear.theory}', whose K is no K of '{theory}'"
+        remedy = f"read the gear with the theory '{theory}'"
+        raise InputError([Finding("theory", words, remedy)])
     ratio = unit_stiffness(case, gear.K_theory) / unit_stiffness(case, theory)
     return scaled(gear.priors["K"], ratio)
 

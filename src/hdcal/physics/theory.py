@@ -95,4 +95,28 @@ def article(geometry: Geometry, modulus: Scalar) -> Scalar:
     )
 
 
-THEORIES: dict[str, Stiffness] = {"ring": ring, "cup": cup, "article": article}
+def spring(_geometry: Geometry, modulus: Scalar) -> Scalar:
+    """Return the stiffness that K multiplies where no sizes are known: k = E · 1 mm.
+
+    With E fixed at 1 MPa, as a gear file with this theory has it, K is the stiffness
+    itself in N/mm.
+
+    Args:
+        _geometry: not used; its sizes may be NaN.
+        modulus: 1 MPa, times what it loses with the temperature.
+
+    Returns:
+        Force per radial displacement [N/mm].
+
+    Source:
+        Hooke's law.
+    """
+    return modulus * 1.0
+
+
+THEORIES: dict[str, Stiffness] = {
+    "ring": ring,
+    "cup": cup,
+    "article": article,
+    "spring": spring,
+}

@@ -1,11 +1,13 @@
 """Parameters of a posterior, with their intervals, in the units of people."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.diagnostics import Diagnosis, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
@@ -83,6 +85,8 @@ def credible_interval(values: np.ndarray) -> Interval:
 
 def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
     """Return the unit in which a parameter is shown, and its factor."""
+    if name == "K" and posterior.theory == SPRING:
+        return "N/mm", 1.0
     if name in UNITS:
         return UNITS[name]
     effect_name, field = name.split(".")
@@ -110,6 +114,14 @@ def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
     return {
         name: _estimate(posterior, name, found.get(name)) for name in (*found, *fixed)
     }
+
+
+def measured(
+    parameters: Mapping[str, ParameterEstimate], theory: Theory
+) -> dict[str, ParameterEstimate]:
+    """Return the parameters without those that the theory itself defines."""
+    defined = {"E0"} if theory == SPRING else set()
+    return {name: one for name, one in parameters.items() if name not in defined}
 
 
 def _estimate(

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.loading import loading
-from hdcal.data.theory_names import THEORY_WORDS
+from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.posterior import Posterior
 from hdcal.report.words import number, with_unit
 
@@ -61,15 +61,18 @@ def gear_rows(case: Case, theory: str) -> list[tuple[str, str]]:
     """Return which gear it was and how it was modelled, as pairs of name and words."""
     gear = case.gear
     size = gear.geometry
-    return [
-        ("case", case.name),
-        ("gear", gear.name),
-        ("material", gear.material),
+    sizes = [
         (
             "wall thickness × radius × length",
             f"{size.wall_thickness:g} × {size.radius:g} × {size.length:g} mm",
         ),
         ("load height", f"{size.load_height:g} mm"),
+    ]
+    return [
+        ("case", case.name),
+        ("gear", gear.name),
+        ("material", gear.material),
+        *(pair for pair in sizes if theory != SPRING),
         ("theory", f"{theory} ({THEORY_WORDS.get(theory, '')})"),
         ("reference temperature", f"{gear.reference_temperature:g} °C"),
         ("SHA-256 of the data", case.data_sha256),

@@ -50,8 +50,8 @@ def begin_core(
 def usual_design(known: Posterior | Gear, prior: StreamPrior) -> np.ndarray:
     """Return linear columns of rows such as will come, shape (row, 4)."""
     if isinstance(known, Gear):
-        # About a hundredth of the radius; the scale of deformations matters little.
-        deformation = np.linspace(0.0, 0.01, 50) * float(known.geometry.radius)
+        # The scale of deformations matters little.
+        deformation = np.linspace(0.0, known.full_scale.deformation, 50)
         rise = np.zeros(50)
     else:
         deformation = np.asarray(known.case.records.deformation)

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import build_effects
@@ -108,7 +109,10 @@ def _tried(effect: type[Effect], posterior, prior, chosen) -> str | None:
     alpha, offset, effects = _draws(posterior, chosen)
     draws = alpha, offset, tuple(e for e in effects if isinstance(e, effect))
     rng, size = np.random.default_rng(0), 40
-    reach = 0.2 * float(posterior.case.gear.geometry.radius)
+    gear = posterior.case.gear
+    reach = 0.2 * float(gear.geometry.radius)
+    if gear.theory == SPRING:
+        reach = 10.0 * gear.full_scale.deformation
     sizes = np.exp(rng.uniform(np.log(0.01), np.log(max(reach, 0.1)), size))
     time = np.sort(rng.uniform(0.0, 1e4, size))
     signs = np.where(rng.random(size) < 0.5, -1.0, 1.0)

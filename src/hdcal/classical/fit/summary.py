@@ -91,10 +91,9 @@ def fit_report(
 
 
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
-    reach = case.gear.geometry.radius * (2 if case.gear.reading == "diametral" else 1)
     with Findings() as wrong:
         wrong += (outside := implausible("at", at))
-        if at is not None and not outside and not abs(at) < reach:
+        if at is not None and not outside and not abs(at) < case.gear.reach:
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
         if posterior is not None and posterior.case.data_sha256 != case.data_sha256:

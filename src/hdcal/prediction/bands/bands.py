@@ -188,12 +188,11 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
     def find(name, problem, remedy):
         findings.append(Finding(name, problem, remedy))
 
-    limit = gear.geometry.radius / cause.problem.reading.radial_per_read
     if deformation.size == 0:
         find("deformation", "is empty", "give numbers in mm")
     elif wrong := implausible("deformation", deformation):
         findings += wrong
-    elif (worst := float(np.max(np.abs(deformation)))) >= limit:
+    elif (worst := float(np.max(np.abs(deformation)))) >= gear.reach:
         problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
         find("deformation", problem, "Give it in mm")
     if temperature.size == 0:

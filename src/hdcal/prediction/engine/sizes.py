@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from hdcal.data.case import Theory
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array, Geometry
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding
 from hdcal.physics.theory import THEORIES
 
@@ -66,7 +66,8 @@ def check_tolerances(
             find(name, f"= {size:g} on a size of {nominal:g} mm", "Give it in mm")
         elif not matters(SIZES[name], geometry, theory):
             words = f"does not enter the theory '{theory}'"
-            find(name, words, "Leave it out, or calibrate with the theory cup")
+            other = "the sizes of the gear" if theory == SPRING else "the theory cup"
+            find(name, words, f"Leave it out, or calibrate with {other}")
     return findings
 
 

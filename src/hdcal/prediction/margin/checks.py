@@ -106,14 +106,14 @@ def check_sign(
 
 
 def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
-    radius = cause.posterior.case.gear.geometry.radius
+    gear = cause.posterior.case.gear
     if wrong := implausible("deformation", deformation):
         return wrong
     if deformation == 0.0:
         words = f"{deformation:g} mm is no deformation"
         return [Finding("deformation", words, "Give a number of mm")]
-    if abs(deformation) >= radius / cause.problem.reading.radial_per_read:
-        words = f"{deformation:g} mm on a radius of {radius:g} mm"
+    if abs(deformation) >= gear.reach:
+        words = f"{deformation:g} mm on a radius of {gear.geometry.radius:g} mm"
         return [Finding("deformation", words, "Give it in mm")]
     return []
 

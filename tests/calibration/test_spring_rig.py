@@ -1,0 +1,54 @@
+"""A rig without a drawing goes the whole way, and what needs sizes is refused."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from commands import ROOT, Hdcal
+from schema_checks import obeys
+from short import SHORT, options
+
+from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.diagnosis.answer import VerdictAnswer
+
+DAMPER = ROOT / "datasets" / "slit-damper"
+
+
+@pytest.fixture
+def calibrated(here: Hdcal, tmp_path: Path) -> Path:
+    done = here("calibrate", DAMPER, *options(SHORT), "--out", "run")
+    assert done.returncode == 0, done.stderr
+    return tmp_path / "run"
+
+
+def test_every_question_that_needs_no_sizes_is_answered(here: Hdcal, calibrated: Path):
+    found = json.loads((calibrated / "summary.json").read_text())
+    obeys(found, CalibrationAnswer)
+    assert found["K_by_theory"] == dict.fromkeys(("ring", "cup", "article"))
+    assert found["parameters"]["K"]["unit"] == "N/mm"
+    K, stiffness = found["parameters"]["K"], found["stiffness_N_per_mm"]
+    assert K["median"] == pytest.approx(stiffness["median"], rel=1e-9)
+    page = (calibrated / "report.html").read_text()
+    assert not re.search(r"\bnan\b", page, re.IGNORECASE)
+    assert "K under each theory" not in page
+    # The modulus is a definition: among the priors, and not among what was found.
+    assert page.count("E₀</td>") == 1
+    asked = "margin", calibrated, "--deformation", 5, "--json"
+    assert json.loads(here(*asked).stdout)["status"] == "ok"
+    for question in ("design", "study"):
+        about = {"design": ["--window", "1:2"], "study": ["--vary", "radius_mm=1:2:3"]}
+        refused = here(question, calibrated, *about[question])
+        assert refused.returncode == 2
+        assert "'spring'" in refused.stderr and "sizes" in refused.stderr
+
+
+def test_a_damper_that_yields_is_a_loop(here: Hdcal):
+    done = here("diagnose", DAMPER, "--quick", "--json")
+    found = json.loads(done.stdout)
+    obeys(found, VerdictAnswer)
+    assert found["budget"] is None
+    assert found["which"]["group"] == "loop"
+    assert found["which"]["effect"] == "hysteresis"
+    told = " ".join(found["answer"])
+    assert "lower while the deformation decreases" in told
