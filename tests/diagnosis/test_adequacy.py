@@ -7,7 +7,7 @@ import pytest
 from diagnosis_cases import NOISE, judged, rich, simulated
 from rigs import make_case
 
-from hdcal.diagnosis.adequacy import sign_odds
+from hdcal.evidence.bursts import sign_odds
 from hdcal.evidence.quantisation import rounding_step
 
 

@@ -84,9 +84,11 @@ def test_compression_read_as_negative_gets_the_same_runs(curved):
         judged(make_case(each), library=library).next_test
         for each in (records, mirrored(records))
     ]
-    assert [run.run for run in both[0]] == [run.run for run in both[1]]
-    told = [[run.information_nats for run in each] for each in both]
-    np.testing.assert_allclose(*told, atol=0.05)
+    # Runs that tell next to the same may change places.
+    one, other = ({run.run: run.information_nats for run in each} for each in both)
+    assert one.keys() == other.keys()
+    for run, told in one.items():
+        assert other[run] == pytest.approx(told, abs=0.05)
 
 
 def test_without_a_run_there_is_a_reason(curved, monkeypatch):

@@ -19,8 +19,8 @@ EFFECTS = {
     "thermal_zero_drift": {"slope": 0.03},
     "relaxation": {"share": 0.05, "time_constant": 40.0},
 }
-# The one knows pressing from pulling and has a radius, the other a pitch of its own.
-OWN_SCALE = ("large_deflection", "screw_error")
+# It knows pressing from pulling, and has a radius.
+OWN_SCALE = ("large_deflection",)
 LIBRARY = {n: e for n, e in REGISTRY.items() if n not in OWN_SCALE}
 GEAR = """\
 [gear]

@@ -20,9 +20,12 @@ LIBRARY = {
 
 
 def waves(case, size: float):
-    """Return the case with a wave along the stroke that no effect has [N rms]."""
+    """Return the case with waves along the stroke that no effect has [N rms].
+
+    They crowd together towards its end, as those of no screw do.
+    """
     w = np.asarray(case.records.deformation)
-    wave = size * np.sqrt(2.0) * np.sin(2.0 * np.pi * w / 0.13)
+    wave = size * np.sqrt(2.0) * np.sin(2.0 * np.pi * 4.0 * (w / np.max(w)) ** 2.5)
     return replace(case, records=replace(case.records, force=case.records.force + wave))
 
 

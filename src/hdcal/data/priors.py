@@ -12,8 +12,8 @@ from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
-# Of a screw and of a radius: whatever is read.
-_FACTS = ("screw_error.pitch", "large_deflection.curvature")
+# Of a radius: whatever is read.
+_FACTS = ("large_deflection.curvature",)
 
 # What a prior table may speak of: name -> its unit inside hdcal.
 MODEL_UNITS = {

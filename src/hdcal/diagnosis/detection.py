@@ -80,7 +80,7 @@ def detect_gap(
 ) -> Detection:
     """Test the base model; where it fails, fit a smooth gap."""
     prepared = evidence.prepared
-    correlation = float(posterior.correlation @ prepared.rows.correlations)
+    correlation = posterior.correlation_between(prepared.rows.correlations)
     cells, directions = declared_directions(evidence, case)
     tested = residual_test(prepared, correlation, directions, rng)
     significant = tested.p_value <= FALSE_ALARM

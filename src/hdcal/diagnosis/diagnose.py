@@ -7,7 +7,6 @@ import numpy as np
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
-from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
 from hdcal.diagnosis.next_run import rank_runs
@@ -72,9 +71,7 @@ def diagnose(
         which=with_sampled_size(which, fits),
         shrink=closed,
         next_test=runs,
-        budget=stiffness_budget(evidence, case, which.named)
-        if case.gear.theory != SPRING
-        else None,
+        budget=stiffness_budget(evidence, case, which.named),
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),

@@ -7,6 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.certificates import GAINS
+from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.budget import Budget, BudgetPart
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import fit_design
@@ -29,8 +30,8 @@ _NOTE = (
 
 def stiffness_budget(
     evidence: CaseEvidence, case: Case, names: Sequence[str] = ()
-) -> Budget:
-    """Split K into factors by prior and likelihood in log space.
+) -> Budget | None:
+    """Split K into factors by prior and likelihood in log space; a spring has none.
 
     log K = Σ log f_i with log f_i ~ N(m_i, s_i²): given the measured log K each part
     takes up the surprise in proportion to its variance. K is that of the ring formula
@@ -42,6 +43,8 @@ def stiffness_budget(
         case: the gear.
         names: effects beside which the stiffness is fitted.
     """
+    if case.gear.theory == SPRING:
+        return None
     causes = _causes(case)
     log_k, log_k_sd = _measured(evidence, names)
     mean = np.array([m for _, m, _, _ in causes])

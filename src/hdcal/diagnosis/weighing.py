@@ -13,6 +13,7 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.model_posterior import ModelPosterior, posterior_of
+from hdcal.evidence.bursts import with_bursts
 from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
 from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
@@ -67,7 +68,7 @@ def weigh(
         most = -(-rows // (_AT_A_TIME * group))
         if not at_the_end or most < _FEWEST:
             break
-    evidence = with_remainders(evidence, rng)
+    evidence = with_bursts(with_remainders(evidence, rng))
     return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
 
 

@@ -13,6 +13,7 @@ from hdcal.data.records import Array, Records
 from hdcal.evidence.effect_curves import base_reading
 from hdcal.evidence.linear_rows import CORRELATIONS, LinearRows
 from hdcal.evidence.row_features import (
+    half_cycles,
     place_in_run,
     scale_to_unit,
     take_rows,
@@ -26,6 +27,10 @@ from hdcal.physics.theory import THEORIES
 
 # Noise below this share of the largest force is taken as this.
 _LEAST_NOISE = 1e-6
+# Noise may err alike over a fifth of a half cycle: what lasts longer is physics.
+_SPANS, _LARGEST = 5.0, 0.98
+# Below this the coefficients that are always there reach far enough.
+_WORTHWHILE = 0.75
 
 
 @dataclass(frozen=True)
@@ -96,11 +101,27 @@ def prepare(
         precision=np.full(columns.shape[1], noise_sd**2),
         before=previous_rows(records),
         weight=1.0 / relative,
-        correlations=np.array(CORRELATIONS),
+        correlations=_correlations(records),
         tolerance=tolerance_functions(records),
     )
     table = {**priors, **case.gear.effect_priors, **case.gear.scale_priors, **own}
     return PreparedCase(records, order, reading, base, rows, noise_sd, table, *scale)
+
+
+def _correlations(records: Records) -> np.ndarray:
+    """Return the AR(1) coefficients that are integrated over.
+
+    A rig that is read often errs alike for many rows and for a small part of a stroke:
+    two further coefficients then reach up to that part.
+    """
+    rows = float(np.median(np.bincount(half_cycles(records))))
+    longest = min(np.exp(-_SPANS / rows), _LARGEST)
+    if longest < _WORTHWHILE:
+        return np.array(CORRELATIONS)
+    # Half-way between time constants, as they multiply.
+    ends = np.log([CORRELATIONS[-1], longest])
+    middle = np.exp(-np.sqrt(ends[0] * ends[1]))
+    return np.array([*CORRELATIONS, middle, longest])
 
 
 def log_moments(prior: Prior) -> tuple[float, float]:

@@ -1,5 +1,7 @@
 """Evidence of rounded readings: all of them lie on a grid coarser than their digits."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from hdcal.evidence.prepare import PreparedCase
@@ -13,6 +15,9 @@ _LEAST_STEP = 0.2
 _MOST_STEP = 1.5 * np.sqrt(12.0)
 # Steps are at least this many of the last digit; the line through counts settles soon.
 _APART, _REFINEMENTS = 20.0, 6
+# Values of more significant digits are written in full.
+_MOST_DIGITS = 9
+_NEAR_ZERO = 1e-3
 
 
 def quantisation_evidence(case: PreparedCase) -> tuple[float, float]:
@@ -63,22 +68,39 @@ def _counted_step(readings: np.ndarray) -> float:
     """Return the step of counts that were scaled and then written with few digits.
 
     Zero and step are those of the line through the counts; every reading lies on it
-    as closely as it was written down. 0 where there is no such step.
+    as closely as it was written down, with so many decimals or with so many digits. 0
+    where there is no such step.
     """
     values = np.unique(readings)
-    written = next(
-        (10.0**-d for d in range(10) if np.array_equal(np.round(values, d), values)),
-        0.0,
-    )
+    steps = (_step_between(values, written) for written in _last_digits(values))
+    return max(steps, default=0.0)
+
+
+def _last_digits(values: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield the worth of the last digit that each value may have been written with."""
+    for decimals in range(10):
+        if np.array_equal(np.round(values, decimals), values):
+            yield np.full(len(values), 10.0**-decimals)
+            break
+    for digits in range(1, _MOST_DIGITS + 1):
+        if all(float(f"{value:.{digits}g}") == value for value in values):
+            # Next to zero the line through the others is known less well than that.
+            size = np.maximum(np.abs(values), _NEAR_ZERO * np.max(np.abs(values)))
+            yield 10.0 ** (np.floor(np.log10(size)) + 1.0 - digits)
+            break
+
+
+def _step_between(values: np.ndarray, written: np.ndarray) -> float:
     gaps = np.diff(values)
-    gaps = gaps[gaps > _APART * written]
-    if written == 0.0 or len(gaps) < 2:
+    gaps = gaps[gaps > _APART * np.maximum(written[1:], written[:-1])]
+    if len(gaps) < 2:
         return 0.0
     step, zero = float(gaps.min()), 0.0
     for _ in range(_REFINEMENTS):
         counts = np.round((values - values[0]) / step)
         if counts[-1] < 2.0:
             return 0.0
-        step, zero = np.polyfit(counts, values, 1)
-    off = np.max(np.abs(values - zero - step * np.round((values - zero) / step)))
-    return float(step) if off <= written and step > _APART * written else 0.0
+        step, zero = np.polyfit(counts, values, 1, w=1.0 / written)
+    off = np.abs(values - zero - step * np.round((values - zero) / step))
+    apart = step > _APART * written.max()
+    return float(step) if apart and np.all(off <= written) else 0.0

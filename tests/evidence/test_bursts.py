@@ -1,0 +1,54 @@
+"""What outliers take of a structure is structure; outliers that are none stay noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import judged, rich, simulated
+
+from hdcal.evidence.bursts import sign_odds
+
+NOISE = 0.4
+
+
+def with_errors(case, error: np.ndarray):
+    records = case.records
+    return replace(case, records=replace(records, force=records.force + error))
+
+
+def stuck(rows: int, seed: int) -> np.ndarray:
+    """Return a chip that lies under the punch at times: stretches of seven rows."""
+    rng, place = np.random.default_rng(seed), np.arange(rows)
+    starts = rng.choice(np.arange(10, rows - 10, 20), 4, replace=False)
+    return sum(8.0 * NOISE * ((place >= s) & (place < s + 7)) for s in starts)
+
+
+def wild(rows: int, seed: int) -> np.ndarray:
+    """Return a few readings that are far off, either way and anywhere."""
+    rng = np.random.default_rng(seed)
+    error = np.zeros(rows)
+    error[rng.choice(rows, 9, replace=False)] = 12.0 * NOISE * rng.choice([-1, 1], 9)
+    return error
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_stretches_of_one_sign_are_no_outliers(seed: int):
+    case = simulated(rich(), seed=seed)
+    found = judged(with_errors(case, stuck(len(case.records.force), seed)))
+    assert found.which.verdict == "unknown"
+    assert found.which.inclusion["outliers"] < 0.5
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_readings_that_are_far_off_stay_outliers(seed: int):
+    case = simulated(rich(), seed=seed)
+    found = judged(with_errors(case, wild(len(case.records.force), seed)))
+    assert found.which.inclusion["outliers"] > 0.9
+
+
+def test_signs_by_chance_are_no_evidence():
+    """On average over signs that are drawn, odds are one: a ratio of likelihoods."""
+    rng = np.random.default_rng(4)
+    same = rng.binomial(12, 0.5, 20_000)
+    odds = [sign_odds(int(s), 12) for s in same]
+    assert np.mean(odds) == pytest.approx(1.0, abs=0.15)
