@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from hdcal.blind.virtual_rig.cases import draw_cases
 from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
-from hdcal.blind.virtual_rig.mixes import MIXES, draw_plans, effects_on
+from hdcal.blind.virtual_rig.mixes import MIXES, RIGS, draw_plans, effects_on
 from hdcal.blind.virtual_rig.oracle import drawn_curves, oracle_probabilities
 from hdcal.blind.virtual_rig.virtual_rig import ALPHA, ALPHA_SD, VirtualRig, draw_noise
 from hdcal.errors import InputError
@@ -53,7 +53,7 @@ def test_mixes_hold_what_they_promise(drawn):
         assert all(set(label.withheld) > set(label.truth) for _, label in cases)
         assert all(len(label.withheld) == 2 for _, label in cases)
     if mix == "all":
-        assert {label.mix for _, label in cases} == MIXES.keys() - {"all"}
+        assert {label.mix for _, label in cases} == MIXES.keys() - {"all", RIGS}
 
 
 def test_the_same_seed_gives_the_same_cases(drawn):
@@ -128,9 +128,11 @@ def test_cases_are_drawn_in_the_proportions_that_are_said():
         "effect": 0.37,
     }.items():
         assert kinds[kind] / 4000 == pytest.approx(share, abs=0.025)
-    assert np.mean([plan.serial for plan in plans]) == pytest.approx(0.25, abs=0.03)
+    assert np.mean([plan.noise == "ar" for plan in plans]) == pytest.approx(
+        0.25, abs=0.03
+    )
     nulls = draw_plans("null", 400, np.random.default_rng(2))
-    assert np.mean([plan.serial for plan in nulls]) == 0.5
+    assert np.mean([plan.noise == "ar" for plan in nulls]) == 0.5
     everything = Counter(
         plan.mix for plan in draw_plans("all", 1000, np.random.default_rng(2))
     )

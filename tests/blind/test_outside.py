@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from hdcal.blind.virtual_rig.history import History
-from hdcal.blind.virtual_rig.outside import CHOSEN, LISTED, UNSEEN
+from hdcal.blind.virtual_rig.outside import CHOSEN, LATE, LISTED, UNSEEN
 
-MECHANISMS = LISTED | CHOSEN | UNSEEN
+MECHANISMS = LISTED | CHOSEN | UNSEEN | LATE
 SEEDS = range(5)
 
 
@@ -48,10 +48,12 @@ def left_over(curve: np.ndarray) -> np.ndarray:
 
 
 def test_the_lists_share_no_name_and_are_long_enough():
-    assert len(MECHANISMS) == len(LISTED) + len(CHOSEN) + len(UNSEEN)
+    lists = (LISTED, CHOSEN, UNSEEN, LATE)
+    assert len(MECHANISMS) == sum(map(len, lists))
     assert len(LISTED) == 7
     assert len(CHOSEN) >= 8
     assert len(UNSEEN) >= 10
+    assert len(LATE) == 24
 
 
 @pytest.mark.parametrize("name", MECHANISMS)

@@ -23,6 +23,8 @@ from hdcal.blind.seal import (
 )
 
 CSV = digest(b"data")
+# Of the label below, as hdcal computed it before composites.
+EARLIER = "a7296eecbc3fd15ef2d46ddbd78873e6d0f0c470cf53cf332e8903537eac01c2"
 
 
 @pytest.fixture
@@ -60,7 +62,7 @@ def test_a_stamp_shows_every_change():
 
 def test_a_commitment_is_that_of_salt_label_and_data():
     salt, plain = new_salt(), label("a")
-    expected = digest(bytes.fromhex(salt) + canonical(plain) + CSV.encode())
+    expected = digest(bytes.fromhex(salt) + canonical(plain.plain()) + CSV.encode())
     assert commit(plain, salt, CSV) == expected
     others = (
         commit(plain, new_salt(), CSV),
@@ -207,3 +209,14 @@ def test_a_seed_gives_the_same_salts_again():
     salts = {drawn_salt(seed, case) for seed in (1, 2) for case in "ab"}
     assert len(salts) == 4
     assert {len(salt) for salt in salts} == {len(new_salt())}
+
+
+def test_a_label_of_before_composites_keeps_its_commitment():
+    """A set that was sealed by an earlier version has no word of what is beside."""
+    label = Label("case-1", "effect", ("slack",), "rich", 180, 1.0, "iid", 0.0, 0.5)
+    told = label.plain()
+    assert not {"beside", "share"} & told.keys()
+    assert Label.from_plain(told) == label
+    mixed = replace(label, kind="composite", beside="burr", share=0.7)
+    assert Label.from_plain(mixed.plain()) == mixed
+    assert commit(label, "00" * 16, "ab" * 32) == EARLIER

@@ -26,7 +26,7 @@ PAIRS = ("drift+friction", "slack+stiffening")
 DIMENSIONS, ROWS = 8, 144
 SIZES = (0.1, 0.15, 0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
 PRIOR = {"none": 0.2, "unknown": 0.15, "pair": 0.05, "effect": 0.6}
-ALARM = 0.02
+ALARM = 0.01
 # Between any two of them the cosine is 0.5: alike, but not the same.
 SHAPES = np.sqrt(0.5) * (np.eye(DIMENSIONS)[: len(EFFECTS)] + np.eye(DIMENSIONS)[-1])
 
@@ -176,7 +176,18 @@ def _planned(rng: np.random.Generator, place: int) -> Label:
         return _label("effect", (name,), 1.0, rng, withheld=(name,))
     if place % 3 == 1:
         return _label("effect", (name,), float(rng.choice([0.5, 1.0])), rng)
+    if place % 6 == 2:
+        return _with_another(_label("effect", (name,), 1.0, rng), rng)
     return _label("null", (), 0.0, rng)
+
+
+def _with_another(label: Label, rng: np.random.Generator) -> Label:
+    """Return the case of an effect with a tenth of its square outside beside it."""
+    other = rng.normal(size=DIMENSIONS)
+    other /= np.linalg.norm(other)
+    curve = np.sqrt(0.9) * np.array(label.curve) + np.sqrt(0.1) * label.r * other
+    kind = {"kind": "composite", "beside": "elsewhere", "share": 0.9}
+    return replace(label, curve=tuple(curve.tolist()), **kind)
 
 
 def _label(kind, truth, size, rng, spanned=None, withheld=()) -> Label:
@@ -185,7 +196,9 @@ def _label(kind, truth, size, rng, spanned=None, withheld=()) -> Label:
     else:
         direction = directions().get("+".join(truth), np.zeros(DIMENSIONS))
     length = np.linalg.norm(direction) or 1.0
-    serial = bool(rng.random() < 0.4)
+    kinds = 4 if kind == "null" else 2
+    chances = np.array([0.5, 0.2, 0.15, 0.15])[:kinds]
+    noise = int(rng.choice(kinds, p=chances / chances.sum()))
     return Label(
         case="",
         kind=kind,
@@ -193,8 +206,8 @@ def _label(kind, truth, size, rng, spanned=None, withheld=()) -> Label:
         program=str(rng.choice(["rich", "ramp"], p=[0.7, 0.3])),
         rows=ROWS,
         r=size,
-        noise="ar" if serial else "iid",
-        correlation=0.3 if serial else 0.0,
+        noise=("iid", "ar", "ar", "log")[noise],
+        correlation=(0.0, 0.3, 0.8, 0.95)[noise],
         sigma=1.0,
         spanned=spanned,
         withheld=withheld,

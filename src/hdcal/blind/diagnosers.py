@@ -16,6 +16,7 @@ from hdcal.data.resources import priors_folder
 from hdcal.data.versions import versions
 from hdcal.diagnosis import model_posterior
 from hdcal.diagnosis.diagnose import diagnose
+from hdcal.diagnosis.groups import JOINED
 from hdcal.diagnosis.library import choose_library
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.where import FALSE_ALARM
@@ -100,6 +101,8 @@ def answer_of(verdict: Verdict) -> CaseAnswer:
         amplitude={f"{size.effect}.{size.parameter}": _span(size)} if size else {},
         closed=_span(verdict.shrink.closed) if verdict.shrink.closed else None,
         noise_sd=gap.noise_sd_N,
+        group=tuple(which.group.split(JOINED)) if which.group else (),
+        group_members=which.group_members,
     )
 
 

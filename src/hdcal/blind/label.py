@@ -1,11 +1,11 @@
 """What is sealed about a case, and what a diagnoser answered."""
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from hdcal.data.typed_json import STRICT, Count, Name, Number, Share, Size, typed
 
-CaseKind = Literal["null", "effect", "pair", "outside", "real"]
+CaseKind = Literal["null", "effect", "pair", "composite", "outside", "real"]
 Quantiles = tuple[Number, Number, Number]
 
 
@@ -16,12 +16,13 @@ class Label:
     Attributes:
         case: name of the case, the stem of its CSV.
         kind: null (nothing is missing), effect (one of the library's), pair (two of
-            them), outside (in no library), real (measured data with a stated cause).
+            them), composite (one of them, and something outside beside it), outside
+            (in no library), real (measured data with a stated cause).
         truth: names of what was switched on; of real data, of what may be answered.
         program: name of the loading.
         rows: number of readings n.
         r: RMS of what the effect leaves beside the base model, over the noise sd.
-        noise: iid or ar (serial).
+        noise: iid, ar (serial), or log (read faster than the rig moves).
         correlation: AR(1) coefficient of the noise.
         sigma: sd of the noise [N].
         spanned: of an outside mechanism, whether it is of the list that was given
@@ -33,6 +34,8 @@ class Label:
             mechanism has just that one, in the library's unit.
         oracle: what Bayes' rule gives who knows r and the noise, by mechanism.
         mix: the part of the check that the case belongs to.
+        beside: what lies outside the library beside the effect of a composite.
+        share: of the square of a gap, what belongs to the effect.
     """
 
     __pydantic_config__ = STRICT
@@ -53,6 +56,16 @@ class Label:
     amplitude: dict[Name, Number] = field(default_factory=dict)
     oracle: dict[Name, Share] = field(default_factory=dict)
     mix: str = ""
+    beside: str = ""
+    share: Share = 1.0
+
+    def plain(self) -> dict[str, Any]:
+        """Return plain data, which is what a commitment is of.
+
+        Without what sets of before composites have not.
+        """
+        composite = {"beside", "share"} if self.kind != "composite" else set()
+        return {n: one for n, one in asdict(self).items() if n not in composite}
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "Label":
@@ -88,6 +101,9 @@ class CaseAnswer:
         amplitude: value of a parameter `effect.parameter`, quantiles .5, .05, .95.
         closed: share closed on held-out rows, quantiles .5, .05, .95.
         noise_sd: of a reading [N].
+        group: that leads, several where the loading cannot part them; empty where no
+            group is said.
+        group_members: effects of it.
     """
 
     __pydantic_config__ = STRICT
@@ -105,6 +121,8 @@ class CaseAnswer:
     amplitude: dict[Name, Quantiles] = field(default_factory=dict)
     closed: Quantiles | None = None
     noise_sd: Size | None = None
+    group: tuple[Name, ...] = ()
+    group_members: tuple[Name, ...] = ()
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":

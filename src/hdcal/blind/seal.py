@@ -47,7 +47,7 @@ def commit(label: Label, salt: str, csv_sha256: str) -> str:
     # Salt and hash have one length, so that no two triples give the same bytes.
     if not HASH.fullmatch(csv_sha256):
         raise Broken("holds a salt or a hash of the wrong length")
-    return digest(_random(salt) + canonical(label) + csv_sha256.encode())
+    return digest(_random(salt) + canonical(label.plain()) + csv_sha256.encode())
 
 
 def commit_origin(mix: str, seed: int, salt: str) -> str:
@@ -98,7 +98,7 @@ class Sealed:
             "schema": FIRST_SCHEMA,
             "mix": self.mix,
             "seed": self.seed,
-            "labels": [{"salt": salt, "label": one} for salt, one in pairs],
+            "labels": [{"salt": salt, "label": one.plain()} for salt, one in pairs],
         }
         if self.origin_salt is None:
             return found

@@ -62,12 +62,12 @@ def make(console: Console, source, out, key, force, **given) -> None:
 
 def _drawn(mix, cases, seed, program, **_) -> dict[str, Any]:
     from hdcal.blind.sealed_measurement import loading_at
-    from hdcal.blind.virtual_rig.cases import GEAR_TOML, draw_cases
+    from hdcal.blind.virtual_rig.cases import draw_cases, gear_file
 
     seed = secrets.randbits(_SEED_BITS) if seed is None else seed
     loading = None if program is None else loading_at(program)
     drawn = draw_cases(mix, cases, seed, loading)
-    return {"drawn": drawn, "gear": GEAR_TOML, "mix": mix, "seed": seed}
+    return {"drawn": drawn, "gear": gear_file(mix), "mix": mix, "seed": seed}
 
 
 def _measured(source, gear, cause, withhold, **_) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from hdcal.blind.scoring.scored_case import Cases, ScoredCase
 from hdcal.blind.scoring.sizes import amplitude_sizes, closed_errors, gap_sizes
 from hdcal.blind.scoring.tables import Row, precision
 
-_NOISES = {"iid": "independent", "ar": "serially correlated"}
+_NOISES = {"iid": "independent", "ar": "serially correlated", "log": "oversampled"}
 
 
 def groups(
@@ -71,7 +71,7 @@ def _numbers(
     return {
         "n": len(cases),
         "top1": share(c.credit for c in known),
-        "family": share(_family_right(c, families) for c in known),
+        "family": share(c.first_group_right(families) for c in known),
         "oracle": share(c.oracle_credit for c in known if c.label.oracle),
         "false_alarms": share(c.answer.detected for c in null),
         "detected": share(c.answer.detected for c in cases if c.label.kind == "effect"),
@@ -86,10 +86,3 @@ def _numbers(
         "closed": closed_errors(cases, closures),
         "log_score": log_score(cases),
     }
-
-
-def _family_right(case: ScoredCase, families: Mapping[str, str]) -> bool:
-    first, truth = case.top_effect, case.label.truth[0]
-    if first is None:
-        return False
-    return families.get(first, first) == families.get(truth, truth)

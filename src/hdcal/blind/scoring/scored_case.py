@@ -97,6 +97,30 @@ class ScoredCase:
         """Whether the effect that is named is one that acts."""
         return self.named and self.answer.effect in self.label.truth
 
+    @property
+    def said(self) -> bool:
+        """Whether a group of causes is said, or an effect of it."""
+        return self.answer.verdict in ("named", "group")
+
+    def said_right(self, families: Mapping[str, str]) -> bool:
+        """Tell whether the group that is said is that of an effect that acts.
+
+        Args:
+            families: group of each effect.
+        """
+        own = {families.get(name, name) for name in self.label.truth}
+        effect = self.answer.effect or ""
+        groups = self.answer.group or (families.get(effect, effect),)
+        found = {*groups} & own or {*self.answer.group_members} & {*self.label.truth}
+        return self.said and bool(found)
+
+    def first_group_right(self, families: Mapping[str, str]) -> bool:
+        """Tell whether the most probable effect is of the true one's group."""
+        first, truth = self.top_effect, self.label.truth[0]
+        return first is not None and families.get(first, first) == families.get(
+            truth, truth
+        )
+
     def at(self, level: float) -> bool:
         """Tell whether the gap is of one size, within 5 %."""
         return self.between(level, level)
@@ -110,9 +134,19 @@ Cases = Sequence[ScoredCase]
 
 
 def null_cases(cases: Cases, noise: str) -> list[ScoredCase]:
-    """Return the cases without a gap in one kind of noise, serial up to .5."""
-    own = [c for c in cases if c.label.kind == "null" and c.label.noise == noise]
-    return [c for c in own if noise != "ar" or c.label.correlation <= 0.5 + 1e-9]
+    """Return the cases without a gap in one kind of noise.
+
+    Args:
+        cases: of any kind.
+        noise: iid, ar (serial up to .5), strong (serial beyond) or log.
+    """
+
+    def kind(label: Label) -> str:
+        strong = label.noise == "ar" and label.correlation > 0.5 + 1e-9
+        return "strong" if strong else label.noise
+
+    null = [c for c in cases if c.label.kind == "null"]
+    return [c for c in null if kind(c.label) == noise]
 
 
 def without_remainder(name: str) -> str:

@@ -124,7 +124,7 @@ def score(
     wanted = everyone if calibration_cases is None else calibration_cases
     stated = reliabilities([case for case in own if case.label.case in wanted])
     order = order_dependence(own)
-    rows = bar(own, known, stated, order)
+    rows = bar(own, known, stated, order, families)
     confused = tables.confusion(own, families)
     return Scores(
         diagnoser=judged,

@@ -16,6 +16,7 @@ from hdcal.blind.scoring.scored_case import (
 )
 
 PAIR, OUTSIDE, WITHHELD, REAL = "pair", "outside", "withheld", "real"
+COMPOSITE = "composite"
 
 
 # A line of a table, by column: names, counts and estimates.
@@ -67,7 +68,8 @@ def _row(case: ScoredCase) -> str:
         return case.label.truth[0]
     if case.withheld:
         return WITHHELD
-    return {"outside": OUTSIDE, "real": REAL}.get(case.label.kind, PAIR)
+    others = {"outside": OUTSIDE, "real": REAL, "composite": COMPOSITE}
+    return others.get(case.label.kind, PAIR)
 
 
 def _column(top: str) -> str:
@@ -76,7 +78,8 @@ def _column(top: str) -> str:
 
 def _sorted(names: set[str], families: Mapping[str, str]) -> list[str]:
     # None first and everything that is no single effect last.
-    last = {NONE: -1, PAIR: 1, WITHHELD: 2, OUTSIDE: 3, REAL: 4, UNKNOWN: 5}
+    last = {NONE: -1, PAIR: 1, COMPOSITE: 1.5, WITHHELD: 2, OUTSIDE: 3, REAL: 4}
+    last[UNKNOWN] = 5
     return sorted(names, key=lambda n: (last.get(n, 0), families.get(n, "~"), n))
 
 
@@ -87,7 +90,7 @@ def mix_ups(table: Confusion, most: int = 12) -> list[MixUp]:
         MixUp(truth, answer, n, sum(counts))
         for truth, counts in zip(table.truths, table.counts, strict=True)
         for answer, n in zip(table.answers, counts, strict=True)
-        if n and truth != REAL and answer != right.get(truth, truth)
+        if n and truth not in (REAL, COMPOSITE) and answer != right.get(truth, truth)
     ]
     return sorted(found, key=lambda row: -row.n)[:most]
 

@@ -7,9 +7,11 @@ import numpy as np
 
 from hdcal.blind.label import Label
 from hdcal.blind.virtual_rig.history import Floats
-from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
+from hdcal.blind.virtual_rig.loadings import LOADINGS, POINTS, Loading, rich
 from hdcal.blind.virtual_rig.mixes import (
     OUTSIDE,
+    RIGS,
+    TIME_CONSTANTS,
     Plan,
     draw_plans,
     effects_shown,
@@ -24,9 +26,21 @@ from hdcal.blind.virtual_rig.virtual_rig import (
     draw_noise,
     draw_rig,
 )
+from hdcal.blind.virtual_rig.writing import AS_SIMULATED, Writing, draw_writing
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
 
+# Rigs of many sizes have no drawing; the material is that of the others.
+RIGS_TOML = """\
+[gear]
+name = "blind check"
+theory = "spring"
+material = "40CrNiMoA"
+
+[measurement]
+deformation = "radial"
+reference_temperature_C = 20.0
+"""
 # Material and geometry are those that the rigs are drawn about.
 GEAR_TOML = """\
 [gear]
@@ -72,7 +86,19 @@ def draw_cases(
         own, name = rng.spawn(1)[0], f"case-{number:0{digits}}"
         if loading is not None:
             plan = _on(loading, plan, own)
-        yield _case(name, plan, loading or LOADINGS[plan.loading](), own)
+        yield _case(name, plan, loading or _loading(plan), own)
+
+
+def gear_file(mix: str) -> str:
+    """Return the gear file of the cases of a mix."""
+    return RIGS_TOML if mix == RIGS else GEAR_TOML
+
+
+def _loading(plan: Plan) -> Loading:
+    if plan.points == POINTS:
+        return LOADINGS[plan.loading]()
+    made = rich(plan.points)
+    return replace(made, name=f"{made.name}-{len(made.history.order)}")
 
 
 def _on(loading: Loading, plan: Plan, rng: np.random.Generator) -> Plan:
@@ -109,23 +135,37 @@ def _drawn_curve(
         None where this rig does not show a drawn mechanism at the size of the plan.
     """
     if plan.kind == "outside":
-        history = replace(rig.history, force=rig.fault_free)
-        curve = OUTSIDE[plan.truth[0]](history, rng)
-        r = float(rig.gap_over_noise(curve))
-        if r == 0.0 or r * rig.sigma < _LEAST_LEFT * np.sqrt(np.mean(curve**2)):
+        curve = _outside_curve(plan.truth[0], plan.r, rig, rng)
+        return None if curve is None else (curve, {})
+    other = np.zeros(len(rig.history.order))
+    if plan.beside:
+        r = plan.r * np.sqrt(1.0 - plan.share)
+        other = _outside_curve(plan.beside, r, rig, rng)
+        if other is None:
             return None
-        return rng.choice([-1.0, 1.0]) * plan.r / r * curve, {}
     active, amplitude = [], {}
     for name in plan.truth:
         if name in NOISES:
             continue
-        found = rig.draw_mechanism(name, plan.r, rng)
+        found = rig.draw_mechanism(name, plan.r * np.sqrt(plan.share), rng)
         if found is None:
             return None
         active.append(found)
         if MECHANISMS[name].amplitude:
             amplitude[MECHANISMS[name].amplitude] = found.size
-    return rig.readings(active) - rig.fault_free, amplitude
+    return rig.readings(active) - rig.fault_free + other, amplitude
+
+
+def _outside_curve(
+    name: str, r: float, rig: VirtualRig, rng: np.random.Generator
+) -> Floats | None:
+    """Return what a mechanism of no library adds [N], None where nothing is left."""
+    history = replace(rig.history, force=rig.fault_free)
+    curve = OUTSIDE[name](history, rng)
+    own = float(rig.gap_over_noise(curve))
+    if own == 0.0 or own * rig.sigma < _LEAST_LEFT * np.sqrt(np.mean(curve**2)):
+        return None
+    return rng.choice([-1.0, 1.0]) * r / own * curve
 
 
 def _read(
@@ -138,44 +178,70 @@ def _read(
     rng: np.random.Generator,
 ) -> tuple[str, Label]:
     """Return the measurement file and the label of one case."""
-    correlation = float(rng.uniform(0.1, 0.5)) if plan.serial else 0.0
+    correlation = _correlation(plan, rng)
     clean = rig.fault_free + curve
     reading = clean + draw_noise(rig, rng, correlation)
     for each in plan.truth:
         if each in NOISES:
             reading = reading + NOISES[each](reading, plan.r * rig.sigma, rng)
-    oracle = {}
-    on_mean = plan.kind == "effect" and plan.truth[0] not in NOISES
-    if on_mean and not plan.withheld and plan.loading in LOADINGS:
-        oracle = oracle_probabilities(
-            loading,
-            rig,
-            reading,
-            truth=plan.truth[0],
-            curve=curve,
-            r=plan.r,
-            correlation=correlation,
-        )
+    writing = draw_writing(rng) if plan.mix == RIGS else AS_SIMULATED
     label = Label(
         case=name,
         mix=plan.mix,
         kind=plan.kind,
         truth=plan.truth,
-        program=plan.loading,
+        program=loading.name,
         rows=len(reading),
         r=plan.r,
-        noise="ar" if plan.serial else "iid",
+        noise="ar" if plan.noise == "strong" else plan.noise,
         correlation=correlation,
-        sigma=rig.sigma,
+        sigma=rig.sigma * writing.force,
         spanned=plan.truth[0] in LISTED if plan.kind == "outside" else None,
         withheld=plan.withheld,
-        clean=_rounded(clean),
-        curve=_rounded(rig.gap(curve)),
-        amplitude=amplitude,
-        oracle=oracle,
+        clean=_rounded(clean, writing),
+        curve=_rounded(rig.gap(curve), writing),
+        # Each has a unit of its own, which goes with the scale.
+        amplitude={} if plan.mix == RIGS else amplitude,
+        oracle=_oracle(plan, loading, rig, reading, curve, correlation),
+        beside=plan.beside,
+        share=plan.share,
     )
-    return loading.csv(reading), label
+    return loading.csv(reading, writing), label
 
 
-def _rounded(values: Floats) -> tuple[float, ...]:
-    return tuple(np.round(values, 5).tolist())
+def _oracle(
+    plan: Plan,
+    loading: Loading,
+    rig: VirtualRig,
+    reading: Floats,
+    curve: Floats,
+    correlation: float,
+) -> dict[str, float]:
+    """Return the oracle's probabilities, where there is one effect for it to find."""
+    on_mean = plan.kind == "effect" and plan.truth[0] not in NOISES
+    as_simulated = plan.loading in LOADINGS and plan.mix != RIGS
+    if not on_mean or plan.withheld or not as_simulated:
+        return {}
+    return oracle_probabilities(
+        loading,
+        rig,
+        reading,
+        truth=plan.truth[0],
+        curve=curve,
+        r=plan.r,
+        correlation=correlation,
+    )
+
+
+def _correlation(plan: Plan, rng: np.random.Generator) -> float:
+    """Draw the AR(1) coefficient of the noise."""
+    if plan.noise == "iid":
+        return 0.0
+    if plan.noise == "ar":
+        return float(rng.uniform(0.1, 0.5))
+    rows = plan.points * rng.uniform(*TIME_CONSTANTS[plan.noise])
+    return float(np.exp(-1.0 / rows))
+
+
+def _rounded(values: Floats, writing: Writing) -> tuple[float, ...]:
+    return tuple((np.round(values, 5) * writing.force).tolist())

@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hdcal.blind.virtual_rig.history import FULL, History, last_true
+from hdcal.blind.virtual_rig.writing import AS_SIMULATED, Writing
 from hdcal.data.case import Case
 
+# Readings of half a loop, unless asked for otherwise.
+POINTS = 13
 LOWEST = 0.02  # deformation where the rigs' own loadings begin [mm]
 # array of the history: column of the file, how a value is written
 _COLUMNS = {
@@ -49,11 +52,12 @@ class Loading:
                 found.add(f"{label}s")
         return frozenset(found)
 
-    def csv(self, force: np.ndarray) -> str:
+    def csv(self, force: np.ndarray, writing: Writing = AS_SIMULATED) -> str:
         """Return the measurement file of these readings [N], shape (n,)."""
+        set_at = self.history.deformation * writing.deformation
         table = {
-            "deformation_mm": [f"{v:.5f}" for v in self.history.deformation],
-            "force_N": [f"{v:.4f}" for v in force],
+            "deformation_mm": [format(v, writing.deformation_form) for v in set_at],
+            "force_N": [format(v, writing.force_form) for v in force * writing.force],
         }
         for name, (column, written) in _COLUMNS.items():
             if name in self.columns:
@@ -67,10 +71,11 @@ def ramp() -> Loading:
     return Loading("ramp", _history(np.linspace(LOWEST, FULL, 60), 5.0))
 
 
-def rich() -> Loading:
+def rich(points: int = POINTS) -> Loading:
     """Three mountings, three temperatures out of order, two rates, six angles."""
     return _loops(
         "rich",
+        points=points,
         temperature=(20.0, 50.0, 35.0, 20.0, 50.0, 35.0),
         seconds=(1.0, 5.0, 1.0, 5.0, 5.0, 1.0),
         angle=(0.0, 120.0, 240.0, 60.0, 300.0, 180.0),
@@ -79,10 +84,11 @@ def rich() -> Loading:
     )
 
 
-def lean() -> Loading:
+def lean(points: int = POINTS) -> Loading:
     """One mounting at one rate: the rig warms up while the gear is turned."""
     return _loops(
         "lean",
+        points=points,
         temperature=(20.0, 26.0, 32.0, 38.0, 44.0, 50.0),
         angle=(0.0, 60.0, 120.0, 180.0, 240.0, 300.0),
         columns=("temperature", "time", "angle"),
@@ -152,7 +158,7 @@ def _loops(
     angle: ArrayLike = 0.0,
     run: ArrayLike = 0,
     specimen: ArrayLike = 0,
-    points: int = 13,
+    points: int = POINTS,
     hold: float = 20.0,
 ) -> Loading:
     """Return loads and unloads with two rows of a hold at the top and the bottom.

@@ -4,21 +4,35 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import islice, product
+from typing import Literal
 
 import numpy as np
 
 from hdcal.blind.label import CaseKind
-from hdcal.blind.virtual_rig.loadings import LOADINGS, Loading
-from hdcal.blind.virtual_rig.outside import CHOSEN, LISTED, UNSEEN
+from hdcal.blind.virtual_rig.loadings import LOADINGS, POINTS, Loading
+from hdcal.blind.virtual_rig.outside import CHOSEN, LATE, LISTED, UNSEEN
 from hdcal.blind.virtual_rig.sensing import NOISES
 from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
 from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, InputError
 
 SIZES = (0.2, 0.3, 0.5, 1.0, 2.0, 5.0)
-OUTSIDE = {**LISTED, **CHOSEN, **UNSEEN}
+OUTSIDE = {**LISTED, **CHOSEN, **UNSEEN, **LATE}
 # Share of cases whose noise is serially correlated.
 _SERIAL = 0.25
+Noise = Literal["iid", "ar", "strong", "log"]
+# Ranges of the time constant of strong noise, in readings of half a loop: noise that
+# errs alike for longer is drift. A log is read faster than its rig moves.
+TIME_CONSTANTS: dict[Noise, tuple[float, float]] = {
+    "strong": (0.1, 0.2),
+    "log": (0.03, 0.12),
+}
+# The mix of rigs that are not all alike.
+RIGS = "rigs"
+# Readings of half a loop: records of about 30 to 2,000 rows.
+SPARSE_AND_DENSE = (3, 6, 40, 160)
+# Of the square of a gap, what belongs to the effect where something else is beside it.
+SHARES = (0.9, 0.7)
 
 MIXES = {
     "effects": "every effect of the library at every size, programs rich and lean",
@@ -28,6 +42,7 @@ MIXES = {
     "programs": "r = 1 on the other programs",
     "prior": "in the proportions that the diagnosis expects, all sizes",
     "all": "all of these",
+    "rigs": "all kinds, on rigs of every size, by every logger",
 }
 _SHARES = {
     "effects": 0.45,
@@ -41,15 +56,23 @@ _SHARES = {
 
 @dataclass(frozen=True)
 class Plan:
-    """What one case shall be; the fields mean what those of `Label` mean."""
+    """What one case shall be; the fields mean what those of `Label` mean.
+
+    Attributes:
+        noise: independent, serially correlated (0.1 to 0.5), or as `TIME_CONSTANTS`.
+        points: readings of half a loop, of programs that can have more or fewer.
+    """
 
     mix: str
     kind: CaseKind
     truth: tuple[str, ...]
     r: float
     loading: str
-    serial: bool = False
+    noise: Noise = "iid"
     withheld: tuple[str, ...] = ()
+    beside: str = ""
+    share: float = 1.0
+    points: int = POINTS
 
 
 def draw_plans(mix: str, count: int, rng: np.random.Generator) -> list[Plan]:
@@ -83,15 +106,17 @@ def _endless(mix: str, rng: np.random.Generator) -> Iterator[Plan]:
     while True:
         for index in rng.permutation(len(design)):
             plan = design[index]
-            serial = plan.serial if mix == "null" else bool(rng.uniform() < _SERIAL)
-            yield replace(plan, serial=serial)
+            fixed = mix == "null" or plan.kind == "null"
+            yield plan if fixed else replace(plan, noise=_noise(rng))
 
 
 def _design(mix: str) -> Iterator[Plan]:
-    if mix == "null":
+    if mix == RIGS:
+        yield from _rigs()
+    elif mix == "null":
         names = ("rich", "rich", "lean", "ramp", "fleet")
-        for loading, serial in product(names, (False, True)):
-            yield Plan(mix, "null", (), 0.0, loading, serial)
+        for loading, noise in product(names, ("iid", "ar")):
+            yield Plan(mix, "null", (), 0.0, loading, noise)
     elif mix == "effects":
         for r in SIZES:
             for name in effects_on("rich"):
@@ -116,16 +141,56 @@ def _design(mix: str) -> Iterator[Plan]:
                 yield Plan(mix, "effect", (name,), 1.0, loading)
 
 
+def _rigs() -> Iterator[Plan]:
+    """Yield one round of the mix `rigs`: a third of it are effects as the bar has them.
+
+    Other numbers of readings show the same effects; a logger that reads faster than its
+    rig moves errs alike from row to row.
+    """
+    shown, others = effects_on("rich"), ("lean", "ramp", "rates", "holds", "angles")
+    for name, r in product(shown, (0.5, 1.0, 2.0)):
+        yield Plan(RIGS, "effect", (name,), r, "rich")
+    for number, name in enumerate(shown):
+        points = SPARSE_AND_DENSE[number % len(SPARSE_AND_DENSE)]
+        yield Plan(RIGS, "effect", (name,), 1.0, "rich", points=points)
+        decoy = shown[(number + 7) % len(shown)]
+        both = tuple(sorted((name, decoy)))
+        yield Plan(RIGS, "effect", (name,), 1.0, "rich", withheld=both)
+    for number, name in enumerate(n for n in shown if n not in NOISES):
+        beside = tuple(OUTSIDE)[(3 * number) % len(OUTSIDE)]
+        for share in SHARES:
+            about = {"beside": beside, "share": share}
+            yield Plan(RIGS, "composite", (name,), 1.0, "rich", **about)
+    for loading in (*others, "fleet"):
+        for name in effects_on(loading)[::3]:
+            yield Plan(RIGS, "effect", (name,), 1.0, loading)
+    for number, name in enumerate(OUTSIDE):
+        yield Plan(RIGS, "outside", (name,), (1.0, 2.0)[number % 2], "rich")
+    for noise in ("iid", "ar"):
+        for points in (POINTS, *SPARSE_AND_DENSE):
+            yield Plan(RIGS, "null", (), 0.0, "rich", noise, points=points)
+        for loading in ("lean", "ramp", "fleet"):
+            yield Plan(RIGS, "null", (), 0.0, loading, noise)
+    for points in (POINTS, POINTS, 20, 30, 40, 60, 80, 120, 160, 160):
+        yield Plan(RIGS, "null", (), 0.0, "rich", "strong", points=points)
+    for points in (60, 60, 80, 80, 100, 120, 120, 140, 160, 160):
+        yield Plan(RIGS, "null", (), 0.0, "rich", "log", points=points)
+
+
+def _noise(rng: np.random.Generator) -> Noise:
+    return "ar" if rng.uniform() < _SERIAL else "iid"
+
+
 def _expected(rng: np.random.Generator) -> Plan:
     """Draw a plan with none ½, unknown 1/10, pairs 3 % and effects for the rest."""
     loading = str(rng.choice(["rich", "lean"]))
-    serial, r = bool(rng.uniform() < _SERIAL), float(rng.choice(SIZES))
+    noise, r = _noise(rng), float(rng.choice(SIZES))
     kinds: tuple[CaseKind, ...] = ("null", "outside", "pair", "effect")
     kind = kinds[rng.choice(4, p=[0.5, 0.1, 0.03, 0.37])]
     if kind == "null":
-        return Plan("prior", kind, (), 0.0, loading, serial)
+        return Plan("prior", kind, (), 0.0, loading, noise)
     truth = ("",) * (2 if kind == "pair" else 1)
-    plan = Plan("prior", kind, truth, r, loading, serial)
+    plan = Plan("prior", kind, truth, r, loading, noise)
     return other_truth(plan, effects_on(loading), rng, noises=kind == "effect")
 
 

@@ -10,6 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from hdcal.blind.virtual_rig import outside_chosen as chosen
+from hdcal.blind.virtual_rig import outside_late as late
+from hdcal.blind.virtual_rig import outside_later as later
 from hdcal.blind.virtual_rig import outside_listed as listed
 from hdcal.blind.virtual_rig import outside_unseen as unseen
 from hdcal.blind.virtual_rig.history import Floats, History
@@ -73,3 +75,31 @@ UNSEEN = _by_name(
     unseen.hunting_drive,
 )
 """Chosen after the method was settled, and shown to it in the published round only."""
+
+LATE = _by_name(
+    late.healing_pad,
+    late.transforming_clip,
+    late.growing_delamination,
+    late.bunched_strip,
+    late.set_grease,
+    late.pinched_pin,
+    late.creeping_roller,
+    late.tilting_table,
+    late.two_lips,
+    late.starved_bearing,
+    late.frame_gradient,
+    late.swinging_thermostat,
+    late.conducted_heat,
+    later.clipped_below,
+    later.inrush_crosstalk,
+    later.slew_limit,
+    later.drooping_hold,
+    later.ground_loop,
+    later.reversed_blocks,
+    later.repeated_rows,
+    later.bridged_gap,
+    later.tare_under_load,
+    later.fahrenheit_shift,
+    later.smoothed_record,
+)
+"""Chosen for the second round, without sight of the library."""
