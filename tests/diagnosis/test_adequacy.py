@@ -7,7 +7,7 @@ import pytest
 from diagnosis_cases import NOISE, judged, rich, simulated
 from rigs import make_case
 
-from hdcal.evidence.bursts import sign_odds
+from hdcal.evidence.bursts import log_sign_odds
 from hdcal.evidence.quantisation import rounding_step
 
 
@@ -82,5 +82,7 @@ def test_odds_of_signs_are_an_integral():
     s = np.linspace(0.5, 1.0, 20001)
     for same, pairs in ((0, 0), (8, 8), (5, 9), (0, 6)):
         slow = np.trapezoid(2.0 * s**same * (1.0 - s) ** (pairs - same), s) * 2.0**pairs
-        assert sign_odds(same, pairs) == pytest.approx(slow, rel=1e-6)
-    assert sign_odds(8, 8) > 10.0 > 1.0 > sign_odds(3, 8)
+        assert np.exp(log_sign_odds(same, pairs)) == pytest.approx(slow, rel=1e-6)
+    assert log_sign_odds(8, 8) > np.log(10.0) > 0.0 > log_sign_odds(3, 8)
+    # Thousands of rows are no reason to overflow.
+    assert np.isfinite([log_sign_odds(n, 5000) for n in (0, 2500, 5000)]).all()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import judged, rich, simulated
 
-from hdcal.evidence.bursts import sign_odds
+from hdcal.evidence.bursts import log_sign_odds
 
 NOISE = 0.4
 
@@ -39,6 +39,17 @@ def test_stretches_of_one_sign_are_no_outliers(seed: int):
     assert found.which.inclusion["outliers"] < 0.5
 
 
+def test_friction_with_stretches_beside_it_is_friction_and_something_else():
+    """The effect stays the cause, and the stretches are what lies beside it."""
+    case = simulated(rich(), {"coulomb_friction": {"force": 4.0}}, seed=5)
+    found = judged(with_errors(case, stuck(len(case.records.force), 5))).which
+    assert found.effect == "coulomb_friction"
+    assert found.inclusion["coulomb_friction"] > 0.9
+    assert found.remainder is not None
+    assert found.remainder.probability > 0.9
+    assert found.remainder.share.median < 0.4
+
+
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_readings_that_are_far_off_stay_outliers(seed: int):
     case = simulated(rich(), seed=seed)
@@ -50,5 +61,5 @@ def test_signs_by_chance_are_no_evidence():
     """On average over signs that are drawn, odds are one: a ratio of likelihoods."""
     rng = np.random.default_rng(4)
     same = rng.binomial(12, 0.5, 20_000)
-    odds = [sign_odds(int(s), 12) for s in same]
+    odds = np.exp([log_sign_odds(int(s), 12) for s in same])
     assert np.mean(odds) == pytest.approx(1.0, abs=0.15)

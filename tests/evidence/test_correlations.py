@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hdcal.diagnosis.model_posterior import ModelPosterior
+from hdcal.diagnosis.detection import correlation_between
 from hdcal.evidence.linear_rows import CORRELATIONS
 from hdcal.evidence.prepare import _correlations
 
@@ -30,18 +30,31 @@ def test_noise_may_last_for_a_fifth_of_a_half_cycle(points: int):
     assert found[-1] == pytest.approx(expected)
 
 
-def posterior(log_weight) -> ModelPosterior:
-    weight = np.exp(np.asarray(log_weight) - np.max(log_weight))
-    return ModelPosterior({}, {}, weight / weight.sum(), {})
+WEIGHED = np.array([0.0, 0.2, 0.4, 0.6, 0.85, 0.95])
+SHARP = -900.0 * (np.arctanh(WEIGHED) - np.arctanh(0.91)) ** 2
+
+
+def found(log_evidence, of_the_likeliest=None) -> tuple[float, float]:
+    """Return the likeliest coefficient and the mean of those that were weighed."""
+    height = np.asarray(log_evidence, float)
+    weight = np.exp(height - np.max(height))
+    weight /= weight.sum()
+    top = height if of_the_likeliest is None else np.asarray(of_the_likeliest)
+    return correlation_between(WEIGHED, weight, top), float(weight @ WEIGHED)
 
 
 def test_the_likeliest_lies_between_those_that_were_weighed():
-    weighed, true = np.array([0.0, 0.2, 0.4, 0.6, 0.85, 0.95]), 0.91
-    far = -900.0 * (np.arctanh(weighed) - np.arctanh(true)) ** 2
-    assert posterior(far).correlation_between(weighed) == pytest.approx(true, abs=1e-6)
-    # Few rows leave several, and at an end there is nothing beyond.
-    near = -2.0 * (weighed - 0.3) ** 2
-    about = posterior(near)
-    assert about.correlation_between(weighed) == about.correlation @ weighed
-    end = posterior([0.0, -50.0, -90.0, -120.0, -300.0, -900.0])
-    assert end.correlation_between(weighed) == pytest.approx(0.0, abs=1e-12)
+    assert found(SHARP)[0] == pytest.approx(0.91, abs=1e-6)
+    # However many rows there are.
+    assert found(1e3 * SHARP)[0] == pytest.approx(0.91, abs=1e-6)
+
+
+def test_where_nothing_lies_between_it_is_the_mean():
+    several = -2.0 * (WEIGHED - 0.3) ** 2
+    at_an_end = [0.0, -50.0, -90.0, -120.0, -300.0, -900.0]
+    for height in (several, at_an_end):
+        one, mean = found(height)
+        assert one == mean
+    # A remainder is weighed at some of them only, and may have no neighbours.
+    one, mean = found(SHARP, np.where(WEIGHED == 0.95, SHARP, -np.inf))
+    assert one == mean

@@ -8,6 +8,7 @@ from hdcal.blind.label import Label
 from hdcal.blind.virtual_rig.cases import GEAR_TOML
 from hdcal.blind.virtual_rig.loadings import Loading, loading_of
 from hdcal.calibration.calibrate import check_names
+from hdcal.data.gear import NO_MATERIAL
 from hdcal.data.priors import material_names
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, InputError
@@ -63,7 +64,7 @@ def sealed_measurement(
         withheld=withheld,
     )
     name, material = case.gear.material, None
-    if name not in material_names():
+    if name not in (NO_MATERIAL, *material_names()):
         material = (Path(gear).parent / name).read_bytes()
     return Path(source).read_bytes(), Path(gear).read_bytes(), material, label
 

@@ -16,7 +16,8 @@ class Gear:
 
     Attributes:
         name: free text; untrusted, escape it before showing it in HTML.
-        geometry: sizes, with load_height defaulting to length (the open rim).
+        geometry: sizes, with load_height defaulting to length (the open rim); NaN where
+            a spring states none.
         material: name of the material's prior file.
         theory: which stiffness formula K multiplies.
         reading: whether the deformation column is radial or diametral.
@@ -25,7 +26,8 @@ class Gear:
         nominal_deformation: design deformation [mm] or None.
         priors: K, E0, alpha, force_offset, deformation_offset, sigma, in code units
             (MPa, 1/K, N, mm), material and overrides already merged. K is the
-            influence coefficient under `ring` unless `K_theory` says otherwise.
+            influence coefficient under `ring` unless `K_theory` says otherwise; under
+            `spring` it is the stiffness [N/mm], and E0 is 1 MPa by definition.
         K_theory: the theory that the prior of K refers to.
         source: the TOML as read, for provenance.
         scale_priors: run_offset_sd, specimen_sd, gap_sd and gap_length, merged

@@ -41,8 +41,10 @@ def leaves_more_than_noise(
     # Rounding in steps above the noise leaves a pattern that is no effect.
     if {NONE, UNKNOWN, QUANTISATION} & {*names}:
         return False
-    if burst_odds(evidence, names, correlation)[0] > BURSTS:
-        return True
+    for noise in {*names} & evidence.noise.keys():
+        relative = evidence.noise[noise].relative_sd
+        if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
+            return True
     return _p_value(evidence, names, case, correlation, rng) < _LEAST
 
 

@@ -23,6 +23,8 @@ from hdcal.evidence.smooth_gap import (
 )
 from hdcal.report.parameters import Interval
 
+# An AR(1) coefficient of this probability stands alone among those weighed.
+_DECIDED = 0.9
 _NOT_SEEN = Interval(np.nan, np.nan, np.nan)
 
 
@@ -72,6 +74,33 @@ class Detection:
         )
 
 
+def correlation_between(
+    correlations: np.ndarray, weight: np.ndarray, log_evidence: np.ndarray
+) -> float:
+    """Return the likeliest AR(1) coefficient, between those that were weighed.
+
+    Many rows leave one of them only, and none may be the true one: Fisher's z of it is
+    where a parabola through the three about the likeliest has its peak. At an end, and
+    where few rows leave several, it is the mean.
+
+    Args:
+        correlations: that were weighed, increasing, shape (r,).
+        weight: posterior of each, shape (r,).
+        log_evidence: of the likeliest hypothesis at each; −inf where not weighed.
+    """
+    at, mean = int(np.argmax(weight)), float(weight @ correlations)
+    about = slice(at - 1, at + 2)
+    if weight[at] < _DECIDED or not 0 < at < len(correlations) - 1:
+        return mean
+    if not np.isfinite(log_evidence[about]).all():
+        return mean
+    z = np.arctanh(correlations[about])
+    curve, slope, _ = np.polyfit(z - z[1], log_evidence[about], 2)
+    if curve >= 0.0:
+        return mean
+    return float(np.tanh(np.clip(z[1] - 0.5 * slope / curve, z[0], z[2])))
+
+
 def detect_gap(
     evidence: CaseEvidence,
     posterior: ModelPosterior,
@@ -80,7 +109,10 @@ def detect_gap(
 ) -> Detection:
     """Test the base model; where it fails, fit a smooth gap."""
     prepared = evidence.prepared
-    correlation = posterior.correlation_between(prepared.rows.correlations)
+    heights = evidence.table[posterior.top]
+    correlation = correlation_between(
+        prepared.rows.correlations, posterior.correlation, heights
+    )
     cells, directions = declared_directions(evidence, case)
     tested = residual_test(prepared, correlation, directions, rng)
     significant = tested.p_value <= FALSE_ALARM

@@ -17,8 +17,6 @@ NAMED = 0.9
 # An effect is the cause where it closes this share of the gap; below it something
 # unknown is, with the effect beside it.
 CARRIES = 0.7
-# An AR(1) coefficient of this probability stands alone among those weighed.
-_DECIDED = 0.9
 
 
 @dataclass(frozen=True)
@@ -41,26 +39,6 @@ class ModelPosterior:
     def top(self) -> str:
         """Most probable hypothesis."""
         return max(self.probabilities, key=lambda name: self.probabilities[name])
-
-    def correlation_between(self, correlations: np.ndarray) -> float:
-        """Return the likeliest AR(1) coefficient, between those that were weighed.
-
-        Many rows leave one of them only, and none may be the true one: Fisher's z of it
-        is where a parabola through the three about the likeliest has its peak. At an
-        end, and where few rows leave several, it is the mean.
-
-        Args:
-            correlations: that were weighed, increasing, shape (r,).
-        """
-        at = int(np.argmax(self.correlation))
-        mean = float(self.correlation @ correlations)
-        if self.correlation[at] < _DECIDED or not 0 < at < len(correlations) - 1:
-            return mean
-        about = slice(at - 1, at + 2)
-        z = np.arctanh(correlations[about])
-        height = np.log(np.maximum(self.correlation[about], 1e-300))
-        curve, slope, _ = np.polyfit(z - z[1], height, 2)
-        return float(np.tanh(np.clip(z[1] - 0.5 * slope / curve, z[0], z[2])))
 
     @property
     def smallest_set(self) -> tuple[str, ...]:

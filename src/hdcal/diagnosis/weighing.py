@@ -12,7 +12,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.priors import effect_priors
-from hdcal.diagnosis.model_posterior import ModelPosterior, posterior_of
+from hdcal.diagnosis.model_posterior import ModelPosterior, log_priors, posterior_of
 from hdcal.evidence.bursts import with_bursts
 from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
 from hdcal.evidence.compute_evidence import compute_evidence
@@ -68,7 +68,10 @@ def weigh(
         most = -(-rows // (_AT_A_TIME * group))
         if not at_the_end or most < _FEWEST:
             break
-    evidence = with_bursts(with_remainders(evidence, rng))
+    evidence = with_remainders(evidence, rng)
+    names = list(evidence.table)
+    prior = dict(zip(names, log_priors(names, evidence.on_noise), strict=True))
+    evidence = with_bursts(evidence, shown, prior)
     return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
 
 

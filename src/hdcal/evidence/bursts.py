@@ -5,7 +5,7 @@ a hypothesis takes to be noisy agree with their neighbours, something that lasts
 them: the odds of that are evidence for structure in their place.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,92 +20,128 @@ from hdcal.evidence.case_evidence import (
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of, fitted_curve
 from hdcal.evidence.linear_rows import remove_base, whiten
+from hdcal.evidence.noise_evidence import noise_evidence
 from hdcal.evidence.prepare import with_relative_noise
+from hdcal.physics.effect import Effect
 
 # Readings with a noise this much larger than the middle one are noisy.
 _NOISY = 1.2
-# Noise in bursts of higher odds than this is structure.
-BURSTS = 10.0
+# Log odds from which noise in bursts is none.
+BURSTS = float(np.log(10.0))
+# How seldom what looks like noise is a structure that lasts, before its signs are seen.
+_SELDOM = float(np.log(0.02))
 
 
-def with_bursts(evidence: CaseEvidence) -> CaseEvidence:
+def with_bursts(
+    evidence: CaseEvidence,
+    library: Mapping[str, type[Effect]],
+    log_prior: Mapping[str, float],
+) -> CaseEvidence:
     """Return the evidence in which noise in bursts is unknown structure as well.
 
     Args:
         evidence: of each hypothesis, those with a remainder included.
+        library: effects by name.
+        log_prior: of each hypothesis.
     """
     table, closed = dict(evidence.table), dict(evidence.closed)
     beside = [name for name in closed if name not in evidence.on_noise]
-    for noise in evidence.noise:
-        for effect in ("", *beside):
-            names = [name for name in (effect, noise) if name]
-            whole = table.get(pair_name(effect, noise) if effect else noise)
-            odds, _ = burst_odds(evidence, names, evidence.likeliest_correlation)
-            if whole is None or odds <= BURSTS:
+    for effect in ("", *beside):
+        key = with_remainder(effect) if effect else UNKNOWN
+        if key not in table:
+            continue
+        for noise in evidence.noise:
+            pair = pair_name(effect, noise) if effect else noise
+            if pair not in table:
                 continue
-            key = with_remainder(effect) if effect else UNKNOWN
-            lasting = whole + np.log(odds)
-            if effect and np.logaddexp.reduce(lasting - table[key]) > 0.0:
-                share = _share(evidence, effect, noise)
-                closed[effect] = np.full_like(closed[effect], share)
-            # Either the one kind of structure or the other.
-            table[key] = np.logaddexp(table[key], lasting) - np.log(2.0)
+            relative = _relative_sd(evidence, library[noise], noise, effect)
+            names = [effect] if effect else []
+            correlation = evidence.likeliest_correlation
+            log_odds, off = burst_odds(evidence, names, relative, correlation)
+            # As seldom beforehand beside the noise in whose place it stands.
+            seldom = _SELDOM + log_prior[pair] - log_prior[key]
+            lasting = evidence.table[pair] + log_odds + seldom
+            if effect:
+                share = _share(evidence, effect, off)
+                closed[effect] = _mixed(closed[effect], table[key], share, lasting)
+            table[key] = np.logaddexp(table[key], lasting)
     return replace(evidence, table=table, closed=closed)
 
 
+def _mixed(
+    closed: np.ndarray, known: np.ndarray, share: float, lasting: np.ndarray
+) -> np.ndarray:
+    """Return draws of the share closed, so many of them beside bursts as is probable.
+
+    Args:
+        closed: draws beside what was known, shape (d,).
+        known: log evidence of that, [correlation].
+        share: closed beside the bursts.
+        lasting: log evidence of those, [correlation].
+    """
+    both = np.logaddexp.reduce(known), np.logaddexp.reduce(lasting)
+    count = round(len(closed) * float(np.exp(both[1] - np.logaddexp(*both))))
+    return np.concatenate([np.full(count, share), closed[count:]])
+
+
+def _relative_sd(
+    evidence: CaseEvidence, noisy: type[Effect], noise: str, effect: str
+) -> np.ndarray:
+    """Return the noise of each row as an effect has it beside another, (n,)."""
+    if not effect:
+        return evidence.noise[noise].relative_sd
+    curve = fitted_curve(evidence, effect)
+    return noise_evidence(noisy, evidence.prepared, curve).relative_sd
+
+
 def burst_odds(
-    evidence: CaseEvidence, names: Sequence[str], correlation: float
+    evidence: CaseEvidence,
+    names: Sequence[str],
+    relative: np.ndarray,
+    correlation: float,
 ) -> tuple[float, np.ndarray]:
-    """Return the odds that noisy readings came in bursts, against one by one.
+    """Return the log odds that noisy readings came in bursts, against one by one.
 
     In a burst neighbours agree with a probability that is uniform from one half to one.
 
     Args:
         evidence: of the case.
         names: of the hypothesis' effects.
+        relative: noise of each row over that of a usual one, shape (n,).
         correlation: AR(1) coefficient of the noise.
 
     Returns:
-        The odds, and what the noisy readings are off by [N], 0 at the others.
+        The log odds, and what the noisy readings are off by [N], 0 at the others.
     """
-    prepared, odds = evidence.prepared, 1.0
-    off = np.zeros(len(prepared.rows.reading))
-    for name in names:
-        if name not in evidence.noise:
-            continue
-        relative = evidence.noise[name].relative_sd
-        rows = with_relative_noise(prepared, relative).rows
-        design = design_of(evidence, names)
-        fit = fit_design(rows, design, prepared.noise_sd, correlation)
-        left = rows.reading - fit.predict()
-        # Serial correlation alone makes neighbours agree.
-        error = whiten(rows, left, correlation)
-        noisy = relative > _NOISY * np.median(relative)
-        before = rows.before
-        both = noisy & (before >= 0) & noisy[before]
-        same = int(np.sum(both & (error * error[before] > 0.0)))
-        odds *= sign_odds(same, int(np.sum(both)))
-        off = np.where(noisy, left, off)
-    return odds, off
+    prepared = evidence.prepared
+    rows = with_relative_noise(prepared, relative).rows
+    fit = fit_design(rows, design_of(evidence, names), prepared.noise_sd, correlation)
+    left = rows.reading - fit.predict()
+    # Serial correlation alone makes neighbours agree.
+    error = whiten(rows, left, correlation)
+    noisy = relative > _NOISY * np.median(relative)
+    before = rows.before
+    both = noisy & (before >= 0) & noisy[before]
+    same = int(np.sum(both & (error * error[before] > 0.0)))
+    return log_sign_odds(same, int(np.sum(both))), np.where(noisy, left, 0.0)
 
 
-def _share(evidence: CaseEvidence, effect: str, noise: str) -> float:
+def _share(evidence: CaseEvidence, effect: str, off: np.ndarray) -> float:
     """Return the share of the visible gap that an effect closes beside the bursts."""
-    correlation = evidence.likeliest_correlation
-    _, off = burst_odds(evidence, [effect, noise], correlation)
     bursts = np.mean(np.maximum(off**2 - evidence.prepared.noise_sd**2, 0.0))
     curve = remove_base(evidence.prepared.rows, fitted_curve(evidence, effect)[None])
     whole = bursts + np.mean(curve**2)
     return float(1.0 - np.sqrt(bursts / max(whole, 1e-300)))
 
 
-def sign_odds(same: int, pairs: int) -> float:
-    """Return the odds of dependent against independent signs.
+def log_sign_odds(same: int, pairs: int) -> float:
+    """Return the log odds of dependent against independent signs.
 
     Args:
         same: pairs of neighbours that agree.
         pairs: of neighbours in all.
     """
     other = pairs - same
-    whole = betaln(same + 1, other + 1) + np.log(betainc(other + 1, same + 1, 0.5))
-    return float(np.exp(whole + (pairs + 1) * np.log(2.0)))
+    tail = max(float(betainc(other + 1, same + 1, 0.5)), 1e-300)
+    whole = float(betaln(same + 1, other + 1)) + np.log(tail)
+    return float(whole + (pairs + 1) * np.log(2.0))

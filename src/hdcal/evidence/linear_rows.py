@@ -8,8 +8,8 @@ from scipy.linalg import cho_solve
 
 from hdcal.inference import serial_correlation
 
-# AR(1) coefficients of the noise within a run that are integrated over; more would
-# explain slow physics as noise.
+# AR(1) coefficients of the noise within a run that are always integrated over; more
+# would explain slow physics as noise where a half cycle has few rows.
 CORRELATIONS = (0.0, 0.2, 0.4, 0.6)
 
 

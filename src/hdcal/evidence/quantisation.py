@@ -72,6 +72,8 @@ def _counted_step(readings: np.ndarray) -> float:
     where there is no such step.
     """
     values = np.unique(readings)
+    if not values.any():
+        return 0.0
     steps = (_step_between(values, written) for written in _last_digits(values))
     return max(steps, default=0.0)
 

@@ -102,7 +102,7 @@ def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
     if "mass" in gear.dynamic_priors:
         return gear.dynamic_priors["mass"]
     if gear.theory == SPRING:
-        words = "a spring has no sizes, so nothing is known of the moved mass"
+        words = "the theory 'spring' uses no sizes, which a mass follows from"
         raise InputError([Finding(gear.name, words, "Add mass to its [priors]")])
     if gear.density is None or "mass_ratio" not in gear.dynamic_priors:
         words = "no density of the material is known, so nor is the moved mass"

@@ -80,6 +80,11 @@ class HeldFullScale:
             raise ValueError("has a full scale that no rig has")
 
 
+def _is_spring(K: HeldPrior | None, E0: HeldPrior | None) -> bool:
+    fixed = E0 is not None and (E0.family, E0.numbers) == ("fixed", [1.0])
+    return fixed and K is not None and K.unit == "N/mm"
+
+
 @dataclass(frozen=True)
 class HeldGear:
     """A gear; lengths in mm. Its numbers are those that a gear file may hold."""
@@ -113,6 +118,9 @@ class HeldGear:
         theories = {self.theory, self.K_theory}
         if theories != {SPRING} and (SPRING in theories or len(size) < _SIZES):
             raise ValueError("lacks the sizes of its theory")
+        defined = self.priors.get("K"), self.priors.get("E0")
+        if self.theory == SPRING and not _is_spring(*defined):
+            raise ValueError("has priors of K and E0 that no spring has")
         if self.nominal_deformation is not None:
             size["nominal_deformation"] = self.nominal_deformation
         if size_faults(size):

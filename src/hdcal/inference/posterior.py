@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
-from hdcal.data.case import Case, Theory
+from hdcal.data.case import Case
 from hdcal.data.priors import Prior
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
@@ -186,6 +187,8 @@ class Posterior(Shown):
                 tree["constant_data"].to_dataset(),
                 tree["observed_data"].to_dataset()["force"],
             )
+            if (model.theory == SPRING) != (case.gear.theory == SPRING):
+                raise ValueError("is of another theory than its gear")
             chosen = _look_up(model.effects, effects, file)
             found = cls(
                 case=case,

@@ -25,7 +25,9 @@ class AssumedFullScale:
         if isinstance(known, Gear):
             other = at_full_scale(known, FullScale(2.0 * REFERENCE.force))
             own, moved = (g.priors | g.scale_priors for g in (known, other))
-            shipped = [name for name in IN_NEWTONS if own[name] != moved[name]]
+            # The stiffness of a spring is such a prior too.
+            names = ("K", *IN_NEWTONS)
+            shipped = [name for name in names if own[name] != moved[name]]
             self._names = ", ".join(name for name in shipped if name != _UNUSED)
 
     def see(self, force: float) -> None:

@@ -66,13 +66,12 @@ def reading_limits(known: Posterior | Gear, prior: StreamPrior) -> ReadingLimits
     gear = known if isinstance(known, Gear) else known.case.gear
     # Where the linear law E(T) has lost half of the modulus; never hotter than that.
     alpha = max(float(np.median(prior.base.alpha)), 1e-5)
-    radius = float(gear.geometry.radius) / prior.reading.radial_per_read
     hottest = gear.reference_temperature + 0.5 / alpha
     if isinstance(known, Gear):
-        return ReadingLimits(radius, hottest)
+        return ReadingLimits(gear.reach, hottest)
     rows = known.case.records
     low, high = np.min(rows.deformation), np.max(rows.deformation)
     cold, warm = np.min(rows.temperature), np.max(rows.temperature)
     ends = (low - _NEAR_MM, high + _NEAR_MM, cold - _NEAR_K, warm + _NEAR_K)
     needs = frozenset().union(*(effect.needs for effect in known.problem.effects))
-    return ReadingLimits(radius, hottest, needs, tuple(map(float, ends)))
+    return ReadingLimits(gear.reach, hottest, needs, tuple(map(float, ends)))

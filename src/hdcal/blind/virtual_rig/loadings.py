@@ -84,11 +84,10 @@ def rich(points: int = POINTS) -> Loading:
     )
 
 
-def lean(points: int = POINTS) -> Loading:
+def lean() -> Loading:
     """One mounting at one rate: the rig warms up while the gear is turned."""
     return _loops(
         "lean",
-        points=points,
         temperature=(20.0, 26.0, 32.0, 38.0, 44.0, 50.0),
         angle=(0.0, 60.0, 120.0, 180.0, 240.0, 300.0),
         columns=("temperature", "time", "angle"),

@@ -142,7 +142,7 @@ def _design(mix: str) -> Iterator[Plan]:
 
 
 def _rigs() -> Iterator[Plan]:
-    """Yield one round of the mix `rigs`: a third of it are effects as the bar has them.
+    """Yield one round of the mix `rigs`, a quarter of it effects as the bar has them.
 
     Other numbers of readings show the same effects; a logger that reads faster than its
     rig moves errs alike from row to row.
@@ -171,7 +171,8 @@ def _rigs() -> Iterator[Plan]:
             yield Plan(RIGS, "null", (), 0.0, "rich", noise, points=points)
         for loading in ("lean", "ramp", "fleet"):
             yield Plan(RIGS, "null", (), 0.0, loading, noise)
-    for points in (POINTS, POINTS, 20, 30, 40, 60, 80, 120, 160, 160):
+    # Among fewer readings such noise is no more than serial.
+    for points in (20, 25, 30, 40, 50, 60, 80, 120, 160, 160):
         yield Plan(RIGS, "null", (), 0.0, "rich", "strong", points=points)
     for points in (60, 60, 80, 80, 100, 120, 120, 140, 160, 160):
         yield Plan(RIGS, "null", (), 0.0, "rich", "log", points=points)
@@ -230,4 +231,5 @@ def other_truth(
     chosen = rng.choice(names, len(plan.truth), replace=False)
     truth = tuple(sorted(map(str, chosen)))
     withheld = tuple(sorted({*decoys, *truth})) if plan.withheld else ()
-    return replace(plan, truth=truth, withheld=withheld)
+    beside = str(rng.choice(tuple(OUTSIDE))) if plan.beside else ""
+    return replace(plan, truth=truth, withheld=withheld, beside=beside)

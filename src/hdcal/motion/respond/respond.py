@@ -220,10 +220,7 @@ def _problems(posterior, temperature, mass, damping, draws, seed) -> list[Findin
 def _check_reach(posterior: Posterior, request: Request, values: dict, mass) -> None:
     """Refuse what is a slip of the unit: to fold the gear, or to swing for hours."""
     findings = []
-    limit = (
-        posterior.case.gear.geometry.radius
-        / case_reading(posterior.case).radial_per_read
-    )
+    limit = posterior.case.gear.reach
     static = float(request.force.largest()) / np.median(values["stiffness"])
     if static >= limit:
         words = f"would deform the gear by {static:.3g} mm even at rest"
