@@ -72,6 +72,8 @@ def test_other_theories_need_sizes(read):
         with pytest.raises(InputError) as error:
             read(text, theory=theory)
         assert findings(error) == [(name, "is missing") for name in lacking]
+        kept = ["keep the theory 'spring'" in f.remedy for f in error.value.findings]
+        assert kept == [theory is not None] * 3
     assert read(SPRING + SIZES, theory="cup").K_theory == "ring"
     assert read("[gear]\n" + SIZES, theory="spring").K_theory == "spring"
 

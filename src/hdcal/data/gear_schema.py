@@ -160,8 +160,10 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
         if isinstance(value, int | float) and not isinstance(value, bool)
         if range_of("size").holds(value)
     }
+    own = table.get("theory") == SPRING
+    kept = f"; or keep the theory '{SPRING}' of the file, which needs none" * own
     lacking = [
-        toml.finding("is missing", f"Add it: {_example(name)}", f"gear.{name}")
+        toml.finding("is missing", f"Add it: {_example(name)}{kept}", f"gear.{name}")
         for name in missing
         if (theory or table.get("theory")) != SPRING
     ]
