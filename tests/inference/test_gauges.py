@@ -22,11 +22,8 @@ from hdcal.errors import InputError
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import (
-    build_dynamic,
-    dynamic_site_priors,
-    predict_motion,
-)
+from hdcal.inference.dynamic_priors import dynamic_site_priors
+from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
 from hdcal.inference.gauges import with_gains
 from hdcal.inference.model import model
 from hdcal.inference.posterior import Posterior

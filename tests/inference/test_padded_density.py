@@ -14,11 +14,8 @@ from rigs import draw_truth, make_case, make_gear, program
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
 from hdcal.inference import compress, density
-from hdcal.inference.dynamic_problem import (
-    build_dynamic,
-    dynamic_site_priors,
-    predict_motion,
-)
+from hdcal.inference.dynamic_priors import dynamic_site_priors
+from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.padding import bucket_size

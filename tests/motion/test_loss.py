@@ -16,11 +16,8 @@ from hdcal.inference.checks import Check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution, frozen
 from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
-from hdcal.inference.dynamic_problem import (
-    FRICTION,
-    build_dynamic,
-    dynamic_site_priors,
-)
+from hdcal.inference.dynamic_priors import FRICTION, dynamic_site_priors
+from hdcal.inference.dynamic_problem import build_dynamic
 from hdcal.inference.values import POSITIVE
 from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps

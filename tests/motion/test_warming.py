@@ -8,11 +8,8 @@ from rigs import make_case, make_records
 from short import SHORT
 
 from hdcal import calibrate_dynamic
-from hdcal.inference.dynamic_problem import (
-    build_dynamic,
-    dynamic_site_priors,
-    predict_states,
-)
+from hdcal.inference.dynamic_priors import dynamic_site_priors
+from hdcal.inference.dynamic_problem import build_dynamic, predict_states
 from hdcal.motion import bands
 from hdcal.motion.bands import motion_bands
 from hdcal.motion.summary import dynamic_answer

@@ -8,11 +8,8 @@ from typing import Any, ClassVar
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.inference import posterior_file
-from hdcal.inference.dynamic_problem import (
-    DynamicProblem,
-    build_dynamic,
-    dynamic_sites,
-)
+from hdcal.inference.dynamic_priors import dynamic_sites
+from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
 from hdcal.inference.held import LOSS
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.problem import Problem

@@ -11,11 +11,7 @@ import numpy as np
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_problem import (
-    DynamicProblem,
-    step_stiffness,
-    stretch,
-)
+from hdcal.inference.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import LinearGear, linear_response
 

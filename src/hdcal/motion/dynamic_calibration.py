@@ -14,12 +14,8 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import Check
 from hdcal.inference.density import densities
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import (
-    DynamicProblem,
-    build_dynamic,
-    dynamic_site_priors,
-    pointwise,
-)
+from hdcal.inference.dynamic_priors import dynamic_site_priors
+from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.frequency_scan import scan
 from hdcal.inference.held import LOSS

@@ -15,8 +15,8 @@ from hdcal.data.prior import Prior
 from hdcal.inference import laplace
 from hdcal.inference.amplitude_units import finest
 from hdcal.inference.distributions import frozen
+from hdcal.inference.dynamic_priors import FRICTION
 from hdcal.inference.dynamic_problem import (
-    FRICTION,
     STOP,
     DynamicProblem,
     predict_motion,

@@ -6,7 +6,7 @@ from typing import Any, cast
 import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import FRICTION
+from hdcal.inference.dynamic_priors import FRICTION
 from hdcal.inference.posterior import FILE_NAME
 from hdcal.motion.answer import DynamicCalibrationAnswer, Loss
 from hdcal.motion.bands import MotionBands, motion_bands

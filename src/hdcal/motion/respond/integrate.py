@@ -11,7 +11,7 @@ import numpy as np
 
 from hdcal.errors import Finding, InputError
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.dynamic_problem import mass_prior
+from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, case_reading
 from hdcal.inference.values import Values
