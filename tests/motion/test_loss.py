@@ -48,6 +48,12 @@ def at_mode(found: loss.Chosen, name: str) -> float:
     return float(laplace.values_at(found.problem, found.whitening.centre)[name])
 
 
+@pytest.fixture(scope="module")
+def asked() -> loss.Chosen:
+    """The model with friction of a record that has both losses."""
+    return chosen(frictional_case(100, *TRUTHS["both"]), ["coulomb_friction"])
+
+
 @pytest.fixture
 def always(monkeypatch):
     """Weigh also where the linear model leaves noise and friction would show."""
@@ -73,10 +79,9 @@ def test_a_loss_is_named(name: str, always):
     assert [check.outcome for check in found.checks] == outcomes
 
 
-def test_friction_that_was_asked_for_is_found():
-    found = chosen(frictional_case(100, *TRUTHS["both"]), ["coulomb_friction"])
-    assert at_mode(found, "damping_ratio") == pytest.approx(0.01, rel=0.1)
-    assert at_mode(found, FRICTION) == pytest.approx(1.0, rel=0.05)
+def test_friction_that_was_asked_for_is_found(asked):
+    assert at_mode(asked, "damping_ratio") == pytest.approx(0.01, rel=0.1)
+    assert at_mode(asked, FRICTION) == pytest.approx(1.0, rel=0.05)
 
 
 def test_an_evidence_without_the_priors_breadth_is_told_by_a_wrong_name(
@@ -158,10 +163,9 @@ def test_a_search_begins_inside_of_its_priors():
     assert at_mode(found, FRICTION) == pytest.approx(1.0, rel=0.2)
 
 
-def test_the_density_with_friction_is_that_of_the_stated_priors():
+def test_the_density_with_friction_is_that_of_the_stated_priors(asked):
     """Its coordinate is where the gear would stop."""
-    found = chosen(frictional_case(100, *TRUTHS["both"]), ["coulomb_friction"])
-    problem = found.problem
+    problem = asked.problem
     names = [n for n, prior in problem.priors.items() if prior.family != "fixed"]
 
     def off(position):
@@ -183,7 +187,7 @@ def test_the_density_with_friction_is_that_of_the_stated_priors():
     rng = np.random.default_rng(0)
     many = {
         name: np.asarray(at) + 0.02 * rng.normal(size=6)
-        for name, at in found.whitening.centre.items()
+        for name, at in asked.whitening.centre.items()
     }
     many["initial_velocity"] = many["initial_velocity"] + 40.0 * rng.normal(size=6)
     apart = np.asarray(jax.jit(jax.vmap(off))(many))
@@ -226,11 +230,10 @@ def test_a_stated_friction_of_any_family_is_taken():
 
 
 @pytest.fixture(scope="module")
-def posterior() -> DynamicPosterior:
+def posterior(asked) -> DynamicPosterior:
     """A calibration with friction whose draws are made about the mode, none sampled."""
     case = frictional_case(100, *TRUTHS["both"])
-    found = chosen(case, ["coulomb_friction"])
-    values = laplace.values_at(found.problem, found.whitening.centre)
+    values = laplace.values_at(asked.problem, asked.whitening.centre)
     rng, scalars = np.random.default_rng(0), {}
     for name, value in values.items():
         if np.ndim(value) == 0:
@@ -242,7 +245,7 @@ def posterior() -> DynamicPosterior:
     settings |= {"chains": 2, "warmup": 1, "draws": 50, "versions": {}}
     settings |= {"target_acceptance": 0.8}
     checks = (Check("by hand", "passed", "told to"),)
-    about = found.problem.effects, found.priors, tree, {}, checks, settings
+    about = asked.problem.effects, asked.priors, tree, {}, checks, settings
     return DynamicPosterior(case, "ring", *about)
 
 

@@ -173,7 +173,7 @@ def _theories(found: CalibrationAnswer) -> Iterator[Section]:
     )
     one = (
         "Data identify the stiffness only, that is K times the theory's stiffness; the "
-        "rows are one posterior seen through three formulas."
+        "rows are one posterior seen through each theory."
     )
     yield Section("K under each theory", [table, Text(one), Text(found.K_note)])
 

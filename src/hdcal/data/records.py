@@ -44,7 +44,7 @@ def _use_double_precision(made: eqx.Module) -> None:
 class Geometry(eqx.Module):
     """Size of the flexspline; every leaf may be differentiated.
 
-    Making one switches JAX to double precision.
+    A spring has none: all are NaN. Making one switches JAX to double precision.
 
     Attributes:
         wall_thickness: δ [mm].

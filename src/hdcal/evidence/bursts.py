@@ -30,6 +30,8 @@ _NOISY = 1.2
 BURSTS = float(np.log(10.0))
 # How seldom what looks like noise is a structure that lasts, before its signs are seen.
 _SELDOM = float(np.log(0.02))
+# Log odds against the likeliest hypothesis from which a hypothesis is no rival.
+_HOPELESS = -25.0
 
 
 def with_bursts(
@@ -46,6 +48,10 @@ def with_bursts(
     """
     table, closed = dict(evidence.table), dict(evidence.closed)
     beside = [name for name in closed if name not in evidence.on_noise]
+    # At most half of the rows are noisier than the middle one.
+    half = len(evidence.prepared.rows.reading) // 2
+    most = log_sign_odds(half, half)
+    top = max(np.logaddexp.reduce(table[name]) + log_prior[name] for name in table)
     for effect in ("", *beside):
         key = with_remainder(effect) if effect else UNKNOWN
         if key not in table:
@@ -53,6 +59,9 @@ def with_bursts(
         for noise in evidence.noise:
             pair = pair_name(effect, noise) if effect else noise
             if pair not in table:
+                continue
+            behind = top - np.logaddexp.reduce(table[pair]) - log_prior[pair]
+            if most + _SELDOM < behind + _HOPELESS:
                 continue
             relative = _relative_sd(evidence, library[noise], noise, effect)
             names = [effect] if effect else []

@@ -86,13 +86,14 @@ def project(
     """Return curves whose inner products are those of P, not of P P.
 
     P = (I + X S X')⁻¹ is no projection where the priors hold the base coefficients
-    back: what this costs is kept in as many further entries as the base has columns.
+    back. It is one of rows and priors together: what those cost is kept in as many
+    further entries as the base has columns.
     """
-    base = whiten(rows, rows.base, correlation)
     white = whiten(rows, curves.T, correlation).T
-    fitted = cho_solve((_root(rows, base), False), base.T @ white.T).T
-    held = np.sqrt(rows.precision) * fitted
-    return np.concatenate([white - fitted @ base.T, held], axis=1)
+    held = np.zeros((len(white), len(rows.precision)))
+    whole = np.concatenate([white, held], axis=1)
+    axes, _ = np.linalg.qr(_stacked(rows, whiten(rows, rows.base, correlation)))
+    return whole - (whole @ axes) @ axes.T
 
 
 def _root(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:
@@ -101,5 +102,9 @@ def _root(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:
     Readings without noise leave next to nothing of the priors: the sum itself would
     be singular by rounding.
     """
-    stacked = np.vstack([base, np.diag(np.sqrt(rows.precision))])
-    return np.asarray(np.linalg.qr(stacked, mode="r"))
+    return np.asarray(np.linalg.qr(_stacked(rows, base), mode="r"))
+
+
+def _stacked(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:
+    """Return the base's columns above what its priors hold them with, (n + p, p)."""
+    return np.vstack([base, np.diag(np.sqrt(rows.precision))])

@@ -26,6 +26,8 @@ from hdcal.physics.effect import Effect, Noise, Rows, parameters
 
 _AMPLITUDES, _SHAPES = 10, 3
 _STEPS = 15
+# Newton steps below this, in prior sds and log σ, change no evidence.
+_STILL = 1e-7
 # Digits of −log density that are more than rounding.
 _DIGITS = 8
 # Curvatures below this are taken as this.
@@ -97,12 +99,18 @@ def _row_precision(point, effect, problem: NoiseProblem):
 def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
     """Return log evidence and effective precision of each row, of each effect."""
 
+    @jax.jit
     def minus(point):
         return _minus_log_density(point, effect, problem, sigma)
 
-    def step(point, _):
+    def slope_of(point):
         height, slope = jax.value_and_grad(minus)(point)
-        strength, axes = jnp.linalg.eigh(jax.hessian(minus)(point))
+        return slope, (height, slope)
+
+    def step(state):
+        count, point, *_ = state
+        hessian, (height, slope) = jax.jacfwd(slope_of, has_aux=True)(point)
+        strength, axes = jnp.linalg.eigh(hessian)
         log_det = jnp.sum(jnp.log(jnp.maximum(strength, _LEAST_CURVATURE)))
         move = axes @ (
             (axes.T @ slope) / jnp.maximum(jnp.abs(strength), _LEAST_CURVATURE)
@@ -112,11 +120,15 @@ def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
         heights = jnp.where(jnp.isfinite(heights), heights, jnp.inf)
         # What rounding decides is no descent: then the full step, which converges.
         after = tries[jnp.argmin(jnp.round(heights, _DIGITS))]
-        return after, (point, height, log_det)
+        return count + 1, after, jnp.max(jnp.abs(move)), (point, height, log_det)
+
+    def goes_on(state):
+        return (state[0] <= _STEPS) & (state[2] > _STILL)
 
     # The last step only looks at where those before have led.
-    _, seen = jax.lax.scan(step, start, None, length=_STEPS + 1)
-    best, height, log_det = (each[-1] for each in seen)
+    nothing = jnp.inf, (start, 0.0, 0.0)
+    *_, found = jax.lax.while_loop(goes_on, step, (0, start, *nothing))
+    best, height, log_det = found
     evidence = (
         -height
         + 0.5 * jnp.sum(jnp.log(problem.precision))

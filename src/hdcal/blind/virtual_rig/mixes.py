@@ -29,9 +29,9 @@ TIME_CONSTANTS: dict[Noise, tuple[float, float]] = {
 }
 # The mix of rigs that are not all alike.
 RIGS = "rigs"
-# Readings of half a loop: records of about 30 to 2,000 rows.
+# Readings of half a loop: records of 60 to 1,944 rows with the programs of today.
 SPARSE_AND_DENSE = (3, 6, 40, 160)
-# Of the square of a gap, what belongs to the effect where something else is beside it.
+# Of the squares of both gaps, what is the effect's where something else is beside it.
 SHARES = (0.9, 0.7)
 
 MIXES = {
