@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
-from hdcal.report.parameters import UNITS, Interval
+from hdcal.report.parameters import Interval
+from hdcal.report.units import UNITS
 
 LABELS = {
     "K": "influence coefficient K",

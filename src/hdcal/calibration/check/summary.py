@@ -23,7 +23,7 @@ from hdcal.data.gear_schema import certificates_in
 from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
-from hdcal.report.parameters import UNITS
+from hdcal.report.units import UNITS
 
 # Prior sds of log K within which 99.7 % of it lies.
 _FAR = 3.0
