@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import judged, rich, simulated
 
+from hdcal.evidence import bursts
 from hdcal.evidence.bursts import log_sign_odds
 
 NOISE = 0.4
@@ -63,3 +64,20 @@ def test_signs_by_chance_are_no_evidence():
     same = rng.binomial(12, 0.5, 20_000)
     odds = np.exp([log_sign_odds(int(s), 12) for s in same])
     assert np.mean(odds) == pytest.approx(1.0, abs=0.15)
+
+
+def test_what_is_passed_over_as_hopeless_changes_nothing(monkeypatch):
+    """Beside a strong effect bursts are looked for beside few others."""
+    case = simulated(rich(), {"coulomb_friction": {"force": 2.0}}, seed=5)
+    looked, odds = [], bursts.burst_odds
+
+    def counted(*given):
+        looked.append(given[1])
+        return odds(*given)
+
+    monkeypatch.setattr(bursts, "burst_odds", counted)
+    few, count = judged(case).which.probabilities, len(looked)
+    monkeypatch.setattr(bursts, "_HOPELESS", -np.inf)
+    all_of_them = judged(case).which.probabilities
+    assert 0 < count < (len(looked) - count) / 2
+    assert all_of_them == pytest.approx(few, abs=1e-9)
