@@ -5,8 +5,9 @@ a hypothesis takes to be noisy agree with their neighbours, something that lasts
 them: the odds of that are evidence for structure in their place.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from scipy.special import betainc, betaln
@@ -30,7 +31,7 @@ _NOISY = 1.2
 BURSTS = float(np.log(10.0))
 # How seldom what looks like noise is a structure that lasts, before its signs are seen.
 _SELDOM = float(np.log(0.02))
-# Log odds against the likeliest hypothesis from which a hypothesis is no rival.
+# Log odds to the likeliest hypothesis below which another is no rival of it.
 _HOPELESS = -25.0
 
 
@@ -47,34 +48,47 @@ def with_bursts(
         log_prior: of each hypothesis.
     """
     table, closed = dict(evidence.table), dict(evidence.closed)
-    beside = [name for name in closed if name not in evidence.on_noise]
+    correlation = evidence.likeliest_correlation
+    for effect, noise in _candidates(evidence, log_prior):
+        pair, key = _keys(effect, noise)
+        relative = _relative_sd(evidence, library[noise], noise, effect)
+        names = [effect] if effect else []
+        log_odds, off = burst_odds(evidence, names, relative, correlation)
+        # As seldom beforehand beside the noise in whose place it stands.
+        seldom = _SELDOM + log_prior[pair] - log_prior[key]
+        lasting = evidence.table[pair] + log_odds + seldom
+        if effect:
+            share = _share(evidence, effect, off)
+            closed[effect] = _mixed(closed[effect], table[key], share, lasting)
+        table[key] = np.logaddexp(table[key], lasting)
+    return replace(evidence, table=table, closed=closed)
+
+
+def _candidates(
+    evidence: CaseEvidence, log_prior: Mapping[str, float]
+) -> Iterator[tuple[str, str]]:
+    """Yield the effects, "" for none, and the noise that may come in bursts beside it.
+
+    Those in whose place no bursts, however clear, would be a rival are passed over.
+    """
+    whole = {
+        n: np.logaddexp.reduce(e) + log_prior[n] for n, e in evidence.table.items()
+    }
     # At most half of the rows are noisier than the middle one.
     half = len(evidence.prepared.rows.reading) // 2
-    most = log_sign_odds(half, half)
-    top = max(np.logaddexp.reduce(table[name]) + log_prior[name] for name in table)
-    for effect in ("", *beside):
-        key = with_remainder(effect) if effect else UNKNOWN
-        if key not in table:
-            continue
-        for noise in evidence.noise:
-            pair = pair_name(effect, noise) if effect else noise
-            if pair not in table:
-                continue
-            behind = top - np.logaddexp.reduce(table[pair]) - log_prior[pair]
-            if most + _SELDOM < behind + _HOPELESS:
-                continue
-            relative = _relative_sd(evidence, library[noise], noise, effect)
-            names = [effect] if effect else []
-            correlation = evidence.likeliest_correlation
-            log_odds, off = burst_odds(evidence, names, relative, correlation)
-            # As seldom beforehand beside the noise in whose place it stands.
-            seldom = _SELDOM + log_prior[pair] - log_prior[key]
-            lasting = evidence.table[pair] + log_odds + seldom
-            if effect:
-                share = _share(evidence, effect, off)
-                closed[effect] = _mixed(closed[effect], table[key], share, lasting)
-            table[key] = np.logaddexp(table[key], lasting)
-    return replace(evidence, table=table, closed=closed)
+    least = max(whole.values()) + _HOPELESS - _SELDOM - log_sign_odds(half, half)
+    beside = [name for name in evidence.closed if name not in evidence.on_noise]
+    for effect, noise in product(["", *beside], evidence.noise):
+        pair, key = _keys(effect, noise)
+        if key in whole and pair in whole and whole[pair] >= least:
+            yield effect, noise
+
+
+def _keys(effect: str, noise: str) -> tuple[str, str]:
+    """Return what a noise beside an effect is called, and what a remainder there is."""
+    if not effect:
+        return noise, UNKNOWN
+    return pair_name(effect, noise), with_remainder(effect)
 
 
 def _mixed(
