@@ -6,6 +6,7 @@ ARGS ?=
 CASES ?= 400
 ATTACKS ?= 100000
 WORKERS ?= 2
+PART ?=
 
 BIN := .venv/bin
 BENCH := .venv-bench/bin
@@ -14,7 +15,7 @@ COMPILE := $(UV) pip compile pyproject.toml --universal --python-version 3.11 \
 	--generate-hashes --custom-compile-command "make lock" --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test slow lint format types contracts docs bench \
+.PHONY: help venv demo test thorough slow lint format types contracts docs bench \
 	bench-diagnosis blind attacks lock clean
 
 help:  ## list the targets
@@ -27,8 +28,12 @@ demo: .venv/installed  ## calibrate and diagnose the bundled gear
 	$(BIN)/hdcal diagnose datasets/xb1-100-80 --quick --out demo-verdict --force
 	@echo "The reports: demo-out/report.html, demo-verdict/report.html"
 
-test: .venv/installed  ## all tests but the long statistical ones
+test: .venv/installed  ## all tests but the longest ones
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(ARGS)
+
+thorough: .venv/installed  ## the longer tests beside them; PART=3/8 for a part of them
+	$(BIN)/python -m pytest -m thorough -n $(JOBS) --dist loadfile --benchmark-disable \
+		$(if $(PART),--part $(PART)) $(ARGS)
 
 slow: .venv/installed  ## the long statistical tests
 	$(BIN)/python -m pytest -m slow $(ARGS)

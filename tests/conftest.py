@@ -5,6 +5,7 @@ import os
 import shutil
 import sys
 import tempfile
+import zlib
 from collections.abc import Iterator
 
 import pytest
@@ -16,6 +17,25 @@ _COMPILED_PLAINLY = (
     "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1 "
     "--xla_cpu_parallel_codegen_split_count=1"
 )
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Let a run take some of the files: --part 3/8, those of every eighth run."""
+    words = "I/N: the tests of one in N files, another one in N for another I"
+    parser.addoption("--part", help=words)
+
+
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """Keep the files of the part that was asked for."""
+    if part := config.getoption("--part"):
+        one, of = map(int, part.split("/"))
+        files = [item.nodeid.partition("::")[0] for item in items]
+        theirs = [zlib.crc32(name.encode()) % of == one % of for name in files]
+        left_out = [item for item, kept in zip(items, theirs, strict=True) if not kept]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item, kept in zip(items, theirs, strict=True) if kept]
 
 
 def pytest_configure(config: pytest.Config) -> None:

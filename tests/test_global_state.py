@@ -139,6 +139,7 @@ def test_no_import_and_no_name_changes_state_or_makes_an_array():
     run(STATE + TOUCH, **NO_ARRAYS)
 
 
+@pytest.mark.thorough
 def test_a_change_or_an_array_would_be_seen():
     run(STATE + PLANTED, **NO_ARRAYS)
 

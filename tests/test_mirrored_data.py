@@ -31,6 +31,7 @@ def runs(
     return {"": calibrated[1], "-": folder / "result"}
 
 
+@pytest.mark.thorough
 def test_every_answer_is_mirrored(here: Hdcal, runs: dict[str, Path], tmp_path: Path):
     def both(command: str, *asked: str) -> list[dict]:
         """Return the answers of both, where ± is the sign of each."""
@@ -75,6 +76,7 @@ def test_every_answer_is_mirrored(here: Hdcal, runs: dict[str, Path], tmp_path: 
     assert pulled["tested_share"] > 0.0
 
 
+@pytest.mark.thorough
 def test_a_window_that_is_pulled_has_its_spring(here: Hdcal, runs: dict[str, Path]):
     springs = []
     for sign, window in (("", "0.35:0.45"), ("-", "-0.45:-0.35")):
@@ -90,6 +92,7 @@ def test_a_window_that_is_pulled_has_its_spring(here: Hdcal, runs: dict[str, Pat
     )
 
 
+@pytest.mark.thorough
 def test_a_stream_of_pulls_alarms_at_a_change(runs: dict[str, Path]):
     lines = [
         {"deformation_mm": -at, "force_N": -stiffness * at}

@@ -61,6 +61,7 @@ def run(tree: Path, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.thorough
 def test_an_effect(tree: Path):
     code = '''
         """Grease that clings to the plunger."""
@@ -131,6 +132,7 @@ def test_an_effect(tree: Path):
     assert int(re.findall(r"(\d+) passed", said)[0]) > 10
 
 
+@pytest.mark.thorough
 def test_a_theory(tree: Path):
     function = '''
         def plate(geometry: Geometry, modulus: Scalar) -> Scalar:
@@ -260,6 +262,7 @@ ROOM = {
 }
 
 
+@pytest.mark.thorough
 def test_a_command(tree: Path):
     main = (tree / "src/hdcal/__main__.py").read_text("utf-8")
     main = main.replace(

@@ -69,6 +69,7 @@ def cases_of(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("answers-*/*.json"))
 
 
+@pytest.mark.thorough
 def test_a_killed_worker_loses_nothing_and_doubles_nothing(local, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 10)
     alone = sealed_set(tmp_path / "alone", 10)
@@ -92,6 +93,7 @@ def test_a_killed_worker_loses_nothing_and_doubles_nothing(local, tmp_path: Path
     assert data["answers"] == expected
 
 
+@pytest.mark.thorough
 def test_what_kills_every_worker_ends_the_run(local, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 2)
     with pytest.raises(HdcalError, match=r"several workers .* again to go on"):
@@ -104,6 +106,7 @@ def test_what_kills_every_worker_ends_the_run(local, tmp_path: Path):
     assert not cases_of(folder) and not (folder / "answers-deadly.json").exists()
 
 
+@pytest.mark.thorough
 def test_a_lost_scheduler_is_one_line_and_costs_no_answer(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
@@ -159,6 +162,7 @@ def until(happened: Callable[[], bool]) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.thorough
 def test_the_real_diagnosis_answers_there(local, here: Hdcal, tmp_path: Path):
     folder = sealed_set(tmp_path / "set", 1)
     asked = ["blind", "answer", folder, "--scheduler", local.scheduler_address]
@@ -170,6 +174,7 @@ def test_the_real_diagnosis_answers_there(local, here: Hdcal, tmp_path: Path):
     assert cases_of(folder) == ["c01"]
 
 
+@pytest.mark.thorough
 def test_workers_of_another_version_are_refused(local, monkeypatch, tmp_path: Path):
     from hdcal.blind import answering
 

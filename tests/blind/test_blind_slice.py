@@ -32,6 +32,7 @@ def guess(label) -> float:
     return np.log(chance.get(label.kind, 0.03 * 2.0 / many**2))
 
 
+@pytest.mark.thorough
 def test_its_log_score_is_best(scores):
     """Better than the rivals', and than knowing how the cases were drawn."""
     found = {name: each.value for name, each in scores.log_score.items()}
@@ -40,6 +41,7 @@ def test_its_log_score_is_best(scores):
     assert found["hdcal"] > np.mean(known) + 0.5
 
 
+@pytest.mark.thorough
 def test_it_names_nothing_where_nothing_is(scores):
     rows = {row.key: row for row in scores.bar}
     assert rows["named_on_null"].n >= 4

@@ -41,6 +41,7 @@ def posterior():
     return calibrate(make_case(with_force(ramp(40))), seed=4, **SHORT)
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_draws(posterior):
     case = posterior.case
     again, other = (calibrate(case, seed=seed, **SHORT) for seed in (4, 5))
@@ -121,6 +122,7 @@ WITH_SITES = [
 SLICE = ("thermal_expansion", "coulomb_friction", "charge_leakage", "outliers")
 
 
+@pytest.mark.thorough
 def test_a_slice_of_effects_is_recovered_side_by_side():
     assert_recovered(SLICE)
 
@@ -161,6 +163,7 @@ def assert_recovered(names):
         assert low < truth[parameter] < high, parameter
 
 
+@pytest.mark.thorough
 def test_two_specimens_with_a_fixed_K_and_a_coarse_scale():
     """The pilot sees each specimen's slope, so coarse rounding is treated exactly."""
     rng = np.random.default_rng(3)
@@ -192,6 +195,7 @@ def test_an_sd_for_every_row_keeps_the_rows():
     assert problem.blocks is None
 
 
+@pytest.mark.thorough
 def test_a_known_sd_by_row_weighs_the_rows():
     """Rows stated to be poor are; ignoring it would move the slope."""
     deformation = np.linspace(0.02, 0.54, 60)

@@ -156,6 +156,7 @@ def test_the_report_asks_nothing_of_the_network(calibrated: Calibrated):
     assert 'class="banner bad"' not in page
 
 
+@pytest.mark.thorough
 def test_an_older_result_is_replaced_only_when_told_to(
     calibrated: Calibrated, here: Hdcal
 ):

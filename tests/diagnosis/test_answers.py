@@ -27,6 +27,7 @@ def curved() -> Verdict:
     return judged(simulated(ramp(14), CURVED, seed=1))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("prior", "spread"),
     [
@@ -45,6 +46,7 @@ def test_the_modulus_is_as_uncertain_as_its_prior(prior, spread):
     assert ("not free" in part.split_by) == (prior.family == "fixed")
 
 
+@pytest.mark.thorough
 def test_k_is_fitted_beside_the_named_effect():
     effects = {"progressive_stiffening": {"slope": 0.3}}
     verdict = judged(simulated(rich(), effects))
@@ -67,6 +69,7 @@ def mirrored(records):
     return replace(records, **{n: -np.asarray(getattr(records, n)) for n in names})
 
 
+@pytest.mark.thorough
 def test_compression_read_as_negative_gets_the_same_runs(curved):
     records = curved.case.records
     runs, others = (
@@ -120,6 +123,7 @@ def test_a_departure_without_a_cause_has_a_reason_of_its_own(monkeypatch):
     assert "remains the most probable" in verdict.shrink.reason
 
 
+@pytest.mark.thorough
 def test_the_step_is_told_where_only_rounding_is_detected():
     records = simulated(ramp(40)).records
     force = 3.0 * np.round(np.asarray(records.force) / 3.0)
@@ -131,6 +135,7 @@ def test_a_gap_that_is_seen_is_not_put_down_to_rounding(curved):
     assert curved.gap.detected and curved.gap.rounding_N is None
 
 
+@pytest.mark.thorough
 def test_the_rows_of_a_mean_are_told(monkeypatch):
     monkeypatch.setattr(weighing, "MOST_ROWS", 60)
     verdict = judged(simulated(rich()))

@@ -283,6 +283,7 @@ def test_several_processes_give_the_same_in_the_same_order():
     assert told == [(done, 6) for done in range(1, 7)]
 
 
+@pytest.mark.thorough
 def test_any_number_of_processes_writes_the_same_bytes(tmp_path: Path):
     found = [read_case(XB1), replace(read_case(XB1), name="again")]
     settings = {"library": None, "quick": True, "report": True, "seed": 3}

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from schema_checks import obeys
+from slices import slice_of
 from verdicts import KINDS
 
 from hdcal.data.case import Case
@@ -32,7 +33,7 @@ def hollow(value):
     return value
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slice_of(KINDS, ["failed", "ambiguous"]))
 def test_without_numbers_everything_is_written(kind: str, tmp_path: Path):
     verdict = hollow(KINDS[kind]())
     assert isinstance(verdict, Verdict)

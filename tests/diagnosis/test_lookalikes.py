@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from diagnosis_cases import judged, rich, simulated
 from rigs import ramp
 
@@ -15,6 +16,7 @@ def names(which) -> set[str]:
     return {each.effect for each in which.lookalikes}
 
 
+@pytest.mark.thorough
 def test_on_one_ramp_a_sensor_that_saturates_may_be_a_wall_that_yields():
     verdict = judged(simulated(ramp(60), SATURATES, seed=3))
     which = verdict.which
@@ -25,6 +27,7 @@ def test_on_one_ramp_a_sensor_that_saturates_may_be_a_wall_that_yields():
     assert needs == ("unloading",)
 
 
+@pytest.mark.thorough
 def test_unloading_tells_them_apart():
     which = judged(simulated(rich(), SATURATES, seed=3)).which
     assert "curve down" in (which.group or "")
@@ -36,6 +39,7 @@ def rounded(case, step: float):
     return replace(case, records=replace(case.records, force=force))
 
 
+@pytest.mark.thorough
 def test_a_coarse_display_does_not_name_what_fine_readings_do_not():
     which = judged(rounded(simulated(ramp(60), SATURATES, seed=3), 0.5)).which
     assert which.verdict != "named"
@@ -55,6 +59,7 @@ def test_behind_a_coarse_display_the_unknown_stays_unknown():
     assert judged(rounded(case, 0.98), library=library).which.verdict == "unknown"
 
 
+@pytest.mark.thorough
 def test_a_kink_upwards_is_no_yield():
     kink = {"contact_onset": {"ratio": 0.3, "onset": 0.3}}
     which = judged(simulated(ramp(60), kink, seed=3)).which

@@ -96,6 +96,7 @@ def test_through_zero_nothing_is_called_unloading():
     assert "decreases than while" in seen(replace(case, records=moved))[0].statement
 
 
+@pytest.mark.thorough
 def test_few_rows_alarm_as_seldom():
     """Of 200 ramps of six rows, 1 % due: seven or more would come once in 200."""
     alarms = [bool(seen(simulated(ramp(6), seed=seed))) for seed in range(200)]

@@ -62,6 +62,7 @@ def test_names_cannot_steer_the_terminal(name: str):
     assert not set(caught.get()) & {"\x00", "\x1b", "\x07", "\u202e"}
 
 
+@pytest.mark.thorough
 def test_the_same_verdict_gives_the_same_bytes():
     for what in FIGURES:
         draw = FIGURES[what]

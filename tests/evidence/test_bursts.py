@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import judged, rich, simulated
+from slices import slice_of
 
 from hdcal.evidence import bursts
 from hdcal.evidence.bursts import log_sign_odds
@@ -32,7 +33,7 @@ def wild(rows: int, seed: int) -> np.ndarray:
     return error
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", slice_of([1, 2, 3], [1]))
 def test_stretches_of_one_sign_are_no_outliers(seed: int):
     case = simulated(rich(), seed=seed)
     found = judged(with_errors(case, stuck(len(case.records.force), seed)))
@@ -51,7 +52,7 @@ def test_friction_with_stretches_beside_it_is_friction_and_something_else():
     assert found.remainder.share.median < 0.4
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", slice_of([1, 2, 3], [1]))
 def test_readings_that_are_far_off_stay_outliers(seed: int):
     case = simulated(rich(), seed=seed)
     found = judged(with_errors(case, wild(len(case.records.force), seed)))

@@ -106,6 +106,7 @@ def difference(name: str, gap: float) -> float:
     return closed(case, name) - sampled(case, name)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", SLICE)
 def test_a_slice_of_the_library_agrees(name):
     assert abs(difference(name, SMALL)) < BAR

@@ -59,6 +59,7 @@ def padded() -> dict[str, np.ndarray]:
     return table_of(rows_of(42))
 
 
+@pytest.mark.thorough
 def test_every_hypothesis_is_as_likely_as_without_padding(padded, unpadded):
     slow = table_of(rows_of(42))
     assert bucket_size(42) > 42
@@ -68,6 +69,7 @@ def test_every_hypothesis_is_as_likely_as_without_padding(padded, unpadded):
         np.testing.assert_allclose(padded[name], evidence, rtol=0, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_rows_that_were_not_measured_would_be_noticed(padded, monkeypatch):
     """The comparison can fail: padding that counts as readings."""
     monkeypatch.setattr(

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from rigs import cycles, draw_truth, make_case, make_gear, posterior_draws, simulate
 from scipy import stats
+from slices import slice_of
 
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
@@ -105,7 +106,9 @@ def _assert_covers(hits):
         assert p > LEVEL, (level, share / len(hits))
 
 
-@pytest.mark.parametrize("model", ["base", "progressive_stiffening"])
+@pytest.mark.parametrize(
+    "model", slice_of(["base", "progressive_stiffening"], ["base"])
+)
 def test_a_slice_of_calibration(model):
     ranks, hits = run_sbc(model, FEW)
     _assert_uniform(ranks)
@@ -137,6 +140,7 @@ def test_a_broken_posterior_is_caught(fault):
     assert uniformity(np.sum(broken < truth[:, None], axis=1)) < LEVEL
 
 
+@pytest.mark.thorough
 def test_a_broken_likelihood_is_caught(monkeypatch):
     """The same run on a model that believes a tenth of the noise it has."""
     from hdcal.inference import compress

@@ -148,6 +148,7 @@ def test_a_prior_that_cuts_the_answer_off_is_a_bound(good):
     assert outcome(good, "no parameter at a bound") == ["passed"]
 
 
+@pytest.mark.thorough
 def test_an_effect_that_is_absent_is_pressed_against_zero():
     absent = calibrate(case_of(cycles(96)), effects=["coulomb_friction"], **SHORT)
     assert outcome(absent, "no parameter at a bound") == ["warning"]

@@ -4,6 +4,7 @@ import arviz_stats
 import numpy as np
 import pytest
 from conjugate import conjugate_case, known_posterior, unit_stiffness
+from slices import slice_of
 
 from hdcal.calibration.calibrate import calibrate
 
@@ -29,7 +30,7 @@ def exact_posterior(case):
     return dict(zip(("K", "force_offset", "sigma"), pairs, strict=True))
 
 
-@pytest.mark.parametrize("rows", [14, 10_000, 1_000_000])
+@pytest.mark.parametrize("rows", slice_of([14, 10_000, 1_000_000], [14]))
 def test_means_and_sds_match_the_closed_form(rows):
     case = case_of(rows)
     posterior = calibrate(case, seed=3)

@@ -62,6 +62,7 @@ KINDS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", KINDS)
 def test_sizes_of_one_bucket_share_every_executable(
     kind: str, compilations, monkeypatch

@@ -10,6 +10,7 @@ from moving import TRUTH, moving_case, moving_gear
 from numpyro.infer.util import log_density
 from rigs import cycles, draw_truth, make_case, make_gear, make_records, ramp, simulate
 from scipy import stats
+from slices import slice_of
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.certificates import (
@@ -53,7 +54,7 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", slice_of(KINDS, ["rounded", "effects, members"]))
 def test_the_likelihood_of_what_was_read_is_the_same(kind: str):
     records, names, about, with_gap = KINDS[kind]
     effects, case = choose_effects(names), make_case(records, make_gear(**about))
@@ -180,6 +181,7 @@ def pair() -> tuple[Posterior, Posterior]:
     return calibrate(precise(gear)), calibrate(precise(certified(gear)))
 
 
+@pytest.mark.thorough
 def test_stiffness_widens_by_the_root_sum_of_squares(pair):
     plain, stated = pair
     assert plain.usable and stated.usable
@@ -189,6 +191,7 @@ def test_stiffness_widens_by_the_root_sum_of_squares(pair):
     assert not adds_up(alone, alone)
 
 
+@pytest.mark.thorough
 def test_the_ridge_is_sampled_well(pair):
     for name, found in pair[1].diagnoses.items():
         # The correlation of the noise is no part of the ridge.
@@ -197,12 +200,14 @@ def test_the_ridge_is_sampled_well(pair):
     assert np.mean(pair[1].tree["sample_stats"]["n_steps"]) < 16
 
 
+@pytest.mark.thorough
 def test_gauges_stay_where_their_certificates_put_them(pair):
     for name, sd in SDS.items():
         draws = pair[1].draws[name]
         assert stats.kstest(draws[::4], stats.norm(0.0, sd).cdf).pvalue > 1e-3
 
 
+@pytest.mark.thorough
 def test_a_posterior_keeps_its_certificates(pair, tmp_path):
     pair[1].save(tmp_path / "posterior.nc")
     back = Posterior.load(tmp_path / "posterior.nc")
@@ -212,6 +217,7 @@ def test_a_posterior_keeps_its_certificates(pair, tmp_path):
         np.testing.assert_array_equal(back.draws[name], pair[1].draws[name])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("spoil", ["site", "name", "size"])
 def test_a_file_that_was_made_up_is_refused(pair, tmp_path, spoil: str):
     tree, gear = pair[1].tree.copy(), pair[1].case.gear

@@ -1,6 +1,7 @@
 """K·E₀ is what the data identify: E₀'s prior moves K, not their product."""
 
 import numpy as np
+import pytest
 from rigs import make_case, make_gear
 from short import SHORT
 
@@ -19,6 +20,7 @@ def width(values):
     return high - low
 
 
+@pytest.mark.thorough
 def test_a_wider_modulus_prior_widens_K_only():
     case = read_case(datasets_folder() / "xb1-100-80")
     wide_gear = make_gear(E0=Prior("normal", (207e3, 30e3)), resolution=0.98)
@@ -32,6 +34,7 @@ def test_a_wider_modulus_prior_widens_K_only():
     assert width(wide["K"]) > 2.0 * width(narrow["K"])
 
 
+@pytest.mark.thorough
 def test_every_theory_reads_one_posterior():
     case = read_case(datasets_folder() / "xb1-100-80")
     by_ring = calibrate(case, **LONGER)

@@ -163,6 +163,7 @@ def test_of_many_rows_a_trace_of_growth_is_none():
         assert noise_grows(case) is seen
 
 
+@pytest.mark.thorough
 def test_noise_in_proportion_to_the_force_is_let_grow():
     rng = np.random.default_rng(2)
     share = [noise_grows(case_of(0.2 * SLOPE * X * rng.normal(size=ROWS))) for _ in X]

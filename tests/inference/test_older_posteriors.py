@@ -38,6 +38,7 @@ def without_correlation(posterior: Posterior) -> Posterior:
     )
 
 
+@pytest.mark.thorough
 def test_an_older_file_answers_as_without_correlation(tmp_path: Path):
     now = written()
     without_correlation(now).save(tmp_path / "posterior.nc")

@@ -10,6 +10,7 @@ import pytest
 from centred import Centred
 from moving import moving_case
 from rigs import draw_truth, make_case, make_gear, program
+from slices import slice_of
 
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
@@ -94,7 +95,10 @@ PROBLEMS = {
 }
 
 
-@pytest.mark.parametrize("name", PROBLEMS)
+QUICK = ("every effect of the force", "rounded, runs and discrepancy")
+
+
+@pytest.mark.parametrize("name", slice_of(PROBLEMS, QUICK))
 def test_padded_rows_have_the_density_of_the_measured_ones(name: str):
     effects, data = PROBLEMS[name]
     with_gap = data.get("with_gap", False)

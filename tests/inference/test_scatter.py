@@ -85,6 +85,7 @@ def bare():
     return calibrate(case_with(3), **SHORT)
 
 
+@pytest.mark.thorough
 def test_gears_have_a_stiffness_and_runs_an_offset_each(bare):
     stiffer = bare.draws["specimen_deviation"].mean(axis=0)
     assert stiffer == pytest.approx(STIFFER / STIFFER.mean() - 1.0, abs=0.01)
@@ -93,6 +94,7 @@ def test_gears_have_a_stiffness_and_runs_an_offset_each(bare):
     assert offsets.sum(axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_a_calibration_keeps_the_name_and_no_more(bare, tmp_path):
     found = calibrate(case_with(3), effects=["run_offset"], **SHORT)
     assert found.effects == (EFFECTS["run_offset"],)

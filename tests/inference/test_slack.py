@@ -64,6 +64,7 @@ def test_the_density_is_that_of_the_stated_priors(reading: str):
     np.testing.assert_allclose(off_the_stated_density(problem), 0.0, atol=1e-4)
 
 
+@pytest.mark.thorough
 def test_a_coordinate_that_forgets_the_slack_is_told(monkeypatch):
     def forgetful(prior, scale, _):
         return unmoved(prior, scale, 0.0)
@@ -79,6 +80,7 @@ def test_a_coordinate_that_forgets_the_slack_is_told(monkeypatch):
     assert np.abs(off).max() > 0.1
 
 
+@pytest.mark.thorough
 def test_little_slack_is_sampled_well():
     found = calibrate(slack_case(1), effects=[SLACK], seed=1)
     assert found.usable, found.reasons

@@ -28,6 +28,7 @@ def answers(gear, time, force, start):
     return jax.jacrev(size, argnums=(0, 1), has_aux=True)(gear, start)
 
 
+@pytest.mark.thorough
 def test_stretches_give_the_response_of_the_whole(monkeypatch):
     case = moving_case(0, rows=333)
     time, force = np.asarray(case.records.time), np.asarray(case.records.force)
@@ -57,6 +58,7 @@ def test_bands_in_stretches_are_those_of_the_whole(monkeypatch):
     np.testing.assert_allclose(np.concatenate(parts, axis=1), whole, atol=1e-10)
 
 
+@pytest.mark.thorough
 def test_a_window_finds_the_peak_of_the_whole(monkeypatch):
     problem = problem_of(600)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from arviz_base import from_dict
 from jax.flatten_util import ravel_pytree
-from moving import TRUTH, frictional_case, moving_case, moving_gear
+from moving import TRUTH, frictional_case, motion, moving_case, moving_gear
 
 from hdcal import InputError, Prior, calibrate_dynamic, respond
 from hdcal.inference import laplace, posterior_file
@@ -23,6 +23,7 @@ from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps
 from hdcal.motion.dynamic_calibration import highest_peak
 from hdcal.motion.summary import dynamic_answer, found_loss
+from hdcal.physics.effects.coulomb_friction import CoulombFriction
 
 pytestmark = pytest.mark.computes
 
@@ -65,7 +66,7 @@ def always(monkeypatch):
     [
         pytest.param("viscous", marks=pytest.mark.slow),
         pytest.param("dry friction", marks=pytest.mark.slow),
-        "both",
+        pytest.param("both", marks=pytest.mark.thorough),
     ],
 )
 def test_a_loss_is_named(name: str, always):
@@ -79,11 +80,13 @@ def test_a_loss_is_named(name: str, always):
     assert [check.outcome for check in found.checks] == outcomes
 
 
+@pytest.mark.thorough
 def test_friction_that_was_asked_for_is_found(asked):
     assert at_mode(asked, "damping_ratio") == pytest.approx(0.01, rel=0.1)
     assert at_mode(asked, FRICTION) == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.thorough
 def test_an_evidence_without_the_priors_breadth_is_told_by_a_wrong_name(
     monkeypatch, always
 ):
@@ -156,6 +159,7 @@ def test_rows_that_are_too_far_apart_for_friction_are_said():
         chosen(gappy, ["coulomb_friction"])
 
 
+@pytest.mark.thorough
 def test_a_search_begins_inside_of_its_priors():
     stated = moving_gear(damping_ratio=Prior("uniform", (0.015, 0.2), "1"))
     found = chosen(frictional_case(0, 0.02, 1.0, stated), ["coulomb_friction"])
@@ -163,6 +167,7 @@ def test_a_search_begins_inside_of_its_priors():
     assert at_mode(found, FRICTION) == pytest.approx(1.0, rel=0.2)
 
 
+@pytest.mark.thorough
 def test_the_density_with_friction_is_that_of_the_stated_priors(asked):
     """Its coordinate is where the gear would stop."""
     problem = asked.problem
@@ -230,14 +235,19 @@ def test_a_stated_friction_of_any_family_is_taken():
 
 
 @pytest.fixture(scope="module")
-def posterior(asked) -> DynamicPosterior:
-    """A calibration with friction whose draws are made about the mode, none sampled."""
-    case = frictional_case(100, *TRUTHS["both"])
-    values = laplace.values_at(asked.problem, asked.whitening.centre)
+def posterior() -> DynamicPosterior:
+    """A calibration with friction whose draws are made about the truth by hand."""
+    ratio, friction = TRUTHS["both"]
+    case = frictional_case(100, ratio, friction)
+    truth = TRUTH | {"damping_ratio": ratio}
+    gear = motion(truth, case)
+    values = truth | gear._asdict() | {FRICTION: friction, "alpha": 3e-4}
+    values |= {"warm_stiffness": gear.stiffness, "initial_velocity": 0.0}
+    values["initial_deformation"] = 40.0 / gear.stiffness
+    values["natural_frequency"] = np.sqrt(gear.stiffness / gear.mass) / (2.0 * np.pi)
     rng, scalars = np.random.default_rng(0), {}
     for name, value in values.items():
-        if np.ndim(value) == 0:
-            scalars[name] = value * (1.0 + 0.01 * rng.standard_normal((2, 50)))
+        scalars[name] = value * (1.0 + 0.01 * rng.standard_normal((2, 50)))
     kept = {"posterior": scalars, "observed_data": {"force": case.records.force}}
     kept |= {"sample_stats": {"diverging": np.zeros((2, 50), bool)}}
     tree = from_dict(kept | {"constant_data": posterior_file.covariates(case.records)})
@@ -245,7 +255,8 @@ def posterior(asked) -> DynamicPosterior:
     settings |= {"chains": 2, "warmup": 1, "draws": 50, "versions": {}}
     settings |= {"target_acceptance": 0.8}
     checks = (Check("by hand", "passed", "told to"),)
-    about = asked.problem.effects, asked.priors, tree, {}, checks, settings
+    priors = dynamic_site_priors(case, "ring", (CoulombFriction,))
+    about = (CoulombFriction,), priors, tree, {}, checks, settings
     return DynamicPosterior(case, "ring", *about)
 
 

@@ -66,6 +66,7 @@ def recovered(seeds, **priors) -> tuple[dict[str, int], float]:
     return count, float(chi2.sf(distance, len(SOUGHT) * len(seeds)))
 
 
+@pytest.mark.thorough
 def test_a_few_seeds_are_recovered():
     count, p = recovered(range(4))
     # All but one: with 95 % intervals fewer come once in 30 parameters.
@@ -73,12 +74,14 @@ def test_a_few_seeds_are_recovered():
     assert p > LEVEL
 
 
+@pytest.mark.thorough
 def test_noise_taken_too_small_is_told_by_the_distance():
     small = certain(0.3 * TRUTH["deformation_sigma"])
     _, p = recovered(range(4), deformation_sigma=small)
     assert p < LEVEL
 
 
+@pytest.mark.thorough
 def test_a_mass_taken_too_large_is_told_by_the_same_count():
     count, p = recovered(range(2), mass=certain(1.2 * TRUTH["mass"]))
     assert count["mass"] == count["stiffness"] == 0, count
@@ -111,6 +114,7 @@ def test_a_good_record_passes(posterior):
     assert drivers["alpha"] == drivers["E0"] == "prior"
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_draws_and_a_file_gives_them_back(
     posterior, tmp_path
 ):

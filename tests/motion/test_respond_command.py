@@ -25,6 +25,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.thorough
 def test_a_sampled_force_is_answered_with_a_whole_folder(here: Hdcal, run: Path):
     Path("f.csv").write_text(FORCE)
     done = here("respond", run, "--force", "f.csv", *SMALL, "--json")

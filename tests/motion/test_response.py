@@ -41,6 +41,7 @@ def test_gears_that_are_known_move_as_the_exact_solution():
     assert not any("prior" in words for words in found.remarks)
 
 
+@pytest.mark.thorough
 def test_draws_integrated_by_the_few_move_alike(monkeypatch):
     given = (still_posterior(K=0.05), "step")
     together = respond(*given, **KNOWN, **SMALL)
@@ -89,6 +90,7 @@ def test_a_warmer_gear_is_softer():
     assert any("extrapolated" in words for words in warm.remarks)
 
 
+@pytest.mark.thorough
 def test_effects_of_the_moment_go_along_and_others_are_named():
     sizes = {"progressive_stiffening.slope": 0.8, "relaxation.share": 0.1}
     sizes |= {"relaxation.time_constant": 30.0}
@@ -101,6 +103,7 @@ def test_effects_of_the_moment_go_along_and_others_are_named():
     assert peaks[0] < 0.9 * peaks[1]
 
 
+@pytest.mark.thorough
 def test_a_leftover_that_was_fitted_bends_the_motion():
     weights = np.zeros(BASIS_SIZE)
     weights[[1, 2]] = 6.0, -4.0
@@ -143,6 +146,7 @@ def test_draws_that_are_kept_fill_what_is_open_evenly():
             assert 0.4 <= np.mean(score > 0.0) <= 0.6
 
 
+@pytest.mark.thorough
 def test_the_peak_is_that_of_the_motion_and_not_of_the_points():
     asked = KNOWN | {"damping": 1e-3, "duration": 0.02, "draws": 20}
     few, many = (

@@ -43,6 +43,7 @@ def posterior():
     return calibrate_dynamic(warming_case(0), effects=(), **SHORT)
 
 
+@pytest.mark.thorough
 def test_alpha_is_found_in_a_record_that_warms(posterior):
     assert posterior.usable, posterior.reasons
     alpha = posterior.draws["alpha"]
@@ -86,6 +87,7 @@ def test_a_temperature_that_hardly_changes_gives_what_one_temperature_does():
     assert np.abs(np.asarray(warmer - one))[:, 0].max() > 1e-3
 
 
+@pytest.mark.thorough
 def test_stretches_of_a_warming_record_give_those_of_the_whole(monkeypatch):
     problem = problem_of(20.0)
     whole = predict_states(problem, values())

@@ -119,6 +119,7 @@ def test_a_failed_posterior_predicts_nothing(rubbing):
     assert not default_bands(failed).usable.any()
 
 
+@pytest.mark.thorough
 def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
     deformation = np.linspace(0.02, 0.54, 60)
     bent = 205.0 * deformation + 60.0 * (deformation - 0.02) * (deformation - 0.54)
@@ -138,6 +139,7 @@ def test_the_gap_widens_the_bands_beyond_the_data_and_leaves_stiffness_alone():
     assert abs(np.median(gap.draws["stiffness"]) - slope) < np.sqrt(covariance[0, 0])
 
 
+@pytest.mark.thorough
 def test_the_gap_is_the_same_at_every_temperature():
     """Tested at one temperature away from the reference, it must not tilt at others."""
     deformation = np.linspace(0.02, 0.54, 60)

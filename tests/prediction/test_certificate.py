@@ -87,6 +87,7 @@ def test_it_says_what_a_certificate_has_to_say():
     assert "ISO/IEC 17025 accredited" not in words
 
 
+@pytest.mark.thorough
 def test_it_says_which_certificates_are_part_of_it():
     text = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40.0\nlength_mm = 70.0\n"
     text += "[measurement]\nforce_calibration = { expanded_N = 0.2 }\n"

@@ -79,6 +79,7 @@ def test_of_gears_there_is_a_global_risk():
     assert "(global risk)" in found.words
 
 
+@pytest.mark.thorough
 def test_tolerances_make_gears_differ_and_no_measurement():
     """Accepted by its estimate, a gear exceeds the limit if its sizes make it stiff."""
     about = {"limit_force": 90.0, "rule": "simple"}

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from posteriors import regressed, single, with_leftover
 from pulled_further import OF_TIME, all_pulled_further
+from slices import slice_of
 
 import hdcal
 from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
@@ -84,6 +85,7 @@ def test_bands_and_margin_say_the_same(make):
             assert got == pytest.approx(getattr(found, end), abs=0.03 * width)
 
 
+@pytest.mark.thorough
 def test_an_outlier_is_no_bend():
     """A cause that knows of outliers does not take one for curvature."""
     x, rng = np.linspace(0.02, 0.54, 40), np.random.default_rng(5)
@@ -133,7 +135,7 @@ def held(names, times: float, count: int, seed: int) -> tuple[float, float, int]
 OF_SHAPE = ("progressive_stiffening", "contact_bedding", "seating_slack", "hysteresis")
 
 
-@pytest.mark.parametrize("times", [1.5, 2.0])
+@pytest.mark.parametrize("times", slice_of([1.5, 2.0], [2.0]))
 def test_a_slice_of_mechanisms_stays_inside(times: float):
     right, alone, cases = held(OF_SHAPE, times, 4, seed=11)
     assert cases >= 15

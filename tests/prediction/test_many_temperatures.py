@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from posteriors import batch, single
+from slices import slice_of
 
 import hdcal
 from hdcal.errors import InputError
@@ -12,7 +13,7 @@ QUICK = {"limit_force": 95.0, "sensitivities": False}
 
 
 @pytest.mark.usefixtures("counted")
-@pytest.mark.parametrize("make", [single, batch])
+@pytest.mark.parametrize("make", slice_of([single, batch], [single]))
 def test_each_is_what_it_is_alone(make):
     posterior, warm = make(size=500), np.linspace(-40.0, 120.0, 100_000)
     found = hdcal.margin(posterior, 0.4, temperature=warm, **QUICK)

@@ -139,6 +139,7 @@ def test_what_the_data_say_nothing_of_has_its_row_with_all_that_hangs_on_it():
     assert line.halved_by == "a load cell certified to ± 0.25 % (k = 2)"
 
 
+@pytest.mark.thorough
 def test_what_draws_show_by_chance_is_no_tie():
     """At 40 K the loss of modulus moves a force by 40 times as much, whatever draws."""
     posterior = single(size=400)
@@ -220,6 +221,7 @@ def test_a_straight_budget_is_valid_and_given():
     assert found.linear_check.words.endswith("The linear budget stands.")
 
 
+@pytest.mark.thorough
 def test_a_budget_that_does_not_stand_gives_way_to_monte_carlo():
     """A wide tolerance is rectangular, and the force its third power."""
     found = hdcal.margin(exact(), 0.4, tolerances={"wall_thickness_mm": 0.1})

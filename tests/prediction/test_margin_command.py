@@ -131,6 +131,7 @@ def test_the_headline_and_the_next_step_are_for_whoever_fits_the_actuator(
     assert bare["next_step"].startswith("Measure at 0.4 mm at 60 °C too")
 
 
+@pytest.mark.thorough
 def test_without_a_folder_there_are_words_only(here: Hdcal, runs: Path, tmp_path):
     done = here("margin", runs / "one", *ASK, "--limit-force", "84")
     assert done.returncode == 0, done.stderr
@@ -142,6 +143,7 @@ def test_without_a_folder_there_are_words_only(here: Hdcal, runs: Path, tmp_path
     assert "basis" not in words and "reliability index" in words
 
 
+@pytest.mark.thorough
 def test_an_unsettled_diagnosis_is_averaged_over(here: Hdcal, runs: Path):
     assert (runs / "ambiguous" / "posterior-seating_slack.nc").is_file()
     done = here("margin", runs / "ambiguous", *ASK, "--json")
@@ -251,6 +253,7 @@ def test_the_models_know_what_they_belong_to(runs: Path):
     assert Posterior.load(folder).settings[ORIGIN]["hypothesis"] is None
 
 
+@pytest.mark.thorough
 def test_the_mixture_alone_says_what_the_models_say(here: Hdcal, runs: Path):
     folder = runs / "ambiguous"
     whole, mixed = (

@@ -125,6 +125,7 @@ def shortfall(hits: np.ndarray) -> float:
     return float(stats.binom.cdf(np.sum(hits), len(hits), CONFIDENCE))
 
 
+@pytest.mark.thorough
 def test_a_slice_of_coverage():
     hits = run("specimens", 5, 25)
     for content in range(2):

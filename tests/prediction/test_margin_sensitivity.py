@@ -57,6 +57,7 @@ def test_gradients_of_one_rounded_gear_agree_with_differences():
     check(single(make_gear(resolution=0.98), 300), "readings", {})
 
 
+@pytest.mark.thorough
 def test_gradients_of_a_cup_with_tolerances_agree_with_differences():
     sizes = {"wall_thickness": 0.02, "load_height": 2.0}
     check(single(make_gear(theory="cup"), 200), "readings", sizes)
@@ -120,6 +121,7 @@ def check_shares(found, parts):
         assert found[name].total == pytest.approx(part / total, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_every_source_has_its_share():
     gears = batch(6, 400)
     asked = {"tolerances": {"wall_thickness_mm": 0.02}, "temperature": 60.0}

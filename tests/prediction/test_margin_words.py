@@ -46,6 +46,7 @@ def test_the_surer_capacity_is_never_the_smaller_one(posterior):
     assert f"{level.capacity_N:.1f} N does with 95 % confidence" in said
 
 
+@pytest.mark.thorough
 def test_far_outside_no_bound_is_called_sure():
     gears = batch(6, 400)
     near, far = (hdcal.margin(gears, at, limit_force=400.0) for at in (0.6, 0.9))

@@ -167,6 +167,7 @@ def short(hits: np.ndarray, share: float = 0.95) -> float:
     return float(stats.binom.cdf(np.sum(hits), len(hits), share))
 
 
+@pytest.mark.thorough
 def test_a_slice_of_coverage(monkeypatch):
     held = coverage(TOLD, range(12))[:, :3]
     assert min(map(short, held.T)) > 1e-3

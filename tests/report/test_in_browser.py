@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from browser import DESK, PAPER, PHONE, Seen, look, print_pages
 from commands import Done
+from slices import slice_of
 from verdicts import KINDS, named
 
 from hdcal.diagnosis.summary import write_verdict
@@ -35,7 +36,7 @@ def reports(calibrated: Calibrated, tmp_path_factory) -> dict[str, Path]:
     return {"calibration": calibrated[1] / "report.html", **pages}
 
 
-@pytest.fixture(scope="module", params=REPORTS)
+@pytest.fixture(scope="module", params=slice_of(REPORTS, ["calibration", "failed"]))
 def report(request, reports: dict[str, Path]) -> Path:
     """One report after the other."""
     return reports[request.param]
@@ -123,6 +124,7 @@ def _directives(line: str) -> list[str]:
     return re.findall(r"\b(?:script|img|style|default)-src\b", line)
 
 
+@pytest.mark.thorough
 def test_the_page_looks_the_same_without_its_policy(reports, tmp_path: Path):
     seen = look(reports["quick"], tmp_path)
     assert planted(reports["quick"], tmp_path, "").frames == seen.frames

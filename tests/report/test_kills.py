@@ -7,6 +7,7 @@ from pathlib import Path
 
 import kills
 import pytest
+from slices import slice_of
 
 CALLS = {
     "new folder": 50,
@@ -26,8 +27,8 @@ def attacked(way: str, renames: bool, again: bool) -> dict:
     return json.loads(done.stdout)
 
 
-@pytest.mark.parametrize("renames", [True, False])
-@pytest.mark.parametrize("way", kills.WAYS)
+@pytest.mark.parametrize("renames", slice_of([True, False], [True]))
+@pytest.mark.parametrize("way", slice_of(kills.WAYS, ["folder over one of v0.1"]))
 def test_a_kill_at_any_call_leaves_the_old_or_the_new(way: str, renames: bool):
     found = attacked(way, renames, again=False)
     assert found["wrong"] == []

@@ -1,5 +1,7 @@
 """The command line as a user runs it, and one result that many tests look at."""
 
+import fcntl
+import json
 import os
 import signal
 import subprocess
@@ -77,11 +79,25 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def calibrated(
     hdcal: Hdcal, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Done, Path]:
-    """A finished calibration of the bundled gear, and its folder."""
-    folder = tmp_path_factory.mktemp("calibrated") / "result"
-    done = hdcal("calibrate", XB1, *options(SHORT), "--json", "--out", folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done, folder
+    """A finished calibration of the bundled gear, and its folder.
+
+    One process of a test run makes it; the others wait and take theirs from it.
+    """
+    place = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        place = place.parent
+    place, said = place / "calibrated", place / "calibrated.json"
+    with open(place.with_suffix(".lock"), "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not said.exists():
+            place.mkdir()
+            asked = "calibrate", XB1, *options(SHORT), "--json", "--out"
+            done = hdcal(*asked, place / "result")
+            assert done.returncode == 0, done.stdout + done.stderr
+            kept = done.args, done.returncode, done.stdout, done.stderr
+            said.write_text(json.dumps(kept), "utf-8")
+    kept = json.loads(said.read_text("utf-8"))
+    return subprocess.CompletedProcess(*kept), place / "result"
 
 
 @pytest.fixture

@@ -68,7 +68,11 @@ def holds(found: float) -> bool:
     return 1.0 / MOST < found < MOST
 
 
-@pytest.mark.parametrize(("rho", "forget"), [(0.0, 0.9), (0.6, 1.0)])
+QUICK = (0.6, 1.0)
+LONGER = pytest.param(0.0, 0.9, marks=pytest.mark.thorough)
+
+
+@pytest.mark.parametrize(("rho", "forget"), [QUICK, LONGER])
 def test_the_stated_rate_holds(rho, forget):
     # 90 alarms are due. Until a correlation is noticed there are more: long streams.
     assert holds(ratio(start(forget), rho, 6, 1500))

@@ -29,6 +29,7 @@ BAD = [
 ]
 
 
+@pytest.mark.thorough
 def test_a_wild_reading_is_refused_with_its_reason(hdcal: Hdcal):
     wild = [
         (name, json.dumps({**json.loads(GOOD), name: "?"}).replace('"?"', number))
