@@ -209,7 +209,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "order",
         half_cycles(records) * x,
         ("rises", "falls"),
-        "the slope {way} from cycle to cycle, by {size} in all",
+        "the slope {way} from cycle to cycle, which moves the force by {size} in all",
         beside=x,
     )
 
@@ -236,7 +236,8 @@ def _over_temperature(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "temperature",
         (warm - warm.mean()) * x,
         ("rises", "falls"),
-        "the slope {way} with temperature beyond the material's own, by {size}",
+        "the slope {way} with temperature beyond the material's own, "
+        "which moves the force by {size}",
         beside=x,
     )
 
@@ -248,7 +249,8 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
                 "angle",
                 wave(turns * np.asarray(records.angle)) * x,
                 ("goes", "goes"),
-                f"the stiffness {{way}} with the angle, {often} a turn, by {{size}}",
+                f"the stiffness {{way}} with the angle, {often} a turn, "
+                "which moves the force by {size}",
                 beside=x,
             )
     runs, gears = case.run_labels, case.specimen_labels
@@ -272,6 +274,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             "specimen",
             (np.asarray(records.specimen) == k) * x,
             ("stiffer", "softer"),
-            f"gear {gears[k]} is {{way}} than the others, by {{size}}",
+            f"gear {gears[k]} is {{way}} than the others, "
+            "which moves its force by {size}",
             beside=x,
         )

@@ -92,13 +92,14 @@ def assemble(
 
 
 def run_settings(found: Draws, began: float) -> dict[str, object]:
-    """Return what the file says of a run that was not asked for.
+    """Return what the file says of a run beside what was asked for.
 
     Args:
         found: its draws.
         began: `time.perf_counter` at its beginning [s].
     """
     return {
+        "draws": found.energy.shape[1],
         "target_acceptance": found.target_acceptance,
         "versions": versions(),
         "seconds": round(time.perf_counter() - began, 3),

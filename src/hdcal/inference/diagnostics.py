@@ -115,14 +115,13 @@ def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
     return {name: Mixing(split[name], bulk[name], tail[name]) for name in draws}
 
 
-def have_mixed(draws: np.ndarray) -> bool:
-    """Tell whether chains mixed in every coordinate, (chain, draw, d)."""
-    found = mixing({str(i): draws[..., i] for i in range(draws.shape[-1])}).values()
-    need = ESS_PER_CHAIN * len(draws)
+def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
+    """Tell whether chains mixed in every quantity, (chain, draw) each."""
     # A NaN, of draws that stand still, is neither.
     return all(
-        one.rhat <= MAX_RHAT and min(one.ess_bulk, one.ess_tail) >= need
-        for one in found
+        one.rhat <= MAX_RHAT
+        and min(one.ess_bulk, one.ess_tail) >= ESS_PER_CHAIN * len(draws[name])
+        for name, one in mixing(draws).items()
     )
 
 

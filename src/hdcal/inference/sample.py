@@ -30,6 +30,8 @@ MAX_TREE_DEPTH = 10
 # Mean acceptance aimed at; each further value is for a run that was not sound.
 TARGET_ACCEPTANCE = (0.8, 0.95, 0.99)
 _STRETCH = 50
+# A run goes on until so many times the draws that were asked for.
+_LONGEST = 4
 # Draws of a chain over the effective ones that it needs, from which their lack tells.
 _TELLING = 8
 # Place of the divergences in what `_advance` keeps of a draw.
@@ -139,8 +141,8 @@ def sample(
     """Draw from the posterior.
 
     A run with divergent trajectories, or whose chains have not mixed, is thrown away
-    whole and repeated with shorter steps; what is returned is one run, with the faults
-    that it still has.
+    whole and repeated with shorter steps. One that needs only more draws goes on, up to
+    four times as long. What is returned is one run, with the faults that it still has.
 
     Args:
         problem: the inference problem.
@@ -148,29 +150,31 @@ def sample(
         key: source of randomness; the same key gives the same draws.
         chains: independent chains, advanced side by side.
         warmup: iterations of adaptation per chain, discarded.
-        draws: iterations kept per chain.
+        draws: iterations kept per chain, or a multiple of them.
         progress: called after every stretch.
     """
-    run = partial(_run, problem, whitening, key, chains, warmup, draws, progress)
+    begin = partial(_Run, problem, whitening, key, chains, warmup, progress)
     # Over bends long steps diverge: they are not even tried.
     target, *shorter = TARGET_ACCEPTANCE[problem.bent :]
-    kept = run(target)
-    while shorter and not _sound(kept):
-        target = shorter.pop(0)
-        kept = run(target)
-    standard, energy, potential_, diverging, steps, acceptance, step_size = kept
-    members = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
-    values = _constrain(problem, whitening, standard, members)
-    return Draws(
-        values={name: np.asarray(value) for name, value in values.items()},
-        energy=energy,
-        potential=potential_,
-        diverging=diverging,
-        n_steps=steps,
-        acceptance=acceptance,
-        step_size=step_size,
-        target_acceptance=target,
-    )
+    run = begin(target)
+    run.advance(draws)
+    while shorter and not _sound(run.kept()):
+        run = begin(shorter.pop(0))
+        run.advance(draws)
+    found = run.found()
+    while found.energy.shape[1] < _LONGEST * draws and _too_few(found):
+        run.advance(draws)
+        found = run.found()
+    return found
+
+
+def _too_few(found: Draws) -> bool:
+    """Tell whether more draws would mend a run, of ordinary length at least."""
+    draws = found.energy.shape[1]
+    if draws < _TELLING * ESS_PER_CHAIN or found.diverging.any():
+        return False
+    named = found.values.items()
+    return not have_mixed({n: v for n, v in named if v.ndim == 2 and np.ptp(v) > 0.0})
 
 
 def _sound(kept) -> bool:
@@ -180,24 +184,47 @@ def _sound(kept) -> bool:
         return False
     # So few draws are no sign of the steps.
     few = standard.shape[1] < _TELLING * ESS_PER_CHAIN
-    return few or have_mixed(standard)
+    coordinates = np.moveaxis(standard, -1, 0)
+    return few or have_mixed({str(i): x for i, x in enumerate(coordinates)})
 
 
-def _run(problem, whitening, key, chains, warmup, draws, progress, target):
-    """Run all chains; return what is kept of each draw, axes chain and draw first."""
-    states = _start(problem, whitening, jax.random.split(key, chains), target, warmup)
-    total, done, kept = warmup + draws, 0, []
-    while done < total:
-        # Stretches end with the warm-up, so that all but the last ones are alike.
-        left = warmup - done if done < warmup else total - done
-        length = min(_STRETCH, left)
-        states, new = _advance(problem, whitening, states, target, warmup, length)
-        if done >= warmup:
-            kept.append(jax.device_get(new))
-        done += length
-        if progress is not None:
-            progress(done, total)
-    return [np.concatenate(parts).swapaxes(0, 1) for parts in zip(*kept, strict=True)]
+class _Run:
+    """All chains of one step size, which may go on."""
+
+    def __init__(self, problem, whitening, key, chains, warmup, progress, target):
+        self._problem, self._whitening, self._key = problem, whitening, key
+        self._warmup, self._progress, self._target = warmup, progress, target
+        keys = jax.random.split(key, chains)
+        self._states = _start(problem, whitening, keys, target, warmup)
+        self._done, self._kept = 0, []
+
+    def advance(self, draws: int) -> None:
+        """Draw so many more from each chain, after its warm-up."""
+        warmup, total = self._warmup, max(self._done, self._warmup) + draws
+        while self._done < total:
+            # Stretches end with the warm-up, so that all but the last ones are alike.
+            left = (warmup if self._done < warmup else total) - self._done
+            about = self._problem, self._whitening, self._states, self._target
+            length = min(_STRETCH, left)
+            self._states, new = _advance(*about, warmup, length)
+            if self._done >= warmup:
+                self._kept.append(jax.device_get(new))
+            self._done += length
+            if self._progress is not None:
+                self._progress(self._done, total)
+
+    def kept(self) -> list[np.ndarray]:
+        """Return what is kept of each draw, axes chain and draw first."""
+        parts = zip(*self._kept, strict=True)
+        return [np.concatenate(part).swapaxes(0, 1) for part in parts]
+
+    def found(self) -> Draws:
+        """Return the draws so far, with their parameters by name."""
+        standard, *about = self.kept()
+        members = jax.random.split(jax.random.fold_in(self._key, 1), standard.shape[:2])
+        values = _constrain(self._problem, self._whitening, standard, members)
+        named = {name: np.asarray(value) for name, value in values.items()}
+        return Draws(named, *about, target_acceptance=self._target)
 
 
 def check_settings(chains: int, warmup: int, draws: int, seed: int) -> None:

@@ -1,0 +1,52 @@
+"""A run that lacks only draws goes on, on the same way and not without end."""
+
+import numpy as np
+import pytest
+from rigs import make_case, make_records
+from short import TOO_SHORT
+
+from hdcal import calibrate
+from hdcal.inference import sample
+
+# As short as a run may be whose lack of draws says something.
+ASKED = {"chains": 2, "warmup": 300, "draws": 800}
+
+
+def case():
+    x = np.linspace(0.02, 0.54, 14)
+    noise = np.random.default_rng(2).normal(0.0, 0.4, 14)
+    return make_case(make_records(x, 205.0 * x - 1.0 + noise))
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """Let a list say, look after look, whether chains have mixed."""
+
+    def tell(answers: list[bool]):
+        monkeypatch.setattr(sample, "have_mixed", lambda _: answers.pop(0))
+
+    return tell
+
+
+def test_it_goes_on_where_it_stood(told):
+    told([True, True])
+    short = calibrate(case(), **ASKED)
+    # The first look is for the steps, the others are for the draws.
+    told([True, False, False, True])
+    longer = calibrate(case(), **ASKED)
+    assert short.settings["draws"] == 800 and longer.settings["draws"] == 2400
+    for name in ("K", "sigma", "stiffness"):
+        drawn = longer.tree["posterior"][name].values
+        assert drawn.shape == (2, 2400)
+        np.testing.assert_array_equal(
+            drawn[:, :800], short.tree["posterior"][name].values
+        )
+
+
+def test_it_comes_to_an_end(told):
+    told([True, False, False, False])
+    assert calibrate(case(), **ASKED).settings["draws"] == 3200
+
+
+def test_too_short_a_run_stays_what_was_asked_for():
+    assert calibrate(case(), **TOO_SHORT).settings["draws"] == TOO_SHORT["draws"]
