@@ -154,6 +154,27 @@ def test_what_draws_show_by_chance_is_no_tie():
     assert line.sensitivity_N_per_unit == pytest.approx(-40.0 * cold, rel=0.03)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ridge_to_an_unknown_zero_leaves_the_calibration_its_row(seed: int):
+    """On one ramp the two zeros hang together, and stiffness with neither."""
+    case, rng = ramp_case(), np.random.default_rng(seed)
+    draws = plain_draws(case, SIZE)
+    zero, slope = rng.normal(-1.0, 3.0, SIZE), rng.normal(205.0, 0.2, SIZE)
+    draws["K"] *= slope / draws["stiffness"]
+    draws |= {"force_offset": zero, "stiffness": slope}
+    # Where the rows have their middle the force is known well.
+    middle = 205.0 * 0.28 - 1.0 + rng.normal(0.0, 0.02, SIZE)
+    draws["deformation_offset"] = 0.28 - (middle - zero) / slope
+    found = written_posterior(case, draws)
+    of_zero = replace(found.diagnoses["force_offset"], driven_by="prior")
+    of_all = {**found.diagnoses, "force_offset": of_zero}
+    (force,) = forces_of(replace(found, diagnoses=of_all))
+    exact = float(np.var(np.asarray(force.along().centre())))
+    rows = by_name(averaged_budget([force]))
+    # Student's t of few degrees of freedom: what of σ is known beside it is taken off.
+    assert rows["calibration"] == pytest.approx(exact, rel=0.2)
+
+
 def test_every_source_has_its_row_and_the_shares_sum_to_one():
     gears = batch(6, 400)
     asked = {"tolerances": {"wall_thickness_mm": 0.02}, "temperature": 60.0}

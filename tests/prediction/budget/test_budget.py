@@ -40,6 +40,14 @@ def test_blocks_are_independent_and_keep_the_variance():
     assert depend == pytest.approx(np.eye(2)) and blocks[0] == 0.0
 
 
+def test_what_is_left_of_a_tie_to_chance_is_a_covariance():
+    """Two inputs hang together, and a third only seems to with one of them."""
+    covariance = np.array([[1.0, 0.01, 0.9998], [0.01, 1.0, 0.02], [0.9998, 0.02, 1.0]])
+    for chance in (0.0, 0.02):
+        _, (_, left) = independent(covariance, [1, 2], chance)
+        assert np.linalg.eigvalsh(left).min() > 0.0
+
+
 @pytest.mark.parametrize("dof", [6.0, 12.0, 40.0])
 def test_scatter_of_unknown_variance_is_the_student_t_it_came_from(dof: float):
     """Draws of σ² are ν s²/χ² at the levels of a fine grid."""

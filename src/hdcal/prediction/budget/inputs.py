@@ -100,14 +100,16 @@ def scatter_law(variances: np.ndarray) -> tuple[float, float]:
     return float(np.sqrt(mean * (dof - 2.0) / dof)), dof
 
 
-def independent(covariance: np.ndarray, sizes: Sequence[int]):
+def independent(covariance: np.ndarray, sizes: Sequence[int], chance: float = 0.0):
     """Return blocks of inputs that are independent, and how the inputs depend on them.
 
     V = A D Aᵀ with A block triangular: each block is what those before it leave open.
+    Where a correlation is left to chance, V lacks what that correlation brings.
 
     Args:
         covariance: V of the inputs, (m, m).
         sizes: of the blocks, in their order.
+        chance: correlations with an earlier block up to this one count as none.
 
     Returns:
         A, and the diagonal blocks of D.
@@ -117,8 +119,12 @@ def independent(covariance: np.ndarray, sizes: Sequence[int]):
     for size in sizes:
         own, rest = slice(start, start + size), slice(start + size, None)
         blocks.append(left[own, own].copy())
-        tie = left[rest, own] @ np.linalg.pinv(left[own, own], hermitian=True)
+        sd = np.sqrt(np.maximum(np.diag(left), 0.0))
+        tied = np.abs(left[rest, own]) > chance * np.outer(sd[rest], sd[own])
+        tie = left[rest, own] @ np.linalg.pinv(left[own, own], hermitian=True) * tied
         depend[rest, own] = tie
-        left[rest, rest] -= tie @ left[own, rest]
+        # Of x − tie · y; it stays a covariance whichever ties are left out.
+        shared = tie @ left[own, rest]
+        left[rest, rest] += tie @ left[own, own] @ tie.T - shared - shared.T
         start += size
     return depend, blocks

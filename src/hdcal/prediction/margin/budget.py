@@ -110,9 +110,11 @@ def force_budget(force: PopulationForce) -> ForceBudget:
     columns = [cause.values[site].reshape(cause.size, -1) for site in sites]
     sizes = [column.shape[1] for column in columns]
     draws = np.concatenate(columns, axis=1)
-    covariance = _covariance(draws, sum(sizes[:own]))
     blocks = [*sizes[:own], sum(sizes[own:])]
-    depend, parts = independent(covariance, blocks)
+    covariance = np.atleast_2d(np.cov(draws, rowvar=False))
+    # A site of which the data say nothing hangs together with others or not at all:
+    # what many independent draws would show by chance is no tie.
+    depend, parts = independent(covariance, blocks, _CHANCE / np.sqrt(len(draws)))
     groups = [
         one_input(site, 0.0, float(np.sqrt(max(part[0, 0], 0.0))))
         for site, part in zip(sites[:own], parts, strict=False)
@@ -138,24 +140,6 @@ def force_budget(force: PopulationForce) -> ForceBudget:
         theory=cause.posterior.theory,
     )
     return _budget(model, groups, cause)
-
-
-def _covariance(draws: np.ndarray, own: int) -> np.ndarray:
-    """Return the covariance of sites, (m, m), from draws of them, (d, m).
-
-    A site of which the data say nothing hangs together with others or not at all:
-    what many independent draws would show by chance is no tie.
-
-    Args:
-        draws: of the sites.
-        own: how many of them, the first, are inputs of their own.
-    """
-    covariance = np.atleast_2d(np.cov(draws, rowvar=False))
-    sd = np.sqrt(np.diag(covariance))
-    chance = np.abs(covariance) < _CHANCE / np.sqrt(len(draws)) * np.outer(sd, sd)
-    chance[own:, own:] = False
-    covariance[chance] = 0.0
-    return covariance
 
 
 def _sites(force: PopulationForce) -> tuple[list[str], int]:
