@@ -119,7 +119,7 @@ def check_words(about, drawn, check: LinearCheck, error: float) -> str:
     shift = abs(sum(about) - sum(drawn)) / 2.0
     spread = abs((about[1] - about[0]) - (drawn[1] - drawn[0])) / 2.0
     if off <= check.tolerance + 2.0 * error:
-        why = f"the draws are too few to tell: in an end they leave up to {error:.2g} N"
+        why = f"the draws are too few to tell, an end is known to {error:.2g} N (sd)"
     elif shift > spread:
         why = "the force is no straight line of its inputs, or their laws are skewed"
     else:
