@@ -48,5 +48,22 @@ def test_it_comes_to_an_end(told):
     assert calibrate(case(), **ASKED).settings["draws"] == 3200
 
 
+def test_one_that_diverges_as_it_goes_on_is_repeated_with_shorter_steps(
+    told, monkeypatch
+):
+    class Diverging(sample._Run):
+        def found(self):
+            drawn = super().found()
+            if self._target == 0.8 and drawn.energy.shape[1] > 800:
+                drawn.diverging[0, -1] = True
+            return drawn
+
+    monkeypatch.setattr(sample, "_Run", Diverging)
+    told([True, False, True, True])
+    found = calibrate(case(), **ASKED)
+    assert found.settings["target_acceptance"] == 0.95
+    assert found.settings["draws"] == 800
+
+
 def test_too_short_a_run_stays_what_was_asked_for():
     assert calibrate(case(), **TOO_SHORT).settings["draws"] == TOO_SHORT["draws"]

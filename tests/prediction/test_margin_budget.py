@@ -175,6 +175,37 @@ def test_a_ridge_to_an_unknown_zero_leaves_the_calibration_its_row(seed: int):
     assert rows["calibration"] == pytest.approx(exact, rel=0.2)
 
 
+def test_a_trace_of_a_second_cause_brings_no_degrees_of_freedom():
+    """Fit and noise have one unknown variance, under two causes too."""
+    one = single(size=SIZE)
+    (alone,) = (averaged_budget(forces_of(m)) for m in (one,))
+    traced = averaged_budget(forces_of([(0.999, one), (0.001, stiffer(one, 1.001))]))
+    assert alone.dof < 1000.0
+    assert traced.dof == pytest.approx(alone.dof, rel=0.05)
+
+
+def test_what_causes_differ_by_is_no_error_of_the_draws():
+    one = single(size=SIZE)
+    apart = forces_of([(0.9, one), (0.1, stiffer(one, 1.02))])
+    law = PredictiveLaw.of(apart)
+    mean, sd = law.moments()
+    end = mean - 1.96 * sd, mean + 1.96 * sd
+    found = law.end_error(end, [1000.0, 1000.0])
+    # The scatter over halves of the draws, of all causes alike.
+    ends = []
+    for rows in np.array_split(np.random.default_rng(1).permutation(SIZE), 20):
+        some = [
+            PredictiveLaw(*([part[rows]] for part in parts))
+            for parts in zip(law.weight, law.mean, law.sd, strict=True)
+        ]
+        share = [sum(np.sum(b) for b in one._below(end[1])) for one in some]
+        ends.append(20.0 * sum(share))
+    step = 0.1 * sd
+    near = [sum(map(np.sum, law._below(end[1] + s))) for s in (-step, step)]
+    expected = np.std(ends) / np.sqrt(10.0) / ((near[1] - near[0]) / (2.0 * step))
+    assert found == pytest.approx(expected, rel=0.6)
+
+
 def test_every_source_has_its_row_and_the_shares_sum_to_one():
     gears = batch(6, 400)
     asked = {"tolerances": {"wall_thickness_mm": 0.02}, "temperature": 60.0}

@@ -139,6 +139,20 @@ def test_every_source_has_its_share():
     assert {"gear", "wall_thickness"} <= large and "noise" not in large
 
 
+def test_a_drift_that_one_cause_holds_is_open_for_the_others():
+    """Whichever of them comes first."""
+    plain = single(size=400)
+    sizes = {"thermal_zero_drift.slope": np.full(400, 0.1)}
+    known = {"temperature"}
+    draws = plain_draws(ramp_case(known=known), 400) | sizes
+    held = written_posterior(
+        ramp_case(known=known), draws, effects=["thermal_zero_drift"]
+    )
+    for models in ([(0.6, held), (0.4, plain)], [(0.4, plain), (0.6, held)]):
+        found = hdcal.margin(models, 0.4, temperature=60.0).shares
+        assert "zero_drift" in {share.name for share in found}
+
+
 def test_a_single_source_has_all_of_it():
     """At the reference temperature the load hangs on the calibration alone."""
     (only,) = hdcal.margin(single(size=400), 0.4, quantity="load").shares

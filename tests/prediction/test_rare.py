@@ -170,3 +170,12 @@ def test_causes_are_averaged():
     mean = 0.25 * near.probability + 0.75 * far.probability
     assert both.probability == pytest.approx(mean)
     assert 0.0 < both.relative_error < 0.1
+
+
+def test_what_no_point_reaches_is_nowhere_and_spoils_no_other_cause():
+    near = Rare(1e-6, 0.02, 1.0, 2.0)
+    nowhere = Rare(0.0, np.nan, np.nan, np.nan)
+    both = pooled_rare([(0.25, near), (0.75, nowhere)])
+    assert both.probability == pytest.approx(0.25e-6)
+    assert both.relative_error == pytest.approx(0.02)
+    assert pooled_rare([(1.0, nowhere)]).probability == 0.0

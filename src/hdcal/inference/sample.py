@@ -155,12 +155,21 @@ def sample(
     """
     begin = partial(_Run, problem, whitening, key, chains, warmup, progress)
     # Over bends long steps diverge: they are not even tried.
-    target, *shorter = TARGET_ACCEPTANCE[problem.bent :]
-    run = begin(target)
-    run.advance(draws)
-    while shorter and not _sound(run.kept()):
-        run = begin(shorter.pop(0))
+    *longer, shortest = TARGET_ACCEPTANCE[problem.bent :]
+    for target in longer:
+        run = begin(target)
         run.advance(draws)
+        if _sound(run.kept()):
+            found = _gone_on(run, draws)
+            if not found.diverging.any():
+                return found
+    run = begin(shortest)
+    run.advance(draws)
+    return _gone_on(run, draws)
+
+
+def _gone_on(run: "_Run", draws: int) -> Draws:
+    """Return the draws of a run, which goes on by so many while that mends it."""
     found = run.found()
     while found.energy.shape[1] < _LONGEST * draws and _too_few(found):
         run.advance(draws)

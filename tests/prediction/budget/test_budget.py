@@ -48,6 +48,20 @@ def test_what_is_left_of_a_tie_to_chance_is_a_covariance():
         assert np.linalg.eigvalsh(left).min() > 0.0
 
 
+def test_a_tie_is_cut_whole_or_not_at_all():
+    """A force to which two inputs trade a third: parts of a tie would not cancel."""
+    rng, force, ratios = np.random.default_rng(7), np.array([1.0, -1.0, -1.0]), []
+    for _ in range(50):
+        zero, slack = rng.normal(size=(2, 400))
+        known = zero - slack + rng.normal(0.0, 0.03, 400)
+        covariance = np.cov([zero, known, slack])
+        depend, blocks = independent(covariance, [1, 2], 4.0 / 20.0)
+        turned = force @ depend
+        found = turned[0] ** 2 * blocks[0][0, 0] + turned[1:] @ blocks[1] @ turned[1:]
+        ratios.append(found / (force @ covariance @ force))
+    assert min(ratios) > 0.9 and max(ratios) < 1.1
+
+
 @pytest.mark.parametrize("dof", [6.0, 12.0, 40.0])
 def test_scatter_of_unknown_variance_is_the_student_t_it_came_from(dof: float):
     """Draws of σ² are ν s²/χ² at the levels of a fine grid."""

@@ -109,7 +109,8 @@ def independent(covariance: np.ndarray, sizes: Sequence[int], chance: float = 0.
     Args:
         covariance: V of the inputs, (m, m).
         sizes: of the blocks, in their order.
-        chance: correlations with an earlier block up to this one count as none.
+        chance: a block whose largest correlation with a later one is this, or less,
+            is taken for independent of them.
 
     Returns:
         A, and the diagonal blocks of D.
@@ -120,11 +121,10 @@ def independent(covariance: np.ndarray, sizes: Sequence[int], chance: float = 0.
         own, rest = slice(start, start + size), slice(start + size, None)
         blocks.append(left[own, own].copy())
         sd = np.sqrt(np.maximum(np.diag(left), 0.0))
-        tied = np.abs(left[rest, own]) > chance * np.outer(sd[rest], sd[own])
-        tie = left[rest, own] @ np.linalg.pinv(left[own, own], hermitian=True) * tied
-        depend[rest, own] = tie
-        # Of x − tie · y; it stays a covariance whichever ties are left out.
-        shared = tie @ left[own, rest]
-        left[rest, rest] += tie @ left[own, own] @ tie.T - shared - shared.T
+        # Parts of a tie would not cancel: it is whole or none.
+        if np.any(np.abs(left[rest, own]) > chance * np.outer(sd[rest], sd[own])):
+            tie = left[rest, own] @ np.linalg.pinv(left[own, own], hermitian=True)
+            depend[rest, own] = tie
+            left[rest, rest] -= tie @ left[own, rest]
         start += size
     return depend, blocks

@@ -27,7 +27,10 @@ def global_false_accept(
         most: largest measured value that is accepted.
     """
     if not production_sd > 0.0:
-        accepted = norm.cdf(most, mean, measurement_sd) if measurement_sd > 0.0 else 1.0
+        known = float(mean <= most)
+        accepted = (
+            norm.cdf(most, mean, measurement_sd) if measurement_sd > 0.0 else known
+        )
         return float(accepted) if mean > limit else 0.0
 
     def density(score: float) -> float:

@@ -81,6 +81,12 @@ class Cause:
         return "data" if found is not None and found.driven_by == "data" else "prior"
 
 
+def independent_draws(cause: Cause) -> float:
+    """Return how many independent draws those of a cause are worth in the tails."""
+    worth = [d.ess_tail for d in cause.posterior.diagnoses.values()]
+    return min([cause.size, *(size for size in worth if np.isfinite(size))])
+
+
 def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...]:
     """Return models as causes whose probabilities sum to 1.
 

@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.prediction.engine.causes import independent_draws
 from hdcal.prediction.engine.loading_sense import (
     LoadingSense,
     ends_along,
@@ -48,6 +49,7 @@ class PopulationDraws:
         table: lower, upper and required quantile, centre [N] and the share above the
             limit; each [temperature, draw].
         weights: of the draws, sum 1.
+        of_errors: the same times the root of the draws that an independent one takes.
         predicted: quantiles of the predictive law [temperature, share] [N]; the ends
             and the middle are of what is shown, all else is before rounding.
     """
@@ -55,6 +57,7 @@ class PopulationDraws:
     sense: LoadingSense
     table: Mapping[str, np.ndarray]
     weights: np.ndarray
+    of_errors: np.ndarray
     predicted: np.ndarray
 
 
@@ -93,8 +96,10 @@ def population_draws(
         predicted.append(np.concatenate(ahead))
     names = ("lower", "upper", "required", "centre", "above")
     columns = {n: np.stack([t[i] for t in tables]) for i, n in enumerate(names)}
-    weight = np.concatenate(weights)
-    return PopulationDraws(forces[0].sense, columns, weight, np.stack(predicted))
+    each = [f.cause.size / independent_draws(f.cause) for f in forces]
+    errors = [w * n**0.5 for w, n in zip(weights, each, strict=True)]
+    about = np.concatenate(weights), np.concatenate(errors), np.stack(predicted)
+    return PopulationDraws(forces[0].sense, columns, *about)
 
 
 def level_of(
@@ -129,7 +134,7 @@ def level_of(
         capacity_N=at("required", criteria.confidence),
         capacity_median_N=at("required", 0.5),
         capacity_predictive_N=ahead[3],
-        exceedance=_exceedance(table, draws.weights, criteria) if limited else None,
+        exceedance=_exceedance(table, draws, criteria) if limited else None,
     )
 
 
@@ -156,8 +161,8 @@ def shown_bounds(of: _Bounded, grid: ReadingGrid, sense: LoadingSense) -> _Bound
     return replace(of, lower_bound_N=lower, upper_bound_N=upper)
 
 
-def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
-    above = table["above"]
+def _exceedance(table, draws: PopulationDraws, criteria: Criteria) -> Exceedance:
+    above, weights = table["above"], draws.weights
     mean = float(np.sum(weights * above) / np.sum(weights))
     low, high, sure = (
         weighted_quantile(above, weights, share)
@@ -170,7 +175,8 @@ def _exceedance(table, weights, criteria: Criteria) -> Exceedance:
     error = 1.0
     if mean > LEAST:
         # Of shares this small the squares may be zero.
-        error = float(np.linalg.norm(weights * (above / mean - 1.0)) / np.sum(weights))
+        off = draws.of_errors * (above / mean - 1.0)
+        error = float(np.linalg.norm(off) / np.sum(weights))
     mean, low, high, sure = map(float, chances)
     return Exceedance(mean, low, high, sure, *betas, error, None)
 

@@ -23,7 +23,7 @@ from hdcal.prediction.budget.inputs import (
     scatter_law,
 )
 from hdcal.prediction.budget.linear import effective_dof, linear_budget
-from hdcal.prediction.engine.causes import Cause, Driver
+from hdcal.prediction.engine.causes import Cause, Driver, independent_draws
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.population_force import PopulationForce, member_force
 from hdcal.prediction.margin.force_model import DRIFTS, ForceModel
@@ -35,6 +35,8 @@ _BY_PRIOR = ("alpha", "force_offset")
 _BASE = ("stiffness", "deformation_offset", "alpha", "force_offset")
 # Correlations up to so many standard errors are what draws show by chance.
 _CHANCE = 4.0
+# Correlations that are none by chance, however few the draws.
+_CLEAR = 0.5
 # A component with less of the variance than this has no row.
 _LEAST_SHARE = 1e-9
 
@@ -113,8 +115,9 @@ def force_budget(force: PopulationForce) -> ForceBudget:
     blocks = [*sizes[:own], sum(sizes[own:])]
     covariance = np.atleast_2d(np.cov(draws, rowvar=False))
     # A site of which the data say nothing hangs together with others or not at all:
-    # what many independent draws would show by chance is no tie.
-    depend, parts = independent(covariance, blocks, _CHANCE / np.sqrt(len(draws)))
+    # what so many independent draws would show by chance is no tie.
+    chance = min(_CHANCE / np.sqrt(independent_draws(cause)), _CLEAR)
+    depend, parts = independent(covariance, blocks, chance)
     groups = [
         one_input(site, 0.0, float(np.sqrt(max(part[0, 0], 0.0))))
         for site, part in zip(sites[:own], parts, strict=False)
@@ -239,9 +242,21 @@ def averaged_budget(forces: Sequence[PopulationForce]) -> ForceBudget:
     between = float(chances @ (each - centre) ** 2)
     about = "discrete", float(np.sqrt(between)), 1.0, between, np.inf
     parts.append(Component("cause", "data", *about))
-    variances = np.array([part.variance for part in parts])
-    dof = effective_dof(variances, np.array([part.dof for part in parts]))
-    return ForceBudget(centre, tuple(parts), dof)
+    return ForceBudget(centre, tuple(parts), _joined_dof(parts))
+
+
+def _joined_dof(parts: Sequence[Component]) -> float:
+    """Return the effective degrees of freedom of components.
+
+    Fit and noise have the same unknown variance of a reading: they are one.
+    """
+    alike = [part for part in parts if part.name in ("calibration", "noise")]
+    each = [(p.variance, p.dof) for p in parts if p not in alike]
+    if whole := sum(part.variance for part in alike):
+        uncertain = sum(part.variance / part.dof for part in alike)
+        each.append((whole, whole / uncertain if uncertain > 0.0 else np.inf))
+    variances, dofs = np.array(each).T
+    return effective_dof(variances, dofs)
 
 
 def _mean_component(found: Sequence[tuple[float, Component]]) -> Component:

@@ -3,11 +3,14 @@
 Rules as ISO/IEC 17025:2017, 7.8.6, ILAC-G8:09/2019 and JCGM 106:2012 have them.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from hdcal.prediction.budget.inputs import scatter_law
 from hdcal.prediction.budget.risk import global_false_accept
 from hdcal.prediction.engine.loading_sense import LoadingSense, ends_along
-from hdcal.prediction.engine.population import Population
+from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.margin.budget_words import (
     GEAR,
@@ -18,6 +21,9 @@ from hdcal.prediction.margin.budget_words import (
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import Level
 from hdcal.prediction.margin.stated import Decision, Rule, StatedUncertainty, Statement
+
+# Probabilities at which the scatter between gears is taken.
+_LEVELS = (np.arange(200) + 0.5) / 200
 
 
 def decide(
@@ -49,7 +55,7 @@ def decision(
     criteria: Criteria,
     unrounded: Criteria,
     sense: LoadingSense,
-    population: Population,
+    forces: Sequence[PopulationForce],
 ) -> Decision | None:
     """Return the decision about a force; without a limit there is none.
 
@@ -59,7 +65,7 @@ def decision(
         criteria: with the limit, a size, and the rule.
         unrounded: the same about the force before it is rounded.
         sense: of loading.
-        population: whose force; of gears there is a global risk too.
+        forces: of each cause; of gears there is a global risk too.
     """
     limit, risk = criteria.limit_force, worst.exceedance
     most_force = unrounded.limit_force
@@ -70,9 +76,12 @@ def decision(
     statement, guard = decide(rule, most_force, estimate, low, high)
     most = most_force - guard
     overall = None
-    if population == "specimens" and stated.budget:
-        sds = _production_and_measurement(stated)
-        overall = global_false_accept(estimate, *sds, most_force, most)
+    if forces[0].whose.population == "specimens" and stated.budget:
+        each, rest = _production_and_measurement(stated, forces)
+        overall = sum(
+            share * global_false_accept(estimate, sd, rest, most_force, most)
+            for share, sd in each
+        )
     wrong = risk.probability
     return Decision(
         rule=rule,
@@ -88,11 +97,21 @@ def decision(
     )
 
 
-def _production_and_measurement(stated: StatedUncertainty) -> tuple[float, float]:
-    """Return the sd between gears, also by their sizes, and that of all else [N]."""
-    between = {component_label(name) for name in (GEAR, *SIZES.values())}
-    own = [line.component in between for line in stated.budget]
-    squares = np.array([line.contribution_N**2 for line in stated.budget])
-    production = float(squares[own].sum())
-    rest = max(float(squares.sum()) - production, 0.0)
-    return production**0.5, rest**0.5
+def _production_and_measurement(
+    stated: StatedUncertainty, forces: Sequence[PopulationForce]
+) -> tuple[list[tuple[float, float]], float]:
+    """Return sds between gears, also by their sizes, and that of all else [N].
+
+    How much gears differ is known from few of them: each sd comes with its probability.
+    """
+    squares = {line.component: line.contribution_N**2 for line in stated.budget}
+    gears = squares.pop(component_label(GEAR), 0.0)
+    sizes = sum(squares.pop(component_label(n), 0.0) for n in SIZES.values())
+    each = []
+    for cause in (force.cause for force in forces):
+        spread = np.quantile(cause.values["specimen_sd"], _LEVELS)
+        scale, _ = scatter_law(cause.values["specimen_sd"] ** 2)
+        share = cause.probability / len(_LEVELS)
+        ratio = spread / scale if scale > 0.0 else np.ones(len(_LEVELS))
+        each += [(share, float(np.sqrt(gears * r**2 + sizes))) for r in ratio]
+    return each, sum(squares.values()) ** 0.5

@@ -151,7 +151,7 @@ def _margin(
         levels=tuple(shown(level, grid, sense) for level in found.levels),
         worst=worst,
         reached=_reached(there, request, criteria),
-        decision=decision(stated, worst, criteria, unrounded, sense, whose),
+        decision=decision(stated, worst, criteria, unrounded, sense, there),
         models=tuple(shown_bounds(model, grid, sense) for model in found.models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),

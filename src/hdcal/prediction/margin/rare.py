@@ -69,6 +69,10 @@ class Rare:
     heavy_tailed: float
 
 
+# Of an event too far off for any point to reach.
+_NOWHERE = Rare(0.0, np.nan, np.nan, np.nan)
+
+
 class _Target(eqx.Module):
     """What a point is weighed by: the posterior, and what exceeds the limit.
 
@@ -181,6 +185,8 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     weight = density - log_law + (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
     weight = np.exp(weight - weight.max())
     share = _ratio(weight, above)
+    if not share > 0.0:
+        return _NOWHERE
     error = np.linalg.norm(weight * (above - share)) / weight.sum()
     # Without its prior σ would be as likely on any scale.
     free = weight * np.exp(of_sigma.min() - of_sigma)
@@ -235,6 +241,9 @@ def pooled_rare(found: Sequence[tuple[float, Rare]]) -> Rare:
     Args:
         found: of each cause its probability, and how rare it makes the event.
     """
+    found = [(share, one) for share, one in found if one.probability > 0.0]
+    if not found:
+        return _NOWHERE
     parts = np.array([share * one.probability for share, one in found])
     each = [one for _, one in found]
     of_each = parts / parts.sum()

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from hdcal.prediction.budget.linear import LinearCheck, check_linear, coverage_factor
+from hdcal.prediction.engine.causes import independent_draws
 from hdcal.prediction.engine.population_force import PopulationForce
 from hdcal.prediction.margin.budget import Component, ForceBudget, averaged_budget
 from hdcal.prediction.margin.budget_words import (
@@ -52,24 +53,27 @@ class PredictiveLaw:
         variance = sum(float(np.sum(w * ((m - mean) ** 2 + s**2))) for w, m, s in parts)
         return mean, variance**0.5
 
-    def end_error(self, ends: tuple[float, float], draws: float) -> float:
+    def end_error(self, ends: tuple[float, float], draws: Sequence[float]) -> float:
         """Return the larger standard error of the ends of an interval [N].
 
         A quantile moves by what the share below it is uncertain, over the density.
 
         Args:
             ends: of the interval.
-            draws: how many independent ones these are worth.
+            draws: how many independent ones those of each cause are worth.
         """
         _, sd = self.moments()
         errors = []
         for end in ends:
-            below = self._below(end)
             near = sum(map(np.sum, self._below(end + 0.05 * sd)))
             density = (near - sum(map(np.sum, self._below(end - 0.05 * sd)))) / 0.1 / sd
-            pairs = zip(below, self.weight, strict=True)
-            whole = np.concatenate([b / w.sum(axis=1) for b, w in pairs])
-            errors.append(float(np.std(whole)) / np.sqrt(draws) / max(density, 1e-300))
+            # Causes differ by what they are, and their draws alone by chance.
+            parts = zip(self._below(end), self.weight, draws, strict=True)
+            each = [
+                np.sum(w) * np.std(below / w.sum(axis=1)) / np.sqrt(worth)
+                for below, w, worth in parts
+            ]
+            errors.append(float(np.linalg.norm(each)) / max(density, 1e-300))
         return float(max(errors))
 
     def _below(self, force: float) -> list[np.ndarray]:
@@ -99,7 +103,8 @@ def stated_uncertainty(
     about = found.estimate - expanded, found.estimate + expanded
     check = check_linear(about, drawn, linear)
     lines = budget_lines(found, forces)
-    error = law.end_error(drawn, _independent_draws(forces))
+    worth = [independent_draws(force.cause) for force in forces]
+    error = law.end_error(drawn, worth)
     said = _said(found, linear, about, drawn, check, error)
     if check.valid:
         return _stated(found.estimate, linear, about, lines, True, said)
@@ -120,16 +125,6 @@ def _stated(estimate, sd, ends, lines, valid, check) -> StatedUncertainty:
         linear_budget_valid=valid,
         linear_check=check,
     )
-
-
-def _independent_draws(forces: Sequence[PopulationForce]) -> float:
-    """Return how many independent draws those of all causes are worth in the tails."""
-    total = 0.0
-    for cause in (force.cause for force in forces):
-        worth = [d.ess_tail for d in cause.posterior.diagnoses.values()]
-        known = [size for size in worth if np.isfinite(size)]
-        total += min([cause.size, *known])
-    return total
 
 
 def _said(

@@ -155,10 +155,11 @@ def _inputs(forces: Sequence[PopulationForce]) -> dict[str, Driver]:
     found |= dict.fromkeys(forces[0].tolerances, "given")
     if not where.low <= where.deformation <= where.high:
         found["leftover"] = "prior"
-    untested = where.untested
-    if whose.quantity == "reading" and float(untested.kelvins(where.temperature)):
-        drifts = {"zero_drift": untested.zero[1], "frame": untested.frame[1]}
-        found |= {name: "prior" for name, sd in drifts.items() if sd > 0.0}
+    # A cause that holds a drift as its effect has none that is open.
+    for untested in (force.conditions.untested for force in forces):
+        if whose.quantity == "reading" and float(untested.kelvins(where.temperature)):
+            drifts = {"zero_drift": untested.zero[1], "frame": untested.frame[1]}
+            found |= {name: "prior" for name, sd in drifts.items() if sd > 0.0}
     return found
 
 
