@@ -160,6 +160,11 @@ def test_the_solver_keeps_what_it_has_when_it_cannot_do_better():
         (WALL, {"limit_force": 120_000.0}, "takes about 70.2 N. Give it in N"),
         (WALL, {"limit_force": 0.06}, "takes about 70.2 N. Give it in N"),
         (WALL, {"limit_stress": 0.0}, "0 MPa does not lie between"),
+        (
+            {"wall_thickness_mm": (0.1, 0.6)},
+            {"tolerances": {"wall_thickness_mm": 0.2}},
+            "0.2 is no tolerance of 0.1 mm",
+        ),
         (WALL, {"deformation": 50.0}, "50 mm on a radius of 40 mm"),
         (WALL, {"probability": 0.0}, "does not lie between 0 and 1"),
         (WALL, {"materials": ["stel"]}, "Did you mean 'steel'"),

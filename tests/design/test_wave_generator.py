@@ -6,15 +6,19 @@ from inspect import signature
 import numpy as np
 import pytest
 from designs import bent, known
+from posteriors import single
 from scipy.optimize import brentq
 from scipy.stats import norm
 
 from hdcal.design import wave_generator as module
+from hdcal.design.design_draws import design_draws
 from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.springs import best_common, judge, set_points
 from hdcal.design.summary import generator_answer
 from hdcal.design.wave_generator import wave_generator
 from hdcal.errors import InputError
+from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.prediction.engine.causes import causes_of, independent_draws
 
 WINDOW = (0.38, 0.42)
 
@@ -173,6 +177,50 @@ def test_impossible_requirements_say_what_the_best_is(given):
     assert "no spring rate between 1 and 50 N/mm meets 0.399 … 0.401 mm" in words
     assert "the best is 50 N/mm with 0." in words
     assert "adjusted gear by gear" in words
+
+
+def test_draws_that_hang_together_are_worth_fewer(given):
+    """What is counted among them is as sure as among so many independent ones."""
+    draws = given(replace(known(2000), worth=1200.0))
+    answer = generator_answer(wave_generator(draws.gear, WINDOW, probability=0.99))
+    share, error = answer.spring.probability, answer.spring.standard_error
+    assert error == pytest.approx(np.sqrt(share * (1.0 - share) / 1200.0))
+    assert answer.at_temperature[0].no_jam <= 1.0 - 0.5 / 1200.0
+    with pytest.raises(InputError, match="2000 draws, worth 1200 independent ones"):
+        wave_generator(draws.gear, WINDOW, probability=0.993)
+
+
+def test_the_worth_of_several_causes_is_that_of_their_mean():
+    """Against a share that is counted among the draws of both, again and again."""
+    posterior = mixed_posterior({"none": (0.7, single()), "x": (0.3, single())})
+    found = design_draws(posterior)
+    each = [independent_draws(cause) for cause in causes_of(posterior)]
+    rng = np.random.default_rng(0)
+    counted = [
+        0.7 * rng.binomial(int(each[0]), 0.9) / int(each[0])
+        + 0.3 * rng.binomial(int(each[1]), 0.9) / int(each[1])
+        for _ in range(20_000)
+    ]
+    assert np.var(counted) == pytest.approx(0.09 / found.independent, rel=0.05)
+
+
+def _ends(interval) -> tuple[float, float]:
+    return interval.lo, interval.hi
+
+
+def test_the_stress_is_that_of_gears_as_they_are_made(given):
+    draws = given(known())
+    wide = wave_generator(
+        draws.gear, WINDOW, probability=0.5, tolerances={"wall_thickness_mm": 0.1}
+    )
+    plain = wave_generator(draws.gear, WINDOW, probability=0.5)
+    (low, high), (least, most) = (
+        _ends(generator_answer(found).stress.stress_MPa) for found in (wide, plain)
+    )
+    own = draws.gear.geometry.wall_thickness
+    # Bending stress grows with the wall: 95 % of a uniform tolerance of it.
+    assert (high - low) / most == pytest.approx(2.0 * 0.095 / own, rel=0.2)
+    assert most - least < 1e-6 * most
 
 
 def test_a_force_that_falls_is_refused(given):

@@ -45,6 +45,19 @@ def mixed(models) -> Posterior:
     return mixed_posterior(models)
 
 
+def test_a_parameter_is_known_as_well_as_by_the_worst_model(models):
+    share, first = models["none"]
+    poor = replace(first.diagnoses["K"], rhat=1.001, ess_tail=120.0)
+    slow = replace(first.diagnoses["K"], rhat=1.004, ess_tail=900.0)
+    each = [
+        (share, replace(first, diagnoses={**first.diagnoses, "K": found}))
+        for found in (poor, slow)
+    ]
+    worst = mixed_posterior(dict(zip(("none", "unknown"), each, strict=True)))
+    assert worst.diagnoses["K"].rhat == 1.004
+    assert worst.diagnoses["K"].ess_tail == 120.0
+
+
 def forces(posterior: Posterior) -> np.ndarray:
     """Return the mean reading of every draw, by whoever knows of no hypotheses."""
     problem = posterior.problem

@@ -5,7 +5,7 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from posteriors import batch, written_posterior
+from posteriors import batch, plain_draws, ramp_case, written_posterior
 from rigs import cycles, make_case, make_records
 from short import SHORT
 
@@ -15,6 +15,7 @@ from hdcal.inference.checks import Check
 from hdcal.prediction.bands import bands
 from hdcal.prediction.bands.bands import default_bands, predict
 from hdcal.prediction.engine.conditions import is_tested
+from hdcal.prediction.engine.forces import force_of, grid_records
 
 
 def reading(records, seed=0):
@@ -78,6 +79,40 @@ def test_blocks_do_not_show(rubbing, monkeypatch):
     monkeypatch.setattr(bands, "_BLOCK", 7)
     pieces = predict(rubbing, grid)
     assert pieces.physics_lo_N == pytest.approx(whole.physics_lo_N, abs=1e-12)
+
+
+LOOPS = {
+    "hysteresis": {"force": 6.0, "reach": 0.1},
+    "plastic_yield": {"softening": 0.2, "yield_deformation": 0.3},
+}
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_what_remembers_came_its_own_way(name: str, monkeypatch):
+    """Each row is of another gear, unloaded from where the tested one was farthest."""
+    case, count = ramp_case(known={"unloading"}), 4
+    sizes = {f"{name}.{site}": value for site, value in LOOPS[name].items()}
+    draws = {site: v[0] for site, v in plain_draws(case, 1).items()} | sizes
+    draws = {site: np.full(count, v) for site, v in draws.items()}
+    known = written_posterior(case, draws, effects=[name])
+    monkeypatch.setattr(bands, "_BLOCK", 2)
+    at, far = np.array([0.4, 0.1, 0.25]), 0.54
+    found = {way: predict(known, at, direction=way) for way in ("up", "down")}
+    for row, place in enumerate(at):
+        loaded, back = np.linspace(0.0, far, 300), np.linspace(far, place, 300)
+        for way, along in (
+            ("up", np.linspace(0.0, place, 300)),
+            ("down", np.append(loaded, back)),
+        ):
+            sense = np.sign(np.diff(along, prepend=-1.0))
+            one_gear = np.zeros(len(along), dtype=int)
+            path = grid_records(along, np.full(len(along), 20.0), sense, 0.0, one_gear)
+            value = {site: v[0] for site, v in known.draws.items()}
+            expected = float(force_of(known.problem, value, path)[0][-1])
+            median = found[way].physics_median_N[row]
+            assert median == pytest.approx(expected, abs=1e-6), (way, place)
+    loop = found["up"].physics_median_N - found["down"].physics_median_N
+    assert np.all(loop > 1.0)
 
 
 def test_the_same_seed_gives_the_same_bands(rubbing):

@@ -178,7 +178,7 @@ def test_a_ridge_to_an_unknown_zero_leaves_the_calibration_its_row(seed: int):
 def test_a_trace_of_a_second_cause_brings_no_degrees_of_freedom():
     """Fit and noise have one unknown variance, under two causes too."""
     one = single(size=SIZE)
-    (alone,) = (averaged_budget(forces_of(m)) for m in (one,))
+    alone = averaged_budget(forces_of(one))
     traced = averaged_budget(forces_of([(0.999, one), (0.001, stiffer(one, 1.001))]))
     assert alone.dof < 1000.0
     assert traced.dof == pytest.approx(alone.dof, rel=0.05)

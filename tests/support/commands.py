@@ -90,7 +90,7 @@ def calibrated(
     with open(place.with_suffix(".lock"), "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not said.exists():
-            place.mkdir()
+            place.mkdir(exist_ok=True)
             asked = "calibrate", XB1, *options(SHORT), "--json", "--out"
             done = hdcal(*asked, place / "result")
             assert done.returncode == 0, done.stdout + done.stderr

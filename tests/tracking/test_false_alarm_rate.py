@@ -115,6 +115,32 @@ def test_a_softer_gear_is_still_called(rho, forget, most):
     assert np.median(delays) <= most
 
 
+def scores_after_pauses(rho: float, told: bool) -> float:
+    """Return the root mean square of the scores of first readings after a pause.
+
+    Noise forgets over it. A pause is a long step of time, or a bad line; or, where
+    nobody told, neither.
+    """
+    tracker, rng, found, time = start(), np.random.default_rng(2), [], 0.0
+    stiffness = float(np.median(still_posterior().draws["stiffness"]))
+    for group in range(1000):
+        time += 100.0 if group % 2 else 1.0
+        if told and not group % 2:
+            tracker.skip()
+        for row, noise in enumerate(correlated(rng, rho, 6).tolist()):
+            at, time = float(rng.uniform(0.0, 0.54)), time + 1.0
+            clock = {"time": time} if told else {}
+            answer = tracker.update(at, stiffness * at + noise, **clock)
+            if row == 0 and group > 200:
+                found.append(answer["innovation"])
+    return float(np.sqrt(np.mean(np.square(found))))
+
+
+def test_noise_that_a_pause_interrupts_is_not_carried_over_it():
+    assert scores_after_pauses(0.6, told=True) == pytest.approx(1.0, abs=0.1)
+    assert scores_after_pauses(0.6, told=False) > 1.2
+
+
 def test_the_answer_and_the_words_state_the_rate():
     tracker = start(alarm_rows=500.0)
     assert "one false alarm in 500 readings" in tracker.describe()

@@ -49,6 +49,21 @@ def readings(truth, sd, count: int, seed: int, *, softer=1.0, at=0, jump=0.0):
     return zip(deformation.tolist(), force.tolist(), strict=True)
 
 
+def test_another_mounting_moves_a_zero_that_the_gear_file_fixes():
+    zero = Prior("fixed", (0.0,))
+    fixed = make_gear(**KNOWN | {"force_offset": zero, "deformation_offset": zero})
+    tracker, rng = Tracker(fixed), np.random.default_rng(4)
+    slope, found = float(np.mean(prior_from_gear(fixed).coefficients()[:, 0])), []
+    for run, moved in (("a", 0.0), ("b", 5.0)):
+        for deformation in rng.uniform(0.02, 0.54, 60).tolist():
+            reading = slope * deformation + moved + float(rng.normal(0.0, 0.8))
+            found.append(tracker.update(deformation, reading, run=run))
+    # As soon as a few readings have told the zero, nothing is carried from row to row.
+    for one in found[70:]:
+        assert abs(one["correlation"]) < 0.4
+    assert np.std([one["innovation"] for one in found[70:]]) < 1.3
+
+
 def followed(tracker: Tracker, stream) -> list[dict]:
     mine = copy.deepcopy(tracker)
     return [mine.update(deformation, force) for deformation, force in stream]

@@ -104,9 +104,12 @@ def probability_findings(draws: DesignDraws, probability: float) -> list[Finding
     """Return what is wrong with a required probability."""
     if wrong := implausible("probability", probability):
         return wrong
-    if (1.0 - probability) * draws.size < _LEAST_OUTSIDE * (1.0 - 1e-9):
+    worth = draws.independent
+    if (1.0 - probability) * worth < _LEAST_OUTSIDE * (1.0 - 1e-9):
         words = f"{probability:g} cannot be told from {draws.size} draws"
-        most = 1.0 - _LEAST_OUTSIDE / draws.size
+        if worth < draws.size:
+            words += f", worth {worth:.0f} independent ones"
+        most = 1.0 - _LEAST_OUTSIDE / worth
         remedy = f"Ask for {most:.4g} or less, or calibrate with more draws"
         return [Finding("probability", words, remedy)]
     return []

@@ -33,6 +33,7 @@ from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.causes import (
     averaging_words,
     causes_of,
+    jointly_worth,
     likeliest,
     sample_prior,
 )
@@ -71,6 +72,7 @@ class DesignDraws:
             calibrated model leaves over.
         untested: what is not known beyond the tested conditions, for each cause; None
             where no gear was tested.
+        worth: how many independent draws these are worth; None for all of them.
     """
 
     gear: Gear
@@ -83,11 +85,17 @@ class DesignDraws:
     records: Records | None
     misfits: tuple[str, ...] = ()
     untested: Untested | None = None
+    worth: float | None = None
 
     @property
     def size(self) -> int:
         """Number of draws."""
         return len(self.values["K"])
+
+    @property
+    def independent(self) -> float:
+        """How many independent draws these are worth, at most as many as there are."""
+        return self.size if self.worth is None else min(self.worth, self.size)
 
     @property
     def nominal_deformation(self) -> float | None:
@@ -255,6 +263,7 @@ def _calibrated(posterior: Posterior, seed: int) -> DesignDraws:
         records=posterior.case.records,
         misfits=(*averaging_words(causes), *misfits(main)),
         untested=untested,
+        worth=jointly_worth(causes),
     )
 
 

@@ -124,7 +124,9 @@ def inverse_design(
         wrong += _findings(draws, asked, materials, limit_force)
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
-        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+        # What is no size at all is told as such.
+        smallest = {name: low for name, (low, _) in vary.items() if low > 0.0}
+        gear = wrong.attempt(next_gear, draws, tolerances, seed, smallest)
     assert gear is not None
     return _nearest_design(draws, filter(None, made), gear, asked)
 

@@ -47,7 +47,10 @@ class NextGear:
 
 
 def next_gear(
-    draws: DesignDraws, tolerances: Mapping[str, float] | None = None, seed: int = 0
+    draws: DesignDraws,
+    tolerances: Mapping[str, float] | None = None,
+    seed: int = 0,
+    smallest: Mapping[str, float] | None = None,
 ) -> NextGear:
     """Draw the gears that a design has to serve.
 
@@ -56,6 +59,7 @@ def next_gear(
         tolerances: ± of a size [mm] by edge name; sizes are uniform within it, which
             is what limits alone say (JCGM 100:2008, 4.3.7).
         seed: of the scatter.
+        smallest: that a size is to be [mm], where it is less than the tested one.
 
     Raises:
         InputError: a size is unknown, or its tolerance is none.
@@ -64,6 +68,7 @@ def next_gear(
     findings = name_findings(tolerances, SIZES, "tolerances")
     for name, width in tolerances.items() if not findings else ():
         own = float(getattr(draws.gear.geometry, SIZES[name]))
+        own = min(own, (smallest or {}).get(name, own))
         if wrong := implausible("tolerances", width):
             findings += wrong
         elif not 0.0 < width < 0.5 * own:

@@ -64,11 +64,12 @@ def in_words(found: D, headline: str, words: Iterable[str]) -> D:
     return replace(found, headline=headline, next_step=step, answer=tuple(words))
 
 
-def _counted(share: float, draws: int) -> tuple[float, float]:
+def _counted(share: float, basis: DesignDraws) -> tuple[float, float]:
     """Return a probability that was counted among draws, and its standard error.
 
     That all draws do it does not make it certain: half a draw is left in doubt.
     """
+    draws = basis.independent
     share = float(np.clip(share, 0.5 / draws, 1.0 - 0.5 / draws))
     return share, float(np.sqrt(share * (1.0 - share) / draws))
 
@@ -109,9 +110,7 @@ def generator_report(
 
 def _curve(found: WaveGenerator) -> SpringCurve:
     counted = (
-        tuple(
-            _counted(getattr(one, name), found.basis.size)[0] for one in found.springs
-        )
+        tuple(_counted(getattr(one, name), found.basis)[0] for one in found.springs)
         for name in ("together", "no_backlash", "no_jam", "adjusted")
     )
     return SpringCurve(tuple(one.rate for one in found.springs), *counted)
@@ -123,8 +122,8 @@ def _signed(ends: np.ndarray, found: WaveGenerator) -> tuple[float, float]:
 
 
 def _spring(found: WaveGenerator) -> ChosenSpring:
-    spring, sense, size = found.chosen, found.asked.sense, found.basis.size
-    probability, error = _counted(spring.together, size)
+    spring, sense, basis = found.chosen, found.asked.sense, found.basis
+    probability, error = _counted(spring.together, basis)
     own = sense * np.median(found.forces[1, _reference(found)]) / _middle(found)
     return ChosenSpring(
         rate_N_per_mm=spring.rate,
@@ -133,8 +132,8 @@ def _spring(found: WaveGenerator) -> ChosenSpring:
         interference_mm=sense * spring.interference,
         probability=probability,
         standard_error=error,
-        zero_backlash=_counted(spring.no_backlash, size)[0],
-        no_jam=_counted(spring.no_jam, size)[0],
+        zero_backlash=_counted(spring.no_backlash, basis)[0],
+        no_jam=_counted(spring.no_jam, basis)[0],
     )
 
 
@@ -169,7 +168,7 @@ def _kept(found: WaveGenerator, level: int) -> WindowKept:
     low, high = found.intervals(level)
     x = found.chosen.interference + found.error
     kept = x >= low, x <= high, (x >= low) & (x <= high)
-    shares = (_counted(float(np.mean(each)), len(x))[0] for each in kept)
+    shares = (_counted(float(np.mean(each)), found.basis)[0] for each in kept)
     return WindowKept(found.asked.temperature_C[level], *shares)
 
 
@@ -183,7 +182,7 @@ def _adjusted(found: WaveGenerator) -> GearByGear:
     reach = np.quantile(own, ends)
     load = found.chosen.rate * (reach - found.asked.sense * _middle(found))
     return GearByGear(
-        probability=_counted(found.chosen.adjusted, found.basis.size)[0],
+        probability=_counted(found.chosen.adjusted, found.basis)[0],
         share_of_gears=found.asked.probability,
         interference_mm=_signed(reach, found),
         preload_N=_signed(load, found),
@@ -195,7 +194,8 @@ def _window_stress(found: WaveGenerator) -> StressAtWindow:
     rise = np.asarray(found.asked.temperature_C) - basis.gear.reference_temperature
     warm = np.max(1.0 - np.asarray(basis.values["alpha"])[:, None] * rise, axis=1)
     modulus = np.asarray(basis.values["E0"]) * warm
-    draws = np.asarray(peak_stress(basis.gear.geometry, modulus, at))
+    made = found.gear.gears.made(basis.gear.geometry)
+    draws = np.asarray(peak_stress(made, modulus, at))
     where = found.asked.sense * at
     return StressAtWindow(deformation_mm=where, **_stress(basis, draws))
 
@@ -248,7 +248,7 @@ def inverse_report(found: InverseDesign, command: str = "") -> Report[InverseAns
 
 def _candidate(one: Candidate, sense: LoadingSense) -> CandidateAnswer:
     span = credible_interval(sense * one.forces)
-    probability, error = _counted(one.kept, len(one.forces))
+    probability, error = _counted(one.kept, one.basis)
     return CandidateAnswer(
         material=one.basis.material,
         sizes_mm={name.removesuffix("_mm"): v for name, v in one.sizes.items()},

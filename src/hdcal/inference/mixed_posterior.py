@@ -171,12 +171,18 @@ def _completed(
 
 def _diagnoses(posteriors: Sequence[Posterior]) -> dict[str, Diagnosis]:
     """Return for each parameter the worst of the models' diagnoses."""
-    found: dict[str, Diagnosis] = {}
+    each: dict[str, list[Diagnosis]] = {}
     for one in posteriors:
         for name, diagnosis in one.diagnoses.items():
-            if name not in found or diagnosis.rhat > found[name].rhat:
-                found[name] = diagnosis
-    return found
+            each.setdefault(name, []).append(diagnosis)
+    return {
+        name: replace(
+            max(of_name, key=lambda found: found.rhat),
+            ess_bulk=float(np.fmin.reduce([found.ess_bulk for found in of_name])),
+            ess_tail=float(np.fmin.reduce([found.ess_tail for found in of_name])),
+        )
+        for name, of_name in each.items()
+    }
 
 
 def _checks(names, posteriors: Sequence[Posterior]) -> Iterator[Check]:

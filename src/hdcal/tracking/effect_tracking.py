@@ -149,7 +149,8 @@ def _readings(draws: Draws, reading: Reading, stiffness, rows):
     """
     deformation, rise, time = rows.T
     warmth = rise + reading.reference_temperature
-    records = grid_records(deformation, warmth, jnp.ones_like(rise), 0.0)
+    one_gear = np.zeros(len(rows), dtype=int)
+    records = grid_records(deformation, warmth, jnp.ones_like(rise), 0.0, one_gear)
     records = replace(records, time=time)
 
     def one(stiffness, draw: Draws):

@@ -9,7 +9,7 @@ learns these rows gives the least-squares answer of correlated readings.
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 
 import numpy as np
 
@@ -22,6 +22,9 @@ _BELIEVED, _CAREFUL = 2.5, 1.0
 _FEWEST, _UNSEEN = 30, 0.6
 # Largest correlation in size: nearer to one a zero could not be told from its noise.
 _MOST = 0.95
+# A step of time over so many usual ones is a pause, over which noise forgets; a usual
+# one is a mean over about so many rows.
+_PAUSE, _USUAL = 10.0, 20
 # A glitch beyond so many half-widths counts as one of this size.
 _FARTHEST = 2.0
 
@@ -56,6 +59,8 @@ class SerialCorrelation:
         self._power = self._product = 0.0
         self._row: tuple[np.ndarray, float] | None = None
         self._error: float | None = None
+        self._time: float | None = None
+        self._usual = inf
 
     @property
     def weight(self) -> float:
@@ -66,6 +71,22 @@ class SerialCorrelation:
     def restart(self) -> None:
         """Begin anew with the next row, as on another mounting; ρ is kept."""
         self._row = self._error = None
+
+    def follow(self, time: float | None) -> None:
+        """Begin anew after a pause, or where time goes back.
+
+        Args:
+            time: of the next row [s], if it has one.
+        """
+        before, self._time = self._time, time
+        if before is None or time is None:
+            return
+        step = time - before
+        if not 0.0 <= step <= _PAUSE * self._usual:
+            self.restart()
+        if step > 0.0:
+            usual = step if self._usual == inf else self._usual
+            self._usual = usual + (min(step, _PAUSE * usual) - usual) / _USUAL
 
     def whiten(self, columns: np.ndarray, force: float) -> WhiteRow:
         """Return a row freed of what the row before says of its noise.

@@ -73,6 +73,8 @@ def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
 def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
     """Return what the priors of a gear file say of the stream.
 
+    Its mounting has a zero of its own, beside that of the gear file.
+
     Args:
         gear: from `read_gear`.
         seed: of the draws.
@@ -85,6 +87,7 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
     priors = {**gear.priors, "K": scaled(gear.priors["K"], meant / own)}
     draws = {n: _draw(priors[n], rng, _PRIOR_DRAWS, n in POSITIVE) for n in _SITES}
     run_sd = _draw(gear.scale_priors["run_offset_sd"], rng, _PRIOR_DRAWS)
+    draws["force_offset"] += run_sd * rng.standard_normal(_PRIOR_DRAWS)
     half = 0.5 if gear.reading == "diametral" else 1.0
     reading = Reading(half, gear.reference_temperature)
     stiffness = draws["K"] * draws["E0"] * own

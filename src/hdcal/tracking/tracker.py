@@ -123,6 +123,7 @@ class Tracker:
         self._limits.check(deformation, force, temperature, time)
         self._mount(run)
         tested = self._limits.were_tested(deformation, warmth)
+        self._noise.follow(time)
         columns, terms = self._row(deformation, warmth, time or 0.0, tested=tested)
         rho, weight = self._noise.value, self._noise.weight
         middle, half, score = self._step(columns, force, terms)
@@ -215,6 +216,7 @@ class Tracker:
     def skip(self) -> int:
         """Count a row that was no reading, and return its number."""
         self.rows += 1
+        self._noise.restart()
         return self.rows
 
     def describe(self) -> str:

@@ -21,6 +21,7 @@ from hdcal.prediction.engine.conditions import (
     Direction,
     is_tested,
     temperature_findings,
+    turning_point,
     usual_sd,
     usual_temperature,
 )
@@ -128,15 +129,16 @@ def _bands(
     """Return the bands at every pair of deformation and temperature."""
     case = causes[0].posterior.case
     at, warm = np.tile(along, len(levels)), np.repeat(levels, len(along))
-    sense = _senses(at, direction, case.records)
-    known_sd = usual_sd(case.records)
+    loading = _loading(at, case.records)
+    sense = loading if direction is None else np.full(len(at), SENSE[direction])
     tails = np.array([0.5 - interval / 2.0, 0.5, 0.5 + interval / 2.0])
     models = [(cause.problem, *with_untested(cause, seed)) for cause in causes]
     blocks = []
     for start in range(0, len(at), _BLOCK):
         rows = slice(start, start + _BLOCK)
-        records = grid_records(at[rows], warm[rows], sense[rows], known_sd)
-        blocks.append(_quantiles(causes, models, records, tails, seed))
+        path = _path(case.records, at[rows], warm[rows], sense[rows], loading[rows])
+        found = _quantiles(causes, models, path, len(at[rows]), tails, seed)
+        blocks.append(found)
     physics, with_gap, new = np.concatenate(blocks, axis=2)
     tested = is_tested(case.records, deformation=at, temperature=warm, sense=sense)
     usable = all(cause.posterior.usable for cause in causes)
@@ -152,25 +154,42 @@ def _bands(
     )
 
 
-def _senses(at: np.ndarray, direction: Direction | None, records: Records):
-    """Return the sense of the movement of each row, +1 where the deformation rises."""
-    if direction is not None:
-        return np.full(len(at), SENSE[direction])
+def _loading(at: np.ndarray, records: Records) -> np.ndarray:
+    """Return the sense of loading of each row, +1 where the deformation rises."""
     # A gear at rest is loaded as the tested one was.
     tested = np.min(records.deformation) + np.max(records.deformation)
     return np.where(np.where(at == 0.0, tested, at) < 0.0, -1.0, 1.0)
 
 
-def _quantiles(causes: Sequence[Cause], models, records: Records, tails, seed: int):
+def _path(tested: Records, at, warm, sense, loading) -> Records:
+    """Return the readings, each of another gear, after where its unloading begins."""
+    known_sd = usual_sd(tested)
+    back = sense != loading
+    if not back.any():
+        return grid_records(at, warm, sense, known_sd)
+    ends = np.min(tested.deformation), np.max(tested.deformation)
+    begin = np.where(back, turning_point(at, loading, *ends), at)
+    path, way = np.append(begin, at), np.append(loading, sense)
+    gear = np.tile(np.arange(len(at)), 2)
+    return grid_records(path, np.tile(warm, 2), way, known_sd, gear)
+
+
+def _quantiles(causes: Sequence[Cause], models, path: Records, count: int, tails, seed):
     """Return quantiles of mean, mean with leftover and new reading: [3, 3, row].
 
-    `models` holds for each cause its problem, its draws and what they leave open.
+    Args:
+        causes: over which to average.
+        models: of each cause its problem, its draws and what they leave open.
+        path: rows, of which the last are asked for.
+        count: of those asked for.
+        tails: probabilities of the quantiles.
+        seed: of the new reading.
     """
     parts = []
     for model in models:
         keys = jax.random.split(jax.random.key(seed), len(model[1]["K"]))
-        parts.append(readings(*model, records, keys))
-    tables = [np.concatenate(kind) for kind in zip(*parts, strict=True)]
+        parts.append(readings(*model, path, keys))
+    tables = [np.concatenate(kind)[:, -count:] for kind in zip(*parts, strict=True)]
     if len(causes) == 1:
         found = [np.quantile(table, tails, axis=0) for table in tables]
     else:

@@ -87,6 +87,11 @@ def independent_draws(cause: Cause) -> float:
     return min([cause.size, *(size for size in worth if np.isfinite(size))])
 
 
+def jointly_worth(causes: Sequence[Cause]) -> float:
+    """Return how many independent draws of one law those of all causes are worth."""
+    return 1.0 / sum(c.probability**2 / independent_draws(c) for c in causes)
+
+
 def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...]:
     """Return models as causes whose probabilities sum to 1.
 

@@ -70,9 +70,20 @@ class Conditions(eqx.Module):
     @property
     def turn(self) -> Float[Array, ""]:
         """Where unloading begins: at the farthest tested deformation, or here [mm]."""
-        tested = jnp.where(self.loading > 0.0, self.high, self.low)
-        farthest = jnp.maximum(self.loading * tested, self.loading * self.deformation)
-        return self.loading * farthest
+        return turning_point(self.deformation, self.loading, self.low, self.high)
+
+
+def turning_point(deformation, loading, low, high):
+    """Return where unloading begins: at the farthest tested deformation, or here [mm].
+
+    Args:
+        deformation: at which it ends [mm].
+        loading: sense of loading, +1 or −1.
+        low: low end of the tested deformation [mm].
+        high: its high end [mm].
+    """
+    tested = jnp.where(loading > 0.0, high, low)
+    return loading * jnp.maximum(loading * tested, loading * deformation)
 
 
 def beyond_tested(where: Conditions) -> float:

@@ -25,17 +25,19 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 _STAGES = {"load": frozenset({"deformation", "force"}), "gear": frozenset({"force"})}
 
 
-def grid_records(deformation, temperature, sense, known_sd) -> Records:
+def grid_records(deformation, temperature, sense, known_sd, gear=None) -> Records:
     """Return rows that were not measured: immediate readings on a fresh reset.
 
     Args:
         deformation: as read [mm], shape (n,).
         temperature: of the specimen [°C], shape (n,).
-        sense: +1 loading, -1 unloading, shape (n,).
+        sense: +1 where the deformation rises, -1 where it falls, shape (n,).
         known_sd: known measurement sd of a row [N].
+        gear: which fresh gear, in a mounting of its own, a row is of, shape (n,); by
+            default each row is of another, so that none remembers another.
     """
     zeros = np.zeros(len(deformation))
-    index = np.zeros(len(deformation), dtype=int)
+    index = np.arange(len(deformation)) if gear is None else gear
     return Records(
         deformation=deformation,
         temperature=temperature,

@@ -1,7 +1,5 @@
 """The force on gears alone: a product has no rig, neither its zeros nor its drift."""
 
-from dataclasses import replace
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -99,8 +97,6 @@ def gear_forces(
     as_read = deformation / problem.reading.radial_per_read
     pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
     records = grid_records(as_read, temperature, pressed, 0.0)
-    # A run for each row: what remembers starts from rest in each.
-    records = replace(records, run=np.arange(count), specimen=np.arange(count))
 
     def of_draw(value, own):
         force, _ = force_of(problem, value, records, factor=own, quantity="gear")

@@ -225,7 +225,8 @@ def member_force(
         for column in (along, sense)
     )
     warmth = jnp.full(len(along), conditions.temperature)
-    records = grid_records(path, warmth, way, conditions.known_sd)
+    one_gear = np.zeros(len(along), dtype=int)
+    records = grid_records(path, warmth, way, conditions.known_sd, one_gear)
     zero = moved = 0.0
     if quantity == "reading":
         zero, moved = conditions.untested.drift(
