@@ -37,9 +37,11 @@ def bound(mixture: Mixture) -> float:
 def check(posterior, population: str, tolerances: dict) -> None:
     (cause,) = causes_of(posterior)
     force = population_force(cause, 0.4, population, tolerances=tolerances).at(WARM)
-    gear = Redesign.of(force)
     quantiles = np.asarray(QUANTILE(force.mixture(), CRITERIA.content))
     found = gradients([force], quantiles, CRITERIA)
+    at = {slope.name: slope.value for slope in found}
+    assert at["K"] == pytest.approx(np.median(cause.values["K"]), rel=1e-3)
+    gear = Redesign.of(force, {name: at[name] for name in ("E0_GPa", "K")})
     assert {slope.name for slope in found} == set(gear.origin)
     for slope in found:
         step = 1e-5 * slope.value
@@ -80,6 +82,17 @@ def test_the_ring_has_the_exponents_of_its_formula():
         assert percent[name] == pytest.approx(power * load, rel=1e-9)
     assert percent["E0_GPa"] == pytest.approx(load, rel=1e-9)
     assert "load_height_mm" not in by_name
+
+
+def test_modulus_and_coefficient_scale_alike_whatever_the_causes():
+    """Causes may differ in K, of which one per cent is another size in each."""
+    one = single(size=300)
+    found = hdcal.margin([(0.7, one), (0.3, stiffer(one, 1.5))], 0.4)
+    by_name = {slope.name: slope for slope in found.gradients}
+    modulus, factor = by_name["E0_GPa"], by_name["K"]
+    assert factor.bound_N_per_percent == pytest.approx(modulus.bound_N_per_percent)
+    load = modulus.force_N * modulus.value
+    assert factor.force_N * factor.value == pytest.approx(load)
 
 
 def test_shares_of_a_sum_are_its_variances():

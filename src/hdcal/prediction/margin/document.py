@@ -228,7 +228,9 @@ def budget_table(found: Margin, *, brief: bool = False) -> Table:
     ]
     if small:
         rest = sum(line.contribution_N**2 for line in small) ** 0.5
-        words = f"{len(small)} smaller ones together"
+        words = (
+            f"{len(small)} smaller ones together" if small[1:] else "one smaller one"
+        )
         share = f"{100.0 * sum(line.share for line in small):.2f} %"
         rows.append([words, *[""] * 5, f"{rest:.3g}", share, ""])
     assert found.linear_check is not None

@@ -15,7 +15,11 @@ from hdcal.data.case import Theory
 from hdcal.data.records import Geometry
 from hdcal.inference.problem import Problem
 from hdcal.prediction.engine.conditions import Conditions
-from hdcal.prediction.engine.mixture import Mixture, quantile_weights
+from hdcal.prediction.engine.mixture import (
+    Mixture,
+    quantile_weights,
+    weighted_quantile,
+)
 from hdcal.prediction.engine.population import Whose
 from hdcal.prediction.engine.population_force import PopulationForce, mixtures
 from hdcal.prediction.engine.sizes import (
@@ -27,7 +31,8 @@ from hdcal.prediction.engine.sizes import (
 )
 from hdcal.prediction.margin.request import Criteria
 
-_MPA_PER_GPA = 1e3
+# What scales the stiffness of every draw: its site, and code units in the unit shown.
+_MODULI = {"E0_GPa": ("E0", 1e3), "K": ("K", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -75,20 +80,24 @@ class Redesign(eqx.Module):
     theory: Theory = eqx.field(static=True)
 
     @classmethod
-    def of(cls, force: PopulationForce) -> "Redesign":
-        """Return the forces of a population as they are."""
-        posterior, values = force.cause.posterior, dict(force.cause.values)
+    def of(cls, force: PopulationForce, moduli: Mapping[str, float]) -> "Redesign":
+        """Return the forces of a population as they are.
+
+        Args:
+            force: of the population.
+            moduli: where the derivative by the modulus [GPa] and by K is taken; what
+                counts is how many times as large they become.
+        """
+        posterior = force.cause.posterior
         geometry, theory = posterior.case.gear.geometry, posterior.theory
         origin = {
             name: float(getattr(geometry, field))
             for name, field in SIZES.items()
             if matters(field, geometry, theory)
-        }
-        origin["E0_GPa"] = float(np.median(values["E0"])) / _MPA_PER_GPA
-        origin["K"] = float(np.median(values["K"]))
+        } | dict(moduli)
         return cls(
             problem=posterior.problem,
-            values=values,
+            values=dict(force.cause.values),
             whose=force.whose,
             conditions=force.conditions,
             geometry=geometry,
@@ -106,7 +115,7 @@ class Redesign(eqx.Module):
         }
         changed = shifted(self.geometry, shifts)
         scale = stiffness_ratio(changed, self.geometry, self.theory)
-        for name in ("E0_GPa", "K"):
+        for name in _MODULI:
             scale = scale * (point[name] / self.origin[name])
         strata = tolerance_strata(changed, self.tolerances, self.theory)
         there = replace(self.conditions, scale=scale, strata=strata)
@@ -133,6 +142,10 @@ def _bound_slopes(gear: Redesign, weights, content):
     return jax.jacfwd(bound)(gear.origin)
 
 
+def _of_all(forces: Sequence[PopulationForce], site: str) -> np.ndarray:
+    return np.concatenate([force.cause.values[site] for force in forces])
+
+
 def gradients(
     forces: Sequence[PopulationForce], quantiles: np.ndarray, criteria: Criteria
 ) -> tuple[Gradient, ...]:
@@ -144,8 +157,12 @@ def gradients(
             causes, shape (d,).
         criteria: content and confidence of the bound.
     """
-    gears = [Redesign.of(force) for force in forces]
     weights = np.concatenate([force.cause.weights for force in forces])
+    moduli = {
+        name: weighted_quantile(_of_all(forces, site), weights, 0.5) / unit
+        for name, (site, unit) in _MODULI.items()
+    }
+    gears = [Redesign.of(force, moduli) for force in forces]
     # The bound lies between two draws: only their derivatives are in it.
     used = quantile_weights(quantiles, weights, criteria.confidence)
     origin = gears[0].origin
