@@ -16,7 +16,7 @@ CASES = {
     "no sizes": (
         "[gear]\n",
         [
-            (1, f"gear.{s}_mm", "missing")
+            (1, f"gear.{s}_mm", "or take the theory 'spring'")
             for s in ("wall_thickness", "radius", "length")
         ],
     ),

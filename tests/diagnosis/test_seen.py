@@ -96,6 +96,20 @@ def test_through_zero_nothing_is_called_unloading():
     assert "decreases than while" in seen(replace(case, records=moved))[0].statement
 
 
+def test_of_one_speed_there_and_back_only_the_direction_is_told():
+    records = cycles(48)
+    sense = np.asarray(records.sense, float)
+    # Friction builds up at a reversal, where the rate over the turn is less too.
+    rate = 0.01 * sense * np.where(np.diff(sense, prepend=0.0) == 0.0, 1.0, 0.3)
+    noise = 0.1 * np.sin(np.arange(48.0) * 7.0)
+    force = 195.0 * records.deformation + 300.0 * rate + noise
+    known = records.known - {"rates"}
+    one = make_case(replace(records, force=force, rate=rate, known=known))
+    assert "lower on unloading" in seen(one)[0].statement
+    both = replace(one.records, known=known | {"rates"})
+    assert "faster movement" in seen(replace(one, records=both))[0].statement
+
+
 @pytest.mark.thorough
 def test_few_rows_alarm_as_seldom():
     """Of 200 ramps of six rows, 1 % due: seven or more would come once in 200."""

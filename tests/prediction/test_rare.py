@@ -18,6 +18,7 @@ from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES
 from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
 from hdcal.prediction.margin.refined import rests_on as refined_words
+from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
 
 AT = 0.4
 SIGMAS = {"Student's t": SIGMA, "normal": Prior("fixed", (0.9,))}
@@ -91,6 +92,44 @@ def test_mountings_and_gaps_are_weighed_as_they_are_sampled():
     found, mean = rare(expected, limit), counted(expected, limit)
     assert 0.005 < mean < 0.2
     assert found.probability == pytest.approx(mean, rel=0.1)
+
+
+@pytest.mark.thorough
+def test_a_leftover_far_out_is_found_alike_from_every_seed():
+    """Its stiffness is far wider than about the mode, where the points begin."""
+    rng, deformation = np.random.default_rng(2), np.linspace(0.02, 0.54, 14)
+    force = 205.0 * deformation + 20.0 * deformation**2 + rng.normal(0.0, 0.5, 14)
+    case = make_case(make_records(deformation, force))
+    (cause,) = causes_of(calibrate(case, with_gap=True, draws=500))
+    expected = population_force(cause, AT, "readings")
+    middle = float(np.median(np.asarray(expected.along().centre())))
+    found = [rare(expected, middle + 9.0, seed) for seed in range(4)]
+    chances = np.array([one.probability for one in found])
+    assert chances.min() > 1e-9 and chances.max() < 1e-3
+    assert max(one.relative_error for one in found) < 0.2
+    assert np.std(chances) < 0.2 * np.mean(chances)
+
+
+def test_weights_with_a_heavy_tail_do_not_tell_their_own_error():
+    rng = np.random.default_rng(6)
+    for shape in (0.3, 1.2):
+        drawn = stats.genpareto(shape).rvs(8000, random_state=rng)
+        assert (pareto_shape(drawn) > 0.7) == (shape > 0.7)
+    assert pareto_shape(np.zeros(8000)) == np.inf
+
+
+def test_laws_take_the_shape_of_weighted_points():
+    """Of a normal law far narrower than, and beside, where the points were."""
+    rng, target = np.random.default_rng(8), stats.multivariate_normal([1.0, -2.0], 0.3)
+    wide = (np.zeros(2), 4.0 * np.eye(2))
+    laws = SamplingLaws(np.array([True, False, True]), (wide, wide))
+    points, log_law = laws.drawn(4096, rng)
+    seen = target.logpdf(points[:, [0, 2]]) + stats.norm.logpdf(points[:, 1])
+    nowhere = np.full(4096, -np.inf)
+    (centre, shape), other = laws.reshaped(points, (seen - log_law, nowhere)).places
+    assert centre == pytest.approx(target.mean, abs=0.1)
+    assert shape == pytest.approx(target.cov_object.covariance, abs=0.05)
+    assert other is wide
 
 
 @pytest.mark.thorough

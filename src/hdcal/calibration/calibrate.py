@@ -259,5 +259,6 @@ def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:
     others = {"stiffness": found.values["stiffness"]}
     for kind, name in MEMBERS.items():
         if name in found.values and kind not in problem.integrated:
-            others |= one_by_one(name, found.values[name])
+            each = np.moveaxis(found.values[name], -1, 0)
+            others |= {f"{name}[{index}]": draws for index, draws in enumerate(each)}
     return others

@@ -33,8 +33,8 @@ ARTICLE_NOTE = (
     "combination of its own inputs reproduces; its K = 0.13 is no property of the gear."
 )
 _IMPLAUSIBLE = (
-    "First look at the units of the columns, and at sizes and `reading` of the gear "
-    "file: what comes out is not what such a gear is believed to be."
+    "First look at the units of the columns, and at sizes and [measurement] of the "
+    "gear file: what comes out is not what such a gear is believed to be."
 )
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {

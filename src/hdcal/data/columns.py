@@ -157,7 +157,8 @@ def _name_remedy(quantity: str, headers: Sequence[str]) -> str:
     near += get_close_matches(example, headers, 1, 0.6)
     named = near[0] if near else "HEADER"
     unit = "[UNIT]" if _split_brackets(named)[1] is None else ""
-    return f"Name it like {example}, or say `columns` '{quantity}={named}{unit}'"
+    known = "" if near else f", HEADER one of: {', '.join(headers[:20])}"
+    return f"Name it like {example}, or say `columns` '{quantity}={named}{unit}'{known}"
 
 
 def _mapped(

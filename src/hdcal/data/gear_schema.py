@@ -160,10 +160,13 @@ def size_findings(toml: TomlFile, theory: str | None = None) -> list[Finding]:
         if isinstance(value, int | float) and not isinstance(value, bool)
         if range_of("size").holds(value)
     }
-    own = table.get("theory") == SPRING
-    kept = f"; or keep the theory '{SPRING}' of the file, which needs none" * own
+    other = ""
+    if table.get("theory") == SPRING:
+        other = f"; or keep the theory '{SPRING}' of the file, which needs none"
+    elif missing == [*SIZES_NEEDED]:
+        other = f"; or take the theory '{SPRING}', which needs none"
     lacking = [
-        toml.finding("is missing", f"Add it: {_example(name)}{kept}", f"gear.{name}")
+        toml.finding("is missing", f"Add it: {_example(name)}{other}", f"gear.{name}")
         for name in missing
         if (theory or table.get("theory")) != SPRING
     ]

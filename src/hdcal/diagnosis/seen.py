@@ -177,13 +177,15 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
 
 
 def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
-    yield Contrast(
-        "rate",
-        np.asarray(records.rate),
-        ("more", "less"),
-        "a faster movement takes {way} force, by {size} over the speeds tested",
-        beside=x,
-    )
+    # Of one speed there and back, the rate tells the direction and nothing else.
+    if "rates" in records.known:
+        yield Contrast(
+            "rate",
+            np.asarray(records.rate),
+            ("more", "less"),
+            "a faster movement takes {way} force, by {size} over the speeds tested",
+            beside=x,
+        )
     yield Contrast(
         "time",
         _held(records),

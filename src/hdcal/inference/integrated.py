@@ -137,6 +137,16 @@ def _linear_blocks(
     )
 
 
+def gap_law(problem: Problem, values: Values):
+    """Return mean of the integrated weights of the leftover, and a covariance's root.
+
+    Both are given the shared parameters of one draw, (m,) and (m, k).
+    """
+    mean, root = linear_part(problem, values).law()
+    used = sum(getattr(problem, f"{kind}s") - 1 for kind in _labelled(problem)[1:])
+    return mean[used:], root[used:]
+
+
 @singledispatch
 def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
     """Draw the integrated members given the shared parameters of one draw."""

@@ -139,6 +139,12 @@ class Linear(eqx.Module):
             + 0.5 * self.count * jnp.log(2.0 * jnp.pi)
         )
 
+    def law(self) -> tuple[Float[Array, " m"], Float[Array, "m m"]]:
+        """Return mean of the weights given y, and a root of their covariance."""
+        _, factor, mean = self._solved()
+        root = solve_triangular(factor.T, jnp.eye(len(mean)), lower=False)
+        return self.scale * mean, self.scale[:, None] * root
+
     def draw(
         self, key: Key[Array, ""]
     ) -> tuple[Float[Array, " m"], Float[Array, " n"] | None]:

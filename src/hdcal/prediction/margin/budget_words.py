@@ -160,10 +160,10 @@ def rule_words(rule: Rule, limit: float, guard: float, most: float) -> str:
     return (
         f"Guarded acceptance ({source}): the force conforms if its estimate and the "
         f"guard band w together are at most the limit, {most:g} N; w = {guard:.3g} N "
-        "is the expanded uncertainty, from the estimate to the end of the 95 % "
-        "coverage interval. It does not conform if that whole interval lies beyond the "
-        "limit. Between the two nothing is decided. An estimate at the acceptance "
-        f"limit is accepted with a risk of 2.5 %.{steps}"
+        "is what the 95 % coverage interval reaches beyond the estimate on the side of "
+        "the limit. It does not conform if that whole interval lies beyond the limit. "
+        "Between the two nothing is decided. An estimate at the acceptance limit is "
+        f"accepted with a risk of 2.5 %.{steps}"
     )
 
 

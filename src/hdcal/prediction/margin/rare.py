@@ -18,16 +18,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
-from scipy import optimize, stats
+from scipy import optimize
 
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
-from hdcal.inference.integrated import draw_members
+from hdcal.inference.integrated import draw_members, gap_law
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
     SCORES,
     PopulationForce,
+    leftover,
     member_mixture,
 )
 from hdcal.prediction.engine.untested import (
@@ -37,16 +38,15 @@ from hdcal.prediction.engine.untested import (
     spread_evenly,
     untested_of,
 )
+from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
 
-# Points about each of both places, and degrees of freedom of their law.
-_POINTS, _FREE = 8192, 5.0
+# Points of a round; rounds whose points shape the laws, and rounds that count.
+_POINTS, _TRIALS, _COUNTED = 4096, 2, 2
 _ABREAST = 4
 # Standard normal scores of a point, beside its parameters.
 _OPEN = 5
 # Of the levels of a bend's size, the power of their distance from the largest.
 _TOWARDS_LARGE = 4.0
-# How much wider than the posterior's own shape the points are spread.
-_SPREAD = 1.3
 # Degrees of freedom of the scatter that the normal one is compared with.
 _HEAVY = 5.0
 
@@ -68,6 +68,10 @@ class Rare:
     without_prior: float
     heavy_tailed: float
 
+
+# Shape of the weights' tail from which on they do not tell their own error (Vehtari,
+# Simpson, Gelman, Yao and Gabry, Journal of Machine Learning Research 25, 2024).
+_UNTOLD = 0.7
 
 # Of an event too far off for any point to reach.
 _NOWHERE = Rare(0.0, np.nan, np.nan, np.nan)
@@ -108,22 +112,37 @@ class _Target(eqx.Module):
         along = self.conditions.loading * mean
         return Mixture(weight, along, jnp.hypot(sd, blur))
 
+    def expected(self, value: dict, blur: Any = 0.0) -> Mixture:
+        """Return the same, with what is open of the leftover among the scatter."""
+        problem = self.problem
+        if "discrepancy" not in problem.integrated:
+            return self.mixture(value, blur)
+        mean, root = gap_law(problem, value)
+
+        def left(weights):
+            about = {**value, "gap_weights": weights}
+            return leftover(problem, about, self.whose.quantity, self.conditions)
+
+        free = jax.grad(left)(mean) @ root
+        spread = jnp.sqrt(blur**2 + free @ free)
+        return self.mixture({**value, "gap_weights": mean}, spread)
+
     def log_tail(self, point: Float[Array, " d"], sizes) -> Float[Array, ""]:
         """Return the log of about how much exceeds the limit, however little."""
         value = self.value(point, sizes, jax.random.key(0))
-        found = self.mixture(value, self.blur)
+        found = self.expected(value, self.blur)
         tail = log_ndtr((found.mean - self.limit) / found.sd)
         return logsumexp(jnp.log(found.weight) + tail)
 
     def terms(self, point: Float[Array, " d"], sizes, key):
         """Return tails, normal and heavy, log prior of log σ, and log density."""
         value = self.value(point, sizes, key)
-        found = self.mixture(value)
+        found = self.expected(value)
         prior, of_sigma = self.problem.priors["sigma"], 0.0
         if prior.family != "fixed":
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
-        heavy = _heavy(found, self.limit)
+        heavy = _heavy(self.mixture(value), self.limit)
         return found.above(self.limit), heavy, of_sigma, self.log_density(point)
 
 
@@ -168,38 +187,60 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         limit: along the sense of loading, of the force before it is rounded [N].
         seed: of the points.
     """
-    problem = force.cause.problem
-    # Large bends are few and count much: the levels are drawn towards them.
-    near = spread_evenly(2 * _POINTS, SITES, seed)
-    untested, sites = untested_of(force.cause, 1.0 - near**_TOWARDS_LARGE)
-    where = replace(force.conditions, untested=untested)
-    whitening = laplace.fit(problem)
-    blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
-    target = _Target(problem, whitening, force.whose, where, jnp.asarray(limit), blur)
-    usual = np.median(force.cause.values[BENDS], axis=0)
-    points, log_law = _points(target, usual, np.random.default_rng(seed))
-    keys = jax.random.split(jax.random.key(seed), len(points))
-    found = _weigh(target, points, sites[BENDS], keys)
-    above, heavy, of_sigma, density = map(np.asarray, found)
-    density = np.where(np.isfinite(density), density, -np.inf)
-    weight = density - log_law + (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
-    weight = np.exp(weight - weight.max())
+    weight, above, heavy, of_sigma = _points(force, limit, seed)
     share = _ratio(weight, above)
     if not share > 0.0:
         return _NOWHERE
-    error = np.linalg.norm(weight * (above - share)) / weight.sum()
+    error = np.linalg.norm(weight * (above - share)) / weight.sum() / share
+    if max(pareto_shape(weight), pareto_shape(weight * above)) > _UNTOLD:
+        error = max(error, 1.0)
     # Without its prior σ would be as likely on any scale.
     free = weight * np.exp(of_sigma.min() - of_sigma)
     return Rare(
         probability=share,
-        relative_error=float(error / share),
+        relative_error=float(error),
         without_prior=_ratio(free, above) / share,
         heavy_tailed=_ratio(weight, heavy) / share,
     )
 
 
-def _points(target: _Target, sizes, rng) -> tuple[np.ndarray, np.ndarray]:
-    """Return points about both places, and the log density of their law."""
+def _points(force: PopulationForce, limit: float, seed: int) -> list[np.ndarray]:
+    """Return weights of the points that count, and their terms but the density."""
+    rounds, rng = _TRIALS + _COUNTED, np.random.default_rng(seed)
+    # Large bends are few and count much: the levels are drawn towards them.
+    near = spread_evenly(rounds * _POINTS, SITES, seed)
+    untested, sites = untested_of(force.cause, 1.0 - near**_TOWARDS_LARGE)
+    towards_large = (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
+    blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
+    target = _Target(
+        problem=force.cause.problem,
+        whitening=laplace.fit(force.cause.problem),
+        whose=force.whose,
+        conditions=replace(force.conditions, untested=untested),
+        limit=jnp.asarray(limit),
+        blur=blur,
+    )
+    laws = _laws(target, np.median(force.cause.values[BENDS], axis=0))
+    keys = jax.random.split(jax.random.key(seed), len(near))
+    counted = []
+    for turn in range(rounds):
+        rows = slice(turn * _POINTS, (turn + 1) * _POINTS)
+        points, log_law = laws.drawn(_POINTS, rng)
+        found = _weigh(target, points, sites[BENDS][rows], keys[rows])
+        *terms, density = map(np.asarray, found)
+        density = np.where(np.isfinite(density), density, -np.inf)
+        log_weight = density - log_law + towards_large[rows]
+        if turn >= _TRIALS:
+            counted.append((log_weight, *terms))
+            continue
+        with np.errstate(divide="ignore"):
+            laws = laws.reshaped(points, (log_weight, log_weight + np.log(terms[0])))
+    log_weight, *terms = [np.concatenate(one) for one in zip(*counted, strict=True)]
+    return [np.exp(log_weight - log_weight.max()), *terms]
+
+
+def _laws(target: _Target, sizes) -> SamplingLaws:
+    """Return the laws of the first round: about the mode, and about the way beyond."""
     size = len(target.whitening.factor) + _OPEN
     start = np.zeros(size)
 
@@ -211,24 +252,11 @@ def _points(target: _Target, sizes, rng) -> tuple[np.ndarray, np.ndarray]:
     shape, place = found.hess_inv, found.x
     if not (np.isfinite(shape).all() and np.isfinite(place).all()):
         shape, place = np.eye(size), start
-    # A score on which nothing depends stays what it is: standard normal.
     counts = np.append(np.ones(size - _OPEN, bool), towards(start)[1][-_OPEN:] != 0.0)
     place, shape = place[counts], shape[np.ix_(counts, counts)]
     strength, axes = np.linalg.eigh(0.5 * (shape + shape.T))
     spread = (axes * np.maximum(strength, 1e-8 * strength.max())) @ axes.T
-    laws: list[Any] = [
-        stats.multivariate_t(centre, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
-        for centre, shape in ((0.0 * place, np.eye(len(place))), (place, spread))
-    ]
-    drawn = [
-        np.reshape(law.rvs(_POINTS, random_state=rng), (_POINTS, -1)) for law in laws
-    ]
-    points = rng.normal(size=(2 * _POINTS, size))
-    log_law = stats.norm.logpdf(points[:, ~counts]).sum(axis=1)
-    # What has an order of its own is spread evenly over both places.
-    points[:, counts] = rng.permutation(np.concatenate(drawn))
-    each = [np.atleast_1d(law.logpdf(points[:, counts])) for law in laws]
-    return points, log_law + np.logaddexp(*each)
+    return SamplingLaws(counts, ((0.0 * place, np.eye(len(place))), (place, spread)))
 
 
 def _ratio(weight: np.ndarray, values: np.ndarray) -> float:

@@ -90,7 +90,7 @@ def next_steps(found: Margin) -> Iterator[str]:
     if limit is not None and limit < level.capacity_N:
         yield (
             f"Provide {newtons(level.capacity_N)}{in_tension(found)}: that is enough "
-            f"with {_percent(found.confidence)} confidence."
+            f"with {_percent(found.confidence)} confidence{_if_bent_so(found)}."
         )
     if found.extrapolated:
         yield (
@@ -102,6 +102,12 @@ def next_steps(found: Margin) -> Iterator[str]:
 def answer(found: Margin) -> list[str]:
     """Return the answer in sentences."""
     return [*_force(found), *_capacity(found), *_inverse(found), *_models(found)]
+
+
+def _if_bent_so(found: Margin) -> str:
+    """Return on what a confidence far beyond the tested deformation rests."""
+    far = ", if nothing but the assumed bend comes in beyond what was tested"
+    return far * (found.beyond_tested > FAR)
 
 
 def _percent(share: float) -> str:
@@ -178,10 +184,9 @@ def _enough(found: Margin, limit: float) -> str:
     sure = _percent(found.confidence)
     given = f"A capacity of {limit:g} N{in_tension(found)}"
     if limit >= level.capacity_N:
-        far = ", if nothing but the assumed bend comes in beyond what was tested"
         return (
             f"{given} is enough for {share}, with {sure} confidence"
-            f"{far * (found.beyond_tested > FAR)}."
+            f"{_if_bent_so(found)}."
         )
     if limit >= level.capacity_median_N:
         return (
@@ -268,5 +273,5 @@ def _models(found: Margin) -> Iterator[str]:
     yield (
         "The cause of the gap is not settled, so the bounds average over the causes by "
         f"probability. Upper bound with each alone: {each}. The average is "
-        f"{bound:.4g} N, {bound - alone:+.2g} N from the likeliest alone."
+        f"{newtons(bound)}, {bound - alone:+.2g} N from the likeliest alone."
     )

@@ -1,0 +1,107 @@
+"""The laws that points of importance sampling are drawn from, and learn from them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy import optimize, stats
+
+# Degrees of freedom of the laws, and how much wider than their shape they are.
+_FREE, _SPREAD = 5.0, 1.3
+# Points per dimension that a shape rests on, at least.
+_RESTS_ON = 20.0
+
+
+@dataclass(frozen=True)
+class SamplingLaws:
+    """Student's t about the posterior, and about where the limit is exceeded.
+
+    Attributes:
+        counts: coordinates of a point that they are of; the others, scores on which
+            nothing depends, stay standard normal.
+        places: centre and covariance of each.
+    """
+
+    counts: np.ndarray
+    places: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def drawn(self, count: int, rng) -> tuple[np.ndarray, np.ndarray]:
+        """Return points, half about each place, and the log density of their law.
+
+        Args:
+            count: of the points, even.
+            rng: source of randomness.
+        """
+        laws: list[Any] = [
+            stats.multivariate_t(centre, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
+            for centre, shape in self.places
+        ]
+        each = count // len(laws)
+        drawn = [
+            np.reshape(law.rvs(each, random_state=rng), (each, -1)) for law in laws
+        ]
+        points = rng.normal(size=(count, len(self.counts)))
+        log_law = stats.norm.logpdf(points[:, ~self.counts]).sum(axis=1)
+        # What has an order of its own is spread evenly over both places.
+        points[:, self.counts] = rng.permutation(np.concatenate(drawn))
+        near = [np.atleast_1d(law.logpdf(points[:, self.counts])) for law in laws]
+        return points, log_law + np.logaddexp(*near)
+
+    def reshaped(
+        self, points: np.ndarray, log_weights: Sequence[np.ndarray]
+    ) -> "SamplingLaws":
+        """Return laws of the mean and covariance that weighted points have.
+
+        Args:
+            points: of a round.
+            log_weights: of the points, for each of the laws.
+        """
+        points = points[:, self.counts]
+        least = _RESTS_ON * points.shape[1]
+        places = []
+        for old, log_weight in zip(self.places, log_weights, strict=True):
+            weight = _tempered(log_weight, least)
+            if weight is None:
+                places.append(old)
+                continue
+            centre = weight @ points
+            off = points - centre
+            places.append((centre, (weight * off.T) @ off))
+        return replace(self, places=tuple(places))
+
+
+def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
+    """Return weights, to a power at which they are worth so many points at least.
+
+    None where hardly any point has a weight.
+    """
+    known = np.isfinite(log_weight)
+    if known.sum() < 2.0 * least:
+        return None
+    log_weight = np.where(known, log_weight - log_weight[known].max(), -np.inf)
+
+    def powered(power: float) -> np.ndarray:
+        weight = np.where(known, np.exp(power * np.where(known, log_weight, 0.0)), 0.0)
+        return weight / weight.sum()
+
+    def short(power: float) -> float:
+        return 1.0 / np.sum(powered(power) ** 2) - least
+
+    if short(1.0) >= 0.0:
+        return powered(1.0)
+    return powered(optimize.root_scalar(short, bracket=(0.0, 1.0)).root)
+
+
+def pareto_shape(weight: np.ndarray) -> float:
+    """Return the shape of the generalised Pareto law of the largest weights.
+
+    It is infinite where hardly any point has a weight.
+    """
+    # Late: a finished result is read without it.
+    from arviz_stats.base.array import array_stats
+
+    try:
+        return np.asarray(array_stats.pareto_khat(weight[None], tail="right")).item()
+    except ValueError:  # the largest are all alike
+        return np.inf
