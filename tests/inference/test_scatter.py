@@ -43,6 +43,25 @@ def test_both_kinds_of_member_have_their_effect():
     assert set(MEMBER_SD) < set(MEMBERS)
 
 
+@pytest.mark.thorough
+@pytest.mark.parametrize("apart", [0.0, 1.0])
+def test_members_alike_and_apart_sample_without_a_divergence(apart: float):
+    """Rounded, so that they are sampled: the first steps tried do, in every seed."""
+    run = np.repeat(np.arange(3), 16)
+    deformation = np.tile([*np.linspace(0.0, 0.4, 9), *np.linspace(0.35, 0.05, 7)], 3)
+    noise = np.random.default_rng(1).normal(0.0, 0.3, 48)
+    force = 150.0 * deformation + 1.0 + apart * OFFSETS[run] + noise
+    records = make_records(
+        deformation, 0.5 * np.round(force / 0.5), run=run, known={"run", "runs"}
+    )
+    case = make_case(records, make_gear(resolution=0.5))
+    for seed in range(3):
+        found = calibrate(case, seed=seed)
+        assert "run" not in found.problem.integrated
+        assert found.usable and found.settings["target_acceptance"] == 0.8
+        assert found.diagnoses["run_offset_sd"].ess_bulk > 2000.0
+
+
 @scatter
 def test_the_problem_is_the_one_without(name):
     case = case_with(3)

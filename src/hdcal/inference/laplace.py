@@ -61,28 +61,17 @@ def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
 def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return the potential whose minimum is a typical place, not only the mode.
 
-    Members that are sampled can tend to zero with their scale, and a discrepancy can
-    interpolate while sigma vanishes: there the density is highest, in next to no
-    volume, and a sampler that starts there stays. The volume is counted in: the scale
-    to the power of the number of parameters that tend to zero with it.
+    A discrepancy that is sampled can interpolate while sigma vanishes: there the
+    density is highest, in next to no volume, and a sampler that starts there stays. The
+    volume is counted in: sigma to the power of the number of its weights.
     """
     value = potential(problem, position)
-    if not isinstance(problem, Problem):
+    if not isinstance(problem, Problem) or problem.discrepancy is None:
         return value
-    vanishing = {}
-    if problem.discrepancy is not None and "discrepancy" not in problem.integrated:
-        vanishing["sigma"] = BASIS_SIZE
-    if "_run_offset" in position:
-        vanishing["run_offset_sd"] = (problem.runs - 1) / 2
-    if "_specimen_deviation" in position:
-        vanishing["specimen_sd"] = (problem.specimens - 1) / 2
-    if vanishing:
-        values = constrain_fn(
-            model, (problem,), {}, position, return_deterministic=True
-        )
-        for name, count in vanishing.items():
-            value = value - count * jnp.log(values[name])
-    return value
+    if "discrepancy" in problem.integrated:
+        return value
+    values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
+    return value - BASIS_SIZE * jnp.log(values["sigma"])
 
 
 @jax.jit

@@ -19,6 +19,7 @@ from hdcal.inference.density import log_likelihood
 from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import with_gains
+from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import CORRELATION
@@ -123,15 +124,30 @@ def _sample_correlation(prior: Prior):
     return numpyro.deterministic(CORRELATION, size)
 
 
-def _sample_members(name: str, sd, count: int):
+def _sample_members(name: str, sd, seen_sd, count: int):
     """Sample how far each tested member is from the mean of the tested members.
 
-    Half-centred, √sd · N(0, sd): between the form that suits members clearly apart
-    and the one that suits members alike, each of which is a funnel for the other.
+    Partially centred: a score counts in sds that a member has given its own readings
+    and those of the others, so that it is as wide where members are alike as where they
+    are clearly apart. Either extreme is a funnel for the other (Papaspiliopoulos,
+    Roberts and Sköld, Statistical Science 22, 2007).
+
+    Args:
+        name: of the members.
+        sd: between members.
+        seen_sd: about how well its own readings tell a member.
+        count: of the members.
     """
-    half = jnp.sqrt(sd)
-    score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(half, (count,)))
-    return numpyro.deterministic(name, half * score)
+    ratio = sd / seen_sd
+    width = sd / jnp.sqrt(1.0 + ratio**2)
+    score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(sd / width, (count,)))
+    return numpyro.deterministic(name, width * score)
+
+
+def _mean_sd(problem: Problem, values: Mapping, members: int):
+    """Return about how well the mean reading of each of some members is known [N]."""
+    variance = values["sigma"] ** 2 + problem.step**2 / 12.0
+    return jnp.sqrt(variance * members / problem.count)
 
 
 def _widen_zero(problem: Problem, values: dict) -> None:
@@ -153,12 +169,18 @@ def _sample_structure(problem: Problem, values: dict) -> None:
             _widen_zero(problem, values)
         if "run" not in integrated:
             sd = values["run_offset_sd"]
-            values["run_offset"] = _sample_members("run_offset", sd, problem.runs)
+            seen = _mean_sd(problem, values, problem.runs)
+            members = _sample_members("run_offset", sd, seen, problem.runs)
+            values["run_offset"] = members
     if problem.specimens:
         values["specimen_sd"] = sample_site("specimen_sd", priors["specimen_sd"])
         if "specimen" not in integrated:
             sd, name = values["specimen_sd"], "specimen_deviation"
-            values[name] = _sample_members(name, sd, problem.specimens)
+            force = problem.rows.force
+            square = jnp.where(measured(len(force), problem.count), force**2, 0.0)
+            usual = jnp.sqrt(jnp.sum(square) / problem.count)
+            seen = _mean_sd(problem, values, problem.specimens) / usual
+            values[name] = _sample_members(name, sd, seen, problem.specimens)
     if problem.discrepancy is not None:
         for name in ("gap_sd", "gap_length"):
             values[name] = sample_site(name, priors[name])
