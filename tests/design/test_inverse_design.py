@@ -1,5 +1,6 @@
 """The sizes found keep the limits with the least change, where algebra says."""
 
+from dataclasses import replace
 from inspect import signature
 
 import numpy as np
@@ -7,10 +8,12 @@ import pytest
 from designs import bent, known
 
 from hdcal.design import inverse_design as module
+from hdcal.design.assumptions import assumptions
 from hdcal.design.inverse_design import inverse_design
 from hdcal.design.nearest_point import nearest_kept
 from hdcal.errors import InputError
 from hdcal.physics.profile import peak_stress
+from hdcal.physics.registry import EFFECTS
 
 WALL, RADIUS = {"wall_thickness_mm": (0.4, 0.9)}, {"radius_mm": (32.0, 50.0)}
 
@@ -113,7 +116,15 @@ def test_materials_are_chosen_among(given):
     # Titanium is soft enough at the tested sizes; no size has to change.
     assert found.chosen.basis.material == "Ti-6Al-4V"
     assert found.chosen.change == 0.0
-    assert any("handbook" in words for words in found.chosen.basis.assumptions)
+    assert any("handbook" in words for words in assumptions(found.chosen.basis))
+
+
+def test_forces_that_turn_with_the_movement_are_told_as_those_of_loading():
+    draws = known(20)
+    assert not any("loading" in words for words in assumptions(draws))
+    friction = EFFECTS["coulomb_friction"]
+    rubbing = replace(draws, problem=replace(draws.problem, effects=(friction,)))
+    assert any("coulomb friction turns" in words for words in assumptions(rubbing))
 
 
 def test_not_even_the_best_is_told_with_its_numbers(given):

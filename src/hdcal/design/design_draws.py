@@ -40,20 +40,6 @@ from hdcal.prediction.engine.causes import (
 from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
 from hdcal.prediction.engine.untested import Untested
 
-CARRIED = (
-    "K is carried over from {gear} to other sizes. That holds for gears of the same "
-    "proportions of teeth, end and wall; the farther away, the less."
-)
-OF_THE_GEAR = (
-    "Deformation is that of the gear itself, radial and from its free shape; the rig's "
-    "zeros and its own compliance are left out. `hdcal predict` and `hdcal margin` say "
-    "what the rig reads at a deformation as read, which differs by these zeros."
-)
-_PRIOR_ONLY = (
-    "Prior only: no gear was measured. Every interval is what is believed before any "
-    "data, mostly of K."
-)
-
 
 @dataclass(frozen=True)
 class DesignDraws:
@@ -134,27 +120,6 @@ class DesignDraws:
         places = (np.arange(self.size) + 0.5) / self.size
         shuffled = np.random.default_rng(self.size).permutation(places)
         return np.asarray(frozen(prior).ppf(shuffled))
-
-    @property
-    def assumptions(self) -> list[str]:
-        """Return what every answer from these draws takes for granted, in words."""
-        words = [CARRIED.format(gear=self.known_as), OF_THE_GEAR]
-        if self.kind == "prior":
-            words.insert(0, _PRIOR_ONLY)
-        if self.material != self.gear.material:
-            words.append(
-                f"Modulus and its loss with temperature are handbook values of "
-                f"{self.material}; K is taken not to depend on the material."
-            )
-        force = [e.name for e in self.problem.effects if e.stage == "force"]
-        if force:
-            words.append(
-                f"The calibrated {', '.join(force).replace('_', ' ')} is carried over "
-                "to other sizes as it is."
-            )
-        if self.problem.discrepancy is not None:
-            words.append("The leftover discrepancy is taken to grow with stiffness.")
-        return words
 
     def usual_force(self, deformation: float) -> float:
         """Return about what a radial deformation [mm] of the gear takes [N]."""

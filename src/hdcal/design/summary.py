@@ -20,6 +20,7 @@ from hdcal.design.answer import (
     WindowForces,
     WindowKept,
 )
+from hdcal.design.assumptions import assumptions
 from hdcal.design.candidate import Candidate
 from hdcal.design.design_draws import DesignDraws
 from hdcal.design.document import generator_document, inverse_document
@@ -88,7 +89,7 @@ def generator_answer(found: WaveGenerator) -> GeneratorAnswer:
         adjusted=_adjusted(found),
         curve=_curve(found),
         stress=_window_stress(found),
-        assumptions=tuple(found.basis.assumptions),
+        assumptions=tuple(assumptions(found.basis)),
         warnings=found.warnings,
     )
     return in_words(told, generator_headline(told), generator_words(told))
@@ -228,7 +229,7 @@ def inverse_answer(found: InverseDesign) -> InverseAnswer:
             _candidate(one, found.asked.sense) for one in found.candidates
         ),
         elasticities=found.elasticities,
-        assumptions=tuple(found.chosen.basis.assumptions),
+        assumptions=tuple(assumptions(found.chosen.basis)),
         warnings=found.warnings,
     )
     return in_words(told, inverse_headline(told), inverse_words(told))

@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
+from hdcal.design.assumptions import assumptions
 from hdcal.design.checks import (
     name_findings,
     no_deformation,
@@ -152,7 +153,7 @@ def _tabulated(draws: DesignDraws, made, axes, interval: float) -> Study:
         interval=interval,
         interval_kind=draws.interval_kind,
         basis=draws,
-        assumptions=tuple(dict.fromkeys(w for one in made for w in one.assumptions)),
+        assumptions=tuple(dict.fromkeys(w for one in made for w in assumptions(one))),
         warnings=(
             *beyond_tested(draws, axes["deformation_mm"], axes["temperature_C"]),
             *far_from_tested(draws, sizes),

@@ -203,13 +203,13 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     if max(risk.hi, risk.probability) < RAREST:
         rarest = chance(risk.probability)
         yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
-        if risk.rests_on:
-            yield risk.rests_on
         return
     low, high = chance(risk.lo), chance(risk.hi)
     span = f"is {high}" if low == high else f"lies between {low} and {high}"
     if risk.lo < RAREST <= risk.hi:
         span = f"is at most {high}"
+        if risk.hi > NEARLY_ALL:
+            span = "may be none of them or nearly all"
     most = chance(risk.at_confidence)
     most = most if risk.at_confidence < RAREST else f"below {most}"
     yield (
