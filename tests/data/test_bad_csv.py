@@ -164,7 +164,7 @@ def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
     content = "defl,load\n" + "".join(f"{i},{i}\n" for i in range(6))
     (folder / "data.csv").write_text(content)
     for found in findings_of(folder):
-        assert "HEADER one of: defl, load" in found.remedy
+        assert "HEADER one of: 'defl', 'load'" in found.remedy
 
 
 def test_many_bad_cells_are_counted_after_twenty(folder):

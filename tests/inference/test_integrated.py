@@ -407,6 +407,23 @@ def test_drawn_members_explain_the_data(structured):
     assert whole == pytest.approx(bayes, rel=1e-7)
 
 
+def test_the_law_of_a_leftover_is_that_of_its_draws(structured):
+    _, problem = structured
+    if "discrepancy" not in problem.integrated:
+        return
+    values, count = random_values(0), 20_000
+
+    def draw(key):
+        return integrated.draw_members(problem, values, key)["gap_weights"]
+
+    drawn = jax.jit(jax.vmap(draw))(jax.random.split(jax.random.key(1), count))
+    mean, root = map(np.asarray, jax.jit(integrated.gap_law)(problem, values))
+    sd = np.linalg.norm(root, axis=1)
+    assert np.all(np.abs(np.mean(drawn, axis=0) - mean) < 5.0 * sd / np.sqrt(count))
+    off = np.cov(np.asarray(drawn).T) - root @ root.T
+    assert np.all(np.abs(off) < 0.06 * np.outer(sd, sd))
+
+
 def log_normal(error, covariance):
     root = np.linalg.cholesky(covariance)
     score = np.linalg.solve(root, error)

@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import equinox as eqx
+import jax
 import numpy as np
 import pytest
+from numpyro.infer import Predictive
 from rigs import make_case, make_gear, make_records
 from short import SHORT
 
@@ -12,6 +14,7 @@ from hdcal.calibration.calibrate import calibrate, check_effect_priors
 from hdcal.calibration.summary import summarise
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
+from hdcal.inference import model
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.inference.values import MEMBER_SD, MEMBERS
@@ -41,6 +44,17 @@ def test_both_kinds_of_member_have_their_effect():
     assert SCATTER == ["specimen_variation", "run_offset"]
     assert {EFFECTS[name].members for name in SCATTER} == set(MEMBER_SD)
     assert set(MEMBER_SD) < set(MEMBERS)
+
+
+@pytest.mark.parametrize("seen_sd", [0.01, 1.0, 100.0])
+def test_members_have_their_law_however_they_are_sampled(seen_sd: float):
+    def members():
+        model._sample_members("run_offset", 2.0, seen_sd, 5)
+
+    drawn = Predictive(members, num_samples=20_000)(jax.random.key(0))["run_offset"]
+    # Deviations from the mean of five.
+    assert np.std(drawn) == pytest.approx(2.0 * np.sqrt(0.8), rel=0.02)
+    assert np.sum(drawn, axis=1) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.thorough

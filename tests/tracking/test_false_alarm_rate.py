@@ -141,6 +141,22 @@ def test_noise_that_a_pause_interrupts_is_not_carried_over_it():
     assert scores_after_pauses(0.6, told=False) > 1.2
 
 
+def test_what_is_a_pause_goes_by_the_usual_step():
+    def carries(times) -> list[bool]:
+        noise, found = SerialCorrelation(), []
+        noise.value = 0.5
+        for time in times:
+            noise.follow(time)
+            found.append(noise.whiten(np.ones(2), 1.0).carried != 0.0)
+        return found
+
+    assert carries([1, 2, 3, 40, 41]) == [False, True, True, False, True]
+    assert carries([1, 2, 3, 0, 1]) == [False, True, True, False, True]
+    # A row without a time hides no pause, and a first pause is not the usual step.
+    assert carries([1, 2, None, 90]) == [False, True, True, False]
+    assert carries([0, 3600, 3601, 3602, 3700]) == [False, True, True, True, False]
+
+
 def test_the_answer_and_the_words_state_the_rate():
     tracker = start(alarm_rows=500.0)
     assert "one false alarm in 500 readings" in tracker.describe()

@@ -9,6 +9,7 @@ import numpy as np
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.units import COLUMN_UNITS, known_unit
+from hdcal.errors import quoted
 
 LABELS = ("run", "specimen")
 QUANTITIES = (*COLUMN_UNITS, *LABELS)
@@ -157,7 +158,7 @@ def _name_remedy(quantity: str, headers: Sequence[str]) -> str:
     near += get_close_matches(example, headers, 1, 0.6)
     named = near[0] if near else "HEADER"
     unit = "[UNIT]" if _split_brackets(named)[1] is None else ""
-    known = "" if near else f", HEADER one of: {', '.join(headers[:20])}"
+    known = "" if near else f", HEADER one of: {', '.join(map(quoted, headers[:20]))}"
     return f"Name it like {example}, or say `columns` '{quantity}={named}{unit}'{known}"
 
 

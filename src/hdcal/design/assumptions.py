@@ -33,12 +33,10 @@ def assumptions(draws: DesignDraws) -> list[str]:
             f"The calibrated {', '.join(force).replace('_', ' ')} is carried over "
             "to other sizes as it is."
         )
-    turning = [e.name for e in draws.problem.effects if "unloading" in e.needs]
-    if turning:
+    if any("unloading" in effect.needs for effect in draws.problem.effects):
         words.append(
-            "Every force is that of loading. On the way back the calibrated "
-            f"{', '.join(turning).replace('_', ' ')} turns: a gear that comes to "
-            "its place by unloading takes another force, or rests elsewhere."
+            "Every force is that of loading. By the calibrated effects a gear that "
+            "comes to its place by unloading takes another force, or rests elsewhere."
         )
     if draws.problem.discrepancy is not None:
         words.append("The leftover discrepancy is taken to grow with stiffness.")

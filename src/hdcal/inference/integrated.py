@@ -4,7 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 import jax.numpy as jnp
-from jaxtyping import Key
+from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
 from hdcal.inference import compress
@@ -137,10 +137,14 @@ def _linear_blocks(
     )
 
 
-def gap_law(problem: Problem, values: Values):
-    """Return mean of the integrated weights of the leftover, and a covariance's root.
+def gap_law(
+    problem: Problem, values: Values
+) -> tuple[Float[Array, " m"], Float[Array, "m k"]]:
+    """Return mean and root of the covariance of the leftover's integrated weights.
 
-    Both are given the shared parameters of one draw, (m,) and (m, k).
+    Args:
+        problem: structure.
+        values: shared parameters of one draw.
     """
     mean, root = linear_part(problem, values).law()
     used = sum(getattr(problem, f"{kind}s") - 1 for kind in _labelled(problem)[1:])

@@ -138,16 +138,22 @@ def _sample_members(name: str, sd, seen_sd, count: int):
         seen_sd: about how well its own readings tell a member.
         count: of the members.
     """
-    ratio = sd / seen_sd
-    width = sd / jnp.sqrt(1.0 + ratio**2)
-    score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(sd / width, (count,)))
-    return numpyro.deterministic(name, width * score)
+    spread = jnp.sqrt(1.0 + (sd / seen_sd) ** 2)
+    score = numpyro.sample(f"_{name}", dist.ZeroSumNormal(spread, (count,)))
+    return numpyro.deterministic(name, sd / spread * score)
 
 
 def _mean_sd(problem: Problem, values: Mapping, members: int):
-    """Return about how well the mean reading of each of some members is known [N]."""
-    variance = values["sigma"] ** 2 + problem.step**2 / 12.0
+    """Return about how well the mean reading of a member is known [N]."""
+    known = _mean_square(problem, problem.rows.force_sd)
+    variance = values["sigma"] ** 2 + known + problem.step**2 / 12.0
     return jnp.sqrt(variance * members / problem.count)
+
+
+def _mean_square(problem: Problem, column):
+    """Return the mean square of a column over the measured rows."""
+    real = measured(len(column), problem.count)
+    return jnp.sum(jnp.where(real, column**2, 0.0)) / problem.count
 
 
 def _widen_zero(problem: Problem, values: dict) -> None:
@@ -176,9 +182,7 @@ def _sample_structure(problem: Problem, values: dict) -> None:
         values["specimen_sd"] = sample_site("specimen_sd", priors["specimen_sd"])
         if "specimen" not in integrated:
             sd, name = values["specimen_sd"], "specimen_deviation"
-            force = problem.rows.force
-            square = jnp.where(measured(len(force), problem.count), force**2, 0.0)
-            usual = jnp.sqrt(jnp.sum(square) / problem.count)
+            usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
             seen = _mean_sd(problem, values, problem.specimens) / usual
             values[name] = _sample_members(name, sd, seen, problem.specimens)
     if problem.discrepancy is not None:

@@ -78,15 +78,19 @@ class SerialCorrelation:
         Args:
             time: of the next row [s], if it has one.
         """
+        if time is None:
+            return
         before, self._time = self._time, time
-        if before is None or time is None:
+        if before is None:
             return
         step = time - before
         if not 0.0 <= step <= _PAUSE * self._usual:
             self.restart()
-        if step > 0.0:
-            usual = step if self._usual == inf else self._usual
-            self._usual = usual + (min(step, _PAUSE * usual) - usual) / _USUAL
+        if 0.0 < step < self._usual / _PAUSE:
+            # What was taken for usual was a pause.
+            self._usual = step
+        elif step > 0.0:
+            self._usual += (min(step, _PAUSE * self._usual) - self._usual) / _USUAL
 
     def whiten(self, columns: np.ndarray, force: float) -> WhiteRow:
         """Return a row freed of what the row before says of its noise.

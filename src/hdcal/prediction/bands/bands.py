@@ -30,8 +30,8 @@ from hdcal.prediction.engine.mixture import draw_quantiles
 from hdcal.prediction.engine.readings import readings
 from hdcal.prediction.engine.untested import with_untested
 
-# Rows predicted at a time: with 4000 draws a block takes 64 MB.
-_BLOCK = 2000
+# Rows predicted at a time: with 4000 draws a block takes 32 MB, on unloading 64 MB.
+_BLOCK = 1000
 _MOST_TEMPERATURES = 6
 
 

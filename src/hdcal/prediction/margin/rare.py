@@ -23,7 +23,7 @@ from scipy import optimize
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
-from hdcal.inference.integrated import draw_members, gap_law
+from hdcal.inference.integrated import gap_law
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
     SCORES,
@@ -47,6 +47,9 @@ _ABREAST = 4
 _OPEN = 5
 # Of the levels of a bend's size, the power of their distance from the largest.
 _TOWARDS_LARGE = 4.0
+# Nodes of a standard normal, and their shares.
+_NODES, _SHARES = np.polynomial.hermite_e.hermegauss(9)
+_SHARES = _SHARES / _SHARES.sum()
 # Degrees of freedom of the scatter that the normal one is compared with.
 _HEAVY = 5.0
 
@@ -97,53 +100,49 @@ class _Target(eqx.Module):
         whole = laplace.potential(self.problem, self.whitening.position(position))
         return -whole - 0.5 * scores @ scores
 
-    def value(self, point: Float[Array, " d"], sizes, key) -> dict:
-        """Return the parameters of a point; the sizes of bends are not in it."""
-        position, scores = point[:-_OPEN], point[-_OPEN:]
-        named = laplace.values_at(self.problem, self.whitening.position(position))
-        left_open = {SCORES: scores[:2], PLACES: scores[2:], BENDS: sizes}
-        return named | draw_members(self.problem, named, key) | left_open
+    def force(self, point: Float[Array, " d"], sizes):
+        """Return parameters of a point and the force of the next member along loading.
 
-    def mixture(self, value: dict, blur: Any = 0.0) -> Mixture:
-        """Return the force of the next member along the sense of loading."""
-        weight, mean, sd = member_mixture(
-            self.problem, value, self.whose, self.conditions
-        )
-        along = self.conditions.loading * mean
-        return Mixture(weight, along, jnp.hypot(sd, blur))
+        Beside it the sd that a leftover adds which is integrated over [N].
+        """
+        problem, (position, scores) = self.problem, (point[:-_OPEN], point[-_OPEN:])
+        value = laplace.values_at(problem, self.whitening.position(position))
+        value |= {SCORES: scores[:2], PLACES: scores[2:], BENDS: sizes}
+        free = 0.0
+        if "discrepancy" in problem.integrated:
+            mean, root = gap_law(problem, value)
+            free = jnp.linalg.norm(jax.grad(partial(self._left, value))(mean) @ root)
+            value["gap_weights"] = mean
+        weight, mean, sd = member_mixture(problem, value, self.whose, self.conditions)
+        return value, Mixture(weight, self.conditions.loading * mean, sd), free
 
-    def expected(self, value: dict, blur: Any = 0.0) -> Mixture:
-        """Return the same, with what is open of the leftover among the scatter."""
-        problem = self.problem
-        if "discrepancy" not in problem.integrated:
-            return self.mixture(value, blur)
-        mean, root = gap_law(problem, value)
-
-        def left(weights):
-            about = {**value, "gap_weights": weights}
-            return leftover(problem, about, self.whose.quantity, self.conditions)
-
-        free = jax.grad(left)(mean) @ root
-        spread = jnp.sqrt(blur**2 + free @ free)
-        return self.mixture({**value, "gap_weights": mean}, spread)
+    def _left(self, value: dict, weights):
+        about = {**value, "gap_weights": weights}
+        return leftover(self.problem, about, self.whose.quantity, self.conditions)
 
     def log_tail(self, point: Float[Array, " d"], sizes) -> Float[Array, ""]:
         """Return the log of about how much exceeds the limit, however little."""
-        value = self.value(point, sizes, jax.random.key(0))
-        found = self.expected(value, self.blur)
-        tail = log_ndtr((found.mean - self.limit) / found.sd)
+        _, found, free = self.force(point, sizes)
+        sd = jnp.sqrt(found.sd**2 + free**2 + self.blur**2)
+        tail = log_ndtr((found.mean - self.limit) / sd)
         return logsumexp(jnp.log(found.weight) + tail)
 
-    def terms(self, point: Float[Array, " d"], sizes, key):
+    def terms(self, point: Float[Array, " d"], sizes):
         """Return tails, normal and heavy, log prior of log σ, and log density."""
-        value = self.value(point, sizes, key)
-        found = self.expected(value)
+        value, found, free = self.force(point, sizes)
         prior, of_sigma = self.problem.priors["sigma"], 0.0
         if prior.family != "fixed":
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
-        heavy = _heavy(self.mixture(value), self.limit)
-        return found.above(self.limit), heavy, of_sigma, self.log_density(point)
+        whole = Mixture(found.weight, found.mean, jnp.hypot(found.sd, free))
+        # What is open of a leftover is no scatter: its law stays normal.
+        heavy = jax.vmap(lambda node: _heavy(found, self.limit - free * node))(_NODES)
+        return (
+            whole.above(self.limit),
+            heavy @ _SHARES,
+            of_sigma,
+            self.log_density(point),
+        )
 
 
 def _heavy(found: Mixture, limit):
@@ -165,7 +164,7 @@ def _towards(target: _Target, point, sizes):
 
 
 @jax.jit
-def _weigh(target: _Target, points, sizes, keys):
+def _weigh(target: _Target, points, sizes):
     """Return the terms of points, each (point,)."""
 
     def one(given):
@@ -173,7 +172,7 @@ def _weigh(target: _Target, points, sizes, keys):
 
     # Few side by side, the others one after the other, as draws are treated.
     given = jax.tree.map(
-        lambda part: part.reshape(_ABREAST, -1, *part.shape[1:]), (points, sizes, keys)
+        lambda part: part.reshape(_ABREAST, -1, *part.shape[1:]), (points, sizes)
     )
     found = jax.vmap(partial(jax.lax.map, one))(given)
     return jax.tree.map(jnp.ravel, found)
@@ -221,12 +220,11 @@ def _points(force: PopulationForce, limit: float, seed: int) -> list[np.ndarray]
         blur=blur,
     )
     laws = _laws(target, np.median(force.cause.values[BENDS], axis=0))
-    keys = jax.random.split(jax.random.key(seed), len(near))
     counted = []
     for turn in range(rounds):
         rows = slice(turn * _POINTS, (turn + 1) * _POINTS)
         points, log_law = laws.drawn(_POINTS, rng)
-        found = _weigh(target, points, sites[BENDS][rows], keys[rows])
+        found = _weigh(target, points, sites[BENDS][rows])
         *terms, density = map(np.asarray, found)
         density = np.where(np.isfinite(density), density, -np.inf)
         log_weight = density - log_law + towards_large[rows]
@@ -254,9 +252,7 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
         shape, place = np.eye(size), start
     counts = np.append(np.ones(size - _OPEN, bool), towards(start)[1][-_OPEN:] != 0.0)
     place, shape = place[counts], shape[np.ix_(counts, counts)]
-    strength, axes = np.linalg.eigh(0.5 * (shape + shape.T))
-    spread = (axes * np.maximum(strength, 1e-8 * strength.max())) @ axes.T
-    return SamplingLaws(counts, ((0.0 * place, np.eye(len(place))), (place, spread)))
+    return SamplingLaws(counts, ((0.0 * place, np.eye(len(place))), (place, shape)))
 
 
 def _ratio(weight: np.ndarray, values: np.ndarray) -> float:

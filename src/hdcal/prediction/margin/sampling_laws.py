@@ -11,6 +11,8 @@ from scipy import optimize, stats
 _FREE, _SPREAD = 5.0, 1.3
 # Points per dimension that a shape rests on, at least.
 _RESTS_ON = 20.0
+# Weights that the shape of their tail is fitted to, over the root of their number.
+_FITTED = 3.5
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class SamplingLaws:
             rng: source of randomness.
         """
         laws: list[Any] = [
-            stats.multivariate_t(centre, _SPREAD**2 * shape, df=_FREE)  # pyright: ignore
+            stats.multivariate_t(centre, _SPREAD**2 * _wide(shape), df=_FREE)  # pyright: ignore
             for centre, shape in self.places
         ]
         each = count // len(laws)
@@ -71,6 +73,12 @@ class SamplingLaws:
         return replace(self, places=tuple(places))
 
 
+def _wide(shape: np.ndarray) -> np.ndarray:
+    """Return a covariance without directions in which it is next to nothing."""
+    strength, axes = np.linalg.eigh(0.5 * (shape + shape.T))
+    return (axes * np.maximum(strength, 1e-8 * strength.max())) @ axes.T
+
+
 def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
     """Return weights, to a power at which they are worth so many points at least.
 
@@ -101,7 +109,8 @@ def pareto_shape(weight: np.ndarray) -> float:
     # Late: a finished result is read without it.
     from arviz_stats.base.array import array_stats
 
-    try:
-        return np.asarray(array_stats.pareto_khat(weight[None], tail="right")).item()
-    except ValueError:  # the largest are all alike
+    # The law is fitted to some three roots of the weights: none of them may be zero.
+    if np.count_nonzero(weight) < _FITTED * np.sqrt(len(weight)):
         return np.inf
+    shape = array_stats.pareto_khat(weight[None], r_eff=1.0, tail="right")
+    return np.asarray(shape).item()

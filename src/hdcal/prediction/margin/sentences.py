@@ -203,6 +203,8 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     if max(risk.hi, risk.probability) < RAREST:
         rarest = chance(risk.probability)
         yield f"{one} with a probability of {rarest}: β is {index(risk.beta)}."
+        if risk.rests_on and risk.probability >= RAREST:
+            yield risk.rests_on
         return
     low, high = chance(risk.lo), chance(risk.hi)
     span = f"is {high}" if low == high else f"lies between {low} and {high}"
