@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conjugate import SIGMA, conjugate_case, known_posterior, unit_stiffness
 from mirrored import mirrored
+from posteriors import with_leftover
 from rigs import make_case, make_records
 from scipy import stats
 from slices import slice_of
@@ -16,6 +17,7 @@ from hdcal.data.priors import Prior
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES
+from hdcal.prediction.margin import rare as module
 from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
 from hdcal.prediction.margin.refined import rests_on as refined_words
 from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
@@ -108,6 +110,26 @@ def test_a_leftover_far_out_is_found_alike_from_every_seed():
     assert chances.min() > 1e-9 and chances.max() < 1e-3
     assert max(one.relative_error for one in found) < 0.2
     assert np.std(chances) < 0.2 * np.mean(chances)
+
+
+def test_where_a_fitted_leftover_has_no_part_a_search_has_its_slope(monkeypatch):
+    """So far beyond the tested deformation that its share is nothing at all."""
+    (cause,) = causes_of(with_leftover())
+    force, slopes, towards = (
+        population_force(cause, 2.5, "readings"),
+        [],
+        module._towards,
+    )
+
+    def seen(*given):
+        height, slope = towards(*given)
+        slopes.append(np.asarray(slope))
+        return height, slope
+
+    monkeypatch.setattr(module, "_towards", seen)
+    limit = float(np.max(np.asarray(force.along().centre()))) + 50.0
+    assert rare(force, limit).probability > 0.0
+    assert np.isfinite(slopes).all()
 
 
 def test_weights_with_a_heavy_tail_do_not_tell_their_own_error():

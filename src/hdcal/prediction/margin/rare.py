@@ -103,7 +103,7 @@ class _Target(eqx.Module):
     def force(self, point: Float[Array, " d"], sizes):
         """Return parameters of a point and the force of the next member along loading.
 
-        Beside it the sd that a leftover adds which is integrated over [N].
+        Beside it the variance that a leftover adds which is integrated over [N²].
         """
         problem, (position, scores) = self.problem, (point[:-_OPEN], point[-_OPEN:])
         value = laplace.values_at(problem, self.whitening.position(position))
@@ -111,7 +111,9 @@ class _Target(eqx.Module):
         free = 0.0
         if "discrepancy" in problem.integrated:
             mean, root = gap_law(problem, value)
-            free = jnp.linalg.norm(jax.grad(partial(self._left, value))(mean) @ root)
+            row = jax.grad(partial(self._left, value))(mean) @ root
+            # Not its root, which has no derivative where the leftover has no part.
+            free = row @ row
             value["gap_weights"] = mean
         weight, mean, sd = member_mixture(problem, value, self.whose, self.conditions)
         return value, Mixture(weight, self.conditions.loading * mean, sd), free
@@ -123,7 +125,7 @@ class _Target(eqx.Module):
     def log_tail(self, point: Float[Array, " d"], sizes) -> Float[Array, ""]:
         """Return the log of about how much exceeds the limit, however little."""
         _, found, free = self.force(point, sizes)
-        sd = jnp.sqrt(found.sd**2 + free**2 + self.blur**2)
+        sd = jnp.sqrt(found.sd**2 + free + self.blur**2)
         tail = log_ndtr((found.mean - self.limit) / sd)
         return logsumexp(jnp.log(found.weight) + tail)
 
@@ -134,9 +136,10 @@ class _Target(eqx.Module):
         if prior.family != "fixed":
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
-        whole = Mixture(found.weight, found.mean, jnp.hypot(found.sd, free))
+        whole = Mixture(found.weight, found.mean, jnp.sqrt(found.sd**2 + free))
         # What is open of a leftover is no scatter: its law stays normal.
-        heavy = jax.vmap(lambda node: _heavy(found, self.limit - free * node))(_NODES)
+        limits = self.limit - jnp.sqrt(free) * _NODES
+        heavy = jax.vmap(partial(_heavy, found))(limits)
         return (
             whole.above(self.limit),
             heavy @ _SHARES,

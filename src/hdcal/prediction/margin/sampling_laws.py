@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from scipy import optimize, stats
+from scipy.special import softmax
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
 _FREE, _SPREAD = 5.0, 1.3
@@ -84,21 +85,18 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
 
     None where hardly any point has a weight.
     """
-    known = np.isfinite(log_weight)
-    if known.sum() < 2.0 * least:
+    if np.count_nonzero(np.isfinite(log_weight)) < 2.0 * least:
         return None
-    log_weight = np.where(known, log_weight - log_weight[known].max(), -np.inf)
 
     def powered(power: float) -> np.ndarray:
-        weight = np.where(known, np.exp(power * np.where(known, log_weight, 0.0)), 0.0)
-        return weight / weight.sum()
+        return softmax(power * log_weight)
 
     def short(power: float) -> float:
         return 1.0 / np.sum(powered(power) ** 2) - least
 
     if short(1.0) >= 0.0:
         return powered(1.0)
-    return powered(optimize.root_scalar(short, bracket=(0.0, 1.0)).root)
+    return powered(optimize.root_scalar(short, bracket=(1e-12, 1.0)).root)
 
 
 def pareto_shape(weight: np.ndarray) -> float:
