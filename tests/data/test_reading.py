@@ -183,6 +183,17 @@ def test_a_gear_file_that_was_not_named_is(folder):
     assert read_case(folder).notes == ()
 
 
+@pytest.mark.parametrize(("wall", "told"), [("0.68", False), ("6.8", True)])
+def test_a_wall_that_is_not_thin_is_noted(folder, wall, told):
+    gear = folder / "gear.toml"
+    line = "wall_thickness_mm = "
+    before = gear.read_text("utf-8")
+    assert f"{line}0.68\n" in before
+    gear.write_text(before.replace(f"{line}0.68", f"{line}{wall}"), "utf-8")
+    notes = read(folder, text()).notes
+    assert any("is not thin" in note for note in notes) == told
+
+
 def test_a_note_names_the_first_rows_of_new_ramps(folder):
     ramp = "".join(f"{i / 20},{2 * i}\n" for i in range(1, 7))
     case = read(folder, f"deformation_mm,force_N\n{ramp * 2}")

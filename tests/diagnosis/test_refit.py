@@ -49,6 +49,27 @@ def test_more_than_two_per_cent_calls_for_the_unknown():
     assert shares(found)["a"] == 0.74
 
 
+def test_pairs_with_the_likeliest_effect_are_no_gap_without_it():
+    chances = {"a": 0.7, "none": 0.06, "unknown": 0.06, "c": 0.02}
+    chances |= {f"a+{name}": 0.04 for name in "defg"}
+    run, asked = calibrated()
+    found = weighed(chances, run)
+    assert asked == ["a", "none", "unknown", "a+unknown"]
+    assert found.left_out.counted_as == "a+unknown"
+    expected = {"a": 0.7, "none": 0.06, "unknown": 0.06, "a+unknown": 0.18}
+    assert shares(found) == pytest.approx(expected)
+    # Where that model fails its checks, the plain one carries them.
+    run, asked = calibrated(failing=("a+unknown",))
+    found = weighed({**chances, "none": 0.12, "unknown": 0.0}, run)
+    assert asked == ["a", "none", "a+unknown", "unknown"]
+    assert found.left_out.counted_as == "unknown"
+    # One that is calibrated anyway is asked once.
+    run, asked = calibrated()
+    found = weighed({"a": 0.75, "a+unknown": 0.1, "a+c": 0.04, "a+d": 0.11}, run)
+    assert asked == ["a", "a+d", "a+unknown"]
+    assert shares(found)["a+unknown"] == pytest.approx(0.14)
+
+
 def test_two_per_cent_and_less_goes_to_the_widest():
     run, asked = calibrated(widths={"a": 1.0, "b": 3.0})
     found = weighed({"a": 0.9, "b": 0.085, "unknown": 0.01, "none": 0.005}, run)

@@ -18,6 +18,7 @@ from hdcal.inference.noise_form import (
     growth_p_value,
     noise_form,
     noise_grows,
+    pilot_noise,
     why_independent,
 )
 from hdcal.inference.problem import build_problem
@@ -86,6 +87,19 @@ def reason(case, effects=(), with_gap=False) -> str:
     found = why_independent(case, effects, rounded=form[0], with_gap=with_gap)
     assert form[1] == (not found)
     return found
+
+
+def test_wild_readings_do_not_hide_that_the_others_are_rounded():
+    """The sd of all is above what Sheppard's correction asks, that of most is not."""
+    noise = np.random.default_rng(0).normal(0.0, 0.3, ROWS)
+    noise[::10] += np.tile([6.0, -6.0], ROWS // 20)
+    case = case_of(np.round(noise, 1), gear=make_gear(resolution=0.5))
+    assert 0.5 * pilot_noise(case.records) > 0.5
+    plain, mixed = (
+        noise_form(case, effects, {}, pilot_noise(case.records))[0]
+        for effects in ((), (EFFECTS["outliers"],))
+    )
+    assert mixed and not plain
 
 
 def test_why_no_correlation_is_asked_for_is_said():

@@ -7,6 +7,7 @@ import pytest
 from rigs import make_case, make_gear, make_records
 from scipy import stats
 from short import SHORT
+from slices import slice_of
 
 import hdcal
 from hdcal.prediction.engine.causes import causes_of
@@ -129,10 +130,11 @@ def test_bounds_are_readings_and_hold_what_they_promise(posterior):
     assert any("come in steps of 0.98 N" in words for words in found.remarks)
 
 
+@pytest.mark.parametrize("limits", slice_of([5, 11], [5]))
 @pytest.mark.parametrize("rule", ["simple", "guarded"])
-def test_a_decision_does_not_contradict_its_risk(rule, posterior):
+def test_a_decision_does_not_contradict_its_risk(rule, limits, posterior):
     said = set()
-    for limit in np.linspace(79.5, 83.5, 11):
+    for limit in np.linspace(79.5, 83.5, limits):
         asked = {"limit_force": limit, "rule": rule, "sensitivities": False}
         found = hdcal.margin(posterior, AT, **asked).decision
         risk = 0.5 if rule == "simple" else 0.025
@@ -149,7 +151,7 @@ def test_a_limit_as_printed_is_the_reading_it_stands_for(posterior):
         hdcal.margin(
             posterior, AT, limit_force=limit, sensitivities=False
         ).worst.exceedance.probability
-        for limit in (82.3, 82.32, 82.36)
+        for limit in (81.3, 81.34, 81.38)
     ]
     assert risks[0] == risks[1] == risks[2]
 

@@ -186,3 +186,18 @@ def test_what_was_left_out_is_said():
     settings = {**posterior.settings, LEFT_OUT: told}
     words = Tracker(replace(posterior, settings=settings)).describe()
     assert "2 % of the probability lies on hypotheses" in words
+
+
+def test_what_the_calibration_left_over_is_told_before_the_first_row():
+    there = np.linspace(0.02, 0.54, 40)
+    deformation = np.concatenate([there, there[::-1]])
+    sense = np.repeat([1.0, -1.0], 40)
+    rng = np.random.default_rng(3)
+    force = 205.0 * deformation + rng.normal(0.0, 0.3, 80)
+    plain, loop = (
+        Tracker(regressed(deformation, read, rng)).describe()
+        for read in (force, force + 3.0 * sense)
+    )
+    assert "shape for right, but its residuals have one" in loop
+    assert "An alarm may come of that" in loop and "with a gap" not in loop
+    assert "alarm may come" not in plain

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import Parsed, read_columns
+from hdcal.cli.option_types import FORCE, Parsed, read_columns
 from hdcal.cli.options import repeated_option
 from hdcal.errors import Finding, InputError
 
@@ -46,8 +46,7 @@ def force_options(command: Callable) -> Callable:
         ),
         click.option(
             "--amplitude",
-            type=float,
-            metavar="N",
+            type=FORCE,
             help="Of a shape [N] [default: 80].",
         ),
         repeated_option(

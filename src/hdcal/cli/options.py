@@ -9,6 +9,7 @@ from click.core import ParameterSource
 
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import (
+    FORCE,
     read_all,
     read_columns,
     read_list,
@@ -135,7 +136,7 @@ def start_options(command: Callable) -> Callable:
 def decision_options(command: Callable) -> Callable:
     """Add --limit-force and --rule."""
     words = "Capacity of the actuator [N]: its size, in compression and in tension."
-    limit = click.option("--limit-force", type=float, help=words)
+    limit = click.option("--limit-force", type=FORCE, help=words)
     rules = click.Choice(["guarded", "simple"])
     words = "Decision about it, by the expanded uncertainty or not [default: guarded]."
     return limit(click.option("--rule", type=rules, help=words)(command))

@@ -18,6 +18,7 @@ from hdcal.errors import Finding, Findings, quoted
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 MOST_ROWS = 8  # listed in one note
+THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
 
@@ -66,6 +67,7 @@ def read_case(
         data_sha256=measured.columns.sha256,
         notes=(
             *([_BESIDE] if gear is None and not folder else []),
+            *_thick_wall(found),
             *_left_out(measured.columns),
             *_off_scale(measured, found),
             *_resets(measured, motion),
@@ -143,6 +145,17 @@ def _left_out(columns: Columns) -> Iterator[str]:
         yield f"columns not used: {', '.join(extra)}"
     if skipped := columns.table.skipped:
         yield f"{skipped} empty lines between the readings were skipped"
+
+
+def _thick_wall(gear: Gear) -> Iterator[str]:
+    size = gear.geometry
+    share = float(size.wall_thickness / size.radius)
+    # NaN where a spring has no sizes.
+    if share > THIN:
+        yield (
+            f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
+            "is not thin, as the theories take it to be. Check both sizes, and units"
+        )
 
 
 def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:

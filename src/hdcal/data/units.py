@@ -138,6 +138,9 @@ def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
 
 @cache
 def _atom(name: str) -> tuple[float, np.ndarray]:
+    # Without Pint, whose definitions take longer to read than a posterior.
+    if name in _CODE_UNITS:
+        return 1.0, np.array([name == unit for unit in _CODE_UNITS], int)
     import pint
 
     quantity = _registry().Quantity

@@ -80,8 +80,11 @@ def ambiguous(found: VerdictAnswer) -> Iterator[str]:
     """Yield what is said of several causes."""
     which = found.which
     yield what_is_seen(found)
-    causes = ", ".join(_with_chance(which, name) for name in which.set)
-    yield f"The cause cannot be told with this data; it may be {causes}."
+    chances = {name: or_zero(_chance(which, name)) for name in which.set}
+    ranked = sorted(chances, key=lambda name: -chances[name])
+    causes = ", ".join(_with_chance(which, name) for name in ranked)
+    twice = "; what acts together counts for each" * (sum(chances.values()) > 1.0)
+    yield f"The cause cannot be told with this data; it may be {causes}{twice}."
     yield from _looks_the_same(which)
     yield from _shrinks(found, label(which.effect or which.set[0]))
 
@@ -117,9 +120,13 @@ def _beside(which: Which, what: str) -> Iterator[str]:
     )
 
 
+def _chance(which: Which, name: str) -> float | None:
+    """Return the probability of a hypothesis, of an effect with all beside it."""
+    return which.inclusion.get(name, which.probabilities.get(name))
+
+
 def _with_chance(which: Which, name: str) -> str:
-    chance = which.inclusion.get(name, which.probabilities.get(name))
-    return f"{hypothesis(name)} ({percent(chance)})"
+    return f"{hypothesis(name)} ({percent(_chance(which, name))})"
 
 
 def _shrinks(found: VerdictAnswer, what: str) -> Iterator[str]:

@@ -1,9 +1,11 @@
 """The hypotheses that are left by NUTS, each with the probability that it carries.
 
 Every hypothesis of 5 % and more is calibrated, whatever the verdict. What is left out
-is not shared out among them: where it is more than 2 %, the plain model with a leftover
-discrepancy is calibrated too and carries it, as it bends wherever the data let it;
-below that the widest model does, the one that knows the stiffness least.
+is not shared out among them: where it is more than 2 %, a model with a leftover
+discrepancy is calibrated too and carries it, as it bends wherever the data let it: the
+plain one, or that of the likeliest effect where most of what is left out is this effect
+and something more. Below that the widest model does, the one that knows the stiffness
+least.
 """
 
 from collections.abc import Callable, Mapping
@@ -98,15 +100,20 @@ def weighed(
     ranked = sorted(probabilities, key=lambda name: -probabilities[name])
     chosen = [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
     fits = {name: calibrated(name) for name in chosen}
-    if _missing(probabilities, fits) > MOST_LEFT_OUT and UNKNOWN not in fits:
-        fits[UNKNOWN] = calibrated(UNKNOWN)
+    carrier = UNKNOWN
+    if _missing(probabilities, fits) > MOST_LEFT_OUT:
+        carrier = _open_model(probabilities, fits)
+        fits[carrier] = fits.get(carrier) or calibrated(carrier)
+        if not fits[carrier].usable and UNKNOWN not in fits:
+            fits[UNKNOWN] = calibrated(UNKNOWN)
     usable = {name: fit for name, fit in fits.items() if fit.usable}
     failed = {name: fit for name, fit in fits.items() if not fit.usable}
     if not usable:
         return Refits({}, None, failed)
-    missing, carrier = _missing(probabilities, fits), _widest(usable)
+    missing = _missing(probabilities, fits)
+    carrier = carrier if carrier in usable else _widest(usable)
     models = {
-        name: (probabilities[name] + missing * (name == carrier), fit)
+        name: (probabilities.get(name, 0.0) + missing * (name == carrier), fit)
         for name, fit in usable.items()
     }
     return Refits(models, LeftOut(missing, carrier), failed)
@@ -114,9 +121,24 @@ def weighed(
 
 def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):
     """Return the probability without a model that may be used."""
-    return max(
-        1.0 - sum(probabilities[n] for n, fit in fits.items() if fit.usable), 0.0
-    )
+    usable = [name for name, fit in fits.items() if fit.usable]
+    return max(1.0 - sum(probabilities.get(name, 0.0) for name in usable), 0.0)
+
+
+def _open_model(
+    probabilities: Mapping[str, float], fits: Mapping[str, Posterior]
+) -> str:
+    """Return the model with a leftover that suits most of what has no model.
+
+    What is the likeliest effect and a little more is no gap without that effect.
+    """
+    usable = {name for name, fit in fits.items() if fit.usable}
+    rest = {n: share for n, share in probabilities.items() if n not in usable}
+    likeliest = max(usable, key=lambda name: probabilities[name], default=UNKNOWN)
+    known = parts_of(likeliest) - {UNKNOWN}
+    alike = sum(share for name, share in rest.items() if known <= parts_of(name))
+    kept = sorted(known) if alike > 0.5 * sum(rest.values()) else []
+    return "+".join([*kept, UNKNOWN])
 
 
 def _widest(fits: Mapping[str, Posterior]) -> str:

@@ -20,6 +20,9 @@ _FEW_ROWS = 500
 _FINE_STEP = 1.3
 # The same where the noise sd is roughly known.
 _FINE_STEP_OF_FEW = 0.5
+# The same beside a mixture: the sd that a fit leaves is that of wild readings too, some
+# ten times that of the others. Its rows are kept one by one anyway.
+_FINE_STEP_OF_A_MIXTURE = 0.1
 # Rows from which on correlation is inferred beside a leftover discrepancy: the first
 # number of a bucket, so that all of it share their programs.
 _BESIDE_A_GAP = 49
@@ -137,7 +140,10 @@ def noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, boo
     """Return whether the noise needs its exact rounding, and may be correlated."""
     step, records = case.gear.force_resolution, case.records
     few = len(records.force) <= _FEW_ROWS and not members
-    rounded = step > (_FINE_STEP_OF_FEW if few else _FINE_STEP) * noise_sd
+    fine = _FINE_STEP_OF_FEW if few else _FINE_STEP
+    if any(effect.mixture for effect in effects):
+        fine = _FINE_STEP_OF_A_MIXTURE
+    rounded = step > fine * noise_sd
     beside = "discrepancy" in members
     return rounded, not why_independent(case, effects, rounded=rounded, with_gap=beside)
 

@@ -138,7 +138,9 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     )
 
 
-def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
+def misfits(
+    posterior: Posterior, *, shapes: bool = True, gap_serves: bool = True
+) -> tuple[str, ...]:
     """Return a warning for all that the model left in the residuals.
 
     For answers that take the model for right. A leftover discrepancy has taken what
@@ -147,10 +149,11 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     Args:
         posterior: from `calibrate`.
         shapes: whether to warn of them.
+        gap_serves: whether the answer could be had with a leftover discrepancy.
     """
     left = residuals(posterior)
-    with_gap = posterior.problem.discrepancy is not None
-    remedy = "Diagnose" if with_gap else "Diagnose, or calibrate with a gap"
+    gap_serves = gap_serves and posterior.problem.discrepancy is None
+    remedy = "Diagnose, or calibrate with a gap" if gap_serves else "Diagnose"
     return (
         *(
             "This takes the model's shape for right, but its residuals have one. "

@@ -4,7 +4,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import WHOLE_NUMBERS
+from hdcal.cli.option_types import LENGTH, WHOLE_NUMBERS
 from hdcal.cli.options import case_options, json_option, out_option, read_given
 
 
@@ -25,8 +25,7 @@ from hdcal.cli.options import case_options, json_option, out_option, read_given
 )
 @click.option(
     "--at",
-    type=float,
-    metavar="MM",
+    type=LENGTH,
     help="Compare forces at this deformation [default: the gear's nominal one].",
 )
 @click.option(

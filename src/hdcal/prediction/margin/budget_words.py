@@ -130,7 +130,8 @@ def check_words(about, drawn, check: LinearCheck, error: float) -> str:
 def coverage_words(check: BudgetCheck) -> str:
     """Return the coverage factor of the linear budget, and what it rests on."""
     dof = check.degrees_of_freedom
-    law = f"Student t, {dof:.3g} d.o.f." if np.isfinite(dof) else "normal"
+    # Beyond a thousand the two differ by less than is printed.
+    law = f"Student t, {dof:.3g} d.o.f." if dof < 1000.0 else "normal"
     return f"k = {check.coverage_factor:.2f}, {law}"
 
 

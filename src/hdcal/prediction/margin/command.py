@@ -8,7 +8,7 @@ from hdcal.cli import options
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import WINDOW
+from hdcal.cli.option_types import FORCE, LENGTH, WINDOW
 
 
 @command(
@@ -17,12 +17,12 @@ from hdcal.cli.option_types import WINDOW
 )
 @click.argument("run", metavar="RUN")
 @click.option(
-    "--deformation", type=float, required=True, help="Deformation as read [mm]."
+    "--deformation", type=LENGTH, required=True, help="Deformation as read [mm]."
 )
 @options.decision_options
 @click.option(
     "--given-force",
-    type=float,
+    type=FORCE,
     help="Force with its sign [N] whose deformation is asked for.",
 )
 @click.option(

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
-from scipy import optimize
+from scipy import optimize, special
 
 from hdcal.data.records import Array
 from hdcal.inference import laplace
@@ -130,30 +130,34 @@ class _Target(eqx.Module):
         return logsumexp(jnp.log(found.weight) + tail)
 
     def terms(self, point: Float[Array, " d"], sizes):
-        """Return tails, normal and heavy, log prior of log σ, and log density."""
+        """Return tail, law of the member, log prior of log σ, and log density."""
         value, found, free = self.force(point, sizes)
         prior, of_sigma = self.problem.priors["sigma"], 0.0
         if prior.family != "fixed":
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
         whole = Mixture(found.weight, found.mean, jnp.sqrt(found.sd**2 + free))
-        # What is open of a leftover is no scatter: its law stays normal.
-        limits = self.limit - jnp.sqrt(free) * _NODES
-        heavy = jax.vmap(partial(_heavy, found))(limits)
-        return (
-            whole.above(self.limit),
-            heavy @ _SHARES,
-            of_sigma,
-            self.log_density(point),
-        )
+        law = found, jnp.asarray(free)
+        return whole.above(self.limit), law, of_sigma, self.log_density(point)
 
 
-def _heavy(found: Mixture, limit):
-    """Return the share beyond, were the scatter Student's t of the same variance."""
-    z = (found.mean - limit) / found.sd * np.sqrt(_HEAVY / (_HEAVY - 2.0))
-    # The regularised incomplete beta function, for whole halves of the degrees.
-    share = jax.scipy.special.betainc(_HEAVY / 2.0, 0.5, _HEAVY / (_HEAVY + z**2))
-    return jnp.sum(found.weight * jnp.where(z < 0.0, 0.5 * share, 1.0 - 0.5 * share))
+def _heavy(law: tuple[Mixture, np.ndarray], limit: float) -> np.ndarray:
+    """Return the shares beyond, were the scatter Student's t of the same variance.
+
+    Args:
+        law: of the next member at each point, parts of shape (point, component), and
+            the variance that a leftover adds [N²], (point,).
+        limit: along the sense of loading [N].
+    """
+    found, free = law
+    scale, total = found.sd * np.sqrt((_HEAVY - 2.0) / _HEAVY), np.zeros(len(free))
+    # What is open of a leftover is no scatter: its law stays normal.
+    nodes = zip(_NODES, _SHARES, strict=True) if free.any() else [(0.0, 1.0)]
+    for node, share in nodes:
+        shifted = found.mean + node * np.sqrt(free)[:, None]
+        beyond = special.stdtr(_HEAVY, (shifted - limit) / scale)
+        total += share * np.sum(found.weight * beyond, axis=1)
+    return total
 
 
 @jax.jit
@@ -178,7 +182,7 @@ def _weigh(target: _Target, points, sizes):
         lambda part: part.reshape(_ABREAST, -1, *part.shape[1:]), (points, sizes)
     )
     found = jax.vmap(partial(jax.lax.map, one))(given)
-    return jax.tree.map(jnp.ravel, found)
+    return jax.tree.map(lambda part: part.reshape(-1, *part.shape[2:]), found)
 
 
 def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
@@ -189,7 +193,7 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
         limit: along the sense of loading, of the force before it is rounded [N].
         seed: of the points.
     """
-    weight, above, heavy, of_sigma = _points(force, limit, seed)
+    weight, above, law, of_sigma = _points(force, limit, seed)
     share = _ratio(weight, above)
     if not share > 0.0:
         return _NOWHERE
@@ -197,7 +201,7 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     if max(pareto_shape(weight), pareto_shape(weight * above)) > _UNTOLD:
         error = max(error, 1.0)
     # Without its prior σ would be as likely on any scale.
-    free = weight * np.exp(of_sigma.min() - of_sigma)
+    free, heavy = weight * np.exp(of_sigma.min() - of_sigma), _heavy(law, limit)
     return Rare(
         probability=share,
         relative_error=float(error),
@@ -206,7 +210,7 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     )
 
 
-def _points(force: PopulationForce, limit: float, seed: int) -> list[np.ndarray]:
+def _points(force: PopulationForce, limit: float, seed: int):
     """Return weights of the points that count, and their terms but the density."""
     rounds, rng = _TRIALS + _COUNTED, np.random.default_rng(seed)
     # Large bends are few and count much: the levels are drawn towards them.
@@ -228,7 +232,7 @@ def _points(force: PopulationForce, limit: float, seed: int) -> list[np.ndarray]
         rows = slice(turn * _POINTS, (turn + 1) * _POINTS)
         points, log_law = laws.drawn(_POINTS, rng)
         found = _weigh(target, points, sites[BENDS][rows])
-        *terms, density = map(np.asarray, found)
+        *terms, density = jax.tree.map(np.asarray, found)
         density = np.where(np.isfinite(density), density, -np.inf)
         log_weight = density - log_law + towards_large[rows]
         if turn >= _TRIALS:
@@ -236,8 +240,8 @@ def _points(force: PopulationForce, limit: float, seed: int) -> list[np.ndarray]
             continue
         with np.errstate(divide="ignore"):
             laws = laws.reshaped(points, (log_weight, log_weight + np.log(terms[0])))
-    log_weight, *terms = [np.concatenate(one) for one in zip(*counted, strict=True)]
-    return [np.exp(log_weight - log_weight.max()), *terms]
+    log_weight, *terms = jax.tree.map(lambda *parts: np.concatenate(parts), *counted)
+    return np.exp(log_weight - log_weight.max()), *terms
 
 
 def _laws(target: _Target, sizes) -> SamplingLaws:
