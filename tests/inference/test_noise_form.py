@@ -116,6 +116,10 @@ def test_why_no_correlation_is_asked_for_is_said():
 def test_none_seen_is_said_only_where_it_was_looked_for():
     seen = correlation_check({CORRELATION: np.full((2, 50), 0.01)}, "")
     assert seen.outcome == "passed" and "no correlation" in seen.words
+    some = correlation_check({CORRELATION: np.full((2, 50), 0.4)}, "")
+    assert some.outcome == "note" and "allows for it" in some.words
+    strong = correlation_check({CORRELATION: np.full((2, 50), 0.8)}, "")
+    assert strong.outcome == "warning" and "80 to 93 %" in strong.words
     unasked = correlation_check({}, "the steps are wide")
     assert unasked.outcome == "note"
     assert unasked.words.endswith("not inferred for these data: the steps are wide")
@@ -153,7 +157,7 @@ def test_correlated_noise_widens_what_it_should(alike):
     wide, narrow = (np.std(one.draws["stiffness"]) for one in alike)
     # Of a line through 60 readings: √((1 + ρ)/(1 − ρ)) times, less what ρ may be.
     assert 1.5 < wide / narrow < 3.5
-    assert correlation_check(found.draws, "").outcome == "note"
+    assert correlation_check(found.draws, "").outcome == "warning"
     told = {check.name: check for check in independent.checks}
     found = told["neighbouring readings err independently"]
     assert found.outcome == "note" and CORRELATION not in independent.draws

@@ -18,6 +18,7 @@ from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION
 
 # Name of the check that data are what was believed of gears.
+INDEPENDENT = "neighbouring readings err independently"
 PLAUSIBLE = "prior and data agree"
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
@@ -29,6 +30,9 @@ CONFLICT_TAIL = 0.0027
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation above which, with 95 % probability, it is told [-].
 _TOLD_CORRELATION = 0.1
+# From which on intervals are too narrow: the prior expects less
+# (tests/inference/test_correlation_prior.py).
+_STRONG_CORRELATION = 0.5
 
 
 @dataclass(frozen=True)
@@ -126,16 +130,23 @@ def correlation_check(draws: Mapping[str, np.ndarray], reason: str) -> Check:
         draws: by parameter.
         reason: why no correlation is in the model, from `why_independent`.
     """
-    name = "neighbouring readings err independently"
     if CORRELATION not in draws:
         words = f"a correlation of neighbours is not inferred for these data: {reason}"
-        return Check(name, "note", words)
+        return Check(INDEPENDENT, "note", words)
     low, middle, high = np.quantile(draws[CORRELATION], [0.05, 0.5, 0.95])
     if low < _TOLD_CORRELATION:
-        return Check(name, "passed", "no correlation of neighbours is seen")
+        return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
     span = f"{middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
-    return Check(name, "note", f"{words}, and every interval allows for it")
+    if middle < _STRONG_CORRELATION:
+        return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
+    return Check(
+        INDEPENDENT,
+        "warning",
+        f"{words}. Every interval allows for it, but so few readings are worth little: "
+        "95 % intervals hold the truth in 80 to 93 % of such runs. Read at longer "
+        "intervals of time, or repeat the run",
+    )
 
 
 def growth_check(draws: Mapping[str, np.ndarray]) -> Check:

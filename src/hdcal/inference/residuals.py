@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.inference.checks import INDEPENDENT
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
 from hdcal.inference.linearisation import Linearisation, linearise
@@ -141,7 +142,7 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
 def misfits(
     posterior: Posterior, *, shapes: bool = True, gap_serves: bool = True
 ) -> tuple[str, ...]:
-    """Return a warning for all that the model left in the residuals.
+    """Return a warning for all that the model left in the residuals, or barely holds.
 
     For answers that take the model for right. A leftover discrepancy has taken what
     depends on the deformation alone; a loop, for one, it cannot take.
@@ -161,4 +162,9 @@ def misfits(
             for shape in (left.structure if shapes else ())
         ),
         *(fault.words for fault in left.noise),
+        *(
+            f"{check.words[:1].upper()}{check.words[1:]}."
+            for check in posterior.checks
+            if check.name == INDEPENDENT and check.outcome == "warning"
+        ),
     )
