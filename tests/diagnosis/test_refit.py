@@ -63,6 +63,13 @@ def test_pairs_with_the_likeliest_effect_are_no_gap_without_it():
     found = weighed({**chances, "none": 0.12, "unknown": 0.0}, run)
     assert asked == ["a", "none", "a+unknown", "unknown"]
     assert found.left_out.counted_as == "unknown"
+    # Whether the effect stands first alone or not.
+    run, _ = calibrated()
+    chances = {"none": 0.45, "a": 0.35, **{f"a+{name}": 0.04 for name in "defgh"}}
+    assert weighed(chances, run).left_out.counted_as == "a+unknown"
+    run, _ = calibrated()
+    chances = {"none": 0.45, "a": 0.35, **{name: 0.04 for name in "defgh"}}
+    assert weighed(chances, run).left_out.counted_as == "unknown"
     # One that is calibrated anyway is asked once.
     run, asked = calibrated()
     found = weighed({"a": 0.75, "a+unknown": 0.1, "a+c": 0.04, "a+d": 0.11}, run)

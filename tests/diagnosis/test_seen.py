@@ -7,6 +7,7 @@ import pytest
 from diagnosis_cases import rich, simulated
 from rigs import cycles, make_case, make_records, ramp
 
+from hdcal.data.loading import derive_motion
 from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.seen import what_is_seen
 from hdcal.evidence.compute_evidence import compute_evidence
@@ -134,3 +135,21 @@ def test_a_toe_is_told_whether_or_not_it_begins_at_zero():
         (first, *_) = seen(make_case(make_records(w, force + noise)))
         assert "at small deformations" in first.statement
         assert first.size_N.median < 8.0
+
+
+def test_a_place_that_is_read_twice_was_not_held():
+    there = np.linspace(0.02, 0.54, 48)
+    x = np.concatenate([there, there[::-1]] * 2)
+    side = np.tile(np.repeat([1.0, -1.0], 48), 2)
+    force = 205.0 * x + 3.0 * side
+    force += np.random.default_rng(4).normal(0.0, 0.3, len(x))
+    time = np.arange(float(len(x)))
+    motion = derive_motion(x, np.zeros(len(x), int), time)
+    assert (
+        np.count_nonzero(motion.direction == 0.0) > 0 and "holds" not in motion.features
+    )
+    moved = {name: getattr(motion, name) for name in ("direction", "sense", "rate")}
+    known = motion.features | {"time"}
+    found = seen(make_case(make_records(x, force, time=time, known=known, **moved)))
+    assert "on unloading than on loading" in found[0].statement
+    assert not any("is held" in one.statement for one in found)

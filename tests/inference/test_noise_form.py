@@ -89,10 +89,11 @@ def reason(case, effects=(), with_gap=False) -> str:
     return found
 
 
-def test_wild_readings_do_not_hide_that_the_others_are_rounded():
+@pytest.mark.parametrize("wild", [6.0, 60.0])
+def test_wild_readings_do_not_hide_that_the_others_are_rounded(wild):
     """The sd of all is above what Sheppard's correction asks, that of most is not."""
     noise = np.random.default_rng(0).normal(0.0, 0.3, ROWS)
-    noise[::10] += np.tile([6.0, -6.0], ROWS // 20)
+    noise[::10] += np.tile([wild, -wild], ROWS // 20)
     case = case_of(np.round(noise, 1), gear=make_gear(resolution=0.5))
     assert 0.5 * pilot_noise(case.records) > 0.5
     plain, mixed = (
@@ -114,13 +115,15 @@ def test_why_no_correlation_is_asked_for_is_said():
 
 
 def test_none_seen_is_said_only_where_it_was_looked_for():
-    seen = correlation_check({CORRELATION: np.full((2, 50), 0.01)}, "")
+    seen = correlation_check({CORRELATION: np.full((2, 50), 0.01)}, 60)
     assert seen.outcome == "passed" and "no correlation" in seen.words
-    some = correlation_check({CORRELATION: np.full((2, 50), 0.4)}, "")
+    some = correlation_check({CORRELATION: np.full((2, 50), 0.4)}, 60)
     assert some.outcome == "note" and "allows for it" in some.words
-    strong = correlation_check({CORRELATION: np.full((2, 50), 0.8)}, "")
-    assert strong.outcome == "warning" and "80 to 93 %" in strong.words
-    unasked = correlation_check({}, "the steps are wide")
+    strong = {CORRELATION: np.full((2, 50), 0.8)}
+    few, many = (correlation_check(strong, rows) for rows in (60, 600))
+    assert few.outcome == "warning" and "some 7 independent ones" in few.words
+    assert many.outcome == "note"
+    unasked = correlation_check({}, 60, "the steps are wide")
     assert unasked.outcome == "note"
     assert unasked.words.endswith("not inferred for these data: the steps are wide")
 
@@ -157,7 +160,7 @@ def test_correlated_noise_widens_what_it_should(alike):
     wide, narrow = (np.std(one.draws["stiffness"]) for one in alike)
     # Of a line through 60 readings: √((1 + ρ)/(1 − ρ)) times, less what ρ may be.
     assert 1.5 < wide / narrow < 3.5
-    assert correlation_check(found.draws, "").outcome == "warning"
+    assert correlation_check(found.draws, ROWS).outcome == "warning"
     told = {check.name: check for check in independent.checks}
     found = told["neighbouring readings err independently"]
     assert found.outcome == "note" and CORRELATION not in independent.draws

@@ -247,7 +247,9 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(
-                found.values, why_independent(case, problem.effects, **form)
+                found.values,
+                len(case.records.force),
+                why_independent(case, problem.effects, **form),
             ),
             growth_check(found.values),
         ],

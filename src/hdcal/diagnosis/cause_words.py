@@ -83,7 +83,8 @@ def ambiguous(found: VerdictAnswer) -> Iterator[str]:
     chances = {name: or_zero(_chance(which, name)) for name in which.set}
     ranked = sorted(chances, key=lambda name: -chances[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
-    twice = "; what acts together counts for each" * (sum(chances.values()) > 1.0)
+    several = sum(chances.values()) > 1.0 + 1e-6
+    twice = "; what acts together counts for each" if several else ""
     yield f"The cause cannot be told with this data; it may be {causes}{twice}."
     yield from _looks_the_same(which)
     yield from _shrinks(found, label(which.effect or which.set[0]))

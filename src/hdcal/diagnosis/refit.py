@@ -8,7 +8,7 @@ and something more. Below that the widest model does, the one that knows the sti
 least.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -133,12 +133,16 @@ def _open_model(
     What is the likeliest effect and a little more is no gap without that effect.
     """
     usable = {name for name, fit in fits.items() if fit.usable}
-    rest = {n: share for n, share in probabilities.items() if n not in usable}
-    likeliest = max(usable, key=lambda name: probabilities[name], default=UNKNOWN)
-    known = parts_of(likeliest) - {UNKNOWN}
-    alike = sum(share for name, share in rest.items() if known <= parts_of(name))
-    kept = sorted(known) if alike > 0.5 * sum(rest.values()) else []
-    return "+".join([*kept, UNKNOWN])
+    effects = frozenset().union(*map(parts_of, usable)) - {UNKNOWN}
+
+    def share(effect: str, among: Iterable[str]) -> float:
+        return sum(probabilities[n] for n in among if effect in parts_of(n))
+
+    rest = probabilities.keys() - usable
+    likeliest = max(sorted(effects), key=lambda e: share(e, probabilities), default="")
+    half = 0.5 * sum(probabilities[name] for name in rest)
+    alike = bool(likeliest) and share(likeliest, rest) > half
+    return f"{likeliest}+{UNKNOWN}" if alike else UNKNOWN
 
 
 def _widest(fits: Mapping[str, Posterior]) -> str:

@@ -186,13 +186,15 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
             "a faster movement takes {way} force, by {size} over the speeds tested",
             beside=x,
         )
-    yield Contrast(
-        "time",
-        _held(records),
-        ("rises", "falls"),
-        "while the deformation is held the force {way} by {size}",
-        beside=x,
-    )
+    # A place that was read twice, as where the movement turns, was not held.
+    if "holds" in records.known:
+        yield Contrast(
+            "time",
+            _held(records),
+            ("rises", "falls"),
+            "while the deformation is held the force {way} by {size}",
+            beside=x,
+        )
     yield Contrast(
         "time",
         np.asarray(records.time),

@@ -17,8 +17,8 @@ from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION
 
-# Name of the check that data are what was believed of gears.
 INDEPENDENT = "neighbouring readings err independently"
+# Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
@@ -30,9 +30,9 @@ CONFLICT_TAIL = 0.0027
 ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELATION})
 # Correlation above which, with 95 % probability, it is told [-].
 _TOLD_CORRELATION = 0.1
-# From which on intervals are too narrow: the prior expects less
-# (tests/inference/test_correlation_prior.py).
-_STRONG_CORRELATION = 0.5
+# Of such readings, worth fewer than so many independent ones, intervals are too narrow:
+# the prior expects less (tests/inference/test_correlation_prior.py).
+_STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 25.0
 
 
 @dataclass(frozen=True)
@@ -123,11 +123,14 @@ def _check(name: str, passed: bool, words: str) -> Check:
     return Check(name, "passed" if passed else "failed", words)
 
 
-def correlation_check(draws: Mapping[str, np.ndarray], reason: str) -> Check:
+def correlation_check(
+    draws: Mapping[str, np.ndarray], rows: int, reason: str = ""
+) -> Check:
     """Say that neighbouring readings err alike, or that nobody looked.
 
     Args:
         draws: by parameter.
+        rows: number of readings.
         reason: why no correlation is in the model, from `why_independent`.
     """
     if CORRELATION not in draws:
@@ -138,14 +141,15 @@ def correlation_check(draws: Mapping[str, np.ndarray], reason: str) -> Check:
         return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
     span = f"{middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
-    if middle < _STRONG_CORRELATION:
+    worth = rows * (1.0 - middle) / (1.0 + middle)
+    if middle < _STRONG_CORRELATION or worth > _LITTLE_WORTH:
         return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
     return Check(
         INDEPENDENT,
         "warning",
-        f"{words}. Every interval allows for it, but so few readings are worth little: "
-        "95 % intervals hold the truth in 80 to 93 % of such runs. Read at longer "
-        "intervals of time, or repeat the run",
+        f"{words}. Every interval allows for it, but these readings are worth some "
+        f"{worth:.0f} independent ones, and 95 % intervals of such runs hold the truth "
+        "in 75 to 94 %. Read longer, or repeat the run",
     )
 
 

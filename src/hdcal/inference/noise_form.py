@@ -20,9 +20,9 @@ _FEW_ROWS = 500
 _FINE_STEP = 1.3
 # The same where the noise sd is roughly known.
 _FINE_STEP_OF_FEW = 0.5
-# The same beside a mixture: the sd that a fit leaves is that of wild readings too, some
-# ten times that of the others. Its rows are kept one by one anyway.
-_FINE_STEP_OF_A_MIXTURE = 0.1
+# The same beside a mixture: the sd that a fit leaves is that of wild readings too, any
+# times that of the others. Its rows are kept one by one anyway.
+_FINE_STEP_OF_A_MIXTURE = 1e-3
 # Rows from which on correlation is inferred beside a leftover discrepancy: the first
 # number of a bucket, so that all of it share their programs.
 _BESIDE_A_GAP = 49

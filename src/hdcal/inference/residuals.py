@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.data.records import Records
-from hdcal.inference.checks import INDEPENDENT
+from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
 from hdcal.inference.linearisation import Linearisation, linearise
@@ -153,6 +153,7 @@ def misfits(
         gap_serves: whether the answer could be had with a leftover discrepancy.
     """
     left = residuals(posterior)
+    alike = correlation_check(posterior.draws, len(posterior.case.records.force))
     gap_serves = gap_serves and posterior.problem.discrepancy is None
     remedy = "Diagnose, or calibrate with a gap" if gap_serves else "Diagnose"
     return (
@@ -163,8 +164,8 @@ def misfits(
         ),
         *(fault.words for fault in left.noise),
         *(
-            f"{check.words[:1].upper()}{check.words[1:]}."
-            for check in posterior.checks
-            if check.name == INDEPENDENT and check.outcome == "warning"
+            [f"{alike.words[:1].upper()}{alike.words[1:]}."]
+            if alike.outcome == "warning"
+            else []
         ),
     )

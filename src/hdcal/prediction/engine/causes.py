@@ -190,8 +190,7 @@ def left_out_words(causes: Sequence[Cause]) -> list[str]:
         return []
     return [
         f"{percent(missing.probability)} of the probability lies on hypotheses that "
-        f"were not calibrated; it counts as {hypothesis(missing.counted_as)}, the "
-        "widest of the models that were."
+        f"were not calibrated; it counts as {hypothesis(missing.counted_as)}."
     ]
 
 

@@ -172,7 +172,7 @@ def _towards(target: _Target, point, sizes):
 
 @jax.jit
 def _weigh(target: _Target, points, sizes):
-    """Return the terms of points, each (point,)."""
+    """Return the terms of points, their leading axis."""
 
     def one(given):
         return target.terms(*given)
