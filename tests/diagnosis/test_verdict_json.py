@@ -139,6 +139,20 @@ def test_ambiguity_names_all_candidates_and_the_next_run():
     assert "charge leakage (needs holds, time)" in limits
 
 
+def test_candidates_come_in_the_order_of_what_is_shown():
+    """With pairs among them they sum to more than one, and that is said."""
+    verdict = KINDS["ambiguous"]()
+    which = replace(
+        verdict.which,
+        set=("none", "seating_slack", "progressive_stiffening"),
+        inclusion={"seating_slack": 0.5, "progressive_stiffening": 0.7},
+    )
+    told = " ".join(verdict_answer(replace(verdict, which=which)).answer)
+    order = "progressive stiffening (70 %), seating slack (50 %), no gap (2 %)"
+    assert f"it may be {order}; what acts together counts for each." in told
+    assert "acts together" not in text("ambiguous")
+
+
 def test_the_unknown_is_called_so():
     assert "Nothing in the library explains it" in text("unknown")
 

@@ -22,6 +22,7 @@ from hdcal.inference.noise_form import (
     why_independent,
 )
 from hdcal.inference.problem import build_problem
+from hdcal.inference.residuals import misfits
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Noise, Rows, parameters
@@ -161,6 +162,8 @@ def test_correlated_noise_widens_what_it_should(alike):
     # Of a line through 60 readings: √((1 + ρ)/(1 − ρ)) times, less what ρ may be.
     assert 1.5 < wide / narrow < 3.5
     assert correlation_check(found.draws, ROWS).outcome == "warning"
+    assert any("independent ones" in words for words in misfits(found))
+    assert not any("independent ones" in words for words in misfits(independent))
     told = {check.name: check for check in independent.checks}
     found = told["neighbouring readings err independently"]
     assert found.outcome == "note" and CORRELATION not in independent.draws

@@ -8,9 +8,10 @@ import pytest
 from posteriors import batch, single
 
 import hdcal
-from hdcal.prediction.margin.budget_words import stated_words
+from hdcal.prediction.margin.budget_words import coverage_words, stated_words
 from hdcal.prediction.margin.number_words import chance, newtons_down
 from hdcal.prediction.margin.sentences import answer, headline
+from hdcal.prediction.margin.stated import BudgetCheck
 
 
 @pytest.fixture(scope="module")
@@ -131,3 +132,10 @@ def test_an_uncertainty_is_never_rounded_down(posterior):
     for size, words in ((1.146, "1.2"), (1.2, "1.2"), (0.0801, "0.081"), (0.0, "0")):
         said = stated_words(replace(found, expanded_uncertainty_N=size))
         assert f"± {words} N" in said
+
+
+def test_a_law_of_very_many_degrees_of_freedom_is_called_normal():
+    check = BudgetCheck(80.0, 1.7, 5e6, 1.96, 76.7, 83.3, 76.7, 83.3, 0.05, 0.01, "-")
+    assert coverage_words(check) == "k = 1.96, normal"
+    few = replace(check, degrees_of_freedom=13.5, coverage_factor=2.15)
+    assert coverage_words(few) == "k = 2.15, Student t, 13.5 d.o.f."

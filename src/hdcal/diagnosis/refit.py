@@ -103,7 +103,8 @@ def weighed(
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)
-        fits[carrier] = fits.get(carrier) or calibrated(carrier)
+        if carrier not in fits:
+            fits[carrier] = calibrated(carrier)
         if not fits[carrier].usable and UNKNOWN not in fits:
             fits[UNKNOWN] = calibrated(UNKNOWN)
     usable = {name: fit for name, fit in fits.items() if fit.usable}

@@ -142,10 +142,11 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
 def misfits(
     posterior: Posterior, *, shapes: bool = True, gap_serves: bool = True
 ) -> tuple[str, ...]:
-    """Return a warning for all that the model left in the residuals, or barely holds.
+    """Return a warning for all that the model left in the residuals.
 
     For answers that take the model for right. A leftover discrepancy has taken what
-    depends on the deformation alone; a loop, for one, it cannot take.
+    depends on the deformation alone; a loop, for one, it cannot take. Noise that is so
+    correlated that intervals are too narrow is told too.
 
     Args:
         posterior: from `calibrate`.

@@ -201,12 +201,12 @@ def rare(force: PopulationForce, limit: float, seed: int = 0) -> Rare:
     if max(pareto_shape(weight), pareto_shape(weight * above)) > _UNTOLD:
         error = max(error, 1.0)
     # Without its prior σ would be as likely on any scale.
-    free, heavy = weight * np.exp(of_sigma.min() - of_sigma), _heavy(law, limit)
+    free = weight * np.exp(of_sigma.min() - of_sigma)
     return Rare(
         probability=share,
         relative_error=float(error),
         without_prior=_ratio(free, above) / share,
-        heavy_tailed=_ratio(weight, heavy) / share,
+        heavy_tailed=_ratio(weight, _heavy(law, limit)) / share,
     )
 
 
