@@ -83,6 +83,9 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     assert force["lo"] < 0.4 * 209 < force["hi"]
     assert "N/mm keeps the gear within 0.38 … 0.42 mm" in said["headline"]
     assert said["next_step"].startswith("Set the free end of a spring of ")
+    assert said["asked"]["tolerances_mm"] == {"wall_thickness_mm": 0.02}
+    page = (folder / "report.html").read_text("utf-8")
+    assert "wall thickness mm 0.02" in page.partition("What was asked")[2]
 
 
 @pytest.mark.usefixtures("undrawn")

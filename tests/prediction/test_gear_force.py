@@ -86,7 +86,7 @@ def test_blocks_of_designs_are_the_obvious_loop(make, monkeypatch):
 
 def limit(deformation, temperatures, probability) -> LimitAsked:
     """Return a limit of 60 N."""
-    return LimitAsked(deformation, temperatures, 60.0, None, probability, {})
+    return LimitAsked(deformation, temperatures, 60.0, None, probability, {}, {})
 
 
 @pytest.mark.parametrize("theory", ["ring", "cup"])

@@ -283,6 +283,10 @@ BAD = {
         "is given twice",
     ),
     "no number": (["{one}", "--deformation", "much"], "'much' is no number"),
+    "decimal comma": (
+        ["{one}", "--deformation", "0,4"],
+        "Write it like 0.4 mm, with a decimal point",
+    ),
 }
 
 

@@ -13,7 +13,13 @@ from hdcal.errors import Finding, Findings, InputError
 
 T = TypeVar("T")
 _QUANTITY = re.compile(r"\s*(?P<number>[-+0-9.eE]+)\s*(?P<unit>\S.*)?")
-_KINDS = {"N": "a force", "mm": "a length", "MPa": "a stress", "N/mm": "a spring rate"}
+_KINDS = {
+    "N": ("a force", "70 N"),
+    "mm": ("a length", "0.4 mm"),
+    "MPa": ("a stress", "70 MPa"),
+    "N/mm": ("a spring rate", "200 N/mm"),
+}
+_DECIMAL_COMMA = re.compile(r"\s*0,\d+\s*")
 
 
 class Parsed(click.ParamType):
@@ -69,8 +75,9 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     """
     from hdcal.data.units import UnitError, to_code
 
+    kind, example = _KINDS[unit]
     match = _QUANTITY.fullmatch(text)
-    remedy = f"Write it like 70 {unit}"
+    remedy = f"Write it like {example}, with a decimal point"
     try:
         number = float(match["number"]) if match else None
     except ValueError:
@@ -84,7 +91,7 @@ def read_quantity(text: str, option: str, *, unit: str) -> float:
     except UnitError as error:
         raise _refused(option, str(error), remedy) from None
     if code != unit:
-        words = f"'{text}' is not {_KINDS[unit]}: its unit is that of {code}"
+        words = f"'{text}' is not {kind}: its unit is that of {code}"
         raise _refused(option, words, remedy)
     return number * factor
 
@@ -134,6 +141,20 @@ def read_grid(text: str, option: str) -> list[float]:
         remedy = f"Write it like 0:0.6:61 or 0.1,0.2, {most}"
         raise _refused(option, words, remedy)
     return numbers
+
+
+def read_deformations(text: str, option: str) -> list[float]:
+    """Read a grid of deformations, where 0,4 may as well be 0.4.
+
+    Raises:
+        InputError: it is that, or no grid.
+    """
+    if _DECIMAL_COMMA.fullmatch(text):
+        first, second = text.strip().split(",")
+        words = f"'{text}' is a list of two numbers, or one with a decimal comma"
+        remedy = f"Write {first}.{second} for one, {first}:{second}:2 for two"
+        raise _refused(option, words, remedy)
+    return read_grid(text, option)
 
 
 def _range(text: str) -> list[float]:
@@ -244,7 +265,7 @@ def read_list(texts: Sequence[str], option: str) -> list[str]:
 
 
 ENDS = Parsed("LO:HI", read_ends)
-GRID = Parsed("START:STOP:COUNT", read_grid)
+DEFORMATIONS = Parsed("START:STOP:COUNT", read_deformations)
 NUMBERS = Parsed("LIST", read_grid)
 # Temperatures whose worst counts: a window is spread over eleven.
 WINDOW = Parsed("FROM:TO", partial(read_window, count=11))

@@ -69,12 +69,14 @@ class WindowAsked:
         temperature_C: at all of which it has to hold.
         probability: with which it has to hold.
         setting_sd_mm: scatter of the set point as built.
+        tolerances_mm: ± of sizes by edge name.
     """
 
     window_mm: Ends
     temperature_C: Numbers
     probability: Fraction
     setting_sd_mm: Size
+    tolerances_mm: Mapping[str, Size]
 
     @property
     def sense(self) -> LoadingSense:
@@ -179,6 +181,7 @@ class LimitAsked:
         limit_stress_MPa: hoop bending; None for the yield strength, if one is known.
         probability: share of the draws that have to keep each limit.
         bounds: of each free size [mm] by edge name.
+        tolerances_mm: ± of sizes by edge name.
     """
 
     deformation_mm: float
@@ -187,6 +190,7 @@ class LimitAsked:
     limit_stress_MPa: float | None
     probability: Fraction
     bounds: Mapping[str, Ends]
+    tolerances_mm: Mapping[str, Size]
 
     @property
     def sense(self) -> LoadingSense:

@@ -119,14 +119,14 @@ def inverse_design(
     at = np.nan if at is None else at
     levels = tuple(with_reference(draws, temperatures).tolist())
     limits = abs(limit_force), limit_stress, probability
-    asked = LimitAsked(at, levels, *limits, dict(vary))
+    asked = LimitAsked(at, levels, *limits, dict(vary), dict(tolerances or {}))
     with Findings() as wrong:
         wrong += _findings(draws, asked, materials, limit_force)
         listed = materials or [draws.material]
         made = [wrong.attempt(draws.of_material, name, seed) for name in listed]
         # What is no size at all is told as such.
         smallest = {name: low for name, (low, _) in vary.items() if low > 0.0}
-        gear = wrong.attempt(next_gear, draws, tolerances, seed, smallest)
+        gear = wrong.attempt(next_gear, draws, asked.tolerances_mm, seed, smallest)
     assert gear is not None
     return _nearest_design(draws, filter(None, made), gear, asked)
 

@@ -101,10 +101,11 @@ def wave_generator(
     """
     draws = design_draws(source, seed=seed)
     levels = tuple(with_reference(draws, temperatures).tolist())
-    asked = WindowAsked(window, levels, probability, setting_sd)
+    given = levels, probability, setting_sd, dict(tolerances or {})
+    asked = WindowAsked(window, *given)
     with Findings() as wrong:
         wrong += _findings(draws, asked, rates)
-        gear = wrong.attempt(next_gear, draws, tolerances, seed)
+        gear = wrong.attempt(next_gear, draws, asked.tolerances_mm, seed)
     assert gear is not None
     return _generator(draws, gear, asked, rates, seed)
 

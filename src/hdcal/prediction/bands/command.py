@@ -7,7 +7,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import GRID, NUMBERS
+from hdcal.cli.option_types import DEFORMATIONS, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
 
 # By these columns --force knows an older table.
@@ -18,7 +18,7 @@ _BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
 @click.argument("run", metavar="RUN")
 @click.option(
     "--deformation",
-    type=GRID,
+    type=DEFORMATIONS,
     required=True,
     help="Deformations as read [mm]: 0:0.6:61, or a list 0.1,0.2.",
 )
