@@ -11,13 +11,14 @@ from posteriors import (
     compensated,
     plain_draws,
     ramp_case,
+    regressed,
     single,
     stiffer,
     with_leftover,
     written_posterior,
 )
 from rigs import make_gear
-from scipy import stats
+from scipy import signal, stats
 
 import hdcal
 from hdcal.errors import InputError
@@ -27,6 +28,7 @@ from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import widest
 from hdcal.prediction.engine.population_force import SCORES, population_force
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio, tolerance_strata
+from hdcal.prediction.margin.sentences import answer
 
 QUICK = {"sensitivities": False}
 QUANTILE = jax.jit(Mixture.quantile)
@@ -216,10 +218,23 @@ def test_the_inverse_is_the_other_way_round(gears):
     assert again.force_N.median == pytest.approx(80.0, rel=1e-3)
 
 
+def test_what_is_reached_first_is_reached():
+    """Correlated readings know little of a bend: far out a share comes back again."""
+    rng = np.random.default_rng(0)
+    place = np.linspace(0.01, 0.54, 60)
+    noise = signal.lfilter([0.96], [1.0, -0.8], rng.normal(size=260))[200:]
+    found = regressed(place, 150.0 * place - 1.0 + noise, rng)
+    reached = hdcal.margin(found, 0.4, given_force=60.0, **QUICK).reached
+    assert reached.lower_bound_mm < reached.median_mm < reached.upper_bound_mm < 0.45
+    again = hdcal.margin(found, reached.upper_bound_mm, **QUICK).worst
+    assert again.lower_bound_N == pytest.approx(60.0, rel=2e-3)
+
+
 def test_a_force_that_nothing_reaches_is_said(gears):
-    found = hdcal.margin(gears, 0.4, given_force=600.0, **QUICK).reached
-    assert found.median_mm is found.lower_bound_mm is None
-    assert not found.tested
+    found = hdcal.margin(gears, 0.4, given_force=600.0, **QUICK)
+    assert found.reached.median_mm is found.reached.lower_bound_mm is None
+    assert not found.reached.tested
+    assert "600 N are reached nowhere within 0 … " in " ".join(answer(found))
 
 
 def test_beyond_the_tested_deformation_a_bend_widens(one):

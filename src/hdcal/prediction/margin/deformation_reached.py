@@ -1,7 +1,7 @@
 """The inverse: the deformation that a given force reaches.
 
-A member reaches the deformation at which it needs this force, so that the share that
-gets beyond w is the share that needs less at w. All of it is along the sense of the
+A member reaches the first deformation at which it needs this force, so that the share
+that gets beyond w is the share that needs less at w. All of it is along the sense of the
 force, which need not be the one that the rest of the question has.
 """
 
@@ -24,6 +24,8 @@ from hdcal.prediction.margin.request import Criteria
 REACH = 2.0
 # A deformation is found to this many mm, its share or force to as much [-, N].
 _CLOSE, _MOST_STEPS = 1e-11, 64
+# Beyond what was tested spreads grow, so that a share may pass and come back again.
+_STRETCHES = 64
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,7 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
     """
     (low, high), sense, (size, unrounded) = ends, conditions.loading, given
     method = optx.Bisection(rtol=0.0, atol=_CLOSE, flip=False)
+    places = jnp.linspace(low, high, _STRETCHES + 1)
 
     def of_draw(value):
         def excess(deformation, row):
@@ -113,17 +116,21 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
             return jnp.where(row == 2, mixture.centre() - size, short)
 
         def solve(row):
+            # What is reached first is reached.
+            passed = jax.lax.map(lambda place: excess(place, row) > 0.0, places)
+            first = jnp.maximum(jnp.argmax(passed), 1)
+            lower, upper = places[first - 1], places[first]
             found = optx.root_find(
                 excess,
                 method,
-                0.5 * (low + high),
+                0.5 * (lower + upper),
                 row,
-                options={"lower": low, "upper": high},
+                options={"lower": lower, "upper": upper},
                 max_steps=_MOST_STEPS,
                 throw=False,
             ).value
-            found = jnp.where(excess(high, row) <= 0.0, np.inf, found)
-            return jnp.where(excess(low, row) > 0.0, -np.inf, found)
+            found = jnp.where(passed.any(), found, np.inf)
+            return jnp.where(passed[0], -np.inf, found)
 
         return jax.vmap(solve)(jnp.arange(3))
 

@@ -238,7 +238,7 @@ def _inverse(found: Margin) -> Iterator[str]:
     if got is None:
         return
     low, high = got.searched_mm
-    beyond = f"not within {low:g} … {high:.3g} mm"
+    beyond = f"a deformation outside {low:g} … {high:.3g} mm"
 
     def at(value: float | None) -> str:
         return beyond if value is None else f"{value:.4g} mm"
@@ -249,6 +249,9 @@ def _inverse(found: Margin) -> Iterator[str]:
         span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} mm)"
     share = _percent(found.content)
     least, most = got.lower_bound_mm, got.upper_bound_mm
+    if got.median_mm is least is most is None:
+        yield f"{got.force_N:g} N are reached nowhere within {low:g} … {high:.3g} mm."
+        return
     if got.force_N < 0.0:
         least, most = most, least
     tested = "" if got.tested else " Part of this lies outside what was tested."
