@@ -58,6 +58,16 @@ def test_a_burst_is_not_outliers():
     assert changed(struck(scattered, signs)).which.effect == "outliers"
 
 
+def test_friction_is_named_beside_readings_that_are_very_wild():
+    """Without the loop they are less far off, and beside it farther than expected."""
+    case = simulated(rich(), {"coulomb_friction": {"force": 3.0}}, seed=5)
+    force = np.array(case.records.force)
+    force[[50, 131]] += 40.0 * NOISE
+    which = judged(make_case(replace(case.records, force=force))).which
+    assert which.verdict == "named" and not which.doubted
+    assert (which.effect, which.second_effect) == ("coulomb_friction", "outliers")
+
+
 @pytest.mark.parametrize("period", slice_of([2.7, 6.0], [6.0]))
 def test_a_hum_is_something_unknown(period):
     """No covariate shows it, only the order of the rows does."""

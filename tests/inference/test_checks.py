@@ -137,6 +137,22 @@ def test_a_median_far_in_the_tail_is_a_conflict():
     assert conflict_check({"x": GOOD + 3.5}, prior).outcome == "warning"
 
 
+def test_an_effect_far_from_its_prior_is_no_wrong_unit():
+    prior = dict.fromkeys(("x", "outliers.ratio"), Prior("normal", (0.0, 1.0)))
+    one = conflict_check({"outliers.ratio": GOOD + 4.0}, prior)
+    assert one.outcome == "warning" and "a prior of its own" in one.words
+    both = conflict_check({"outliers.ratio": GOOD + 4.0, "x": GOOD + 4.0}, prior)
+    assert "Is it a wrong unit" in both.words
+
+
+def test_what_a_lognormal_prior_lost_counts_in_logarithms():
+    """Far above its prior a parameter is as wide as that in N, but well known."""
+    draws, prior = 15.0 * np.exp(0.1 * GOOD), Prior("lognormal", (5.0, 0.3))
+    found = diagnose_parameters({"x": draws}, {"x": prior}, -draws, -draws)["x"]
+    assert found.contraction == pytest.approx(1.0 - 0.1**2 * np.var(GOOD) / 0.3**2)
+    assert found.driven_by == "data"
+
+
 def test_a_prior_that_cuts_the_answer_off_is_a_bound(good):
     """Beyond K = 2.3 the likelihood still rises: the draws pile up below it."""
     wanted = np.random.default_rng(7).normal(2.5, 0.15, 40_000)

@@ -5,26 +5,32 @@ test is repeated on the readings beside the likeliest hypothesis, its shape free
 differ as far as evidence allows. It moves no probability.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
-from hdcal.evidence.bursts import BURSTS, burst_odds
+from hdcal.evidence.bursts import BURSTS, burst_odds, is_noisy, relative_sd
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
 from hdcal.evidence.prepare import with_relative_noise
 from hdcal.evidence.remainder_evidence import beside_effects
 from hdcal.evidence.residual_test import residual_test
+from hdcal.physics.effect import Effect
 
 # Draws of pure noise for one hypothesis.
 _DRAWS = 600
 # A hypothesis with a smaller p-value leaves more than noise.
 _LEAST = 0.01
+# Noise of a wild reading, over a usual one's, with which it says nothing of the mean.
+_WILD = 1e3
 
 
 def leaves_more_than_noise(
     evidence: CaseEvidence,
     hypothesis: str,
     case: Case,
+    library: Mapping[str, type[Effect]],
     correlation: float,
     rng: np.random.Generator,
 ) -> bool:
@@ -34,6 +40,7 @@ def leaves_more_than_noise(
         evidence: of the case.
         hypothesis: effects joined with +.
         case: for its labels.
+        library: effects by name.
         correlation: AR(1) coefficient of the noise.
         rng: of the draws of pure noise.
     """
@@ -41,22 +48,16 @@ def leaves_more_than_noise(
     # Rounding in steps above the noise leaves a pattern that is no effect.
     if {NONE, UNKNOWN, QUANTISATION} & {*names}:
         return False
+    mean = next((name for name in names if name not in evidence.noise), "")
+    prepared = beside_effects(evidence, names)
     for noise in {*names} & evidence.noise.keys():
-        relative = evidence.noise[noise].relative_sd
+        relative = relative_sd(evidence, library, noise, mean)
         if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
             return True
-    return _p_value(evidence, names, case, correlation, rng) < _LEAST
-
-
-def _p_value(
-    evidence: CaseEvidence, names: list[str], case: Case, correlation: float, rng
-) -> float:
-    """Return the p-value of the mean beside a hypothesis at its best fit."""
-    prepared = beside_effects(evidence, names)
-    for name in names:
-        if name in evidence.noise:
-            noise = evidence.noise[name].relative_sd
-            prepared = with_relative_noise(prepared, noise)
+        if library[noise].mixture:
+            # However far off a wild reading is: of these the signs have been judged.
+            relative = np.where(is_noisy(relative), _WILD, relative)
+        prepared = with_relative_noise(prepared, relative)
     _, directions = declared_directions(evidence, case)
     tested = residual_test(prepared, correlation, directions, rng, draws=_DRAWS)
-    return tested.mean_p_value
+    return tested.mean_p_value < _LEAST

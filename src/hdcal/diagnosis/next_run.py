@@ -13,7 +13,7 @@ import numpy as np
 from hdcal.diagnosis.candidate_runs import ROWS, CandidateRun, candidate_runs
 from hdcal.diagnosis.model_posterior import ModelPosterior
 from hdcal.diagnosis.verdict import NextRun
-from hdcal.evidence.case_evidence import NONE, CaseEvidence, with_remainder
+from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
 from hdcal.evidence.design_matrix import DesignMatrix, fit_design, join_designs
 from hdcal.evidence.effect_curves import effect_curves
 from hdcal.evidence.hypothesis_design import design_of
@@ -67,14 +67,17 @@ def rank_runs(
 
 
 def _candidates(evidence: CaseEvidence, posterior: ModelPosterior) -> dict[str, float]:
-    """Return the likeliest effects without another, and none, with their shares."""
-    allowed = {NONE, *evidence.single.names, *evidence.subspace_effects}
-    chance = posterior.probabilities
-    share = {
-        n: p + chance.get(with_remainder(n), 0.0)
-        for n, p in chance.items()
-        if n in allowed
-    }
+    """Return the likeliest effects, and none, with their shares.
+
+    What stands beside an effect on the noise, or a remainder, tells a run nothing.
+    """
+    allowed = NONE, *evidence.single.names, *evidence.subspace_effects
+    share = dict.fromkeys(allowed, 0.0)
+    for name, chance in posterior.probabilities.items():
+        alone = {*name.split("+")} - {*evidence.on_noise} or {NONE}
+        mean = "+".join(alone - {UNKNOWN})
+        if mean in share:
+            share[mean] += chance
     best = sorted(share, key=lambda name: -share[name])[:_MOST]
     best = [n for n in best if share[n] >= _LEAST_SHARE]
     if len(best) > 2 and NONE in best:

@@ -148,7 +148,9 @@ def which_section(found: VerdictAnswer) -> Section:
     note = (
         f"Bold: the fewest that make up 90 %. {rest}An effect stands here alone; the "
         "answer's percentage counts all that hold it. Log evidence in nats: three are "
-        "a factor of twenty."
+        "a factor of twenty. Something outside the library also counts what may last "
+        "in what looks like noise, and what stands beside an effect that carries too "
+        "little of the gap."
     )
     caption = (
         "Every hypothesis was weighed against the same data. “Something outside the "

@@ -49,7 +49,7 @@ def identify_cause(
     group = leading_group(posterior, library, alike, noise)
     ranked = ranked_effects(posterior, noise)
     doubt = found.detected and leaves_more_than_noise(
-        evidence, posterior.top, case, found.correlation, rng.spawn(1)[0]
+        evidence, posterior.top, case, library, found.correlation, rng.spawn(1)[0]
     )
     best = ranked[0] if ranked else ""
     unseen = untestable_lookalikes(evidence, best, library)

@@ -51,7 +51,7 @@ def with_bursts(
     correlation = evidence.likeliest_correlation
     for effect, noise in _candidates(evidence, log_prior):
         pair, key = _keys(effect, noise)
-        relative = _relative_sd(evidence, library[noise], noise, effect)
+        relative = relative_sd(evidence, library, noise, effect)
         names = [effect] if effect else []
         log_odds, off = burst_odds(evidence, names, relative, correlation)
         # As seldom beforehand beside the noise in whose place it stands.
@@ -107,14 +107,29 @@ def _mixed(
     return np.concatenate([np.full(count, share), closed[count:]])
 
 
-def _relative_sd(
-    evidence: CaseEvidence, noisy: type[Effect], noise: str, effect: str
+def relative_sd(
+    evidence: CaseEvidence, library: Mapping[str, type[Effect]], noise: str, effect: str
 ) -> np.ndarray:
-    """Return the noise of each row as an effect has it beside another, (n,)."""
+    """Return the noise of each row over that of a usual one, (n,).
+
+    Beside a loop of friction, which leaves little, wild readings are farther off than
+    on their own.
+
+    Args:
+        evidence: of the case.
+        library: effects by name.
+        noise: name of an effect on the noise.
+        effect: beside which it stands, "" for none.
+    """
     if not effect:
         return evidence.noise[noise].relative_sd
     curve = fitted_curve(evidence, effect)
-    return noise_evidence(noisy, evidence.prepared, curve).relative_sd
+    return noise_evidence(library[noise], evidence.prepared, curve).relative_sd
+
+
+def is_noisy(relative: np.ndarray) -> np.ndarray:
+    """Tell which readings are noisier than the middle one, of `relative_sd`."""
+    return relative > _NOISY * np.median(relative)
 
 
 def burst_odds(
@@ -142,8 +157,7 @@ def burst_odds(
     left = rows.reading - fit.predict()
     # Serial correlation alone makes neighbours agree.
     error = whiten(rows, left, correlation)
-    noisy = relative > _NOISY * np.median(relative)
-    before = rows.before
+    noisy, before = is_noisy(relative), rows.before
     both = noisy & (before >= 0) & noisy[before]
     same = int(np.sum(both & (error * error[before] > 0.0)))
     return log_sign_odds(same, int(np.sum(both))), np.where(noisy, left, 0.0)

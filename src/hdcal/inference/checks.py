@@ -20,6 +20,8 @@ from hdcal.inference.serial_correlation import CORRELATION
 INDEPENDENT = "neighbouring readings err independently"
 # Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
+# How it ends where the data themselves may be others than they seem.
+SUSPECT = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
 # Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.
@@ -191,19 +193,22 @@ def conflict_check(
     draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]
 ) -> Check:
     """Say which posteriors lie where their prior thought nothing would be."""
-    far = []
+    far = {}
     for parameter, values in draws.items():
         prior, median = frozen(priors[parameter]), float(np.median(values))
         # A density that is highest at zero, as of an effect, expects a zero.
         below = np.inf if _peaks_at_zero(priors[parameter]) else prior.cdf(median)
         if 2.0 * min(below, prior.sf(median)) < CONFLICT_TAIL:
             low, high = prior.interval(1.0 - CONFLICT_TAIL)
-            far.append(f"{parameter} = {median:.3g}, expected {low:.3g} to {high:.3g}")
+            far[parameter] = f"{median:.3g}, expected {low:.3g} to {high:.3g}"
     if not far:
         return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
-    words = f"far outside what was expected before the data: {listed(far)}"
-    remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
-    return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
+    each = [f"{name} = {about}" for name, about in far.items()]
+    words = f"far outside what was expected before the data: {listed(each)}"
+    # A wrong unit shows in more than in parameters of effects.
+    of_effects = all("." in name for name in far)
+    remedy = "Where the rig explains it, give it a prior of its own"
+    return Check(PLAUSIBLE, "warning", f"{words}. {remedy if of_effects else SUSPECT}")
 
 
 def _peaks_at_zero(prior: Prior) -> bool:

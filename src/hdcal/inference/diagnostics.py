@@ -43,7 +43,7 @@ class Diagnosis(Mixing):
     """Mixing, and what drives a parameter.
 
     Attributes:
-        contraction: 1 − var(posterior)/var(prior).
+        contraction: 1 − var(posterior)/var(prior), of a lognormal prior in logarithms.
         prior_sensitivity: change of the posterior when the priors are power-scaled.
         likelihood_sensitivity: likewise for the likelihood.
         driven_by: whether the data or the prior decide the parameter.
@@ -87,17 +87,28 @@ def diagnose_parameters(
         to_data = _sensitivity(tree, "likelihood")
     found = {}
     for name, values in draws.items():
-        contraction = 1.0 - values.var() / frozen(priors[name]).var()
+        contraction = _contraction(values, priors[name])
         weak = to_data[name] < SENSITIVE < to_prior[name]
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
         found[name] = Diagnosis(
             **vars(mixed[name]),
-            contraction=float(contraction),
+            contraction=contraction,
             prior_sensitivity=to_prior[name],
             likelihood_sensitivity=to_data[name],
             driven_by="data" if contraction >= enough else "prior",
         )
     return found
+
+
+def _contraction(draws: np.ndarray, prior: Prior) -> float:
+    """Return which share of the prior's variance the data removed.
+
+    A lognormal prior is wider in N where the parameter is larger; in logarithms its
+    width is everywhere the same.
+    """
+    if prior.family == "lognormal":
+        return float(1.0 - np.log(draws).var() / float(prior.numbers[1]) ** 2)
+    return float(1.0 - draws.var() / frozen(prior).var())
 
 
 def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:

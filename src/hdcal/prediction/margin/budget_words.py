@@ -80,7 +80,7 @@ def halved_by(part: Component, force: PopulationForce) -> str:
     if name in ("zero_drift", "frame"):
         return f"readings at {float(where.temperature):g} °C"
     rows = len(force.cause.posterior.case.records.force)
-    return f"about {4 * rows} independent readings instead of {rows}"
+    return f"about {4 * rows} such readings instead of {rows}"
 
 
 def _more_members(count: int, what: str) -> str:

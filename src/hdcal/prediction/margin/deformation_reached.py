@@ -1,8 +1,8 @@
 """The inverse: the deformation that a given force reaches.
 
 A member reaches the first deformation at which it needs this force, so that the share
-that gets beyond w is the share that needs less at w. All of it is along the sense of the
-force, which need not be the one that the rest of the question has.
+that gets beyond w is the share that needs less at w. All of it is along the sense of
+the force, which need not be the one that the rest of the question has.
 """
 
 from collections.abc import Sequence
