@@ -32,7 +32,7 @@ GROUPS = {
         "the same forces on a cell of twice the range; unloading shows a yield",
     ),
     "loop": Group(
-        "loading and unloading part",
+        "loading and unloading differ",
         "calibrate on loading alone or on both in equal number, grease and free the "
         "guides, and widen margins by half the loop",
         "small inner loops, and a second loading of the same specimen",

@@ -80,7 +80,7 @@ def headline(found: Margin) -> str:
     return (
         f"At {found.deformation_mm:g} mm {_percent(found.content)} of {_many(found)} "
         f"need at most {_at_most(found, found.worst)}, with "
-        f"{_percent(found.confidence)} confidence."
+        f"{_percent(found.confidence)} confidence{_if_bent_so(found)}."
     )
 
 
