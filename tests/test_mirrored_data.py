@@ -114,6 +114,7 @@ def test_a_stream_of_pulls_alarms_at_a_change(runs: dict[str, Path]):
     assert any(found["alarm"] for found in answers[15:])
 
 
+@pytest.mark.thorough
 def test_a_capacity_of_the_other_sign_names_its_option(here: Hdcal, runs, tmp_path):
     asked = ["--deformation", "0.4", "--limit-force", "-70"]
     done = here("margin", runs[""], *asked, "--out", "result")

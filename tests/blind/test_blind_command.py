@@ -427,6 +427,7 @@ def test_an_interrupted_run_goes_on_where_it_stopped(
     assert kept.items() <= seen(fresh / "answers-hdcal").items()
 
 
+@pytest.mark.thorough
 def test_several_processes_answer_the_same(
     fresh: Path, answered: Path, frozen_data: dict
 ):

@@ -202,6 +202,7 @@ def test_predict_writes_a_file_or_json(
     assert [path.name for path in tmp_path.iterdir()] == ["bands.csv"]
 
 
+@pytest.mark.thorough
 def test_without_a_writable_cache_it_works_too(
     calibrated: Calibrated, hdcal: Hdcal, tmp_path: Path
 ):

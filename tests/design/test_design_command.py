@@ -243,6 +243,7 @@ def test_bad_input_is_told_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.thorough
 @pytest.mark.usefixtures("undrawn")
 def test_the_longest_table_is_cut_and_says_so(folders: dict[str, Path]):
     gear = read_gear(XB1 / "gear.toml")

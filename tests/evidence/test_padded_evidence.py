@@ -81,6 +81,7 @@ def test_rows_that_were_not_measured_would_be_noticed(padded, monkeypatch):
     assert np.max(np.abs(wrong["outliers"] - padded["outliers"])) > 0.1
 
 
+@pytest.mark.thorough
 def test_sizes_of_one_bucket_share_every_executable():
     assert bucket_size(42) == bucket_size(48) != bucket_size(54)
     # Made beforehand: to simulate readings compiles for their own number of rows.

@@ -34,6 +34,7 @@ def evidence_of(case):
     return with_remainders(found, np.random.default_rng(0))
 
 
+@pytest.mark.thorough
 def test_friction_with_a_small_wave_is_friction_and_something_else():
     which = judged(waves(simulated(rich(), FRICTION, seed=1), 1.5 * NOISE)).which
     assert which.verdict == "named"

@@ -118,6 +118,7 @@ def test_names_of_many_records():
     assert told >= 36 and wrong <= 1, (told, wrong)
 
 
+@pytest.mark.thorough
 def test_long_records_keep_the_linear_model_and_say_so(monkeypatch):
     monkeypatch.setattr(loss, "MOST_ROWS", 100)
     found = chosen(frictional_case(0, *TRUTHS["both"]))

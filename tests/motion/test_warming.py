@@ -60,6 +60,7 @@ def test_alpha_is_found_in_a_record_that_warms(posterior):
     assert held.mean() >= 0.9
 
 
+@pytest.mark.thorough
 def test_at_one_temperature_alpha_is_left_to_its_prior():
     case = warming_case(1, 0.0)
     problem = build_dynamic(case, dynamic_site_priors(case, "ring"), "ring")

@@ -8,6 +8,7 @@ import pytest
 from posteriors import batch, plain_draws, ramp_case, written_posterior
 from rigs import cycles, make_case, make_records
 from short import SHORT
+from slices import slice_of
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.errors import InputError, NotUsable
@@ -87,7 +88,7 @@ LOOPS = {
 }
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", slice_of(LOOPS, ["hysteresis"]))
 def test_what_remembers_came_its_own_way(name: str, monkeypatch):
     """Each row is of another gear, unloaded from where the tested one was farthest."""
     case, count = ramp_case(known={"unloading"}), 4

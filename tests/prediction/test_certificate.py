@@ -49,6 +49,7 @@ def longest(tmp_path_factory) -> Path:
     return page
 
 
+@pytest.mark.thorough
 def test_the_longest_certificate_is_one_page(longest: Path, tmp_path: Path):
     assert print_pages(longest, tmp_path) == 1
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from posteriors import batch, single
-from slices import slice_of
 
 import hdcal
 from hdcal.errors import InputError
@@ -13,7 +12,8 @@ QUICK = {"limit_force": 95.0, "sensitivities": False}
 
 
 @pytest.mark.usefixtures("counted")
-@pytest.mark.parametrize("make", slice_of([single, batch], [single]))
+@pytest.mark.thorough
+@pytest.mark.parametrize("make", [single, batch])
 def test_each_is_what_it_is_alone(make):
     posterior, warm = make(size=500), np.linspace(-40.0, 120.0, 100_000)
     found = hdcal.margin(posterior, 0.4, temperature=warm, **QUICK)

@@ -112,6 +112,7 @@ def test_a_leftover_far_out_is_found_alike_from_every_seed():
     assert np.std(chances) < 0.2 * np.mean(chances)
 
 
+@pytest.mark.thorough
 def test_where_a_fitted_leftover_has_no_part_a_search_has_its_slope(monkeypatch):
     """So far beyond the tested deformation that its share is nothing at all."""
     (cause,) = causes_of(with_leftover())
