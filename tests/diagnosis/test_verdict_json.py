@@ -126,7 +126,7 @@ def test_a_named_cause_is_told_without_statistics():
 def test_no_gap_says_what_would_be_too_small_to_see():
     words = text("none")
     assert "No gap is seen" in words
-    assert "Too small to be seen here: a gap of less than about 0.18 N" in words
+    assert "Too small to be seen here: a gap of less than about 0.2 N" in words
     assert NO_PROOF not in plain("none")["limits"]
 
 
@@ -151,6 +151,18 @@ def test_candidates_come_in_the_order_of_what_is_shown():
     order = "progressive stiffening (70 %), seating slack (50 %), no gap (2 %)"
     assert f"it may be {order}; what acts together counts for each." in told
     assert "acts together" not in text("ambiguous")
+
+
+def test_readings_whose_neighbours_err_alike_are_said_to_tell_less():
+    verdict = KINDS["none"]()
+    assert not any("err alike" in line for line in verdict_answer(verdict).limits)
+    alike = replace(verdict, gap=replace(verdict.gap, autocorrelation=0.8))
+    told = verdict_answer(alike)
+    rows = told.data.rows_diagnosed
+    words = f"{rows} tell about as much as {rows / 9.0:.0f} independent ones"
+    assert words in told.limits[0]
+    smallest = [found.answer[1] for found in (verdict_answer(verdict), told)]
+    assert "Too small to be seen" in smallest[0] and smallest[0] != smallest[1]
 
 
 def test_the_unknown_is_called_so():
@@ -190,8 +202,8 @@ def test_of_means_the_noise_is_that_of_a_mean():
     obeys(json.loads(as_json(found)), VerdictAnswer)
     words = " ".join(found.answer)
     assert "the noise of a mean of 3 readings is 0.3 N" in words
-    # 4.2 · 0.3 / √48
-    assert "a gap of less than about 0.18 N" in words
+    # 4.2 · 0.3 / √(48 · (1 − 0.1) / (1 + 0.1))
+    assert "a gap of less than about 0.2 N" in words
     assert "the noise of a reading is 0.3 N" in text("none")
 
 

@@ -172,7 +172,9 @@ def test_another_mounting_may_have_another_zero(gear, truths):
 BAD = [
     ((np.nan, 1.0), {}, "deformation of nan mm does not lie"),
     ((0.1, np.inf), {}, "force of inf N does not lie"),
-    ((40.0, 1.0), {}, "none of this gear"),
+    ((40.0, 1.0), {}, "a deformation of 40 mm is none of this gear"),
+    ((0.1, 45e3), {}, "a force of 45000 N is none of this gear"),
+    ((0.1, -45e3), {}, "a force of -45000 N is none of this gear"),
     ((0.1, 1e300), {}, r"force of 1e\+300 N does not lie between -1000000000"),
     ((0.1, 1.0), {"temperature": -300.0}, "absolute zero"),
     ((0.1, 1.0), {"temperature": 2.9e3}, "leaves nothing"),

@@ -27,7 +27,10 @@ NO_PROOF = (
     "close it as well."
 )
 
-# A gap of r noise sds in n rows is detected nine times in ten from r √n = 4.2 on.
+# A correlation of neighbours from which on it is told.
+_ALIKE = 0.5
+# A gap of r noise sds in n independent rows is detected nine times in ten from
+# r √n = 4.2 on.
 _DETECTABLE = 4.2
 
 
@@ -89,7 +92,25 @@ def one_reading(found: VerdictAnswer) -> str:
 def limits(found: VerdictAnswer) -> list[str]:
     """Return what this verdict cannot say, in sentences."""
     which = found.which
-    return [*_blind(which), PROPORTIONAL, *([NO_PROOF] if _closes(found) else [])]
+    proof = [NO_PROOF] if _closes(found) else []
+    return [*_correlated(found), *_blind(which), PROPORTIONAL, *proof]
+
+
+def _correlated(found: VerdictAnswer) -> Iterator[str]:
+    """Say how little readings tell whose neighbours err very much alike."""
+    if known(rho := found.gap.autocorrelation) and rho >= _ALIKE:
+        yield (
+            f"Neighbouring readings err alike, with a correlation of {rho:.2f}: these "
+            f"{found.data.rows_diagnosed} tell about as much as {_worth(found):.0f} "
+            "independent ones."
+        )
+
+
+def _worth(found: VerdictAnswer) -> float:
+    """Return as how many independent readings these tell about a mean."""
+    rho = found.gap.autocorrelation
+    rho = max(rho, 0.0) if known(rho) else 0.0
+    return found.data.rows_diagnosed * (1.0 - rho) / (1.0 + rho)
 
 
 def _blind(which: Which) -> Iterator[str]:
@@ -136,8 +157,7 @@ def _none(found: VerdictAnswer) -> Iterator[str]:
 
 def _unseen(found: VerdictAnswer) -> str:
     """Say how small a gap could go unseen, on average and in a range of deformation."""
-    noise, rows = found.gap.noise_sd_N, found.data.rows_diagnosed
-    mean = newton(_DETECTABLE * noise / rows**0.5)
+    mean = newton(_DETECTABLE * found.gap.noise_sd_N / _worth(found) ** 0.5)
     widths = [
         cell.bias_N.hi - cell.bias_N.median
         for cell in found.where.cells

@@ -7,9 +7,12 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.inference.posterior import Posterior
+from hdcal.tracking.linear_core import STIFFNESS
 from hdcal.tracking.stream_prior import StreamPrior
 
 _NEAR_K, _NEAR_MM = 1.0, 1e-9
+# A gear is hardly stiffer than this quantile, nor so many times as stiff farther on.
+_SURE, _STIFFENING = 0.999, 2.0
 
 
 @dataclass(frozen=True)
@@ -19,12 +22,14 @@ class ReadingLimits:
     Attributes:
         radius: of the gear, in the deformation as read [mm].
         hottest: temperature at which half of the modulus is lost [°C].
+        strongest: size of a force that would press it beyond its radius [N].
         needs: what the effects look at.
         tested: ends of deformation [mm] and of temperature [°C], or None.
     """
 
     radius: float
     hottest: float
+    strongest: float
     needs: frozenset[str] = frozenset()
     tested: tuple[float, ...] | None = None
 
@@ -45,6 +50,8 @@ class ReadingLimits:
             raise ValueError(
                 f"a deformation of {deformation:g} mm is none of this gear"
             )
+        if abs(force) > self.strongest:
+            raise ValueError(f"a force of {force:g} N is none of this gear")
         if temperature is not None and temperature > self.hottest:
             raise ValueError(f"{temperature:g} °C leaves nothing of the stiffness")
 
@@ -67,11 +74,13 @@ def reading_limits(known: Posterior | Gear, prior: StreamPrior) -> ReadingLimits
     # Where the linear law E(T) has lost half of the modulus; never hotter than that.
     alpha = max(float(np.median(prior.base.alpha)), 1e-5)
     hottest = gear.reference_temperature + 0.5 / alpha
+    stiffest = np.quantile(np.abs(prior.coefficients()[:, STIFFNESS]), _SURE)
+    ends_of_gear = gear.reach, hottest, _STIFFENING * float(stiffest) * gear.reach
     if isinstance(known, Gear):
-        return ReadingLimits(gear.reach, hottest)
+        return ReadingLimits(*ends_of_gear)
     rows = known.case.records
     low, high = np.min(rows.deformation), np.max(rows.deformation)
     cold, warm = np.min(rows.temperature), np.max(rows.temperature)
     ends = (low - _NEAR_MM, high + _NEAR_MM, cold - _NEAR_K, warm + _NEAR_K)
     needs = frozenset().union(*(effect.needs for effect in known.problem.effects))
-    return ReadingLimits(gear.reach, hottest, needs, tuple(map(float, ends)))
+    return ReadingLimits(*ends_of_gear, needs, tuple(map(float, ends)))

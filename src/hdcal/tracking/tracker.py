@@ -236,11 +236,12 @@ class Tracker:
             f"{self.rows} rows, {self.alarms} alarms; without a change {due:.2g} false "
             f"ones are due in {self._readings} readings"
         )
-        if self._noise.value:
-            words += (
-                "; readings are correlated with the one before "
-                f"({self._noise.value:.2f}), which is taken into account"
-            )
+        if rho := self._noise.value:
+            so = "as they are where a change is followed slowly"
+            so = so if self.alarms else "which is taken into account"
+            words += f"; readings are correlated with the one before ({rho:.2f}), {so}"
+        if self.alarms and not self._reopen:
+            words += "; `reopen` above 0 learns a changed gear anew"
         return words + self._full_scale.at_end()
 
     def _mount(self, run: str | None) -> None:
