@@ -6,10 +6,11 @@ import math
 from dataclasses import replace
 
 import jsonschema
+import numpy as np
 import pytest
 from rigs import cycles, make_case
 from schema_checks import obeys
-from verdicts import KINDS, named
+from verdicts import KINDS, NOISE, named
 
 from hdcal.diagnosis.answer import VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.gap import Cell
@@ -159,10 +160,11 @@ def test_readings_whose_neighbours_err_alike_are_said_to_tell_less():
     alike = replace(verdict, gap=replace(verdict.gap, autocorrelation=0.8))
     told = verdict_answer(alike)
     rows = told.data.rows_diagnosed
-    words = f"{rows} tell about as much as {rows / 9.0:.0f} independent ones"
-    assert words in told.limits[0]
-    smallest = [found.answer[1] for found in (verdict_answer(verdict), told)]
-    assert "Too small to be seen" in smallest[0] and smallest[0] != smallest[1]
+    correlation = 0.8 ** np.abs(np.subtract.outer(np.arange(rows), np.arange(rows)))
+    worth = np.linalg.inv(correlation).sum()
+    assert f"{rows} tell about as much as {worth:.0f} independent" in told.limits[0]
+    least = newton(4.2 * NOISE / np.sqrt(worth))
+    assert f"a gap of less than about {least} on average" in " ".join(told.answer)
 
 
 def test_the_unknown_is_called_so():
@@ -202,7 +204,7 @@ def test_of_means_the_noise_is_that_of_a_mean():
     obeys(json.loads(as_json(found)), VerdictAnswer)
     words = " ".join(found.answer)
     assert "the noise of a mean of 3 readings is 0.3 N" in words
-    # 4.2 · 0.3 / √(48 · (1 − 0.1) / (1 + 0.1))
+    # 4.2 · 0.3 / √((48 − 46 · 0.1) / (1 + 0.1))
     assert "a gap of less than about 0.2 N" in words
     assert "the noise of a reading is 0.3 N" in text("none")
 

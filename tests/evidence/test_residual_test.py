@@ -9,7 +9,9 @@ from dense import NOISE, covariance, prepared_case
 from scipy import stats
 
 from hdcal.evidence.linear_rows import whiten
+from hdcal.evidence.prepare import with_rows
 from hdcal.evidence.residual_test import Directions, pull_back, residual_test
+from hdcal.inference.serial_correlation import previous_rows
 
 SIZE, RUNS = 24, 240
 
@@ -69,6 +71,24 @@ def test_p_values_of_noise_are_uniform(statistic, correlation):
 def test_noise_fails_the_test_as_seldom_as_it_says(correlation):
     alarms = sum(g.p_value <= 0.05 for g in null_tests(correlation, correlation))
     assert stats.binomtest(alarms, RUNS, 0.05, "greater").pvalue > 1e-3
+
+
+def test_rows_left_out_say_nothing_and_hide_nothing():
+    """A wild reading in the midst of a cell that is off."""
+    prepared, kept = prepared_case(), np.ones(SIZE, bool)
+    kept[[0, 13]] = False
+    there = Directions(*(column[kept] for column in vars(directions()).values()))
+    off = NOISE * np.random.default_rng(3).normal(size=SIZE)
+    off += 4.0 * NOISE * directions().cells[:, 3]
+    found = []
+    for wild in (30.0, 3000.0):
+        reading = off + wild * NOISE * ~kept
+        rows = replace(prepared.rows, reading=reading)
+        one = with_rows(replace(prepared, rows=rows), kept)
+        np.testing.assert_array_equal(one.rows.before, previous_rows(one.records))
+        found.append(residual_test(one, 0.5, there, np.random.default_rng(0)))
+    assert found[0].mean_p_value == found[1].mean_p_value < 0.05
+    assert np.argmax(np.abs(found[0].z[:4])) == 3
 
 
 def test_serial_noise_taken_for_independent_is_noticed():

@@ -141,6 +141,7 @@ def test_an_effect_far_from_its_prior_is_no_wrong_unit():
     prior = dict.fromkeys(("x", "outliers.ratio"), Prior("normal", (0.0, 1.0)))
     one = conflict_check({"outliers.ratio": GOOD + 4.0}, prior)
     assert one.outcome == "warning" and "a prior of its own" in one.words
+    assert one.name == "prior and effects agree"
     both = conflict_check({"outliers.ratio": GOOD + 4.0, "x": GOOD + 4.0}, prior)
     assert "Is it a wrong unit" in both.words
 

@@ -234,7 +234,18 @@ def test_a_force_that_nothing_reaches_is_said(gears):
     found = hdcal.margin(gears, 0.4, given_force=600.0, **QUICK)
     assert found.reached.median_mm is found.reached.lower_bound_mm is None
     assert not found.reached.tested
-    assert "600 N are reached nowhere within 0 … " in " ".join(answer(found))
+    assert " mm needs 600 N." in " ".join(answer(found))
+
+
+def test_towards_the_other_sense_no_spread_grows():
+    """Of a gear pushed and pulled, 60 N are reached as if it had only been pushed."""
+    rng = np.random.default_rng(0)
+    place = np.linspace(-0.5, 0.5, 60)
+    noise = signal.lfilter([1.44], [1.0, -0.8], rng.normal(size=260))[200:]
+    found = regressed(place, 150.0 * place - 1.0 + noise, rng)
+    reached = hdcal.margin(found, 0.4, given_force=60.0, **QUICK).reached
+    assert reached.searched_mm == pytest.approx((-0.5, 1.0))
+    assert 0.3 < reached.lower_bound_mm < reached.upper_bound_mm < 0.5
 
 
 def test_beyond_the_tested_deformation_a_bend_widens(one):

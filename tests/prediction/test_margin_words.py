@@ -56,6 +56,8 @@ def test_far_outside_no_bound_is_called_sure():
     assert (near.basis, far.basis) == ("A-basis", "")
     assumed = "if nothing but the assumed bend"
     assert assumed in headline(far) and assumed not in headline(near)
+    bare = hdcal.margin(gears, 0.9, sensitivities=False)
+    assert assumed in headline(bare) and bare.limit_force_N is None
     assert "test there before you rely on it" in far.extrapolated[0]
     assert "rely on it" not in near.extrapolated[0]
     inside = hdcal.margin(gears, 0.4, limit_force=400.0)

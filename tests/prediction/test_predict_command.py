@@ -78,8 +78,8 @@ def test_all_that_is_wrong_is_said_at_once(here: Hdcal, runs: Path):
 
 
 def test_a_decimal_comma_is_no_list_of_deformations(here: Hdcal, runs: Path):
-    done = here("predict", runs / "plain", "--deformation", "0,4")
+    done = here("predict", runs / "plain", "--deformation=-0,4")
     assert done.returncode == 2 and done.stdout == ""
     said = " ".join(done.stderr.split())
-    assert "'0,4' is a list of two numbers, or one with a decimal comma" in said
-    assert "Write 0.4 for one, 0:4:2 for two" in said
+    assert "'-0,4' is a list of two numbers, or one with a decimal comma" in said
+    assert "Write -0.4 for one, -0:4:2 for two" in said

@@ -169,6 +169,14 @@ def test_the_answer_and_the_words_state_the_rate():
     )
 
 
+def test_more_alarms_than_chance_gives_are_followed_by_advice():
+    tracker = start(alarm_rows=500.0)
+    tracker.rows = tracker._readings = 600
+    for alarms, said in ((1, False), (4, False), (5, True)):
+        tracker.alarms = alarms
+        assert ("learned anew" in tracker.summary()) is said
+
+
 def test_whitened_rows_give_the_least_squares_answer_of_correlated_ones():
     """Against one problem of all rows and their covariance, the slow twin."""
     rng, rho, count = np.random.default_rng(3), 0.6, 80

@@ -5,7 +5,7 @@ from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
-from hdcal.inference.checks import SUSPECT
+from hdcal.inference.checks import PLAUSIBLE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
 from hdcal.inference.residuals import Residuals
@@ -75,7 +75,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
             "still fails, look at the data and leave effects out."
         ]
     known = posterior.case.records.known
-    odd = any(check.words.endswith(SUSPECT) for check in posterior.checks)
+    odd = any(c.name == PLAUSIBLE and c.outcome == "warning" for c in posterior.checks)
     steps = [_IMPLAUSIBLE] * odd
     steps += [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [words for name, words in _LACKING.items() if name not in known]

@@ -19,7 +19,7 @@ _KINDS = {
     "MPa": ("a stress", "70 MPa"),
     "N/mm": ("a spring rate", "200 N/mm"),
 }
-_DECIMAL_COMMA = re.compile(r"\s*0,\d+\s*")
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?0,\d+\s*")
 
 
 class Parsed(click.ParamType):
@@ -146,13 +146,15 @@ def read_grid(text: str, option: str) -> list[float]:
 def read_deformations(text: str, option: str) -> list[float]:
     """Read a grid of deformations, where 0,4 may as well be 0.4.
 
+    A list that begins with 1, such as 1,5, is taken for one.
+
     Raises:
-        InputError: it is that, or no grid.
+        InputError: it may be a decimal comma, or is no grid.
     """
     if _DECIMAL_COMMA.fullmatch(text):
         first, second = text.strip().split(",")
         words = f"'{text}' is a list of two numbers, or one with a decimal comma"
-        remedy = f"Write {first}.{second} for one, {first}:{second}:2 for two"
+        remedy = f"Write {first}.{second} for one, {first}:{float(second):g}:2 for two"
         raise _refused(option, words, remedy)
     return read_grid(text, option)
 

@@ -13,17 +13,15 @@ from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
 from hdcal.evidence.bursts import BURSTS, burst_odds, is_noisy, relative_sd
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
-from hdcal.evidence.prepare import with_relative_noise
+from hdcal.evidence.prepare import with_relative_noise, with_rows
 from hdcal.evidence.remainder_evidence import beside_effects
-from hdcal.evidence.residual_test import residual_test
+from hdcal.evidence.residual_test import Directions, residual_test
 from hdcal.physics.effect import Effect
 
 # Draws of pure noise for one hypothesis.
 _DRAWS = 600
 # A hypothesis with a smaller p-value leaves more than noise.
 _LEAST = 0.01
-# Noise of a wild reading, over a usual one's, with which it says nothing of the mean.
-_WILD = 1e3
 
 
 def leaves_more_than_noise(
@@ -50,14 +48,17 @@ def leaves_more_than_noise(
         return False
     mean = next((name for name in names if name not in evidence.noise), "")
     prepared = beside_effects(evidence, names)
+    kept = np.ones(len(prepared.rows.reading), bool)
     for noise in {*names} & evidence.noise.keys():
         relative = relative_sd(evidence, library, noise, mean)
         if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
             return True
         if library[noise].mixture:
-            # However far off a wild reading is: of these the signs have been judged.
-            relative = np.where(is_noisy(relative), _WILD, relative)
+            # Wild readings say nothing of the mean, however far off they are.
+            kept &= ~is_noisy(relative)
         prepared = with_relative_noise(prepared, relative)
     _, directions = declared_directions(evidence, case)
+    directions = Directions(*(column[kept] for column in vars(directions).values()))
+    prepared = with_rows(prepared, kept)
     tested = residual_test(prepared, correlation, directions, rng, draws=_DRAWS)
     return tested.mean_p_value < _LEAST

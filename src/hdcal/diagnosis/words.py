@@ -107,10 +107,11 @@ def _correlated(found: VerdictAnswer) -> Iterator[str]:
 
 
 def _worth(found: VerdictAnswer) -> float:
-    """Return as how many independent readings these tell about a mean."""
-    rho = found.gap.autocorrelation
+    """Return as how many independent readings one run of these tells about a mean."""
+    rho, rows = found.gap.autocorrelation, found.data.rows_diagnosed
     rho = max(rho, 0.0) if known(rho) else 0.0
-    return found.data.rows_diagnosed * (1.0 - rho) / (1.0 + rho)
+    # 1ᵀ R⁻¹ 1 of a run.
+    return (rows - (rows - 2) * rho) / (1.0 + rho)
 
 
 def _blind(which: Which) -> Iterator[str]:

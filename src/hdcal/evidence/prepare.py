@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from jaxtyping import Bool
 
 from hdcal.data.case import Case
 from hdcal.data.certificates import GAINS
@@ -222,3 +223,19 @@ def with_relative_noise(case: PreparedCase, relative_sd: Array) -> PreparedCase:
     """Return the case with another noise sd in each row, relative to σ."""
     weight = np.asarray(case.rows.weight) / np.asarray(relative_sd)
     return replace(case, rows=replace(case.rows, weight=weight))
+
+
+def with_rows(case: PreparedCase, kept: Bool[np.ndarray, " n"]) -> PreparedCase:
+    """Return the case as if only these of its rows had been read."""
+    rows, run = case.rows, np.cumsum(case.rows.before < 0)[kept]
+    left = LinearRows(
+        reading=rows.reading[kept],
+        base=rows.base[kept],
+        precision=rows.precision,
+        before=np.where(np.diff(run, prepend=0) == 0, np.arange(len(run)) - 1, -1),
+        weight=np.asarray(rows.weight)[kept],
+        correlations=rows.correlations,
+        tolerance=rows.tolerance[:, kept],
+    )
+    records = take_rows(case.records, np.flatnonzero(kept))
+    return replace(case, records=records, order=case.order[kept], rows=left)

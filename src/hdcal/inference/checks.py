@@ -20,8 +20,6 @@ from hdcal.inference.serial_correlation import CORRELATION
 INDEPENDENT = "neighbouring readings err independently"
 # Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
-# How it ends where the data themselves may be others than they seem.
-SUSPECT = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
 # Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.
@@ -206,9 +204,11 @@ def conflict_check(
     each = [f"{name} = {about}" for name, about in far.items()]
     words = f"far outside what was expected before the data: {listed(each)}"
     # A wrong unit shows in more than in parameters of effects.
-    of_effects = all("." in name for name in far)
-    remedy = "Where the rig explains it, give it a prior of its own"
-    return Check(PLAUSIBLE, "warning", f"{words}. {remedy if of_effects else SUSPECT}")
+    if all("." in name for name in far):
+        remedy = "Where the rig explains it, give it a prior of its own"
+        return Check("prior and effects agree", "warning", f"{words}. {remedy}")
+    remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
+    return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
 
 
 def _peaks_at_zero(prior: Prior) -> bool:

@@ -21,6 +21,8 @@ SENSITIVE = 0.05
 MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
 
 Driver = Literal["data", "prior"]
+# The smallest number that has a logarithm.
+_TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -103,11 +105,12 @@ def diagnose_parameters(
 def _contraction(draws: np.ndarray, prior: Prior) -> float:
     """Return which share of the prior's variance the data removed.
 
-    A lognormal prior is wider in N where the parameter is larger; in logarithms its
-    width is everywhere the same.
+    What a lognormal prior lets be large may scatter widely too; in logarithms its width
+    is everywhere the same.
     """
     if prior.family == "lognormal":
-        return float(1.0 - np.log(draws).var() / float(prior.numbers[1]) ** 2)
+        logarithm, sd = np.log(np.maximum(draws, _TINY)), float(prior.numbers[1])
+        return float(1.0 - logarithm.var() / sd**2)
     return float(1.0 - draws.var() / frozen(prior).var())
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.inference.posterior import Posterior
-from hdcal.tracking.linear_core import STIFFNESS
+from hdcal.tracking.linear_core import STIFFNESS, ZERO
 from hdcal.tracking.stream_prior import StreamPrior
 
 _NEAR_K, _NEAR_MM = 1.0, 1e-9
@@ -22,7 +22,7 @@ class ReadingLimits:
     Attributes:
         radius: of the gear, in the deformation as read [mm].
         hottest: temperature at which half of the modulus is lost [°C].
-        strongest: size of a force that would press it beyond its radius [N].
+        strongest: size of a force that no gear needs, twice that at its radius [N].
         needs: what the effects look at.
         tested: ends of deformation [mm] and of temperature [°C], or None.
     """
@@ -74,8 +74,9 @@ def reading_limits(known: Posterior | Gear, prior: StreamPrior) -> ReadingLimits
     # Where the linear law E(T) has lost half of the modulus; never hotter than that.
     alpha = max(float(np.median(prior.base.alpha)), 1e-5)
     hottest = gear.reference_temperature + 0.5 / alpha
-    stiffest = np.quantile(np.abs(prior.coefficients()[:, STIFFNESS]), _SURE)
-    ends_of_gear = gear.reach, hottest, _STIFFENING * float(stiffest) * gear.reach
+    size = np.quantile(np.abs(prior.coefficients()), _SURE, axis=0)
+    strongest = _STIFFENING * size[STIFFNESS] * gear.reach + size[ZERO]
+    ends_of_gear = gear.reach, hottest, float(strongest)
     if isinstance(known, Gear):
         return ReadingLimits(*ends_of_gear)
     rows = known.case.records

@@ -1,6 +1,6 @@
 """Follow a gear reading by reading: stiffness, the next force, and a change alarm."""
 
-from math import inf, isfinite
+from math import inf, isfinite, sqrt
 
 import numpy as np
 
@@ -28,6 +28,8 @@ ALARM_ROWS = 10_000.0
 _ANOTHER_CORRELATION = 0.1
 # Errors that repeat with the force, by more than this share, are no correlated noise.
 _MOST_REPEATED = 0.1
+# So many sds of a Poisson number more alarms than due are none of chance.
+_MANY_SDS = 3.0
 
 
 class Tracker:
@@ -237,11 +239,16 @@ class Tracker:
             f"ones are due in {self._readings} readings"
         )
         if rho := self._noise.value:
-            so = "as they are where a change is followed slowly"
-            so = so if self.alarms else "which is taken into account"
-            words += f"; readings are correlated with the one before ({rho:.2f}), {so}"
-        if self.alarms and not self._reopen:
-            words += "; `reopen` above 0 learns a changed gear anew"
+            words += (
+                f"; readings are correlated with the one before ({rho:.2f}), which is "
+                "taken into account"
+            )
+        by_chance = self.alarms <= due + _MANY_SDS * sqrt(due)
+        if not by_chance and not self._reopen and self._forget == 1.0:
+            words += (
+                "; a change is followed slowly, and may look like correlation: with "
+                "`reopen` above 0 a changed gear is learned anew"
+            )
         return words + self._full_scale.at_end()
 
     def _mount(self, run: str | None) -> None:

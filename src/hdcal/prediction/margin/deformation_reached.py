@@ -72,7 +72,9 @@ def deformation_reached(
     """
     where, sense = forces[0].conditions, sense_of(given)
     low, high, warm = map(float, (where.low, where.high, where.temperature))
-    ends = min(0.0, REACH * low), max(0.0, REACH * high)
+    # The other way it is searched no farther than was tested.
+    far = (1.0, REACH)[::sense]
+    ends = min(0.0, far[0] * low), max(0.0, far[1] * high)
     shares = jnp.array([criteria.content, 1.0 - criteria.content])
     size = abs(given), grid.unrounded(abs(given))
     asked = size, shares, ends_along(*ends, sense)
@@ -107,21 +109,22 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
     places = jnp.linspace(low, high, _STRETCHES + 1)
 
     def of_draw(value):
-        def excess(deformation, row):
+        def excess(deformation):
             there = replace(conditions, deformation=sense * deformation)
             parts = member_mixture(problem, value, whose, there)
             mixture = Mixture(*parts).along(sense)
             # Positive where the force does not get this far.
-            short = shares[jnp.minimum(row, 1)] - mixture.below(unrounded)
-            return jnp.where(row == 2, mixture.centre() - size, short)
+            short = shares - mixture.below(unrounded)
+            return jnp.append(short, mixture.centre() - size)
+
+        passed = jax.lax.map(lambda place: excess(place) > 0.0, places)
 
         def solve(row):
             # What is reached first is reached.
-            passed = jax.lax.map(lambda place: excess(place, row) > 0.0, places)
-            first = jnp.maximum(jnp.argmax(passed), 1)
+            first = jnp.maximum(jnp.argmax(passed[:, row]), 1)
             lower, upper = places[first - 1], places[first]
             found = optx.root_find(
-                excess,
+                lambda place, row: excess(place)[row],
                 method,
                 0.5 * (lower + upper),
                 row,
@@ -129,8 +132,8 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
                 max_steps=_MOST_STEPS,
                 throw=False,
             ).value
-            found = jnp.where(passed.any(), found, np.inf)
-            return jnp.where(passed[0], -np.inf, found)
+            found = jnp.where(passed[:, row].any(), found, np.inf)
+            return jnp.where(passed[0, row], -np.inf, found)
 
         return jax.vmap(solve)(jnp.arange(3))
 

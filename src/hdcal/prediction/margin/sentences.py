@@ -250,7 +250,7 @@ def _inverse(found: Margin) -> Iterator[str]:
     share = _percent(found.content)
     least, most = got.lower_bound_mm, got.upper_bound_mm
     if got.median_mm is least is most is None:
-        yield f"{got.force_N:g} N are reached nowhere within {low:g} … {high:.3g} mm."
+        yield f"No deformation within {low:g} … {high:.3g} mm needs {got.force_N:g} N."
         return
     if got.force_N < 0.0:
         least, most = most, least
