@@ -122,7 +122,7 @@ def test_none_seen_is_said_only_where_it_was_looked_for():
     assert some.outcome == "note" and "allows for it" in some.words
     strong = {CORRELATION: np.full((2, 50), 0.8)}
     few, many = (correlation_check(strong, rows) for rows in (60, 600))
-    assert few.outcome == "warning" and "some 7 independent ones" in few.words
+    assert few.outcome == "warning" and "some 8 independent ones" in few.words
     assert many.outcome == "note"
     unasked = correlation_check({}, 60, "the steps are wide")
     assert unasked.outcome == "note"

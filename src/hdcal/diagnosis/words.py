@@ -13,6 +13,7 @@ from hdcal.diagnosis.cause_words import (
 )
 from hdcal.diagnosis.seen_words import p_words
 from hdcal.diagnosis.verdict import Which
+from hdcal.inference.serial_correlation import worth
 from hdcal.report.words import (
     known,
     label,
@@ -107,11 +108,9 @@ def _correlated(found: VerdictAnswer) -> Iterator[str]:
 
 
 def _worth(found: VerdictAnswer) -> float:
-    """Return as how many independent readings one run of these tells about a mean."""
-    rho, rows = found.gap.autocorrelation, found.data.rows_diagnosed
-    rho = max(rho, 0.0) if known(rho) else 0.0
-    # 1ᵀ R⁻¹ 1 of a run.
-    return (rows - (rows - 2) * rho) / (1.0 + rho)
+    """Return as how many independent readings these tell, taken for one run."""
+    rho = found.gap.autocorrelation
+    return worth(found.data.rows_diagnosed, max(rho, 0.0) if known(rho) else 0.0)
 
 
 def _blind(which: Which) -> Iterator[str]:

@@ -228,13 +228,12 @@ def with_relative_noise(case: PreparedCase, relative_sd: Array) -> PreparedCase:
 def with_rows(case: PreparedCase, kept: Bool[np.ndarray, " n"]) -> PreparedCase:
     """Return the case as if only these of its rows had been read."""
     rows, run = case.rows, np.cumsum(case.rows.before < 0)[kept]
-    left = LinearRows(
+    left = replace(
+        rows,
         reading=rows.reading[kept],
         base=rows.base[kept],
-        precision=rows.precision,
         before=np.where(np.diff(run, prepend=0) == 0, np.arange(len(run)) - 1, -1),
         weight=np.asarray(rows.weight)[kept],
-        correlations=rows.correlations,
         tolerance=rows.tolerance[:, kept],
     )
     records = take_rows(case.records, np.flatnonzero(kept))

@@ -15,7 +15,7 @@ from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.sample import MAX_TREE_DEPTH
-from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.serial_correlation import CORRELATION, worth
 
 INDEPENDENT = "neighbouring readings err independently"
 # Name of the check that data are what was believed of gears.
@@ -32,7 +32,7 @@ ORDINARY_AT_ZERO = frozenset({"run_offset_sd", "specimen_sd", "gap_sd", CORRELAT
 _TOLD_CORRELATION = 0.1
 # Of such readings, worth fewer than so many independent ones, intervals are too narrow:
 # the prior expects less (tests/inference/test_correlation_prior.py).
-_STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 25.0
+_STRONG_CORRELATION, _LITTLE_WORTH = 0.5, 26.0
 
 
 @dataclass(frozen=True)
@@ -141,14 +141,14 @@ def correlation_check(
         return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
     span = f"{middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
-    worth = rows * (1.0 - middle) / (1.0 + middle)
-    if middle < _STRONG_CORRELATION or worth > _LITTLE_WORTH:
+    left = worth(rows, float(middle))
+    if middle < _STRONG_CORRELATION or left > _LITTLE_WORTH:
         return Check(INDEPENDENT, "note", f"{words}, and every interval allows for it")
     return Check(
         INDEPENDENT,
         "warning",
         f"{words}. Every interval allows for it, but these readings are worth some "
-        f"{worth:.0f} independent ones, and 95 % intervals hold the truth less often: "
+        f"{left:.0f} independent ones, and 95 % intervals hold the truth less often: "
         "in 85 to 93 % of such runs of 60 rows, in 75 % of 12. Read longer, or repeat",
     )
 

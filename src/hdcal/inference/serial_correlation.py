@@ -42,6 +42,18 @@ def whiten(columns, before, correlation):
     return own * columns - (correlation * gain) * follows * columns[before]
 
 
+def worth(rows: int, correlation: float) -> float:
+    """Return as how many independent readings those of one run tell about a mean.
+
+    1ᵀ R⁻¹ 1 with R of elements ρ^|i − j|.
+
+    Args:
+        rows: of the run.
+        correlation: ρ, from 0 to 1.
+    """
+    return (rows - (rows - 2) * correlation) / (1.0 + correlation)
+
+
 def log_volume(following, correlation) -> Float[Array, ""]:
     """Return log |de/dz|, of as many rows as follow another one."""
     return 0.5 * following * jnp.log1p(-(correlation**2))

@@ -28,8 +28,6 @@ ALARM_ROWS = 10_000.0
 _ANOTHER_CORRELATION = 0.1
 # Errors that repeat with the force, by more than this share, are no correlated noise.
 _MOST_REPEATED = 0.1
-# So many sds of a Poisson number more alarms than due are none of chance.
-_MANY_SDS = 3.0
 
 
 class Tracker:
@@ -243,8 +241,9 @@ class Tracker:
                 f"; readings are correlated with the one before ({rho:.2f}), which is "
                 "taken into account"
             )
-        by_chance = self.alarms <= due + _MANY_SDS * sqrt(due)
-        if not by_chance and not self._reopen and self._forget == 1.0:
+        # Three sds of a Poisson number above what is due are no chance.
+        many = self.alarms > due + 3.0 * sqrt(due)
+        if many and not self._reopen and self._forget == 1.0:
             words += (
                 "; a change is followed slowly, and may look like correlation: with "
                 "`reopen` above 0 a changed gear is learned anew"
