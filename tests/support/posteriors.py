@@ -192,12 +192,14 @@ def with_leftover(size: int = 2000) -> Posterior:
 
 def beside(posterior: Posterior, name: str) -> Posterior:
     """Return the same beside an effect that changes nothing."""
+    gap = posterior.settings["with_gap"] is True
     draws, spec = posterior.draws, parameters(EFFECTS[name])
     idle = {
         f"{name}.{n}": np.full(len(draws["K"]), p.typical if p.null is None else p.null)
         for n, p in spec.items()
     }
-    return written_posterior(posterior.case, {**draws, **idle}, effects=[name])
+    draws = {**draws, **idle}
+    return written_posterior(posterior.case, draws, effects=[name], with_gap=gap)
 
 
 def stiffer(posterior: Posterior, factor: float) -> Posterior:

@@ -207,10 +207,3 @@ def test_a_failed_calibration_gives_nothing():
 
     with pytest.raises(NotUsable):
         Tracker(SimpleNamespace(require_usable=refuse))  # type: ignore[arg-type]
-
-
-def test_a_calibration_with_a_discrepancy_is_refused():
-    problem = SimpleNamespace(discrepancy=object())
-    known = SimpleNamespace(require_usable=lambda: None, problem=problem)
-    with pytest.raises(InputError, match="known: holds a leftover discrepancy"):
-        Tracker(known)  # type: ignore[arg-type]

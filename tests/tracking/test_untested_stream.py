@@ -16,6 +16,7 @@ from hdcal.prediction.engine.untested_reading import Addition, UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
 from hdcal.tracking.tracker import Tracker
 
+NOISE = "outliers"
 PLACES = [0.6, 0.7, 0.8, 0.9, 1.0]
 
 
@@ -159,16 +160,17 @@ def test_a_common_error_is_never_averaged_away_in_long_streams(places):
 
 
 def mixture(**shares: float):
-    made = {"none": single(), "contact_onset": beside(single(), "contact_onset")}
-    made["unknown"] = with_leftover()
+    made = {n: beside(single(), n) for n in shares.keys() & {"contact_onset", NOISE}}
+    made |= {"none": single(), "unknown": with_leftover()}
     return mixed_posterior({n: (share, made[n]) for n, share in shares.items()})
 
 
 def test_causes_that_can_be_followed_are_and_the_rest_is_said():
-    words = Tracker(mixture(none=0.5, contact_onset=0.3, unknown=0.2)).describe()
-    assert "averages over no gap (50 %), contact onset (30 %)" in words
-    assert "something outside the library cannot be followed" in words
-    assert "20 % of the probability has no part" in words
+    shares = {"none": 0.4, "contact_onset": 0.3, NOISE: 0.2, "unknown": 0.1}
+    words = Tracker(mixture(**shares)).describe()
+    assert "averages over no gap (40 %), contact onset (30 %)" in words
+    assert "something outside the library (10 %)" in words
+    assert "outliers cannot be followed row by row: 20 % of the probability" in words
     # Forgetting goes with a line only.
     words = Tracker(mixture(none=0.7, contact_onset=0.3), forget=0.99).describe()
     assert "contact onset cannot be followed row by row: 30 %" in words
@@ -176,8 +178,8 @@ def test_causes_that_can_be_followed_are_and_the_rest_is_said():
 
 
 def test_where_most_cannot_be_followed_nothing_is():
-    with pytest.raises(InputError, match="holds a leftover discrepancy"):
-        Tracker(mixture(none=0.4, unknown=0.6))
+    with pytest.raises(InputError, match="'outliers' shapes the noise"):
+        Tracker(mixture(none=0.4, **{NOISE: 0.6}))
 
 
 def test_what_was_left_out_is_said():
@@ -189,15 +191,13 @@ def test_what_was_left_out_is_said():
 
 
 def test_what_the_calibration_left_over_is_told_before_the_first_row():
-    there = np.linspace(0.02, 0.54, 40)
-    deformation = np.concatenate([there, there[::-1]])
-    sense = np.repeat([1.0, -1.0], 40)
-    rng = np.random.default_rng(3)
-    force = 205.0 * deformation + rng.normal(0.0, 0.3, 80)
-    plain, loop = (
+    deformation, rng = np.linspace(0.02, 0.54, 40), np.random.default_rng(3)
+    force = 205.0 * deformation + rng.normal(0.0, 0.3, 40)
+    plain, bent = (
         Tracker(regressed(deformation, read, rng)).describe()
-        for read in (force, force + 3.0 * sense)
+        for read in (force, force + 30.0 * deformation**2)
     )
-    assert "shape for right, but its residuals have one" in loop
-    assert "An alarm may come of that" in loop and "with a gap" not in loop
+    assert "shape for right, but its residuals have one" in bent
+    # Which is then followed.
+    assert "An alarm may come of that" in bent and "calibrate with a gap" in bent
     assert "alarm may come" not in plain

@@ -139,9 +139,7 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     )
 
 
-def misfits(
-    posterior: Posterior, *, shapes: bool = True, gap_serves: bool = True
-) -> tuple[str, ...]:
+def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     """Return a warning for all that the model left in the residuals.
 
     For answers that take the model for right. A leftover discrepancy has taken what
@@ -151,12 +149,11 @@ def misfits(
     Args:
         posterior: from `calibrate`.
         shapes: whether to warn of them.
-        gap_serves: whether the answer could be had with a leftover discrepancy.
     """
     left = residuals(posterior)
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    gap_serves = gap_serves and posterior.problem.discrepancy is None
-    remedy = "Diagnose, or calibrate with a gap" if gap_serves else "Diagnose"
+    plain = posterior.problem.discrepancy is None
+    remedy = "Diagnose, or calibrate with a gap" if plain else "Diagnose"
     return (
         *(
             "This takes the model's shape for right, but its residuals have one. "

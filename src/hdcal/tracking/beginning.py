@@ -5,7 +5,6 @@ from collections.abc import Callable
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.tracking.effect_tracking import build_particles, force_effects
 from hdcal.tracking.first_rows import FirstRows
@@ -17,6 +16,7 @@ from hdcal.tracking.stream_prior import (
     prior_from_gear,
     prior_from_posterior,
 )
+from hdcal.tracking.unequal_rows import UnequalRows
 
 
 def begin_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
@@ -29,36 +29,65 @@ def begin_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
     if isinstance(known, Gear):
         return prior_from_gear(known, seed)
     known.require_usable()
-    if known.problem.discrepancy is not None:
-        words = "holds a leftover discrepancy, which cannot be followed"
-        raise InputError([Finding("known", words, "Calibrate again without it")])
     return prior_from_posterior(known, seed)
 
 
 def begin_core(
-    known: Posterior | Gear, prior: StreamPrior, forget: float
+    known: Posterior | Gear,
+    prior: StreamPrior,
+    forget: float,
+    unequal: UnequalRows | None,
 ) -> tuple[LinearCore | FirstRows | Particles, Callable[..., np.ndarray]]:
-    """Return the core, and what makes of a row the columns that it takes."""
+    """Return the core, and what makes of a row the columns that it takes.
+
+    Args:
+        known: what the stream begins with.
+        prior: of the stream, from the same.
+        forget: share of the past kept at each reading.
+        unequal: what readings have beside the model; None of a gear.
+    """
+    coefficients = prior.coefficients()
     if isinstance(known, Gear):
-        return FirstRows(prior.coefficients(), prior.variance), _linear_columns
+        return FirstRows(coefficients, prior.variance), _linear_columns
     if force_effects(known):
-        return build_particles(known, prior, forget)
-    law = match_draws(prior.coefficients(), prior.variance)
-    return LinearCore(law, forget), _linear_columns
+        core, columns = build_particles(known, prior, forget)
+    else:
+        core = LinearCore(match_draws(coefficients, prior.variance), forget)
+        columns = _linear_columns
+    if unequal is None or known.problem.discrepancy is None:
+        return core, columns
+
+    def with_leftover(deformation: float, rise: float, time: float) -> np.ndarray:
+        found = columns(deformation, rise, time)
+        fitted = unequal.leftover(np.array([deformation]))[0]
+        fitted = np.broadcast_to(fitted, (*found.shape[:-1], len(fitted)))
+        return np.concatenate([found, fitted], axis=-1)
+
+    return core, with_leftover
 
 
-def usual_design(known: Posterior | Gear, prior: StreamPrior) -> np.ndarray:
-    """Return linear columns of rows such as will come, shape (row, 4)."""
+def usual_design(
+    known: Posterior | Gear, prior: StreamPrior, unequal: UnequalRows | None
+) -> np.ndarray:
+    """Return columns of rows such as will come, without effects, shape (row, p).
+
+    Args:
+        known: what the stream begins with.
+        prior: of the stream, from the same.
+        unequal: what readings have beside the model; None of a gear.
+    """
     if isinstance(known, Gear):
         # The scale of deformations matters little.
         deformation = np.linspace(0.0, known.full_scale.deformation, 50)
-        rise = np.zeros(50)
+        rise, fitted = np.zeros(50), np.empty((50, 0))
     else:
         deformation = np.asarray(known.case.records.deformation)
         rise = np.asarray(known.case.records.temperature)
         rise = rise - prior.reading.reference_temperature
+        assert unequal is not None
+        fitted = unequal.leftover(deformation)
     ones = np.ones_like(rise)
-    return np.stack([deformation, deformation * rise, ones, rise], axis=1)
+    return np.column_stack([deformation, deformation * rise, ones, rise, fitted])
 
 
 def _linear_columns(deformation: float, rise: float, time: float) -> np.ndarray:

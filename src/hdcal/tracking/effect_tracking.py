@@ -194,6 +194,7 @@ def _particles(posterior: Posterior, prior: StreamPrior, chosen) -> Particles:
     fixed = np.stack([draws[name] for name in sites], axis=1)
     sd = fixed.std(axis=0)
     stiffness = np.asarray(prior.base.stiffness) * prior.reading.radial_per_read
-    linear = np.stack([stiffness, np.asarray(prior.base.force_offset)], axis=1)
+    zero = np.asarray(prior.base.force_offset)
+    linear = np.column_stack([stiffness, zero, prior.weights])
     scaled = fixed / np.where(sd > 0.0, sd, 1.0)
     return Particles(linear, prior.variance, scaled, chosen)

@@ -49,13 +49,11 @@ def followed_causes(known: Posterior, forget: float) -> tuple[Posterior, list[st
 
 
 def _unexplained(causes: Sequence[Cause]) -> list[str]:
-    found = misfits(likeliest(causes).posterior, gap_serves=False)
+    found = misfits(likeliest(causes).posterior)
     return [*found, "An alarm may come of that, without a change."] if found else []
 
 
 def _can_be_followed(alone: Posterior, forget: float) -> bool:
-    if alone.problem.discrepancy is not None:
-        return False
     if not force_effects(alone):
         return True
     return forget == 1.0 and not unfollowed(alone, prior_from_posterior(alone))

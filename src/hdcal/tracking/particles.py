@@ -27,11 +27,13 @@ class Particles(WeightedCores):
     """Weighted particles, each with its normal-inverse-gamma stiffness and zero.
 
     The columns of a row are force per unit of stiffness [mm], force at no stiffness
-    [N], and one; the coefficient of the second is known. Stiffness and zero of a
-    particle have the law of the draws given what it fixes, from their moments.
+    [N], one, and those of the fitted leftover; the coefficient of the second is known.
+    The others of a particle have the law of the draws given what it fixes, from their
+    moments.
 
     Args:
-        linear: stiffness [N/mm] and zero [N] of every draw, shape (draw, 2).
+        linear: stiffness [N/mm], zero [N] and weights of the fitted leftover [N] of
+            every draw, shape (draw, 2 + weight).
         variance: σ² of a reading [N²], shape (draw,).
         fixed: what particles fix, shape (draw, q).
         chosen: indices of the draws that become particles.

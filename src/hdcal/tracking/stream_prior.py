@@ -23,6 +23,7 @@ class StreamPrior:
 
     Attributes:
         base: parameters of the model, each (draw,).
+        weights: of the fitted leftover discrepancy [N], (draw, weight); none of a gear.
         variance: of a reading, rounding and stated errors included [N²], (draw,).
         reading: how the rig reads.
         remounting: variance of the force's zero from one mounting to the next [N²].
@@ -30,14 +31,16 @@ class StreamPrior:
     """
 
     base: Base
+    weights: np.ndarray
     variance: np.ndarray
     reading: Reading
     remounting: float
     step: float
 
     def coefficients(self) -> np.ndarray:
-        """Return the coefficients of the linear columns, shape (draw, 4)."""
-        return np.asarray(linear_coefficients(self.base, self.reading))
+        """Return the coefficients of the linear columns, shape (draw, 4 + weight)."""
+        linear = np.asarray(linear_coefficients(self.base, self.reading))
+        return np.concatenate([linear, self.weights], axis=1)
 
 
 def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
@@ -97,8 +100,10 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
 
 def _stream_prior(stiffness, draws, stated, reading, run_sd, step) -> StreamPrior:
     base = Base(stiffness=stiffness, **{name: draws[name] for name in _SITES[2:]})
+    weights = draws.get("gap_weights", np.empty((len(stiffness), 0)))
     variance = draws["sigma"] ** 2 + stated + step**2 / 12.0
-    return StreamPrior(base, variance, reading, 2.0 * float(np.mean(run_sd**2)), step)
+    remounting = 2.0 * float(np.mean(run_sd**2))
+    return StreamPrior(base, weights, variance, reading, remounting, step)
 
 
 def _draw(prior: Prior, rng, size: int, positive: bool = False) -> np.ndarray:

@@ -78,7 +78,7 @@ class Tracker:
         if isinstance(known, Posterior):
             self._unequal = UnequalRows(known, prior)
         self._unknowns, self._full_scale = False, AssumedFullScale(known)
-        self._core, self._columns = begin_core(known, prior, forget)
+        self._core, self._columns = begin_core(known, prior, forget, self._unequal)
         self._slow, self._noise = self._core.slower(), SerialCorrelation()
         self._rounding = CoarseRounding(prior.step, forget)
         self._limits = reading_limits(known, prior)
@@ -86,7 +86,7 @@ class Tracker:
         self._remounting = prior.remounting
         self._alarm_rows = alarm_rows
         self._alarm = ChangeAlarm(threshold_for(alarm_rows))
-        self._design = usual_design(known, prior)
+        self._design = usual_design(known, prior, self._unequal)
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
         self._since, self._run = 1, None
         self._forget, self._reopen = forget, reopen

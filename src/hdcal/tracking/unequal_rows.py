@@ -1,4 +1,4 @@
-"""What makes the readings of a stream unequal: untested conditions, growing noise."""
+"""What readings of a stream have beside the model, and what makes them unequal."""
 
 from dataclasses import dataclass
 
@@ -64,3 +64,11 @@ class UnequalRows:
         added = self._untested.at(deformation, temperature)
         rest = added.rest**2 / self._variance
         return RowTerms(added.shift, added.columns, noise, rest)
+
+    def leftover(self, deformation: np.ndarray) -> np.ndarray:
+        """Return columns of the weights of the fitted leftover, shape (n, weight).
+
+        Args:
+            deformation: as read [mm], shape (n,).
+        """
+        return self._untested.leftover(deformation)

@@ -16,6 +16,7 @@ from scipy.stats import qmc
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Array
+from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.distributions import moments
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
@@ -117,10 +118,23 @@ class Bends(eqx.Module):
         bend = share * (mean + sd * loading * self.score)
         if problem.discrepancy is None or "gap_weights" not in value:
             return bend, jnp.zeros_like(bend)
-        low, high = self.above.growth.far, self.below.growth.far
-        inside = jnp.clip(deformation, low, high)
-        fitted = problem.discrepancy.columns(inside) @ value["gap_weights"]
-        return bend, (1.0 - share) * fitted
+        ends = self.above.growth.far, self.below.growth.far
+        columns = fitted_columns(problem.discrepancy, ends, deformation, share)
+        return bend, columns @ value["gap_weights"]
+
+
+def fitted_columns(
+    discrepancy: Discrepancy, ends: tuple, deformation, share
+) -> Float[Array, "n m"]:
+    """Return what each weight of the fitted leftover discrepancy adds to readings [-].
+
+    Args:
+        discrepancy: of the problem.
+        ends: of the tested deformation [mm].
+        deformation: as read [mm], shape (n,).
+        share: how much of the bend is in, from `Bends.law`, shape (n,).
+    """
+    return (1.0 - share)[:, None] * discrepancy.columns(jnp.clip(deformation, *ends))
 
 
 def spread_evenly(count: int, columns: int, seed: int) -> np.ndarray:

@@ -7,13 +7,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
 from hdcal.prediction.engine.growth import Growth, bend_covariance
-from hdcal.prediction.engine.untested import BENDS, Untested
+from hdcal.prediction.engine.untested import BENDS, Untested, fitted_columns
 
 # Draws that tell: their sd is then known to some 5 %.
 _DRAWS = 256
@@ -76,6 +77,20 @@ class UntestedReading:
             hypot(*(bend.rest for bend in bends)),
         )
 
+    def leftover(self, deformation: np.ndarray) -> np.ndarray:
+        """Return what each weight of the fitted leftover adds to readings [-].
+
+        Args:
+            deformation: as read [mm], shape (n,).
+
+        Returns:
+            Shape (n, weight); no weight where no leftover was fitted.
+        """
+        if self._problem.discrepancy is None:
+            return np.empty((len(deformation), 0))
+        growths = tuple(bend.growth for bend in self._bends)
+        return np.asarray(_leftover(self._problem.discrepancy, growths, deformation))
+
     def _drift(self, deformation: float, temperature: float) -> tuple[float, float]:
         """Return sd, with the sign of the kelvins, and mean of the rig's drift [N]."""
         coldest, warmest = self._tested
@@ -98,7 +113,7 @@ class _Bend:
 
     def __init__(self, growth: Growth, sizes: np.ndarray, cause: np.ndarray):
         # The causes have the same rows, and so the same ends.
-        self._growth: Growth = jax.tree.map(lambda leaf: leaf[0], growth)
+        self.growth: Growth = jax.tree.map(lambda leaf: leaf[0], growth)
         found, known = map(np.asarray, _given(growth, sizes, cause))
         self._mean, square = found.mean(axis=0), sizes[:, 0] ** 2
         self._square = float(square.mean())
@@ -111,7 +126,7 @@ class _Bend:
 
     def at(self, deformation: float) -> Addition:
         """Return what it adds to a reading at a deformation as read [mm]."""
-        beyond, share = map(float, _reach(self._growth, deformation))
+        beyond, share = map(float, _reach(self.growth, deformation))
         if share == 0.0:
             return Addition(0.0, np.zeros(len(_NODES)), 0.0)
         place = np.array([1.0 + beyond])
@@ -134,6 +149,15 @@ def _powers(place: np.ndarray) -> np.ndarray:
 def _reach(growth: Growth, deformation):
     """Return how far beyond the end a deformation is, and the share of the bend."""
     return growth.beyond(deformation), growth.share(deformation)
+
+
+@jax.jit
+def _leftover(discrepancy: Discrepancy, growths: tuple[Growth, Growth], deformation):
+    """Return the columns of the fitted leftover; growths below and above."""
+    below, above = growths
+    over = deformation > above.far
+    share = jnp.where(over, above.share(deformation), below.share(deformation))
+    return fitted_columns(discrepancy, (above.far, below.far), deformation, share)
 
 
 @jax.jit

@@ -1,0 +1,99 @@
+"""A fitted leftover is followed with the stiffness, as the calibration left it."""
+
+import copy
+
+import numpy as np
+import pytest
+from posteriors import beside, plain_draws, ramp_case, written_posterior
+
+from hdcal.tracking.stream_prior import prior_from_posterior
+from hdcal.tracking.tracker import Tracker
+from hdcal.tracking.unequal_rows import UnequalRows
+
+# Off the middle of what was tested: there the leftover looks like stiffness.
+PLACES = np.linspace(0.25, 0.5, 25)
+
+
+def with_newtons():
+    """Return a posterior whose leftover is of a newton and known to half of that."""
+    case, rng = ramp_case(), np.random.default_rng(2)
+    size = np.where(np.arange(20) < 8, 1.0, 1e-3) / (1.0 + np.arange(20.0))
+    weights = 2.0 * size * (np.array([1.0, -1.0] * 10) + rng.normal(size=(2000, 20)))
+    scale = {"gap_sd": np.full(2000, 1.5), "gap_length": np.full(2000, 0.3)}
+    draws = plain_draws(case, 2000) | scale | {"gap_weights": weights}
+    return written_posterior(case, draws, with_gap=True)
+
+
+def stream(posterior, draw: int, rows: int, rng):
+    """Return readings of a gear that is one draw of the posterior."""
+    prior = prior_from_posterior(posterior)
+    at = np.resize(PLACES, rows)
+    columns = np.column_stack([at, 0.0 * at, 0.0 * at + 1.0, 0.0 * at])
+    left = np.asarray(posterior.problem.discrepancy.columns(at))
+    coefficients, sd = prior.coefficients()[draw], np.sqrt(prior.variance[draw])
+    force = np.hstack([columns, left]) @ coefficients + sd * rng.normal(size=rows)
+    return at, force, np.hstack([columns, left]), coefficients
+
+
+def test_it_is_a_batch_fit_of_stiffness_zero_and_leftover():
+    posterior = with_newtons()
+    at, force, columns, _ = stream(posterior, 7, 60, np.random.default_rng(0))
+    tracker = Tracker(posterior)
+    law = tracker._core.prior
+    for row in zip(at.tolist(), force.tolist(), strict=True):
+        found = tracker.update(*row)
+    # Normal equations over σ², with the prior in directions that may vary.
+    tall = columns @ law.root
+    inner = tall.T @ tall + np.eye(law.root.shape[1])
+    along = np.linalg.solve(inner, tall.T @ (force - columns @ law.mean))
+    mean = law.mean + law.root @ along
+    assert tracker._noise.value == 0.0
+    assert found["stiffness_N_per_mm"]["mean"] == pytest.approx(mean[0], rel=1e-9)
+    np.testing.assert_allclose(tracker._core.mean, mean, rtol=1e-6, atol=1e-9)
+
+
+def followed(posterior, streams: int, rows: int = 300) -> tuple[float, float, float]:
+    """Return shares of stiffnesses and of readings inside, and alarms over the due."""
+    start, inside, read, alarms = Tracker(posterior, alarm_rows=100.0), [], [], 0
+    for seed in range(streams):
+        rng, mine = np.random.default_rng(400 + seed), copy.deepcopy(start)
+        draw = rng.integers(len(posterior.draws["K"]))
+        at, force, _, truth = stream(posterior, draw, rows, rng)
+        found = {}
+        for row in zip(at.tolist(), force.tolist(), strict=True):
+            found = mine.update(*row)
+            low, high = found["force_N"]["predictive_95"]
+            read.append(low < row[1] < high)
+        low, high = found["stiffness_N_per_mm"]["credible_95"]
+        inside.append(low < truth[0] < high)
+        alarms += mine.alarms
+    return np.mean(inside), np.mean(read), alarms * 100.0 / (streams * rows)
+
+
+def test_intervals_hold_and_alarms_are_as_many_as_promised():
+    inside, read, alarms = followed(with_newtons(), 30)
+    # Chance of fewer than 25 of 30 at 95 %: 0.3 %.
+    assert inside >= 0.83
+    # Four sds of chance in 9000 rows; 90 alarms are due.
+    assert read == pytest.approx(0.95, abs=0.01)
+    assert 1.0 / 1.5 < alarms < 1.5
+
+
+def test_a_leftover_that_is_left_out_is_told_by_the_same_count(monkeypatch):
+    real = UnequalRows.leftover
+    monkeypatch.setattr(UnequalRows, "leftover", lambda self, at: 0.0 * real(self, at))
+    inside, _, _ = followed(with_newtons(), 10)
+    assert inside < 0.5
+
+
+def test_beside_an_effect_it_is_followed_too():
+    posterior = with_newtons()
+    other = beside(posterior, "contact_onset")
+    at, force, _, _ = stream(posterior, 3, 40, np.random.default_rng(1))
+    plain, particles = Tracker(posterior), Tracker(other)
+    for row in zip(at.tolist(), force.tolist(), strict=True):
+        one, two = plain.update(*row), particles.update(*row)
+    assert not two["degenerate"]
+    one, two = (found["stiffness_N_per_mm"] for found in (one, two))
+    assert two["mean"] == pytest.approx(one["mean"], abs=0.3 * one["sd"])
+    assert two["sd"] == pytest.approx(one["sd"], rel=0.2)
