@@ -64,24 +64,6 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def optimised(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Compile with more care where a file computes for longer than it compiles."""
-    if request.node.get_closest_marker("computes") is None:
-        yield
-        return
-    import jax
-
-    with pytest.MonkeyPatch.context() as commands:
-        commands.setenv("JAX_DISABLE_MOST_OPTIMIZATIONS", "false")
-        # What is compiled one way rounds otherwise: none of it goes into other files.
-        jax.clear_caches()
-        jax.config.update("jax_disable_most_optimizations", False)
-        yield
-        jax.clear_caches()
-        jax.config.update("jax_disable_most_optimizations", True)
-
-
-@pytest.fixture(scope="module", autouse=True)
 def few_executables() -> Iterator[None]:
     """Forget what was compiled between files where memory mappings are scarce.
 

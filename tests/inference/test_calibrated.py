@@ -20,8 +20,6 @@ from hdcal.inference.values import member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.registry import EFFECTS
 
-pytestmark = pytest.mark.computes
-
 # Draws that the truth is ranked among, thinned so that they are nearly independent.
 RANKED, BINS = 99, 10
 # False-alarm probability of each uniformity test; the seeds are fixed.

@@ -154,6 +154,7 @@ def alike():
     return [calibrate(one, **SHORT) for one in (case, case_of(0.6 * noise, gear=held))]
 
 
+@pytest.mark.thorough
 def test_correlated_noise_widens_what_it_should(alike):
     found, independent = alike
     low, high = np.quantile(found.draws[CORRELATION], [0.025, 0.975])

@@ -25,8 +25,6 @@ from hdcal.motion.dynamic_calibration import highest_peak
 from hdcal.motion.summary import dynamic_answer, found_loss
 from hdcal.physics.effects.coulomb_friction import CoulombFriction
 
-pytestmark = pytest.mark.computes
-
 # Enough to look at, far too few for their checks.
 FEW = {"chains": 2, "warmup": 100, "draws": 50}
 # Damping ratio and friction [N] of each truth, and the model that holds it.

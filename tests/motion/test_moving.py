@@ -26,8 +26,6 @@ from hdcal.motion.summary import dynamic_answer
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.report.plain import as_json
 
-pytestmark = pytest.mark.computes
-
 # One shape and one length for all: the sampler is compiled once.
 SETTINGS = {"chains": 4, "effects": (), **SHORT}
 SOUGHT = ("mass", "damping", "stiffness")

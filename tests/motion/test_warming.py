@@ -16,7 +16,6 @@ from hdcal.motion.summary import dynamic_answer
 from hdcal.physics import linear_response as response
 from hdcal.physics.linear_response import linear_response
 
-pytestmark = pytest.mark.computes
 ROWS, ALPHA = 380, 5e-4
 
 

@@ -80,6 +80,7 @@ def test_of_gears_there_is_a_global_risk():
     assert "(global risk)" in found.words
 
 
+@pytest.mark.thorough
 def test_the_global_risk_knows_how_little_six_gears_say():
     """It is the mean over what their scatter may be, not that of one scatter."""
     gears = batch(6, 400)

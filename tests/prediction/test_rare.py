@@ -26,8 +26,6 @@ AT = 0.4
 SIGMAS = {"Student's t": SIGMA, "normal": Prior("fixed", (0.9,))}
 LIMITS = {"Student's t": (85.0, 100.0, 130.0), "normal": (83.0, 84.0, 85.0)}
 
-pytestmark = pytest.mark.computes
-
 
 def case_of(sigma: Prior, rows: int = 6):
     """Return few rows; the law of a further reading is known in closed form."""
