@@ -80,13 +80,15 @@ def test_the_prior_of_the_coefficient_stays_exact():
     values = draw_truth(problem, jax.random.key(3))
     seen = values["E0"] * (1.0 + values["force_gain"])
     seen /= 1.0 + values["deformation_gain"]
-    sites = ["E0", *GAUGE_UNITS, "alpha", "sigma", "force_offset", "deformation_offset"]
+    sites = ["E0", *GAUGE_UNITS, "alpha", "force_offset", "deformation_offset"]
     given = {name: values[name] for name in sites} | {"_KE0": values["K"] * seen}
     place = np.arctanh(np.sqrt(values[CORRELATION]))
     given[f"_{CORRELATION}"] = place
+    added = np.sqrt(1.0 - values[CORRELATION] ** 2)
+    given["_added_sd"] = values["sigma"] * added
     total = float(log_density(model, (problem,), {}, given)[0])
-    wanted = float(log_likelihood(problem, values)) - np.log(seen)
-    for name in (*sites, "K"):
+    wanted = float(log_likelihood(problem, values)) - np.log(seen * added)
+    for name in (*sites, "K", "sigma"):
         law = distribution(problem.priors[name], positive=name == "E0")
         wanted += float(law.log_prob(values[name]))
     # Both signs of the place are the same correlation.
@@ -122,6 +124,7 @@ def test_mountings_add_to_the_zero_that_a_certificate_states():
         given = {name: truth[name] for name in names}
         given |= {"_KE0": truth["K"] * truth["E0"], "force_offset": np.float64(zero)}
         given[f"_{CORRELATION}"] = np.float64(0.5)
+        given["_added_sd"] = given.pop("sigma")
         added = [
             float(log_density(model, (one,), {}, given)[0]) for one in (stated, plain)
         ]

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from rigs import autoregression, draw_truth, make_case, make_gear, make_records
 from scipy import stats
+from stated_density import off_the_stated_density
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
+from hdcal.inference import model
 from hdcal.inference.checks import correlation_check, growth_check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.member_counts import member_counts
@@ -28,6 +30,7 @@ from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Noise, Rows, parameters
 from hdcal.physics.registry import EFFECTS
 
+GROWS = EFFECTS["heteroscedastic_noise"]
 SLOPE, ROWS = 205.0, 60
 X = np.linspace(0.02, 0.54, ROWS)
 SHORT = {"chains": 2, "warmup": 300, "draws": 300}
@@ -35,6 +38,43 @@ SHORT = {"chains": 2, "warmup": 300, "draws": 300}
 
 def case_of(noise, *, x=X, gear=None, **columns):
     return make_case(make_records(x, SLOPE * x - 1.0 + noise, **columns), gear)
+
+
+@pytest.fixture(scope="module")
+def both_forms():
+    """Correlated noise that grows, and places in the sampler's coordinates."""
+    rng = np.random.default_rng(0)
+    problem = build_problem(case_of(rng.normal(size=ROWS)), effect_priors(), (GROWS,))
+    noise = f"{GROWS.name}.share"
+    names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
+    places = {
+        "E0": 12.2 + 0.01 * rng.normal(size=8),
+        "_KE0": 13.1 + 0.1 * rng.normal(size=8),
+        "alpha": -8.0 + 0.1 * rng.normal(size=8),
+        "force_offset": rng.normal(size=8),
+        "deformation_offset": 0.02 * rng.normal(size=8),
+        "_added_sd": rng.normal(size=8),
+        f"_{CORRELATION}": 0.8 + 0.3 * rng.normal(size=8),
+        f"_{noise}": 3.0 * rng.normal(size=8),
+    }
+    return problem, [*names, CORRELATION, noise], places
+
+
+def test_coordinates_of_the_noise_have_the_stated_density(both_forms):
+    np.testing.assert_allclose(off_the_stated_density(*both_forms), 0.0, atol=1e-4)
+
+
+def test_a_coordinate_that_forgets_its_scale_is_told(both_forms, monkeypatch):
+    real = model._scaled_and_moved
+    monkeypatch.setattr(
+        model,
+        "_scaled_and_moved",
+        lambda law, scale, by: real(law, 1.1 * scale, by),
+    )
+    jax.clear_caches()
+    found = off_the_stated_density(*both_forms)
+    jax.clear_caches()
+    assert np.abs(found).max() > 0.1
 
 
 def test_neighbours_are_of_one_run_on_one_specimen():

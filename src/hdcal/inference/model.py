@@ -24,7 +24,8 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import POSITIVE, stiffness
-from hdcal.physics.effect import parameters
+from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.theory import Scalar
 
 # What a correlation keeps away from 0 and 1.
 _OPEN = 1e-12
@@ -38,7 +39,7 @@ def sample_site(name: str, prior: Prior):
     return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
 
 
-def sample_amplitude(name: str, prior: Prior, unit: float | None):
+def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
     """Sample a parameter of an effect.
 
     A half-normal one is sampled as unit · log(1 + eᵘ) with the unit that the data
@@ -75,13 +76,13 @@ def _sample_influence(prior: Prior, modulus):
     """Sample K·E₀, as read, under the prior of K, and return K."""
     if prior.family == "fixed":
         return sample_site("K", prior)
-    product = numpyro.sample("_KE0", _scaled_and_moved(prior, modulus, 0.0))
+    law = _scaled_and_moved(distribution(prior), modulus, 0.0)
+    product = numpyro.sample("_KE0", law)
     return numpyro.deterministic("K", product / modulus)
 
 
-def _scaled_and_moved(prior: Prior, scale, shift) -> dist.Distribution:
+def _scaled_and_moved(law, scale, shift) -> dist.Distribution:
     """Return the distribution of scale · parameter + shift."""
-    law = distribution(prior)
     domain = law.support or dist.constraints.real
     transform = dist.transforms.AffineTransform(shift, scale, domain=domain)
     return dist.TransformedDistribution(law, transform)
@@ -100,7 +101,8 @@ def _sample_contact(problem: Problem, values: Mapping):
     pressed = jnp.mean(jnp.sign(problem.rows.deformation))
     slack = values["seating_slack.clearance"]
     taken = pressed * slack / problem.reading.radial_per_read
-    corner = numpyro.sample("_corner", _scaled_and_moved(prior, 1.0, taken))
+    law = _scaled_and_moved(distribution(prior), 1.0, taken)
+    corner = numpyro.sample("_corner", law)
     return numpyro.deterministic(CONTACT, corner - taken)
 
 
@@ -122,6 +124,39 @@ def _sample_correlation(prior: Prior):
     log_prior = distribution(prior).log_prob(size) + log_jacobian
     numpyro.factor(f"_{CORRELATION}_prior", log_prior - formal.log_prob(v))
     return numpyro.deterministic(CORRELATION, size)
+
+
+def _sample_noise(problem: Problem, values: dict) -> None:
+    """Sample what noise there is: its sd, how neighbours err alike, and its growth.
+
+    Where neighbours err nearly alike rows show what each adds to the one before,
+    σ √(1 − ρ²), and neither σ nor ρ. So that is sampled, and σ follows; what grows with
+    the force is counted in a unit as much larger.
+    """
+    name, prior, own = "sigma", problem.priors["sigma"], 1.0
+    if problem.correlated:
+        values[CORRELATION] = _sample_correlation(problem.priors[CORRELATION])
+        own = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
+    if problem.correlated and prior.family != "fixed":
+        law = _scaled_and_moved(distribution(prior, positive=True), own, 0.0)
+        added = jnp.asarray(numpyro.sample("_added_sd", law))
+        values[name] = numpyro.deterministic(name, added / own)
+    else:
+        values[name] = sample_site(name, prior)
+    for effect in problem.effects:
+        if effect.stage == "noise":
+            _sample_effect(problem, effect, values, own)
+
+
+def _sample_effect(
+    problem: Problem, effect: type[Effect], values: dict, own: Scalar = 1.0
+) -> None:
+    """Sample the parameters of an effect, amplitudes in their unit over `own`."""
+    for field in parameters(effect):
+        name = f"{effect.name}.{field}"
+        unit = problem.units.get(name)
+        unit = None if unit is None else unit / own
+        values[name] = sample_amplitude(name, problem.priors[name], unit)
 
 
 def _sample_members(name: str, sd, seen_sd, count: int):
@@ -205,16 +240,13 @@ def _(problem: Problem) -> None:
     priors = problem.priors
     values = sample_stiffness(priors)
     slack = any(effect.name == "seating_slack" for effect in problem.effects)
-    for name in ("alpha", "force_offset", CONTACT, "sigma"):
+    for name in ("alpha", "force_offset", CONTACT):
         if not (slack and name == CONTACT):
             values[name] = sample_site(name, priors[name])
-    if problem.correlated:
-        values[CORRELATION] = _sample_correlation(priors[CORRELATION])
+    _sample_noise(problem, values)
     for effect in problem.effects:
-        for field in parameters(effect):
-            name = f"{effect.name}.{field}"
-            unit = problem.units.get(name)
-            values[name] = sample_amplitude(name, priors[name], unit)
+        if effect.stage != "noise":
+            _sample_effect(problem, effect, values)
     if slack:
         values[CONTACT] = _sample_contact(problem, values)
     _sample_structure(problem, values)

@@ -1,0 +1,35 @@
+"""Whether what is sampled, in whatever coordinates, has the density that is stated."""
+
+from collections.abc import Mapping
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.flatten_util import ravel_pytree
+
+from hdcal.inference.density import log_likelihood, log_prior
+from hdcal.inference.laplace import potential, values_at
+
+
+def off_the_stated_density(problem, names, coordinates: Mapping) -> np.ndarray:
+    """Return by how much the sampled density is off, at some places, one removed.
+
+    Args:
+        problem: the inference problem.
+        names: of its parameters, as many as there are coordinates.
+        coordinates: unconstrained, by site, each of shape (place,).
+    """
+
+    def named(flat, unravel):
+        values = values_at(problem, unravel(flat))
+        return jnp.stack([values[name] for name in names])
+
+    def off(position):
+        flat, unravel = ravel_pytree(position)
+        values = values_at(problem, position)
+        stated = log_prior(problem, values) + log_likelihood(problem, values)
+        moved = jnp.linalg.slogdet(jax.jacfwd(named)(flat, unravel))[1]
+        return -potential(problem, position) - stated - moved
+
+    found = np.asarray(jax.jit(jax.vmap(off))(dict(coordinates)))
+    return found - found[0]
