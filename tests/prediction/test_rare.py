@@ -52,7 +52,7 @@ def counted(force, limit: float) -> float:
 @pytest.mark.parametrize("law", slice_of(SIGMAS, ["Student's t"]))
 def test_tails_are_exact_however_far(law):
     case = case_of(SIGMAS[law])
-    posterior = calibrate(case, chains=2, warmup=300, draws=300)
+    posterior = calibrate(case, chains=2, warmup=300, draws=600)
     (cause,), (pulled,) = causes_of(posterior), causes_of(mirrored(posterior))
     force = population_force(cause, AT, "readings")
     for limit in LIMITS[law]:
@@ -181,7 +181,7 @@ def test_what_is_open_is_weighed_too():
 def test_at_every_temperature_it_is_refined():
     """The likeliest one counts, and its neighbours do not stay counted."""
     case = case_of(SIGMAS["normal"])
-    posterior = calibrate(case, chains=2, warmup=300, draws=300)
+    posterior = calibrate(case, chains=2, warmup=300, draws=600)
     asked = {"limit_force": 130.0, "temperature": [40.0, 60.0, 50.0]}
     found = hdcal.margin(posterior, AT, sensitivities=False, **asked)
     risks = [level.exceedance for level in found.levels]
