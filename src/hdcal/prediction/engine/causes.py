@@ -3,6 +3,7 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +13,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.typed_json import typed
 from hdcal.errors import Finding, InputError, NotUsable
+from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.hypotheses import (
     LEFT_OUT,
@@ -57,6 +59,11 @@ class Cause:
     def problem(self) -> Problem:
         """Structure of the model."""
         return self.posterior.problem
+
+    @cached_property
+    def whitening(self) -> laplace.Whitening:
+        """Mode of its density and curvature there."""
+        return laplace.fit(self.problem)
 
     @property
     def size(self) -> int:

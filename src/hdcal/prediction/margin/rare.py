@@ -220,7 +220,7 @@ def _points(force: PopulationForce, limit: float, seed: int):
     blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
     target = _Target(
         problem=force.cause.problem,
-        whitening=laplace.fit(force.cause.problem),
+        whitening=force.cause.whitening,
         whose=force.whose,
         conditions=replace(force.conditions, untested=untested),
         limit=jnp.asarray(limit),
