@@ -12,6 +12,7 @@ from stated_density import off_the_stated_density
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference import model
+from hdcal.inference import noise_form as noise_form_module
 from hdcal.inference.checks import correlation_check, growth_check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.member_counts import member_counts
@@ -217,6 +218,23 @@ def test_noise_of_one_size_is_seldom_let_grow():
         x = np.linspace(0.02, 0.54, rows)
         grown = [noise_grows(case_of(rng.normal(size=rows), x=x)) for _ in range(400)]
         assert np.mean(grown) < most
+
+
+def test_correlated_noise_of_one_size_is_seldom_let_grow(monkeypatch):
+    rng, x = np.random.default_rng(2), np.linspace(0.02, 0.54, 200)
+
+    def grown(scale) -> float:
+        cases = (
+            case_of(scale * autoregression(rng.normal(size=200), 0 * x, 0.8), x=x)
+            for _ in range(300)
+        )
+        return float(np.mean([noise_grows(case) for case in cases]))
+
+    assert grown(1.0) < 0.1
+    assert grown(1.0 + 2.0 * x / x.max()) > 0.9
+    # Taken for independent it passes for growth.
+    monkeypatch.setattr(noise_form_module, "_MOST_ALIKE", 0.0)
+    assert grown(1.0) > 0.12
 
 
 def test_of_many_rows_a_trace_of_growth_is_none():

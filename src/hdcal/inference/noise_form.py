@@ -9,7 +9,7 @@ from scipy import stats
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.member_counts import member_counts
-from hdcal.inference.serial_correlation import CORRELATION, previous_rows
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.physics.effect import Effect
 
 # Up to this many rows the noise that a fit leaves is a rough number, and the exact
@@ -30,6 +30,8 @@ _BESIDE_A_GAP = 49
 _LEAST_ROWS = 12
 # Noise sds over a range that differ by less are one: of very many rows any would show.
 _LEAST_GROWTH = 1.1
+# Correlation of neighbours that is taken off residuals, at most.
+_MOST_ALIKE = 0.95
 # Probability that noise of one size is let grow: one parameter more, near nothing.
 _FALSE_ALARM = 0.05
 
@@ -88,9 +90,23 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     coarse = case.gear.force_resolution > pilot.noise_sd
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
-    square = pilot.residual**2
+    square = _added(pilot.residual, previous_rows(records)) ** 2
     clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
     return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
+
+
+def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Return what each row adds to the row before it, on one scale.
+
+    Where neighbours err alike the squares of their errors come in waves, which pass for
+    growth twice or three times as often as those of independent ones.
+    """
+    follows, square = before >= 0, float(residual @ residual)
+    if not follows.any() or not square > 0.0:
+        return residual
+    tied = float(residual[follows] @ residual[before[follows]]) / follows.sum()
+    rho = np.clip(tied * len(residual) / square, 0.0, _MOST_ALIKE)
+    return whiten(residual, before, float(rho))
 
 
 def _variance_ratio(square: np.ndarray, deformation) -> float:
