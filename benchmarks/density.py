@@ -59,13 +59,15 @@ def log_density(e, numbers: Numbers, xp):
 
 
 def make_problem():
-    """Return hdcal's problem: the XB1-100-80 case, rounding left out."""
+    """Return hdcal's problem: the XB1-100-80 case, neither rounded nor correlated."""
     from hdcal import read_case
-    from hdcal.data.priors import effect_priors
+    from hdcal.data.priors import Prior, effect_priors
     from hdcal.inference.problem import build_problem
 
     case = read_case(CASE)
-    case = replace(case, gear=replace(case.gear, force_resolution=0.0))
+    alone = case.gear.scale_priors | {"noise_correlation": Prior("fixed", (0.0,))}
+    gear = replace(case.gear, force_resolution=0.0, scale_priors=alone)
+    case = replace(case, gear=gear)
     return build_problem(case, effect_priors())
 
 

@@ -51,6 +51,26 @@ def test_the_moments_are_those_of_independent_noise():
     assert stats.binomtest(low, 2000, 0.5 * FALSE_ALARM, "greater").pvalue > 1e-3
 
 
+def test_correlation_that_the_model_has_is_no_growth():
+    rng, rows = np.random.default_rng(4), 200
+    x = np.linspace(0.02, 0.54, rows)
+    records, absorbed = make_records(x), np.column_stack([np.ones(rows), x])
+
+    def alarms(noise) -> float:
+        told = 0
+        for _ in range(400):
+            data = Whitened(noise(correlated(0.8, rng, rows)), absorbed, {})
+            found = noise_faults(
+                data, records, np.ones(rows), rounded=False, correlation=0.8
+            )
+            told += any(fault.name == SCATTER for fault in found)
+        return told / 400
+
+    # Half of 1 % each; of errors as they are it was 9 %.
+    assert alarms(lambda error: error) < 0.025
+    assert alarms(lambda error: error * (1.0 + 2.0 * x / x.max())) > 0.9
+
+
 @pytest.mark.parametrize("run", [None, np.repeat(np.arange(3), 20)])
 def test_correlated_noise_is_found(run):
     rng = np.random.default_rng(3)

@@ -1,11 +1,14 @@
 """A fitted leftover is followed with the stiffness, as the calibration left it."""
 
 import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from posteriors import beside, plain_draws, ramp_case, written_posterior
 
+from hdcal.prediction.engine.gear_forces import gear_bends, gear_values
+from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
 from hdcal.tracking.tracker import Tracker
 from hdcal.tracking.unequal_rows import UnequalRows
@@ -84,6 +87,35 @@ def test_a_leftover_that_is_left_out_is_told_by_the_same_count(monkeypatch):
     monkeypatch.setattr(UnequalRows, "leftover", lambda self, at: 0.0 * real(self, at))
     inside, _, _ = followed(with_newtons(), 10)
     assert inside < 0.5
+
+
+def test_what_is_forgotten_of_a_long_wave_fades_to_the_prior_too():
+    """Its finest weights are as good as none, and may not grow without end."""
+    posterior = with_newtons()
+    tree = posterior.tree.copy(deep=True)
+    weights = tree["posterior"]["gap_weights"]
+    tree["posterior"]["gap_weights"] = weights * 10.0 ** (-4.0 * np.arange(20))
+    tracker = Tracker(replace(posterior, tree=tree), forget=0.9)
+    rng, found = np.random.default_rng(0), []
+    for at in np.resize(PLACES, 4000).tolist():
+        answer = tracker.update(at, 205.0 * at + rng.normal(0.0, 0.5))
+        found.append(answer["stiffness_N_per_mm"]["sd"])
+    assert np.mean(found[-200:]) < 1.5 * np.mean(found[100:300])
+
+
+def test_the_fit_has_no_part_far_from_what_was_tested():
+    posterior = with_newtons()
+    reader, values = UntestedReading(posterior), gear_values(posterior)
+    for at in (0.01, 0.3, 0.55, 0.58, 1.5, -0.05, -1.0):
+        place = np.array([at])
+        own = reader.leftover(place) @ posterior.draws["gap_weights"][5]
+        draws, untested = values
+        one = {name: column[5] for name, column in draws.items()}
+        bends = gear_bends(untested, one)
+        _, fitted = bends.leftover(posterior.problem, one, place, np.ones(1))
+        np.testing.assert_allclose(own, fitted, rtol=1e-9, atol=1e-12)
+    inside, outside = (reader.leftover(np.array([at])) for at in (0.3, 1.5))
+    assert np.abs(inside).max() > 0.1 and np.abs(outside).max() < 1e-9
 
 
 def test_beside_an_effect_it_is_followed_too():

@@ -133,29 +133,29 @@ def _sample_noise(problem: Problem, values: dict) -> None:
     σ √(1 − ρ²), and neither σ nor ρ. So that is sampled, and σ follows; what grows with
     the force is counted in a unit as much larger.
     """
-    name, prior, own = "sigma", problem.priors["sigma"], 1.0
+    name, prior, unshared = "sigma", problem.priors["sigma"], 1.0
     if problem.correlated:
         values[CORRELATION] = _sample_correlation(problem.priors[CORRELATION])
-        own = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
+        unshared = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
     if problem.correlated and prior.family != "fixed":
-        law = _scaled_and_moved(distribution(prior, positive=True), own, 0.0)
+        law = _scaled_and_moved(distribution(prior, positive=True), unshared, 0.0)
         added = jnp.asarray(numpyro.sample("_added_sd", law))
-        values[name] = numpyro.deterministic(name, added / own)
+        values[name] = numpyro.deterministic(name, added / unshared)
     else:
         values[name] = sample_site(name, prior)
     for effect in problem.effects:
         if effect.stage == "noise":
-            _sample_effect(problem, effect, values, own)
+            _sample_effect(problem, effect, values, unshared)
 
 
 def _sample_effect(
-    problem: Problem, effect: type[Effect], values: dict, own: Scalar = 1.0
+    problem: Problem, effect: type[Effect], values: dict, over: Scalar = 1.0
 ) -> None:
-    """Sample the parameters of an effect, amplitudes in their unit over `own`."""
+    """Sample the parameters of an effect, amplitudes in their unit over that."""
     for field in parameters(effect):
         name = f"{effect.name}.{field}"
         unit = problem.units.get(name)
-        unit = None if unit is None else unit / own
+        unit = None if unit is None else unit / over
         values[name] = sample_amplitude(name, problem.priors[name], unit)
 
 

@@ -21,7 +21,7 @@ from hdcal.physics.effect import Effect, Noise, parameters
 Values = Mapping[str, Any]
 
 # A normal prior of these is cut at zero.
-POSITIVE = frozenset({"E0", "mass", "damping_ratio", "deformation_sigma"})
+POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
 MEMBERS = {
     "run": "run_offset",
     "specimen": "specimen_deviation",

@@ -24,7 +24,6 @@ def begin_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: it holds what cannot be followed row by row.
     """
     if isinstance(known, Gear):
         return prior_from_gear(known, seed)
@@ -45,6 +44,9 @@ def begin_core(
         prior: of the stream, from the same.
         forget: share of the past kept at each reading.
         unequal: what readings have beside the model; None of a gear.
+
+    Raises:
+        InputError: the calibration holds what cannot be followed row by row.
     """
     coefficients = prior.coefficients()
     if isinstance(known, Gear):

@@ -38,7 +38,8 @@ def build_particles(
         forget: has to be 1.
 
     Returns:
-        The particles, and (deformation, temperature rise, time) → their columns.
+        The particles, and (deformation, temperature rise, time) → their columns but
+        those of a fitted leftover.
 
     Raises:
         InputError: an effect remembers earlier rows, needs what a stream does not
@@ -174,7 +175,7 @@ def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
 
 @jax.jit
 def _columns(draws: Draws, reading: Reading, ends, row):
-    """Return the columns of `Particles` at one row, shape (3, particle)."""
+    """Return the first columns of `Particles` at one row, shape (3, particle)."""
     low, high = _readings(draws, reading, ends, row[None, :])[:, :, 0]
     slope = (high - low) / (ends[1] - ends[0])
     # Stiffness as read: radial stiffness times the radial displacement per read.

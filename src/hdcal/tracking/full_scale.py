@@ -5,7 +5,7 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import IN_NEWTONS, at_full_scale
 from hdcal.inference.posterior import Posterior
 
-# Of the leftover discrepancy a stream makes no use.
+# Of a leftover discrepancy a stream that begins with priors makes no use.
 _UNUSED = "gap_sd"
 # Largest ratio of full scales for which priors in newtons serve as well.
 _ALIKE = 3.0

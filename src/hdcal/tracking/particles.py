@@ -24,7 +24,7 @@ LEAST_EFFECTIVE = 5.0
 
 
 class Particles(WeightedCores):
-    """Weighted particles, each with its normal-inverse-gamma stiffness and zero.
+    """Weighted particles, each with its normal-inverse-gamma law of what is linear.
 
     The columns of a row are force per unit of stiffness [mm], force at no stiffness
     [N], one, and those of the fitted leftover; the coefficient of the second is known.

@@ -14,6 +14,9 @@ from hdcal.physics.chain import Base, Reading, linear_coefficients
 from hdcal.physics.theory import THEORIES
 
 _PRIOR_DRAWS = 20_000
+# Weights of a leftover below this share of the largest one have no part in a reading.
+# Of a long wave the finest ones are 1e-100: too small to be told from what is known.
+_NO_PART = 1e-9
 _SITES = ("K", "E0", "alpha", "force_offset", "deformation_offset", "sigma")
 
 
@@ -101,6 +104,8 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
 def _stream_prior(stiffness, draws, stated, reading, run_sd, step) -> StreamPrior:
     base = Base(stiffness=stiffness, **{name: draws[name] for name in _SITES[2:]})
     weights = draws.get("gap_weights", np.empty((len(stiffness), 0)))
+    size = np.sqrt(np.mean(weights**2, axis=0))
+    weights = np.where(size > _NO_PART * size.max(initial=0.0), weights, 0.0)
     variance = draws["sigma"] ** 2 + stated + step**2 / 12.0
     remounting = 2.0 * float(np.mean(run_sd**2))
     return StreamPrior(base, weights, variance, reading, remounting, step)
