@@ -29,10 +29,10 @@ demo: .venv/installed  ## calibrate and diagnose the bundled gear
 	@echo "The reports: demo-out/report.html, demo-verdict/report.html"
 
 test: .venv/installed  ## all tests but the longest ones
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(ARGS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal --benchmark-disable $(ARGS)
 
 thorough: .venv/installed  ## the longer tests beside them; PART=3/8 for a part of them
-	$(BIN)/python -m pytest -m thorough -n $(JOBS) --dist loadfile --benchmark-disable \
+	$(BIN)/python -m pytest -m thorough -n $(JOBS) --dist worksteal --benchmark-disable \
 		$(if $(PART),--part $(PART)) $(ARGS)
 
 slow: .venv/installed  ## the long statistical tests
