@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rigs import autoregression, draw_truth, make_case, make_gear, make_records
 from scipy import stats
-from stated_density import off_the_stated_density
+from stated_density import base_places, off_the_stated_density
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
@@ -49,10 +49,7 @@ def both_forms():
     noise = f"{GROWS.name}.share"
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     places = {
-        "E0": 12.2 + 0.01 * rng.normal(size=8),
-        "_KE0": 13.1 + 0.1 * rng.normal(size=8),
-        "alpha": -8.0 + 0.1 * rng.normal(size=8),
-        "force_offset": rng.normal(size=8),
+        **base_places(rng),
         "deformation_offset": 0.02 * rng.normal(size=8),
         "_added_sd": rng.normal(size=8),
         f"_{CORRELATION}": 0.8 + 0.3 * rng.normal(size=8),

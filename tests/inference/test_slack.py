@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 from rigs import make_case, make_gear, make_records
-from stated_density import off_the_stated_density
+from stated_density import base_places, off_the_stated_density
 
 from hdcal import EFFECTS, calibrate
 from hdcal.data.priors import Prior, effect_priors
@@ -29,10 +29,7 @@ def off(problem) -> np.ndarray:
     """Return by how much the sampled density is off, at random places, one removed."""
     rng = np.random.default_rng(0)
     coordinates = {
-        "E0": 12.2 + 0.01 * rng.normal(size=8),
-        "_KE0": 13.1 + 0.1 * rng.normal(size=8),
-        "alpha": -8.0 + 0.1 * rng.normal(size=8),
-        "force_offset": rng.normal(size=8),
+        **base_places(rng),
         "_corner": 0.02 * rng.normal(size=8),
         "sigma": rng.normal(size=8),
         "_seating_slack.clearance": 3.0 * rng.normal(size=8),

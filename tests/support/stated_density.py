@@ -11,6 +11,16 @@ from hdcal.inference.density import log_likelihood, log_prior
 from hdcal.inference.laplace import potential, values_at
 
 
+def base_places(rng, count: int = 8) -> dict[str, np.ndarray]:
+    """Return unconstrained places of what every problem has, near those of a gear."""
+    return {
+        "E0": 12.2 + 0.01 * rng.normal(size=count),
+        "_KE0": 13.1 + 0.1 * rng.normal(size=count),
+        "alpha": -8.0 + 0.1 * rng.normal(size=count),
+        "force_offset": rng.normal(size=count),
+    }
+
+
 def off_the_stated_density(problem, names, coordinates: Mapping) -> np.ndarray:
     """Return by how much the sampled density is off, at some places, one removed.
 
