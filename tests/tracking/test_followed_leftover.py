@@ -1,11 +1,11 @@
 """A fitted leftover is followed with the stiffness, as the calibration left it."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from posteriors import beside, plain_draws, ramp_case, written_posterior
+from streams import follow
 
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_values
 from hdcal.prediction.engine.untested_reading import UntestedReading
@@ -59,17 +59,13 @@ def followed(posterior, streams: int, rows: int = 300) -> tuple[float, float, fl
     """Return shares of stiffnesses and of readings inside, and alarms over the due."""
     start, inside, read, alarms = Tracker(posterior, alarm_rows=100.0), [], [], 0
     for seed in range(streams):
-        rng, mine = np.random.default_rng(400 + seed), copy.deepcopy(start)
+        rng = np.random.default_rng(400 + seed)
         draw = rng.integers(len(posterior.draws["K"]))
         at, force, _, truth = stream(posterior, draw, rows, rng)
-        found = {}
-        for row in zip(at.tolist(), force.tolist(), strict=True):
-            found = mine.update(*row)
-            low, high = found["force_N"]["predictive_95"]
-            read.append(low < row[1] < high)
-        low, high = found["stiffness_N_per_mm"]["credible_95"]
-        inside.append(low < truth[0] < high)
-        alarms += mine.alarms
+        held, readings, called = follow(start, at, force, truth[0])
+        inside.append(held)
+        read += readings
+        alarms += called
     return np.mean(inside), np.mean(read), alarms * 100.0 / (streams * rows)
 
 

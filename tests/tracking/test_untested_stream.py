@@ -1,12 +1,12 @@
 """Readings at untested conditions: their bands are wide, and they teach little."""
 
-import copy
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from posteriors import beside, regressed, single, with_leftover
 from scipy import stats
+from streams import follow
 
 import hdcal
 from hdcal.errors import InputError
@@ -94,7 +94,7 @@ def followed(posterior, places, streams: int, rows: int, alarm_rows: float = 100
     stiffness, reading, alarms = [], [], 0
     terms = [added.at(place, 20.0) for place in places]
     for seed in range(streams):
-        rng, mine = np.random.default_rng(800 + seed), copy.deepcopy(start)
+        rng = np.random.default_rng(800 + seed)
         draw = rng.integers(len(prior.variance))
         truth, sd = prior.coefficients()[draw], np.sqrt(prior.variance[draw])
         common = rng.normal(size=len(terms[0].columns))
@@ -102,14 +102,10 @@ def followed(posterior, places, streams: int, rows: int, alarm_rows: float = 100
         bend = [t.shift + t.columns @ common + t.rest * rng.normal() for t in terms]
         force = truth[0] * at + truth[2] + np.resize(bend, rows)
         force = force + rng.normal(0.0, sd, rows)
-        found = {}
-        for row in zip(at.tolist(), force.tolist(), strict=True):
-            found = mine.update(*row)
-            low, high = found["force_N"]["predictive_95"]
-            reading.append(low < row[1] < high)
-        low, high = found["stiffness_N_per_mm"]["credible_95"]
-        stiffness.append(low < truth[0] < high)
-        alarms += mine.alarms
+        held, readings, called = follow(start, at, force, truth[0])
+        stiffness.append(held)
+        reading += readings
+        alarms += called
     due = streams * rows / alarm_rows
     return np.mean(stiffness), np.mean(reading), alarms / due
 
