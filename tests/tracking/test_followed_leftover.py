@@ -7,6 +7,7 @@ import pytest
 from posteriors import beside, plain_draws, ramp_case, written_posterior
 from streams import follow
 
+from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_values
 from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
@@ -125,3 +126,34 @@ def test_beside_an_effect_it_is_followed_too():
     one, two = (found["stiffness_N_per_mm"] for found in (one, two))
     assert two["mean"] == pytest.approx(one["mean"], abs=0.3 * one["sd"])
     assert two["sd"] == pytest.approx(one["sd"], rel=0.2)
+
+
+def halves():
+    """Return a calibration that has the leftover or has none, and both alone."""
+    case, other = ramp_case(), with_newtons()
+    plain = written_posterior(case, plain_draws(case, 2000))
+    return mixed_posterior({"none": (0.5, plain), "unknown": (0.5, other)}), other
+
+
+def test_of_several_causes_the_one_that_a_stream_shows_is_followed_as_if_alone():
+    mixture, other = halves()
+    chances, odds = np.random.default_rng(5), []
+    for draw in chances.integers(2000, size=6).tolist():
+        at, force, _, _ = stream(other, draw, 200, np.random.default_rng(draw))
+        together, alone = Tracker(mixture), Tracker(other)
+        for row in zip(at.tolist(), force.tolist(), strict=True):
+            one, two = together.update(*row), alone.update(*row)
+        odds.append(together._core.weight[1])
+        if odds[-1] > 0.99:
+            one, two = (found["stiffness_N_per_mm"] for found in (one, two))
+            assert one["mean"] == pytest.approx(two["mean"], abs=0.2 * two["sd"])
+            assert one["sd"] == pytest.approx(two["sd"], rel=0.1)
+    assert sum(share > 0.99 for share in odds) >= 3
+
+
+@pytest.mark.thorough
+def test_the_interval_of_a_mixture_holds_the_stiffness():
+    inside, read, alarms = followed(halves()[0], 30)
+    assert inside >= 0.83
+    assert read == pytest.approx(0.95, abs=0.01)
+    assert 1.0 / 1.5 < alarms < 1.5

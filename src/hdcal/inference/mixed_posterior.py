@@ -79,6 +79,18 @@ def models_of(posterior: Posterior) -> list[tuple[float, Posterior]]:
     ]
 
 
+def causes_of_draws(posterior: Posterior) -> np.ndarray:
+    """Return the number of the cause behind each draw, shape (draw,); 0 of one model.
+
+    Draws are in the order of `Posterior.draws`, chain after chain.
+    """
+    draws = posterior.tree["posterior"].to_dataset()
+    if HYPOTHESIS not in draws.coords:
+        return np.zeros(draws.sizes["chain"] * draws.sizes["draw"], int)
+    _, number = np.unique(draws[HYPOTHESIS].to_numpy().astype(str), return_inverse=True)
+    return np.tile(number, draws.sizes["chain"])
+
+
 def _alone(posterior: Posterior, name: str, rows: np.ndarray) -> Posterior:
     """Return one model of a mixture, of these draws of each chain."""
     own = parts_of(name)

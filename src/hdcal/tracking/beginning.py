@@ -6,11 +6,11 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.inference.posterior import Posterior
+from hdcal.tracking.cause_cores import CauseCores, followed_one_by_one
 from hdcal.tracking.effect_tracking import build_particles, force_effects
 from hdcal.tracking.first_rows import FirstRows
 from hdcal.tracking.linear_core import LinearCore
 from hdcal.tracking.normal_inverse_gamma import match_draws
-from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import (
     StreamPrior,
     prior_from_gear,
@@ -36,7 +36,7 @@ def begin_core(
     prior: StreamPrior,
     forget: float,
     unequal: UnequalRows | None,
-) -> tuple[LinearCore | FirstRows | Particles, Callable[..., np.ndarray]]:
+) -> tuple[LinearCore | FirstRows | CauseCores, Callable[..., np.ndarray]]:
     """Return the core, and what makes of a row the columns that it takes.
 
     Args:
@@ -51,11 +51,13 @@ def begin_core(
     coefficients = prior.coefficients()
     if isinstance(known, Gear):
         return FirstRows(coefficients, prior.variance), _linear_columns
+    columns = _linear_columns
     if force_effects(known):
         core, columns = build_particles(known, prior, forget)
+    elif forget == 1.0 and prior.cause.any():
+        core = followed_one_by_one(coefficients, prior.variance, prior.cause)
     else:
         core = LinearCore(match_draws(coefficients, prior.variance), forget)
-        columns = _linear_columns
     if unequal is None or known.problem.discrepancy is None:
         return core, columns
 

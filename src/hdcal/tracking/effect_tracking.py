@@ -198,4 +198,4 @@ def _particles(posterior: Posterior, prior: StreamPrior, chosen) -> Particles:
     zero = np.asarray(prior.base.force_offset)
     linear = np.column_stack([stiffness, zero, prior.weights])
     scaled = fixed / np.where(sd > 0.0, sd, 1.0)
-    return Particles(linear, prior.variance, scaled, chosen)
+    return Particles(linear, prior.variance, scaled, prior.cause, chosen)

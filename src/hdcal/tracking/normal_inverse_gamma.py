@@ -27,8 +27,9 @@ class NormalInverseGamma:
     """The law of coefficients and noise variance, or of those of many cores.
 
     Attributes:
-        mean: m, shape (p,) or (p, core).
-        root: L, shape (p, r) or (p, r, core); what cannot vary has no column.
+        mean: m, shape (p,) or (core, p).
+        root: L, shape (p, r) or (core, p, r); what cannot vary has no column, or an
+            empty one.
         shape: a [-].
         rate: b [N²], a number or shape (core,).
     """

@@ -8,6 +8,7 @@ from hdcal.data.case import Gear
 from hdcal.data.prior import Prior, scaled
 from hdcal.inference.distributions import bounds, frozen
 from hdcal.inference.gauges import as_read
+from hdcal.inference.mixed_posterior import causes_of_draws
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import POSITIVE
 from hdcal.physics.chain import Base, Reading, linear_coefficients
@@ -28,6 +29,7 @@ class StreamPrior:
         base: parameters of the model, each (draw,).
         weights: of the fitted leftover discrepancy [N], (draw, weight); none of a gear.
         variance: of a reading, rounding and stated errors included [N²], (draw,).
+        cause: number of the cause behind each draw, (draw,).
         reading: how the rig reads.
         remounting: variance of the force's zero from one mounting to the next [N²].
         step: of the force as read [N], 0 = not rounded.
@@ -36,6 +38,7 @@ class StreamPrior:
     base: Base
     weights: np.ndarray
     variance: np.ndarray
+    cause: np.ndarray
     reading: Reading
     remounting: float
     step: float
@@ -72,8 +75,8 @@ def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
     reading = Reading(
         float(reading.radial_per_read), float(reading.reference_temperature)
     )
-    step = float(problem.step)
-    return _stream_prior(stiffness, draws, stated, reading, run_sd, step)
+    step, cause = float(problem.step), causes_of_draws(posterior)
+    return _stream_prior(stiffness, draws, stated, cause, reading, run_sd, step)
 
 
 def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
@@ -97,18 +100,20 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
     half = 0.5 if gear.reading == "diametral" else 1.0
     reading = Reading(half, gear.reference_temperature)
     stiffness = draws["K"] * draws["E0"] * own
-    step = gear.force_resolution
-    return _stream_prior(stiffness, draws, 0.0, reading, run_sd, step)
+    step, cause = gear.force_resolution, np.zeros(_PRIOR_DRAWS, int)
+    return _stream_prior(stiffness, draws, 0.0, cause, reading, run_sd, step)
 
 
-def _stream_prior(stiffness, draws, stated, reading, run_sd, step) -> StreamPrior:
+def _stream_prior(
+    stiffness, draws, stated, cause, reading, run_sd, step
+) -> StreamPrior:
     base = Base(stiffness=stiffness, **{name: draws[name] for name in _SITES[2:]})
     weights = draws.get("gap_weights", np.empty((len(stiffness), 0)))
     size = np.sqrt(np.mean(weights**2, axis=0))
     weights = np.where(size > _NO_PART * size.max(initial=0.0), weights, 0.0)
     variance = draws["sigma"] ** 2 + stated + step**2 / 12.0
     remounting = 2.0 * float(np.mean(run_sd**2))
-    return StreamPrior(base, weights, variance, reading, remounting, step)
+    return StreamPrior(base, weights, variance, cause, reading, remounting, step)
 
 
 def _draw(prior: Prior, rng, size: int, positive: bool = False) -> np.ndarray:
