@@ -29,7 +29,7 @@ def handmade(**share) -> ModelPosterior:
 
 @pytest.fixture
 def word(monkeypatch):
-    def ask(alike=(), *, carried=1.0, detected=True, doubt=False, **share):
+    def ask(alike=(), *, carried=1.0, detected=True, doubt=False, minor=False, **share):
         posterior = handmade(**share)
         # What some effects close of the likeliest hypothesis, by their share of names.
         monkeypatch.setattr(
@@ -39,6 +39,7 @@ def word(monkeypatch):
                 carried if any(n in names for n in hypothesis) else 0.0
             ),
         )
+        monkeypatch.setattr(levels, "leaves_most", lambda *_: minor)
         return levels.verdict_word(
             SimpleNamespace(on_noise=("wild",)),
             SimpleNamespace(posterior=posterior, detected=detected),
@@ -98,6 +99,13 @@ def test_what_leaves_more_than_noise_is_said_one_level_less(word):
 def test_what_does_not_carry_the_gap_is_no_cause(word):
     assert word(carried=0.6, **SURE) == "ambiguous"
     assert word(carried=0.8, **SURE) == "named"
+
+
+def test_of_what_leaves_most_of_the_gap_nothing_is_said(word):
+    assert word(minor=True, **SURE) == "ambiguous"
+    assert word(minor=True, none=0.02, unknown=0.03, stick=0.5, slip=0.45) == (
+        "ambiguous"
+    )
 
 
 def test_groups_add_up_what_holds_a_member():

@@ -103,6 +103,7 @@ def answer_of(verdict: Verdict) -> CaseAnswer:
         noise_sd=gap.noise_sd_N,
         group=tuple(which.group.split(JOINED)) if which.group else (),
         group_members=which.group_members,
+        describes_best=which.describes_best,
     )
 
 
@@ -140,6 +141,7 @@ def fingerprint(library: str | None = None) -> dict[str, Any]:
         "library_sha256": _of({name: _declared(effect) for name, effect in considered}),
         "priors_sha256": _of(_hashes(priors_folder(), ".toml")),
         "thresholds_sha256": _of({**thresholds, "FALSE_ALARM": FALSE_ALARM}),
+        "naming_sha256": _of(_hashes(_package(), ".toml")),
         "versions": versions(),
         "code_sha256": _of(_hashes(_package(), ".py")),
     }

@@ -104,6 +104,8 @@ class CaseAnswer:
         group: that leads, several where the loading cannot part them; empty where no
             group is said.
         group_members: effects of it.
+        describes_best: `effect` alone describes the gap, and is not named only since
+            other causes look like it too often.
     """
 
     __pydantic_config__ = STRICT
@@ -123,6 +125,7 @@ class CaseAnswer:
     noise_sd: Size | None = None
     group: tuple[Name, ...] = ()
     group_members: tuple[Name, ...] = ()
+    describes_best: bool = False
 
     @classmethod
     def from_plain(cls, data: dict[str, Any]) -> "CaseAnswer":

@@ -13,6 +13,8 @@ from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
 from hdcal.evidence.bursts import BURSTS, burst_odds, is_noisy, relative_sd
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
+from hdcal.evidence.hypothesis_design import fitted_curve
+from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.prepare import with_relative_noise, with_rows
 from hdcal.evidence.remainder_evidence import beside_effects
 from hdcal.evidence.residual_test import Directions, residual_test
@@ -22,6 +24,32 @@ from hdcal.physics.effect import Effect
 _DRAWS = 600
 # A hypothesis with a smaller p-value leaves more than noise.
 _LEAST = 0.01
+# An effect that closes less of the gap leaves more than it closes.
+_MOST = 0.5
+
+
+def leaves_most(evidence: CaseEvidence, hypothesis: str, effect: str) -> bool:
+    """Tell whether an effect would leave most of the gap to unknown structure.
+
+    Noise of any size can take in what is none, so that nothing seems to be left beside
+    the effect. And what is smaller than the rounding of readings is a part of that.
+
+    Args:
+        evidence: of the case.
+        hypothesis: the likeliest, effects joined with +.
+        effect: that leads.
+    """
+    names, closed = {*hypothesis.split("+")}, evidence.closed.get(effect)
+    # Of two effects together neither has to close most.
+    second = names - {effect, UNKNOWN, *evidence.on_noise}
+    if closed is None or effect in evidence.on_noise or second:
+        return False
+    if QUANTISATION in names:
+        curve = fitted_curve(evidence, effect)[None]
+        curve = remove_base(evidence.prepared.rows, curve)
+        if np.sqrt(np.mean(curve**2)) < evidence.rounding_step / np.sqrt(12.0):
+            return True
+    return float(np.median(closed)) < _MOST
 
 
 def leaves_more_than_noise(

@@ -56,6 +56,12 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
+    if which.describes_best:
+        yield (
+            f"{capital(label(which.effect))} alone describes it, but is not named: "
+            f"{percent(which.lookalike_rate)} of {which.lookalike_cases} such cases of "
+            "blind checks had another cause."
+        )
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."

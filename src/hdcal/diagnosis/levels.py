@@ -6,6 +6,7 @@ what fails one is said on the next: nothing here moves a probability.
 
 from collections.abc import Container, Mapping
 
+from hdcal.diagnosis.adequacy import leaves_most
 from hdcal.diagnosis.detection import Detection
 from hdcal.diagnosis.groups import LeadingGroup, identified
 from hdcal.diagnosis.model_posterior import CARRIES, NAMED
@@ -47,11 +48,12 @@ def verdict_word(
     def carry(names: Container[str]) -> bool:
         return closed_by(evidence, posterior.top.split("+"), names) >= CARRIES
 
+    minor = leaves_most(evidence, posterior.top, best)
     alone = identified(posterior, library, best) >= NAMED
     # A rival that this loading can never exclude is not excluded by a name.
-    if alone and not rival and not doubt and carry(sure):
+    if alone and not rival and not doubt and not minor and carry(sure):
         return "named"
-    if group is None or group.probability < NAMED:
+    if group is None or group.probability < NAMED or minor:
         return "ambiguous"
     # Noise that leaves more than noise is none.
     hollow = doubt and (not sure or best in evidence.on_noise)

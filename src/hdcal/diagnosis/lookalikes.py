@@ -1,6 +1,7 @@
-"""Effects that these records cannot test and that would look like the leading one."""
+"""Effects that these records cannot tell apart, untestable ones among them."""
 
 from collections.abc import Mapping
+from itertools import combinations
 
 import numpy as np
 
@@ -54,3 +55,32 @@ def untestable_lookalikes(
         if alike > ALIKE and (1.0 - alike) * size < LEAST_SEEN * noise**2:
             found.append(NotTestable(name, needs))
     return tuple(found)
+
+
+def inseparable(evidence: CaseEvidence) -> tuple[tuple[str, str], ...]:
+    """Return pairs of effects that this loading can never tell apart.
+
+    In the best case most of the smaller one is shared by the other, and what is not
+    has less than `LEAST_SEEN` squared noise sds.
+    """
+    rows, noise = evidence.prepared.rows, evidence.prepared.noise_sd
+    left = {
+        each.name: remove_base(rows, each.large) * rows.weight
+        for each in evidence.piecewise
+        if each.name in evidence.table
+    }
+    sided = {each.name for each in evidence.piecewise if each.grid.one_sided}
+    pairs = []
+    for one, two in combinations(left, 2):
+        a, b = left[one], left[two]
+        along = a @ b.T
+        if {one, two} <= sided:
+            # Both bend one way only.
+            along = np.maximum(along, 0.0)
+        size_a, size_b = np.sum(a**2, axis=1), np.sum(b**2, axis=1)
+        share = along**2 / np.maximum(size_a[:, None] * size_b, 1e-300)
+        apart = np.minimum(size_a[:, None], size_b) * (1.0 - share)
+        alike = np.min(share) > ALIKE
+        if alike and np.max(apart) < LEAST_SEEN * noise**2:
+            pairs.append((one, two))
+    return tuple(pairs)

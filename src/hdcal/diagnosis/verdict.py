@@ -9,7 +9,14 @@ from hdcal.diagnosis.gap import Gap, Seen, Where
 from hdcal.inference.hypotheses import LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
-from hdcal.report.answer import EffectName, Probability, Promise, Real, Words
+from hdcal.report.answer import (
+    Count,
+    EffectName,
+    Probability,
+    Promise,
+    Real,
+    Words,
+)
 from hdcal.report.parameters import Interval
 
 VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
@@ -51,6 +58,21 @@ class Remainder:
 
 
 @dataclass(frozen=True)
+class Certificate:
+    """How often what is said was wrong in a blind check, none of its effects withheld.
+
+    Attributes:
+        said: how often a name, or a name or a group, was given there.
+        wrong: how often that was wrong.
+        at_most: share that is wrong at most, with a confidence of 95 %.
+    """
+
+    said: Count
+    wrong: Count
+    at_most: Probability
+
+
+@dataclass(frozen=True)
 class Which:
     """Which unmodelled effect causes the gap.
 
@@ -77,6 +99,12 @@ class Which:
         doubted: the likeliest hypothesis leaves more than noise.
         lookalikes: effects that these records cannot show and that would look like
             `effect` in them.
+        lookalike_cases: cases of blind checks that `effect` alone described.
+        lookalike_rate: share of these in which another cause acted; None if there were
+            none.
+        describes_best: `effect` alone describes the gap, but other causes look like it
+            too often for a name.
+        certificate: of such an answer; None where neither group nor effect is said.
     """
 
     verdict: VerdictWord
@@ -99,6 +127,10 @@ class Which:
     remainder: Remainder | None = None
     doubted: bool = False
     lookalikes: tuple[NotTestable, ...] = ()
+    lookalike_cases: Count = 0
+    lookalike_rate: Probability | None = None
+    describes_best: bool = False
+    certificate: Certificate | None = None
 
     @property
     def named(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """Which effect causes the gap: posterior over hypotheses, and how firm it is."""
 
-from itertools import combinations, starmap
+from itertools import starmap
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from hdcal.diagnosis.groups import (
     ranked_effects,
 )
 from hdcal.diagnosis.levels import verdict_word
-from hdcal.diagnosis.lookalikes import ALIKE, untestable_lookalikes
+from hdcal.diagnosis.lookalikes import inseparable, untestable_lookalikes
 from hdcal.diagnosis.model_posterior import (
     CARRIES,
     NAMED,
@@ -22,15 +22,14 @@ from hdcal.diagnosis.model_posterior import (
     carried,
     model_posterior,
 )
-from hdcal.diagnosis.verdict import NotTestable, Remainder, Which
+from hdcal.diagnosis.naming import naming
+from hdcal.diagnosis.verdict import Certificate, NotTestable, Remainder, Which
 from hdcal.diagnosis.where import interval
 from hdcal.evidence.case_evidence import (
-    LEAST_SEEN,
     NONE,
     CaseEvidence,
     with_remainder,
 )
-from hdcal.evidence.linear_rows import remove_base
 from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
@@ -45,20 +44,21 @@ def identify_cause(
 ) -> Which:
     """Return the verdict on the cause."""
     posterior, alike = found.posterior, inseparable(evidence)
-    noise = evidence.on_noise
-    group = leading_group(posterior, library, alike, noise)
-    ranked = ranked_effects(posterior, noise)
+    group = leading_group(posterior, library, alike, evidence.on_noise)
+    ranked = ranked_effects(posterior, evidence.on_noise)
     doubt = found.detected and leaves_more_than_noise(
         evidence, posterior.top, case, library, found.correlation, rng.spawn(1)[0]
     )
     best = ranked[0] if ranked else ""
     unseen = untestable_lookalikes(evidence, best, library)
-    others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED]
-    said = {best, *others[:1]}
-    rival = bool(unseen) or any(said & {*pair} for pair in alike)
+    others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED][:1]
+    rival = bool(unseen) or any({best, *others} & {*pair} for pair in alike)
     word = verdict_word(evidence, found, library, best, group, rival=rival, doubt=doubt)
+    describes_best = word == "named" and not naming().may_be_named(best)
+    word = "group" if describes_best else word
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = best if suspected else None
+    counted = naming().called.get(effect or "")
     return Which(
         verdict=word,
         effect=effect,
@@ -78,9 +78,18 @@ def identify_cause(
         remainder=_remainder(evidence, posterior, effect),
         doubted=doubt,
         lookalikes=unseen if suspected else (),
+        lookalike_cases=counted.said if counted else 0,
+        lookalike_rate=counted.rate if counted else None,
+        describes_best=describes_best,
+        certificate=_certificate(word),
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,
     )
+
+
+def _certificate(word: str) -> Certificate | None:
+    tally = {"named": naming().names, "group": naming().groups}.get(word)
+    return tally and Certificate(tally.said, tally.wrong, tally.at_most)
 
 
 def _remainder(
@@ -94,35 +103,6 @@ def _remainder(
     chance = posterior.probabilities[with_remainder(effect)]
     share = interval(1.0 - closed)
     return Remainder(chance / max(posterior.inclusion[effect], chance, 1e-300), share)
-
-
-def inseparable(evidence: CaseEvidence) -> tuple[tuple[str, str], ...]:
-    """Return pairs of effects that this loading can never tell apart.
-
-    In the best case most of the smaller one is shared by the other, and what is not
-    has less than `LEAST_SEEN` squared noise sds.
-    """
-    rows, noise = evidence.prepared.rows, evidence.prepared.noise_sd
-    left = {
-        each.name: remove_base(rows, each.large) * rows.weight
-        for each in evidence.piecewise
-        if each.name in evidence.table
-    }
-    sided = {each.name for each in evidence.piecewise if each.grid.one_sided}
-    pairs = []
-    for one, two in combinations(left, 2):
-        a, b = left[one], left[two]
-        along = a @ b.T
-        if {one, two} <= sided:
-            # Both bend one way only.
-            along = np.maximum(along, 0.0)
-        size_a, size_b = np.sum(a**2, axis=1), np.sum(b**2, axis=1)
-        share = along**2 / np.maximum(size_a[:, None] * size_b, 1e-300)
-        apart = np.minimum(size_a[:, None], size_b) * (1.0 - share)
-        alike = np.min(share) > ALIKE
-        if alike and np.max(apart) < LEAST_SEEN * noise**2:
-            pairs.append((one, two))
-    return tuple(pairs)
 
 
 def sensitivity(evidence: CaseEvidence, effect: str) -> dict[str, float]:

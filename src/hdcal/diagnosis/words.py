@@ -94,7 +94,28 @@ def limits(found: VerdictAnswer) -> list[str]:
     """Return what this verdict cannot say, in sentences."""
     which = found.which
     proof = [NO_PROOF] if _closes(found) else []
-    return [*_correlated(found), *_blind(which), PROPORTIONAL, *proof]
+    worth = list(_certified(which))
+    return [*_correlated(found), *_blind(which), *worth, PROPORTIONAL, *proof]
+
+
+def _certified(which: Which) -> Iterator[str]:
+    """Say how often such an answer was wrong where the truth was known."""
+    counted = which.certificate
+    if counted is None:
+        return
+    what = "names" if which.verdict == "named" else "groups and names"
+    yield (
+        f"Of {counted.said} {what} given in a blind check {counted.wrong} were wrong: "
+        f"at most {percent(counted.at_most)}, with a confidence of 95 %, for causes "
+        "and rigs like those of its catalogue."
+    )
+    rate = which.lookalike_rate
+    if which.verdict == "named" and rate is not None and which.effect is not None:
+        yield (
+            f"What is in no library may look like {label(which.effect)}: in blind "
+            f"checks, effects withheld, {percent(rate)} of {which.lookalike_cases} "
+            "cases that it alone described had another cause."
+        )
 
 
 def _correlated(found: VerdictAnswer) -> Iterator[str]:

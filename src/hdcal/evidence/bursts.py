@@ -149,7 +149,8 @@ def burst_odds(
         correlation: AR(1) coefficient of the noise.
 
     Returns:
-        The log odds, and what the noisy readings are off by [N], 0 at the others.
+        The log odds, and what noisy readings beside another are off by [N], (n,); 0 at
+        the others, those that are struck one by one among them.
     """
     prepared = evidence.prepared
     rows = with_relative_noise(prepared, relative).rows
@@ -160,7 +161,9 @@ def burst_odds(
     noisy, before = is_noisy(relative), rows.before
     both = noisy & (before >= 0) & noisy[before]
     same = int(np.sum(both & (error * error[before] > 0.0)))
-    return log_sign_odds(same, int(np.sum(both))), np.where(noisy, left, 0.0)
+    together = both.copy()
+    together[before[both]] = True
+    return log_sign_odds(same, int(np.sum(both))), np.where(together, left, 0.0)
 
 
 def _share(evidence: CaseEvidence, effect: str, off: np.ndarray) -> float:

@@ -108,10 +108,14 @@ def subspace_effect(effect: type[Effect], case: PreparedCase) -> SubspaceEffect:
     grid = make_grid(effect, case.priors, kind="subspace")
     values = grid.one_amplitude_each(grid.shapes)
     found = effect_curves(effect, values, case.base, case.records, case.reading)
+    columns = found.reshape(grid.size, len(grid.amplitudes), -1)
+    if effect.period:
+        stroke = np.ptp(case.records.deformation) * case.reading.radial_per_read
+        columns = columns * (grid.shapes[effect.period] <= stroke)[:, None, None]
     # Scales that are not needed have no weight; all subspaces have equally many.
     unused = len(_STEPS) - len(SCALES)
     return SubspaceEffect(
-        found.reshape(grid.size, len(grid.amplitudes), -1),
+        columns,
         np.append(SCALES, np.ones(unused)),
         np.log(np.append(SCALE_WEIGHTS, np.full(unused, 1e-300))),
         large=2.0,

@@ -23,6 +23,7 @@ class ScrewError(Effect):
     groups: ClassVar[tuple[str, ...]] = ("screw",)
     # The phase belongs to the screw, whichever way the gear is loaded.
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "none"
+    period: ClassVar[str] = "pitch"
 
     sine: Float[Array, ""] | float = parameter(
         "mm", "sine part of the error over a turn", typical=0.003, null=0.0

@@ -1,0 +1,69 @@
+"""What the name of an effect is worth: how often it was right in blind checks.
+
+A cause that no library holds inherits the name of the effect that looks like it,
+however clear the evidence. How often that happens is counted where the truth is known.
+On one blind check it is learned which effects may be named, on a later one the names
+are tested (after Angelopoulos et al., Learn then Test, 2021, arXiv:2110.01052).
+"""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from scipy import stats
+
+# An effect whose name other causes get more often than this is not named.
+MOST_OTHERS = 0.15
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How often something was said in blind checks, and how often it was wrong."""
+
+    said: int
+    wrong: int
+
+    @property
+    def rate(self) -> float:
+        """Share that is wrong; what was said at least once has one."""
+        return self.wrong / self.said
+
+    @property
+    def at_most(self) -> float:
+        """Share that is wrong at most, with a confidence of 95 % (Clopper, Pearson)."""
+        if self.wrong == self.said:
+            return 1.0
+        law = stats.beta(self.wrong + 1, self.said - self.wrong)
+        return float(law.ppf(CONFIDENCE))
+
+
+@dataclass(frozen=True)
+class Naming:
+    """What was counted.
+
+    Attributes:
+        called: of each effect that alone described cases, in how many of them
+            something else acted, an effect that was withheld included.
+        names: names on the round in which they were tested, none withheld.
+        groups: groups or names there, likewise.
+    """
+
+    called: dict[str, Tally]
+    names: Tally
+    groups: Tally
+
+    def may_be_named(self, effect: str) -> bool:
+        """Tell whether few enough other causes get this name, as far as is known."""
+        found = self.called.get(effect)
+        return found is None or found.rate <= MOST_OTHERS
+
+
+@cache
+def naming() -> Naming:
+    """Return what was counted on the rounds that `docs/blind-check.md` lists."""
+    text = files("hdcal.diagnosis").joinpath("naming.toml").read_text("utf-8")
+    table = tomllib.loads(text)
+    called = {name: Tally(*counts) for name, counts in table["called"].items()}
+    return Naming(called, Tally(*table["names"]), Tally(*table["groups"]))

@@ -1,0 +1,78 @@
+"""What closes little of a gap is not its cause, whatever noise takes in the rest."""
+
+from dataclasses import replace
+
+import numpy as np
+from diagnosis_cases import NOISE, rich, simulated
+
+from hdcal.data.priors import effect_priors
+from hdcal.diagnosis.adequacy import leaves_most
+from hdcal.evidence.bursts import with_bursts
+from hdcal.evidence.case_evidence import QUANTISATION
+from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.evidence.parameter_grid import make_grid
+from hdcal.evidence.remainder_evidence import with_remainders
+from hdcal.evidence.subspaces import subspace_effect
+from hdcal.physics.registry import EFFECTS
+
+NAMES = ("coulomb_friction", "progressive_stiffening", "outliers")
+LIBRARY = {name: EFFECTS[name] for name in NAMES}
+
+
+def evidence_of(error):
+    case = simulated(rich(), {"coulomb_friction": {"force": 1.5}}, seed=5)
+    records = replace(case.records, force=case.records.force + error)
+    found = compute_evidence(replace(case, records=records), LIBRARY, effect_priors())
+    found = with_remainders(found, np.random.default_rng(0))
+    return with_bursts(found, LIBRARY, dict.fromkeys(found.table, 0.0))
+
+
+def leaves(evidence, hypothesis: str = "coulomb_friction+outliers") -> bool:
+    return leaves_most(evidence, hypothesis, "coulomb_friction")
+
+
+def bursts(size: float):
+    """Return six stretches of six readings that are off to one side."""
+    error = np.zeros(180)
+    for start in range(8, 180, 29):
+        error[start : start + 6] = size * NOISE
+    return error
+
+
+def test_readings_struck_one_by_one_are_no_part_of_the_gap():
+    error = np.zeros(180)
+    error[[11, 40, 73, 101, 150, 166]] = 40.0 * NOISE * np.array([1, -1, 1, 1, -1, 1])
+    assert not leaves(evidence_of(error))
+
+
+def test_what_lasts_is_whatever_noise_takes_it_in():
+    assert leaves(evidence_of(bursts(40.0)))
+    assert not leaves(evidence_of(bursts(2.0)))
+
+
+def test_of_two_effects_neither_has_to_close_most():
+    lasting = evidence_of(bursts(40.0))
+    assert not leaves(lasting, "coulomb_friction+progressive_stiffening")
+    assert leaves(lasting, "coulomb_friction+unknown")
+
+
+def test_what_is_smaller_than_the_rounding_is_a_part_of_it():
+    rounded = f"coulomb_friction+{QUANTISATION}"
+    plain = evidence_of(0.0)
+    plain = replace(plain, table=plain.table | {QUANTISATION: plain.table["none"]})
+    assert not leaves(replace(plain, rounding_step=1.0), rounded)
+    assert leaves(replace(plain, rounding_step=10.0), rounded)
+
+
+def test_less_than_a_period_is_a_bend_like_any_other():
+    evidence = evidence_of(0.0)
+    effect = EFFECTS["screw_error"]
+    prepared = evidence.prepared
+    priors = prepared.priors | {
+        f"screw_error.{name}": prior for name, prior in effect_priors().items()
+    }
+    pitch = make_grid(effect, priors, kind="subspace").shapes["pitch"]
+    found = subspace_effect(effect, replace(prepared, priors=priors))
+    shown = np.any(found.columns != 0.0, axis=(1, 2))
+    np.testing.assert_array_equal(shown, pitch <= 0.52)
+    assert 0.5 < np.mean(shown) < 0.95

@@ -1,0 +1,95 @@
+"""What a name is worth is counted where the truth is known, and said with each name."""
+
+import pytest
+from benchmarks.naming import by_mechanism, called, lines
+from diagnosis_cases import judged, rich, simulated
+from handmade import said, truth
+from scipy.stats import binom
+
+from hdcal.blind.scoring.scored_case import match_answers
+from hdcal.diagnosis import which
+from hdcal.diagnosis.naming import Naming, Tally, naming
+from hdcal.diagnosis.summary import verdict_answer
+from hdcal.diagnosis.words import answer, limits
+from hdcal.physics.registry import EFFECTS
+
+
+def test_no_larger_share_is_as_likely_as_the_confidence_leaves():
+    for tally in (Tally(199, 8), Tally(30, 0), Tally(5, 4)):
+        assert binom.cdf(tally.wrong, tally.said, tally.at_most) == pytest.approx(0.05)
+    assert Tally(4, 4).at_most == 1.0
+
+
+def test_what_was_counted_is_of_effects_of_the_library():
+    counted = naming()
+    assert counted.called.keys() <= EFFECTS.keys()
+    assert all(0 <= t.wrong <= t.said for t in counted.called.values())
+    assert counted.names.said <= counted.groups.said
+    # Of an effect that nobody has counted nothing is known.
+    assert counted.may_be_named("own_effect")
+
+
+def with_counts(monkeypatch, wrong: int):
+    counted = Naming(
+        {"coulomb_friction": Tally(20, wrong)}, Tally(100, 2), Tally(200, 3)
+    )
+    monkeypatch.setattr(which, "naming", lambda: counted)
+    case = simulated(rich(), {"coulomb_friction": {"force": 1.5}}, seed=2)
+    return judged(case)
+
+
+def test_a_name_that_others_get_too_often_is_not_given(monkeypatch):
+    sure, doubtful = (with_counts(monkeypatch, wrong) for wrong in (1, 8))
+    one, two = sure.which, doubtful.which
+    assert one.verdict == "named" and not one.describes_best
+    assert (one.lookalike_cases, one.lookalike_rate) == (20, 0.05)
+    assert (one.certificate.said, one.certificate.wrong) == (100, 2)
+    assert two.verdict == "group" and two.describes_best
+    assert (two.effect, two.group) == ("coulomb_friction", "loop")
+    assert (two.certificate.said, two.certificate.wrong) == (200, 3)
+    # Neither moves a probability.
+    assert one.probabilities == two.probabilities
+    told, words = (" ".join(limits(verdict_answer(v))) for v in (sure, doubtful))
+    assert "Of 100 names given in a blind check 2 were wrong: at most 6 %" in told
+    assert "may look like coulomb friction" in told and "5 % of 20 cases" in told
+    assert "Of 200 groups and names" in words and "may look like" not in words
+    assert (
+        "Coulomb friction alone describes it, but is not named: 40 % of 20"
+        in " ".join(answer(verdict_answer(doubtful)))
+    )
+
+
+def cases():
+    """Return two names that are right, one for what was withheld, one for a burr."""
+    labels = [
+        truth("a"),
+        truth("b", names=("friction",)),
+        truth("c", names=("friction",), withheld=("friction", "slack")),
+        truth("d", kind="outside", names=("burr",), spanned=False),
+    ]
+    answers = [
+        said("a"),
+        said("b", effect="friction"),
+        said("c", verdict="group", effect="drift", describes_best=True),
+        said("d", verdict="group", effect="slack", group=("rig",)),
+    ]
+    return match_answers(labels, answers, name="hdcal", all_of_them=True)
+
+
+def test_whose_name_others_got_is_counted():
+    assert called(cases()) == {
+        "slack": Tally(1, 0),
+        "friction": Tally(1, 0),
+        "drift": Tally(1, 1),
+    }
+    text = "\n".join(lines(cases(), cases()))
+    assert "# Not named: friction, slack, drift" not in text
+    assert "drift = [1, 1]" in text and "names = [2, 0]" in text
+    # The group that is said of the burr is wrong, what was withheld is no part of it.
+    assert "groups = [3, 1]" in text
+    assert "Withheld: 0 of 1 named" in text
+
+
+def test_a_mechanism_is_wrong_where_one_of_its_cases_is():
+    twice = [*cases()[:2], *cases()[:2]]
+    assert by_mechanism(twice, [True, True, True, False]) == Tally(2, 1)
