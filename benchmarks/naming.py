@@ -16,7 +16,7 @@ from hdcal.blind.diagnosers import families
 from hdcal.blind.label import Label
 from hdcal.blind.scoring.scored_case import ScoredCase, match_answers
 from hdcal.blind.sealed_set import read_set
-from hdcal.diagnosis.naming import MOST_OTHERS, Tally
+from hdcal.diagnosis.naming import Naming, Tally
 
 _BY = "hdcal"
 
@@ -34,8 +34,8 @@ def called(cases: Iterable[ScoredCase]) -> dict[str, Tally]:
     """Return of each effect that alone described cases how often another acted."""
     counts: dict[str, list[int]] = {}
     for case in cases:
-        effect = case.answer.effect
-        if effect and (case.named or case.answer.describes_best):
+        effect, alone = case.answer.effect, case.answer.second_effect is None
+        if effect and alone and (case.named or case.answer.describes_best):
             own = counts.setdefault(effect, [0, 0])
             own[0] += 1
             own[1] += effect not in {*case.label.truth} - {*case.label.withheld}
@@ -60,11 +60,13 @@ def by_mechanism(cases: Iterable[ScoredCase], right: Iterable[bool]) -> Tally:
 def lines(learn: list[ScoredCase], test: list[ScoredCase]) -> Iterator[str]:
     """Yield the lines of the file."""
     found = called(learn)
-    left_out = [n for n, counted in found.items() if counted.rate > MOST_OTHERS]
+    rule = Naming(found, Tally(0, 0), Tally(0, 0))
+    left_out = [name for name in found if not rule.may_be_named(name)]
     yield f"# {len(learn)} cases to learn from, {len(test)} others to test on."
     yield f"# Not named: {', '.join(left_out) or 'none'}."
     own = [c for c in test if not c.label.withheld]
-    named, said = [c for c in own if c.named], [c for c in own if c.said]
+    named = [c for c in own if c.named]
+    said = [c for c in own if c.said and not c.named]
     groups = families()
     for word, some, right in (
         ("names", named, [c.named_right for c in named]),

@@ -7,12 +7,13 @@ from diagnosis_cases import NOISE, rich, simulated
 
 from hdcal.data.priors import effect_priors
 from hdcal.diagnosis.adequacy import leaves_most
+from hdcal.diagnosis.amplitude import amplitude_of
 from hdcal.evidence.bursts import with_bursts
 from hdcal.evidence.case_evidence import QUANTISATION
 from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.evidence.parameter_grid import make_grid
 from hdcal.evidence.remainder_evidence import with_remainders
-from hdcal.evidence.subspaces import subspace_effect
+from hdcal.evidence.subspaces import shown_shapes
 from hdcal.physics.registry import EFFECTS
 
 NAMES = ("coulomb_friction", "progressive_stiffening", "outliers")
@@ -65,14 +66,24 @@ def test_what_is_smaller_than_the_rounding_is_a_part_of_it():
 
 
 def test_less_than_a_period_is_a_bend_like_any_other():
-    evidence = evidence_of(0.0)
-    effect = EFFECTS["screw_error"]
-    prepared = evidence.prepared
-    priors = prepared.priors | {
-        f"screw_error.{name}": prior for name, prior in effect_priors().items()
-    }
-    pitch = make_grid(effect, priors, kind="subspace").shapes["pitch"]
-    found = subspace_effect(effect, replace(prepared, priors=priors))
-    shown = np.any(found.columns != 0.0, axis=(1, 2))
-    np.testing.assert_array_equal(shown, pitch <= 0.52)
-    assert 0.5 < np.mean(shown) < 0.95
+    prepared, effect = evidence_of(0.0).prepared, EFFECTS["screw_error"]
+    priors = prepared.priors | effect_priors()
+    grid = make_grid(effect, priors, kind="subspace")
+    assert 0.05 < np.mean(grid.shapes["pitch"] > 0.52) < 0.5
+    shown = shown_shapes(grid, prepared)["pitch"]
+    assert shown.shape == grid.shapes["pitch"].shape
+    assert shown.max() <= 0.52 and np.unique(shown).size > 10
+    # A drawing may say that it is longer.
+    known = replace(priors["screw_error.pitch"], numbers=(0.6, 0.005))
+    grid = make_grid(effect, priors | {"screw_error.pitch": known}, kind="subspace")
+    assert shown_shapes(grid, prepared)["pitch"].min() > 0.52
+
+
+def test_no_shape_that_says_nothing_is_likelier_than_all_that_say_something():
+    library = {"screw_error": EFFECTS["screw_error"]}
+    for seed in range(3):
+        case = simulated(rich(), seed=seed)
+        evidence = compute_evidence(case, library, effect_priors())
+        found = amplitude_of(evidence, "screw_error", library, np.random.default_rng(0))
+        assert found is not None
+        assert np.isfinite([found.median, found.lo, found.hi]).all()

@@ -18,6 +18,7 @@ from hdcal.diagnosis import model_posterior
 from hdcal.diagnosis.diagnose import diagnose
 from hdcal.diagnosis.groups import JOINED
 from hdcal.diagnosis.library import choose_library
+from hdcal.diagnosis.naming import naming_file
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.where import FALSE_ALARM
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
@@ -141,7 +142,7 @@ def fingerprint(library: str | None = None) -> dict[str, Any]:
         "library_sha256": _of({name: _declared(effect) for name, effect in considered}),
         "priors_sha256": _of(_hashes(priors_folder(), ".toml")),
         "thresholds_sha256": _of({**thresholds, "FALSE_ALARM": FALSE_ALARM}),
-        "naming_sha256": _of(_hashes(_package(), ".toml")),
+        "naming_sha256": _of(naming_file()),
         "versions": versions(),
         "code_sha256": _of(_hashes(_package(), ".py")),
     }

@@ -56,18 +56,28 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
+    others = [n for n in which.named if n not in which.group_members]
+    if others:
+        told = " and ".join(_with_chance(which, name) for name in others)
+        yield f"Together with it acts {told}."
     if which.describes_best:
         yield (
             f"{capital(label(which.effect))} alone describes it, but is not named: "
-            f"{percent(which.lookalike_rate)} of {which.lookalike_cases} such cases of "
-            "blind checks had another cause."
+            f"{lookalikes_counted(which)} such cases of blind checks had another cause."
         )
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."
     yield from _looks_the_same(which)
     yield from _beside(which, label(which.effect))
-    yield from _shrinks(found, label(which.effect))
+    both = " and ".join(map(label, which.named))
+    yield from _shrinks(found, both)
+
+
+def lookalikes_counted(which: Which) -> str:
+    """Return in how many of the cases of blind checks something else acted."""
+    others = round((which.lookalike_rate or 0.0) * which.lookalike_cases)
+    return f"{others} of {which.lookalike_cases}"
 
 
 def _looks_the_same(which: Which) -> Iterator[str]:

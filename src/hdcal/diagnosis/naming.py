@@ -15,6 +15,8 @@ from scipy import stats
 
 # An effect whose name other causes get more often than this is not named.
 MOST_OTHERS = 0.15
+# Fewer cases than these tell nothing.
+_FEWEST = 5
 CONFIDENCE = 0.95
 
 
@@ -47,23 +49,32 @@ class Naming:
         called: of each effect that alone described cases, in how many of them
             something else acted, an effect that was withheld included.
         names: names on the round in which they were tested, none withheld.
-        groups: groups or names there, likewise.
+        groups: groups there, likewise.
     """
 
     called: dict[str, Tally]
     names: Tally
     groups: Tally
 
+    def counted(self, effect: str) -> Tally | None:
+        """Return what was counted of an effect; None of too few cases."""
+        found = self.called.get(effect)
+        return found if found is not None and found.said >= _FEWEST else None
+
     def may_be_named(self, effect: str) -> bool:
         """Tell whether few enough other causes get this name, as far as is known."""
-        found = self.called.get(effect)
+        found = self.counted(effect)
         return found is None or found.rate <= MOST_OTHERS
+
+
+def naming_file() -> str:
+    """Return the text of the file with what was counted."""
+    return files("hdcal.diagnosis").joinpath("naming.toml").read_text("utf-8")
 
 
 @cache
 def naming() -> Naming:
     """Return what was counted on the rounds that `docs/blind-check.md` lists."""
-    text = files("hdcal.diagnosis").joinpath("naming.toml").read_text("utf-8")
-    table = tomllib.loads(text)
+    table = tomllib.loads(naming_file())
     called = {name: Tally(*counts) for name, counts in table["called"].items()}
     return Naming(called, Tally(*table["names"]), Tally(*table["groups"]))

@@ -19,6 +19,7 @@ from hdcal.evidence.effect_curves import effect_curves
 from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.parameter_grid import make_grid
 from hdcal.evidence.prepare import PreparedCase
+from hdcal.evidence.subspaces import shown_shapes
 from hdcal.physics.effect import Effect
 
 # Hypotheses that take part, draws of each, and the least that is worth a run.
@@ -141,7 +142,8 @@ def _subspace_on_run(
         # Members of a new run or gear are new: their scatter adds to the noise.
         return _NOTHING
     shape, _ = evidence.subspaces.likeliest(effect.name)
-    values = grid.one_amplitude_each({n: v[[shape]] for n, v in grid.shapes.items()})
+    shapes = shown_shapes(grid, prepared)
+    values = grid.one_amplitude_each({n: v[[shape]] for n, v in shapes.items()})
     table = _curves_on_run(prepared, effect, values, run)
     return DesignMatrix(np.zeros(ROWS), table, own.mean, own.sd, {})
 

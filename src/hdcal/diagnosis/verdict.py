@@ -59,10 +59,10 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How often what is said was wrong in a blind check, none of its effects withheld.
+    """How often such answers were wrong in a blind check, no effect withheld.
 
     Attributes:
-        said: how often a name, or a name or a group, was given there.
+        said: how often such an answer, a name or a group, was given there.
         wrong: how often that was wrong.
         at_most: share that is wrong at most, with a confidence of 95 %.
     """
@@ -100,11 +100,12 @@ class Which:
         lookalikes: effects that these records cannot show and that would look like
             `effect` in them.
         lookalike_cases: cases of blind checks that `effect` alone described.
-        lookalike_rate: share of these in which another cause acted; None if there were
-            none.
+        lookalike_rate: share of these in which another cause acted; None if they were
+            too few to tell.
         describes_best: `effect` alone describes the gap, but other causes look like it
             too often for a name.
-        certificate: of such an answer; None where neither group nor effect is said.
+        certificate: of such an answer; None where neither group nor effect is said, or
+            by another library.
     """
 
     verdict: VerdictWord

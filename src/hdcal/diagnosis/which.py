@@ -1,5 +1,6 @@
 """Which effect causes the gap: posterior over hypotheses, and how firm it is."""
 
+from collections.abc import Mapping
 from itertools import starmap
 
 import numpy as np
@@ -33,6 +34,7 @@ from hdcal.evidence.case_evidence import (
 from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
+from hdcal.physics.registry import EFFECTS
 
 
 def identify_cause(
@@ -54,11 +56,12 @@ def identify_cause(
     others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED][:1]
     rival = bool(unseen) or any({best, *others} & {*pair} for pair in alike)
     word = verdict_word(evidence, found, library, best, group, rival=rival, doubt=doubt)
-    describes_best = word == "named" and not naming().may_be_named(best)
-    word = "group" if describes_best else word
+    mistaken = not all(map(naming().may_be_named, [best, *others]))
+    describes_best = word == "named" and mistaken and not others
+    word = "group" if word == "named" and mistaken else word
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = best if suspected else None
-    counted = naming().called.get(effect or "")
+    counted = naming().counted(effect or "")
     return Which(
         verdict=word,
         effect=effect,
@@ -81,15 +84,18 @@ def identify_cause(
         lookalike_cases=counted.said if counted else 0,
         lookalike_rate=counted.rate if counted else None,
         describes_best=describes_best,
-        certificate=_certificate(word),
+        certificate=_certificate(word, library),
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,
     )
 
 
-def _certificate(word: str) -> Certificate | None:
+def _certificate(word: str, library: Mapping) -> Certificate | None:
+    """Return what was counted of such answers, by the library that was tested."""
     tally = {"named": naming().names, "group": naming().groups}.get(word)
-    return tally and Certificate(tally.said, tally.wrong, tally.at_most)
+    if tally is None or library.keys() != EFFECTS.keys():
+        return None
+    return Certificate(tally.said, tally.wrong, tally.at_most)
 
 
 def _remainder(

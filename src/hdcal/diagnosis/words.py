@@ -1,5 +1,6 @@
 """A verdict in sentences that need no statistics to be understood."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
@@ -7,6 +8,7 @@ from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.cause_words import (
     ambiguous,
     group_of_causes,
+    lookalikes_counted,
     named,
     unknown,
     with_needs,
@@ -103,18 +105,19 @@ def _certified(which: Which) -> Iterator[str]:
     counted = which.certificate
     if counted is None:
         return
-    what = "names" if which.verdict == "named" else "groups and names"
+    what = "names" if which.verdict == "named" else "groups"
+    # Rounded up: it is a bound.
+    most = math.ceil(1000.0 * counted.at_most) / 10.0
     yield (
-        f"Of {counted.said} {what} given in a blind check {counted.wrong} were wrong: "
-        f"at most {percent(counted.at_most)}, with a confidence of 95 %, for causes "
-        "and rigs like those of its catalogue."
+        f"Of {counted.said} {what} given in a blind check, no effect withheld, "
+        f"{counted.wrong} were wrong: at most {most:g} %, with a confidence of 95 %, "
+        "for the causes of its catalogue on rigs like its own."
     )
-    rate = which.lookalike_rate
-    if which.verdict == "named" and rate is not None and which.effect is not None:
+    if which.verdict == "named" and known(which.lookalike_rate) and which.effect:
         yield (
             f"What is in no library may look like {label(which.effect)}: in blind "
-            f"checks, effects withheld, {percent(rate)} of {which.lookalike_cases} "
-            "cases that it alone described had another cause."
+            f"checks with effects withheld {lookalikes_counted(which)} cases that it "
+            "alone described had another cause."
         )
 
 

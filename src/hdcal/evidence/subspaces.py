@@ -12,7 +12,12 @@ from hdcal.evidence.closed_form import subspace_evidence
 from hdcal.evidence.effect_curves import effect_curves, padded_records
 from hdcal.evidence.inner_products import CommonTerms, subspace_products
 from hdcal.evidence.kernels import principal
-from hdcal.evidence.parameter_grid import SCALE_WEIGHTS, SCALES, make_grid
+from hdcal.evidence.parameter_grid import (
+    SCALE_WEIGHTS,
+    SCALES,
+    ParameterGrid,
+    make_grid,
+)
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
 from hdcal.physics.scatter import Scatter, scores
@@ -106,21 +111,39 @@ def subspace_effect(effect: type[Effect], case: PreparedCase) -> SubspaceEffect:
     if issubclass(effect, Scatter):
         return _member_effect(effect, case)
     grid = make_grid(effect, case.priors, kind="subspace")
-    values = grid.one_amplitude_each(grid.shapes)
+    values = grid.one_amplitude_each(shown_shapes(grid, case))
     found = effect_curves(effect, values, case.base, case.records, case.reading)
-    columns = found.reshape(grid.size, len(grid.amplitudes), -1)
-    if effect.period:
-        stroke = np.ptp(case.records.deformation) * case.reading.radial_per_read
-        columns = columns * (grid.shapes[effect.period] <= stroke)[:, None, None]
     # Scales that are not needed have no weight; all subspaces have equally many.
     unused = len(_STEPS) - len(SCALES)
     return SubspaceEffect(
-        columns,
+        found.reshape(grid.size, len(grid.amplitudes), -1),
         np.append(SCALES, np.ones(unused)),
         np.log(np.append(SCALE_WEIGHTS, np.full(unused, 1e-300))),
         large=2.0,
         scatter=False,
     )
+
+
+def shown_shapes(grid: ParameterGrid, case: PreparedCase) -> dict[str, np.ndarray]:
+    """Return the shape points of an effect that these records can show, by name.
+
+    Less than a period is a bend like any other: the points of shorter ones stand for
+    those of longer ones. Where the prior leaves only these the period is known.
+
+    Args:
+        grid: of the effect.
+        case: on whose rows it acts.
+
+    Returns:
+        As many of each as the grid has.
+    """
+    if not grid.effect.period:
+        return grid.shapes
+    stroke = np.ptp(case.records.deformation) * case.reading.radial_per_read
+    shown = np.flatnonzero(grid.shapes[grid.effect.period] <= stroke)
+    if not len(shown):
+        return grid.shapes
+    return {n: np.resize(value[shown], grid.size) for n, value in grid.shapes.items()}
 
 
 def _member_effect(effect: type[Scatter], case: PreparedCase) -> SubspaceEffect:

@@ -88,8 +88,9 @@ class Effect(eqx.Module):
         symmetry: how the contribution answers to tension instead of compression,
             `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
         mixture: whether a reading's noise becomes more than one normal.
-        period: its shape parameter that is a period in radial deformation [mm]; records
-            of less than one period show a bend like any other, and not this effect.
+        period: of an effect with several amplitudes, its shape parameter that is a
+            period in radial deformation [mm]. Records of less than one period show a
+            bend like any other, and not this effect, unless its prior says so.
         acts_at_once: whether it is a force or play of the gear itself that depends on
             deformation, speed and temperature of the moment only; `hdcal respond`
             takes such effects along and leaves others out.

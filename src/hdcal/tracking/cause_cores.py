@@ -10,8 +10,9 @@ from hdcal.tracking.normal_inverse_gamma import (
 )
 from hdcal.tracking.weighted_cores import WeightedCores
 
-# A cause of fewer draws has no law of its own; it goes with the likeliest.
-_FEWEST = 100
+# A cause of fewer draws for each number has no law of its own; it goes with the
+# likeliest.
+_FEWEST = 10
 
 
 class CauseCores(WeightedCores):
@@ -42,17 +43,22 @@ def followed_one_by_one(
         variance: σ² of a reading [N²], shape (draw,).
         cause: number of the cause behind each draw, shape (draw,).
     """
-    cause = told_apart(cause)
+    cause = told_apart(cause, coefficients.shape[1])
     _, first, count = np.unique(cause, return_index=True, return_counts=True)
     nothing = np.empty((len(cause), 0))
     law = laws_given(coefficients, variance, nothing, cause, first)
     return CauseCores(law, count / len(cause))
 
 
-def told_apart(cause: np.ndarray) -> np.ndarray:
-    """Return the numbers with rare causes counted as the likeliest, shape (draw,)."""
+def told_apart(cause: np.ndarray, numbers: int) -> np.ndarray:
+    """Return the causes with rare ones counted as the likeliest, shape (draw,).
+
+    Args:
+        cause: number of the cause behind each draw, shape (draw,).
+        numbers: that each draw has.
+    """
     count = np.bincount(cause)
-    return np.where(count[cause] < _FEWEST, np.argmax(count), cause)
+    return np.where(count[cause] < _FEWEST * numbers, np.argmax(count), cause)
 
 
 def laws_given(
@@ -80,9 +86,9 @@ def laws_given(
     for number in np.unique(cause[chosen]):
         of, own = cause == number, cause[chosen] == number
         centre, about = linear[of].mean(axis=0), fixed[of] - fixed[of].mean(axis=0)
-        slope = np.linalg.lstsq(about, linear[of] - centre, rcond=1e-10)[0]
+        slope, _, rank, _ = np.linalg.lstsq(about, linear[of] - centre, rcond=1e-10)
         left = linear[of] - centre - about @ slope
-        covariance = left.T @ left / np.count_nonzero(of)
+        covariance = left.T @ left / (np.count_nonzero(of) - 1 - rank)
         law = match_moments(centre, covariance, float(middle[number]), spread)
         mean[own] = centre + (fixed[chosen[own]] - fixed[of].mean(axis=0)) @ slope
         root[own, :, : law.root.shape[1]] = law.root

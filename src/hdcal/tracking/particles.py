@@ -42,7 +42,8 @@ class Particles(CauseCores):
         cause: np.ndarray,
         chosen: np.ndarray,
     ):
-        law = laws_given(linear, variance, fixed, told_apart(cause), chosen)
+        cause = told_apart(cause, linear.shape[1] + fixed.shape[1])
+        law = laws_given(linear, variance, fixed, cause, chosen)
         mean = np.insert(law.mean, 1, 1.0, axis=1)
         root = np.insert(law.root, 1, 0.0, axis=1)
         prior = replace(law, mean=mean, root=root)

@@ -36,8 +36,8 @@ class Tracker:
     Without effects the update is exact: after any number of rows it is what a batch
     fit of all of them gives, under a normal prior of the linear coefficients and an
     inverse-gamma one of the noise variance. That prior has the moments of the
-    posterior, or of the gear file's priors, that the tracker began with. With effects
-    it is a set of weighted particles. Memory does not grow with the rows.
+    posterior, or of the gear file's priors, that the tracker began with; of several
+    causes each has one, weighted. With effects it is a set of weighted particles.
 
     Args:
         known: a calibration, or a gear whose priors are all there is.
