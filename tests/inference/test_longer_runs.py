@@ -28,6 +28,7 @@ def told(monkeypatch):
     return tell
 
 
+@pytest.mark.thorough
 def test_it_goes_on_where_it_stood(told):
     told([True, True])
     short = calibrate(case(), **ASKED)

@@ -96,6 +96,7 @@ def test_any_reader_of_netcdf_sees_the_hypotheses(mixed: Posterior, tmp_path: Pa
         assert int(count.sel(hypothesis=name)) == pytest.approx(share * 2000, abs=4)
 
 
+@pytest.mark.thorough
 def test_the_draws_together_are_those_of_each_model(models, mixed: Posterior):
     """As one model with all of the effects: absent ones change nothing."""
     whole, parts = forces(mixed), models_of(mixed)

@@ -125,6 +125,7 @@ def test_long_records_keep_the_linear_model_and_say_so(monkeypatch):
     assert "nobody looked for dry friction" in found.checks[0].words
 
 
+@pytest.mark.thorough
 def test_where_the_linear_model_leaves_noise_nothing_is_weighed():
     found = chosen(moving_case(0))
     assert found.problem.effects == () and not found.probabilities

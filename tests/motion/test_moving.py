@@ -141,6 +141,7 @@ def test_no_force_is_predicted_from_it(posterior):
         predict(posterior, [0.1])
 
 
+@pytest.mark.thorough
 def test_a_gear_that_is_not_linear_is_told_by_its_residuals():
     case = moving_case(0)
     records = case.records

@@ -146,6 +146,7 @@ def test_a_decision_does_not_contradict_its_risk(rule, limits, posterior):
     assert said >= {"conforms", "does not conform"}
 
 
+@pytest.mark.thorough
 def test_a_limit_as_printed_is_the_reading_it_stands_for(posterior):
     risks = [
         hdcal.margin(
