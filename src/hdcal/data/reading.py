@@ -49,8 +49,7 @@ def read_case(
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
     with Findings() as wrong:
-        measured = wrong.attempt(read_measurements, csv_path, columns)
-        found = None
+        measured, found = wrong.attempt(read_measurements, csv_path, columns), None
         if gear is None and not os.path.exists(gear_path):
             wrong.append(_no_gear(data))
         else:

@@ -82,8 +82,7 @@ def next_gear(
         SIZES[name]: random.uniform(-width, width, draws.size)
         for name, width in tolerances.items()
     }
-    tested = draws.problem.specimens
-    deviation = np.zeros(draws.size)
+    tested, deviation = draws.problem.specimens, np.zeros(draws.size)
     if tested:
         spread = new_member_sd(np.asarray(draws.values["specimen_sd"]), tested)
         deviation = spread * random.normal(size=draws.size)

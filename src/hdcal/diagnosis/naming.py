@@ -14,10 +14,10 @@ from importlib.resources import files
 from scipy import stats
 
 # An effect whose name other causes get more often than this is not named.
-MOST_OTHERS = 0.15
+_MOST_OTHERS = 0.15
 # Fewer cases than these tell nothing.
 _FEWEST = 5
-CONFIDENCE = 0.95
+_CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
@@ -29,16 +29,14 @@ class Tally:
 
     @property
     def rate(self) -> float:
-        """Share that is wrong; what was said at least once has one."""
+        """Share that is wrong, of what was said at least once."""
         return self.wrong / self.said
 
     @property
     def at_most(self) -> float:
         """Share that is wrong at most, with a confidence of 95 % (Clopper, Pearson)."""
-        if self.wrong == self.said:
-            return 1.0
-        law = stats.beta(self.wrong + 1, self.said - self.wrong)
-        return float(law.ppf(CONFIDENCE))
+        test = stats.binomtest(self.wrong, self.said, alternative="less")
+        return float(test.proportion_ci(_CONFIDENCE).high)
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class Naming:
     Attributes:
         called: of each effect that alone described cases, in how many of them
             something else acted, an effect that was withheld included.
-        names: names on the round in which they were tested, none withheld.
+        names: names on the rounds in which they were tested, no effect withheld.
         groups: groups there, likewise.
     """
 
@@ -64,7 +62,7 @@ class Naming:
     def may_be_named(self, effect: str) -> bool:
         """Tell whether few enough other causes get this name, as far as is known."""
         found = self.counted(effect)
-        return found is None or found.rate <= MOST_OTHERS
+        return found is None or found.rate <= _MOST_OTHERS
 
 
 def naming_file() -> str:

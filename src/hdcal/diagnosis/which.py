@@ -56,9 +56,8 @@ def identify_cause(
     others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED][:1]
     rival = bool(unseen) or any({best, *others} & {*pair} for pair in alike)
     word = verdict_word(evidence, found, library, best, group, rival=rival, doubt=doubt)
-    mistaken = not all(map(naming().may_be_named, [best, *others]))
-    describes_best = word == "named" and mistaken and not others
-    word = "group" if word == "named" and mistaken else word
+    mistaken = word == "named" and not all(map(naming().may_be_named, [best, *others]))
+    word = "group" if mistaken else word
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = best if suspected else None
     counted = naming().counted(effect or "")
@@ -83,7 +82,7 @@ def identify_cause(
         lookalikes=unseen if suspected else (),
         lookalike_cases=counted.said if counted else 0,
         lookalike_rate=counted.rate if counted else None,
-        describes_best=describes_best,
+        describes_best=mistaken and not others,
         certificate=_certificate(word, library),
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,

@@ -127,8 +127,9 @@ def subspace_effect(effect: type[Effect], case: PreparedCase) -> SubspaceEffect:
 def shown_shapes(grid: ParameterGrid, case: PreparedCase) -> dict[str, np.ndarray]:
     """Return the shape points of an effect that these records can show, by name.
 
-    Less than a period is a bend like any other: the points of shorter ones stand for
-    those of longer ones. Where the prior leaves only these the period is known.
+    Less than a period is a bend like any other: points of periods within the stroke
+    take the place of longer ones, each as often as the others but for one. Where the
+    prior leaves only longer ones the period is known.
 
     Args:
         grid: of the effect.
@@ -143,7 +144,8 @@ def shown_shapes(grid: ParameterGrid, case: PreparedCase) -> dict[str, np.ndarra
     shown = np.flatnonzero(grid.shapes[grid.effect.period] <= stroke)
     if not len(shown):
         return grid.shapes
-    return {n: np.resize(value[shown], grid.size) for n, value in grid.shapes.items()}
+    evenly = shown[np.arange(grid.size) * len(shown) // grid.size]
+    return {name: value[evenly] for name, value in grid.shapes.items()}
 
 
 def _member_effect(effect: type[Scatter], case: PreparedCase) -> SubspaceEffect:

@@ -67,10 +67,9 @@ def mixed_posterior(models: _Weighed) -> Posterior:
 
 def models_of(posterior: Posterior) -> list[tuple[float, Posterior]]:
     """Return the models of a mixture with their probabilities; of one model that."""
-    draws = posterior.tree["posterior"].to_dataset()
-    if HYPOTHESIS not in draws.coords:
+    labels = _hypotheses(posterior)
+    if labels is None:
         return [(1.0, posterior)]
-    labels = np.asarray(draws[HYPOTHESIS].to_numpy(), str)
     origin = posterior.settings[ORIGIN]
     assert isinstance(origin, dict)
     return [
@@ -84,11 +83,18 @@ def causes_of_draws(posterior: Posterior) -> np.ndarray:
 
     Draws are in the order of `Posterior.draws`, chain after chain.
     """
+    sizes, labels = posterior.tree["posterior"].sizes, _hypotheses(posterior)
+    if labels is None:
+        return np.zeros(sizes["chain"] * sizes["draw"], int)
+    return np.tile(np.unique(labels, return_inverse=True)[1], sizes["chain"])
+
+
+def _hypotheses(posterior: Posterior) -> np.ndarray | None:
+    """Return the hypothesis of each draw of a chain; None of one model."""
     draws = posterior.tree["posterior"].to_dataset()
     if HYPOTHESIS not in draws.coords:
-        return np.zeros(draws.sizes["chain"] * draws.sizes["draw"], int)
-    _, number = np.unique(draws[HYPOTHESIS].to_numpy().astype(str), return_inverse=True)
-    return np.tile(number, draws.sizes["chain"])
+        return None
+    return np.asarray(draws[HYPOTHESIS].to_numpy(), str)
 
 
 def _alone(posterior: Posterior, name: str, rows: np.ndarray) -> Posterior:

@@ -35,9 +35,9 @@ class Tracker:
 
     Without effects the update is exact: after any number of rows it is what a batch
     fit of all of them gives, under a normal prior of the linear coefficients and an
-    inverse-gamma one of the noise variance. That prior has the moments of the
-    posterior, or of the gear file's priors, that the tracker began with; of several
-    causes each has one, weighted. With effects it is a set of weighted particles.
+    inverse-gamma one of the noise variance, with the moments of what the tracker began
+    with; of several causes each has its own, weighted. With effects it is a set of
+    weighted particles. Memory does not grow with the rows.
 
     Args:
         known: a calibration, or a gear whose priors are all there is.
@@ -116,8 +116,7 @@ class Tracker:
             The answer as plain data: a line of `hdcal track`.
 
         Raises:
-            ValueError: a number is missing, not finite or none of this gear; nothing
-                was learned from it.
+            ValueError: a number is missing or none of this gear; nothing was learned.
         """
         warmth = self._reference if temperature is None else temperature
         self._limits.check(deformation, force, temperature, time)
