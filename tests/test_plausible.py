@@ -87,6 +87,8 @@ def read_entries() -> Iterator[tuple[str, str, Callable]]:
     for key in [
         *(f"gear.{name}_mm" for name in sizes),
         *("measurement.reference_temperature_C", "measurement.force_resolution_N"),
+        *("rig.load_cell_capacity_N", "rig.gauge_range_mm"),
+        *("rig.displacement_pitch_mm", "rig.filter_Hz"),
     ]:
         name = key.rpartition(".")[2].rpartition("_")[0]
         yield NAMES.get(name, name), key, partial(gear_key, key)

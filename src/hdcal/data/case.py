@@ -32,7 +32,7 @@ class Gear:
         source: the TOML as read, for provenance.
         scale_priors: run_offset_sd, specimen_sd, gap_sd and gap_length, merged
             in the same way.
-        effect_priors: overrides of the gear file only, keyed `effect.parameter`;
+        effect_priors: what the gear file says of them only, keyed `effect.parameter`;
             the names are not checked here, the effects live on a higher floor.
         dynamic_priors: of the moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.

@@ -6,6 +6,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
+import numpy as np
+
 from hdcal.data.case import Gear
 from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
 from hdcal.data.full_scale import FullScale
@@ -19,6 +21,7 @@ from hdcal.data.priors import (
     SCALE_UNITS,
     SPRING_UNITS,
     dynamic_priors,
+    effect_priors,
     material_names,
     material_priors,
     read_effect_priors,
@@ -26,6 +29,7 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.data.records import Geometry
+from hdcal.data.rig_facts import filtered, rig_fact_priors
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
@@ -90,6 +94,8 @@ def _assemble(
     if gauge := stated.get("deformation_offset"):
         contact = (rig_priors() | given)["deformation_offset"]
         merged["deformation_offset"] = contact_as_read(contact, gauge)
+    radial = 0.5 if measurement.deformation == "diametral" else 1.0
+    sharper = rig_fact_priors(model.rig, effect_priors(), radial)
     moving = {name: given[name] for name in DYNAMIC_UNITS if name in given}
     chosen: Any = theory or sizes.theory
     return Gear(
@@ -105,7 +111,7 @@ def _assemble(
         K_theory=_theory_of_K(sizes, chosen, given),
         source=toml.table,
         scale_priors={name: merged[name] for name in SCALE_UNITS},
-        effect_priors=effects,
+        effect_priors=sharper | effects,
         dynamic_priors=dynamic_priors() | moving,
         density=float(facts["density"].numbers[0]) if "density" in facts else None,
         gauge_priors={name: stated[name] for name in GAUGE_UNITS if name in stated},
@@ -153,6 +159,23 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
         gear = replace(gear, priors=gear.priors | own_K)
     tables = {"priors": own(gear.priors), "scale_priors": own(gear.scale_priors)}
     return replace(gear, full_scale=full_scale, **tables)
+
+
+def behind_filter(gear: Gear, time: np.ndarray | None) -> Gear:
+    """Return a gear whose neighbouring readings err alike as behind its rig's filter.
+
+    Args:
+        gear: what its file states of the correlation stays.
+        time: of the readings [s], shape (n,); None where it was not measured.
+    """
+    name, cutoff = "noise_correlation", gear.source.get("rig", {}).get("filter_Hz")
+    shipped = rig_priors()[name]
+    own = gear.scale_priors.get(name)
+    stated = own is None or own.source != shipped.source
+    if cutoff is None or time is None or stated:
+        return gear
+    table = gear.scale_priors | {name: filtered(shipped, cutoff, time)}
+    return replace(gear, scale_priors=table)
 
 
 def _in_gear(toml: TomlFile, key: str, given: Any = None) -> Any:

@@ -15,6 +15,7 @@ from hdcal.data.certificates import (
     certificate_faults,
 )
 from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
+from hdcal.data.rig_facts import RigTable
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.typed_json import within
@@ -65,6 +66,7 @@ class GearFile(BaseModel):
     model_config = _STRICT
     gear: GearTable
     measurement: MeasurementTable = MeasurementTable()
+    rig: RigTable = RigTable()
     priors: dict[str, Any] = {}
 
 

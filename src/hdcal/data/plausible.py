@@ -67,6 +67,10 @@ RANGES = {
     # the gear and what is believed of it
     "size": Range(1e-6, 1e5, "mm", "from a nanometre to a hundred metres"),
     "force_resolution": Range(1e-15, 1e9, "N", _SCATTER),
+    "load_cell_capacity": Range(
+        1e-3, 1e9, "N", "from a letter scale's to a large ship's"
+    ),
+    "filter": Range(1e-6, 1e9, "Hz", "from a reading in ten days to a radio's"),
     "K": Range(1e-6, 1e6, "", "a millionth to a million times the theory"),
     "spring_stiffness": Range(1e-12, 1e12, "N/mm", "from a hair to a rock"),
     "E0": Range(1e-6, 1e7, "MPa", _STEEL),
@@ -126,7 +130,8 @@ NAMES = {
     **dict.fromkeys(("run_offset_sd", "gap_sd"), "sigma"),
     **dict.fromkeys(("temperatures", "reference_temperature"), "temperature"),
     **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), "size"),
-    "nominal_deformation": "size",
+    **dict.fromkeys(("nominal_deformation", "gauge_range"), "size"),
+    "displacement_pitch": "size",
     "expanded_N": "force_resolution",
     "expanded_mm": "deformation_sigma",
     **dict.fromkeys(("content", "confidence", "required_probability"), "share"),

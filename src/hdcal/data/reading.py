@@ -9,7 +9,7 @@ import numpy as np
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
 from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.gear import at_full_scale, read_gear
+from hdcal.data.gear import at_full_scale, behind_filter, read_gear
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.records import Records
@@ -58,6 +58,7 @@ def read_case(
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
+    found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
         name=(data.resolve().name if folder else data.stem) or "case",
         gear=at_full_scale(found, _full_scale(measured, found)),
