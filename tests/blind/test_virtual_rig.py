@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from hdcal.blind.virtual_rig.loadings import LOADINGS, loading_of
 from hdcal.blind.virtual_rig.mechanism import RigState
-from hdcal.blind.virtual_rig.paths import guide, sliding_cells, solid
+from hdcal.blind.virtual_rig.paths import guide, sliding_cells, solid, wedge
 from hdcal.blind.virtual_rig.sensing import NOISES, charge_amplifier
 from hdcal.blind.virtual_rig.virtual_rig import (
     MECHANISMS,
@@ -116,20 +116,26 @@ def test_a_held_solid_relaxes_to_its_long_term_force():
 
 
 @pytest.mark.parametrize(
-    ("friction", "shape"),
+    ("friction", "shape", "pressed"),
     [
-        (guide, {"reach": 0.004}),
-        (sliding_cells, {"reach": np.linspace(0.02, 0.2, 5), "share": np.ones(5) / 5}),
+        (guide, {"reach": 0.004}, False),
+        (wedge, {"reach": 0.004}, True),
+        (
+            sliding_cells,
+            {"reach": np.linspace(0.02, 0.2, 5), "share": np.ones(5) / 5},
+            False,
+        ),
     ],
 )
-def test_friction_takes_work_from_every_loop(friction, shape):
+def test_friction_takes_work_from_every_loop(friction, shape, pressed):
     rig = VirtualRig(LOADINGS["rates"]().history)
     force = friction(rig.fault_free, state_of(rig), 2.0, shape)
     step = np.diff(rig.history.deformation, prepend=0.0)
     for loop in range(6):
         inside = rig.history.cycle == loop
         assert np.sum((force * step)[inside]) > 0.0
-    assert np.max(np.abs(force)) <= 2.0 + 1e-12
+    most = 2.0 * (np.abs(rig.fault_free) if pressed else 1.0)
+    assert np.all(np.abs(force) <= most + 1e-12)
 
 
 def test_noise_has_its_sd_and_its_correlation():

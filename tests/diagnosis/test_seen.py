@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import rich, simulated
-from rigs import cycles, make_case, make_records, ramp
+from rigs import cycles, make_case, make_gear, make_records, ramp
 
 from hdcal.data.loading import derive_motion
-from hdcal.data.priors import effect_priors
+from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.diagnosis.seen import what_is_seen
 from hdcal.evidence.compute_evidence import compute_evidence
 
@@ -22,6 +22,7 @@ def seen(case):
 
 CASES = {
     "coulomb_friction": ({"force": 3.0}, "on unloading than on loading", 6.0),
+    "load_friction": ({"share": 0.05}, "the lower unloading lies against", None),
     "progressive_stiffening": ({"slope": 0.3}, "the curve stiffens", None),
     "thermal_zero_drift": ({"slope": 0.1}, "the zero rises with temperature", 6.0),
     "thermal_stiffness": ({"slope": -2e-3}, "the slope falls with temperature", None),
@@ -40,6 +41,27 @@ def test_what_an_effect_does_is_seen_first(name):
     if size is not None:
         assert first.size_N.lo < size < first.size_N.hi
         assert f"{size:.0f} N" in first.statement
+
+
+def test_a_loop_that_opens_with_the_load_is_no_slope_that_falls_from_cycle_to_cycle():
+    found = seen(simulated(rich(), {"load_friction": {"share": 0.05}}, seed=2))
+    assert [one.covariate for one in found] == ["direction"]
+
+
+def test_an_angle_that_was_not_measured_shows_nothing():
+    """Its column is that of the slope, but for rounding, however sure the rest is."""
+    case = simulated(rich(), {"thermal_stiffness": {"slope": -1.4e-2}}, seed=2)
+    assert "angle" not in {one.covariate for one in seen(case)}
+
+
+def test_a_slope_that_falls_with_heat_is_told_of_a_part_of_no_stated_material():
+    effect = {"thermal_stiffness": {"slope": -5e-3}}
+    loose = make_gear(alpha=rig_priors()["spring_alpha"])
+    case = replace(simulated(rich(), effect, seed=2), gear=loose)
+    (first, *_) = seen(case)
+    assert "the slope falls with temperature, which" in first.statement
+    (first, *_) = seen(simulated(rich(), effect, seed=2))
+    assert "with temperature beyond the material's own" in first.statement
 
 
 def test_of_pure_noise_nothing_is_seen():

@@ -42,6 +42,7 @@ TRUTH = {
 SLICE = ("progressive_stiffening",)
 OTHERS = (
     "coulomb_friction",
+    "load_friction",
     "contact_onset",
     "hysteresis",
     "viscous_damping",

@@ -12,10 +12,10 @@ from hdcal import EFFECTS
 # A memory of time or of unloading starts anew with the run or the specimen.
 LICENCES = {
     "temperature": {"temperature"},
-    "time": {"time", "holds", "rates", "cycles"},
+    "time": {"time", "holds or rates", "rates", "cycles"},
     "angle": {"angle"},
     "rate": {"rates", "time"},
-    "sense": {"unloading", "holds", "cycles"},
+    "sense": {"unloading", "cycles"},
     # A loop remembers the movements of its run, load cycles those of their specimen.
     "run": {"run", "runs", "time", "cycles", "unloading"},
     "specimen": {"specimen", "specimens", "cycles", "unloading"},
@@ -27,7 +27,7 @@ CARRIERS = {
     "angle": {"angle"},
     "rates": {"rate", "time"},
     "unloading": {"sense", "order"},
-    "holds": {"time", "sense"},
+    "holds or rates": {"time"},
     "cycles": {"order", "time", "sense"},
     "run": {"run"},
     "runs": {"run"},

@@ -2,6 +2,7 @@
 
 import dataclasses
 from functools import cache
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -48,6 +49,14 @@ def test_bedding_is_in_series_with_the_gear():
     assert effect.apply(np.array([half]), rows_of([half]))[0] == pytest.approx(
         half - 0.5 * effect.closure, abs=1e-7
     )
+
+
+def test_friction_under_load_draws_a_wedge_and_pinches_a_loop_of_both_signs():
+    way = np.array([0.0, 0.2, 0.4, 0.2, 0.0, -0.3, -0.1, 0.1])
+    slope = np.array([1.1, 1.1, 1.1, 0.9, 0.9, 1.1, 0.9, 1.1])
+    sense = SimpleNamespace(sense=np.sign(np.diff(way, prepend=-1.0)))
+    found = force_on(typical("load_friction", share=0.1), way, sense)
+    np.testing.assert_allclose(found, STIFFNESS * slope * way, atol=1e-12)
 
 
 def test_bedding_follows_hertz():

@@ -26,7 +26,8 @@ def rich() -> Records:
     direction = np.tile(way, 6)
     return make_records(
         np.tile(half, 6),
-        known={"temperature", "time", "unloading", "holds", "rates", "cycles"},
+        known={"temperature", "time", "unloading", "cycles"}
+        | {"holds", "rates", "holds or rates"},
         temperature=np.repeat([20.0, 80.0, 50.0], 60),
         time=np.cumsum(pace),
         sense=np.where(direction == 0.0, 1.0, direction),

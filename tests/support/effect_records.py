@@ -20,6 +20,7 @@ EVERYTHING = frozenset(
         "specimen",
         "unloading",
         "holds",
+        "holds or rates",
         "rates",
         "cycles",
         "runs",

@@ -108,7 +108,8 @@ def program(start: float = -0.1) -> Records:
     direction = np.tile(direction, 3)
     return make_records(
         np.tile(one, 3),
-        known={"temperature", "time", "unloading", "holds", "rates", "cycles"},
+        known={"temperature", "time", "unloading", "cycles"}
+        | {"holds", "rates", "holds or rates"},
         temperature=np.repeat([20.0, 80.0, 50.0], len(one)),
         time=np.cumsum(pace),
         sense=np.where(direction == 0.0, 1.0, direction),

@@ -37,7 +37,8 @@ class Motion:
         sense: sign of the last movement, before any that of the first one,
             +1 in a run that never moves; shape (n,).
         rate: deformation rate [mm/s], 0 on holds and without time; shape (n,).
-        features: of `unloading`, `holds`, `rates`, `cycles` those present.
+        features: of `unloading`, `holds`, `rates`, `cycles` those present, and
+            `holds or rates` where one of the two is.
         resets: rows reached by one step back over most of the range.
     """
 
@@ -124,6 +125,8 @@ def derive_motion(
     features = _features(moves, rate, span)
     if any(moves) and _rests(direction, run, time):
         features |= {"holds"}
+    if features & {"holds", "rates"}:
+        features |= {"holds or rates"}
     resets = [m.reset for run in moves for m in run if m.reset is not None]
     return Motion(direction, sense, rate, features, tuple(sorted(resets)))
 

@@ -83,7 +83,8 @@ class Records(eqx.Module):
         force_sd: known measurement sd [N]; 0 when not given.
         known: names of what was measured or is present in the loading:
             temperature, time, angle, force_sd, run, specimen (two or more labels),
-            unloading, holds, rates, cycles, runs and specimens (three or more).
+            unloading, holds, rates, holds or rates, cycles, runs and specimens (three
+            or more).
     """
 
     deformation: Float[Array, " n"]

@@ -13,7 +13,7 @@ from hdcal.diagnosis.cause_words import (
     unknown,
     with_needs,
 )
-from hdcal.diagnosis.seen_words import p_words
+from hdcal.diagnosis.seen_words import p_words, what_is_seen
 from hdcal.diagnosis.verdict import Which
 from hdcal.inference.serial_correlation import worth
 from hdcal.report.words import (
@@ -174,7 +174,10 @@ def _none(found: VerdictAnswer) -> Iterator[str]:
         )
     else:
         rows = found.data.rows
-        yield f"No gap is seen: the model fits all {rows} readings; {noise}."
+        if found.seen:
+            yield what_is_seen(found)
+        no_gap = "Beside that no gap" if found.seen else "No gap"
+        yield f"{no_gap} is seen: the model fits all {rows} readings; {noise}."
     if known(gap.noise_sd_N):
         yield f"Too small to be seen here: {_unseen(found)}."
 

@@ -14,7 +14,7 @@ from hdcal.physics.effect import Effect, parameters
 # not linear in its amplitude has many cells at each of them, and gets fewer.
 SHAPE_POINTS = {"linear": (25, 7, 4), "cells": (7, 4, 3), "subspace": (31, 5, 3)}
 # Edges of the amplitude's cells reach from the first to the last, in prior sds.
-SMALLEST, LARGEST = 1.0 / 64.0, 32.0
+SMALLEST, LARGEST = 1.0 / 64.0, 64.0
 # Ratio of neighbouring edges: an effect that is linear in its amplitude needs cells
 # only because the tolerance of its shape grows with it.
 COARSE, FINE = 2.0, 2.0**0.5

@@ -32,6 +32,8 @@ _LEAST_NOISE = 1e-6
 _SPANS, _LARGEST = 5.0, 0.98
 # Below this the coefficients that are always there reach far enough.
 _WORTHWHILE = 0.75
+# Place of the loss of modulus among the base columns.
+MODULUS_LOSS = 2
 
 
 @dataclass(frozen=True)

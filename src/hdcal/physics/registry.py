@@ -11,6 +11,7 @@ from hdcal.physics.effects.force_saturation import ForceSaturation
 from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
 from hdcal.physics.effects.hysteresis import Hysteresis
 from hdcal.physics.effects.large_deflection import LargeDeflection
+from hdcal.physics.effects.load_friction import LoadFriction
 from hdcal.physics.effects.outliers import Outliers
 from hdcal.physics.effects.ovality import Ovality
 from hdcal.physics.effects.plastic_yield import PlasticYield
@@ -42,6 +43,7 @@ EFFECTS: dict[str, type[Effect]] = {
         LargeDeflection,
         PlasticYield,
         CoulombFriction,
+        LoadFriction,
         Ovality,
         ThermalStiffness,
         Hysteresis,

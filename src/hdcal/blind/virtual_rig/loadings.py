@@ -44,6 +44,8 @@ class Loading:
         speed = np.abs(step[moves]) / seconds[moves]
         if "time" in found and moves.any() and speed.max() > 1.5 * speed.min():
             found.add("rates")
+        if found & {"holds", "rates"}:
+            found.add("holds or rates")
         for gear in np.unique(history.specimen):
             if np.ptp(history.cycle[history.specimen == gear]) > 0:
                 found.add("cycles")

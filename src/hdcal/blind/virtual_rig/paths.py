@@ -19,20 +19,34 @@ def _stop(rng) -> Shape:
     return {"onset": onset, "power": power, "round": rng.uniform(0.002, 0.02)}
 
 
-def guide(force, state: RigState, size: float, shape: Shape):
-    """Friction of the guide, with a short elastic way before it slips; size [N].
+def _dahl(state: RigState, reach: float) -> np.ndarray:
+    """Friction over its largest, with a short elastic way before it slips.
 
     Dahl (1968): dz = (1 − sgn(dx) z) dx / reach.
     """
-    x, z = state.deformation, np.zeros(len(force))
-    reach, last, before = shape["reach"], 0.0, 0.0
+    x, z = state.deformation, np.zeros(len(state.deformation))
+    last, before = 0.0, 0.0
     for row, (here, begins) in enumerate(zip(x, state.history.run_starts, strict=True)):
         last, before = (0.0, 0.0) if begins else (last, before)
         way = here - before
         target = np.sign(way)
         last = target + (last - target) * np.exp(-abs(way) / reach) if way else last
         z[row], before = last, here
-    return size * z
+    return z
+
+
+def guide(force, state: RigState, size: float, shape: Shape):
+    """Friction of the guide; size [N]."""
+    return size * _dahl(state, shape["reach"])
+
+
+def wedge(force, state: RigState, size: float, shape: Shape):
+    """Friction of contacts that the gear's own force presses; size: coefficient."""
+    return size * np.abs(force) * _dahl(state, shape["reach"])
+
+
+def _short(rng) -> Shape:
+    return {"reach": rng.uniform(0.002, 0.008)}
 
 
 def sliding_cells(force, state: RigState, size: float, shape: Shape):
@@ -95,8 +109,16 @@ PATHS: dict[str, Mechanism] = {
         guide,
         6.0,
         frozenset({"unloading"}),
-        draw=lambda rng: {"reach": rng.uniform(0.002, 0.008)},
+        draw=_short,
         amplitude="coulomb_friction.force",
+    ),
+    "load_friction": Mechanism(
+        "path",
+        wedge,
+        0.2,
+        frozenset({"unloading"}),
+        draw=_short,
+        amplitude="load_friction.share",
     ),
     "hysteresis": Mechanism(
         "path", sliding_cells, 10.0, frozenset({"unloading"}), draw=_cells
@@ -109,6 +131,6 @@ PATHS: dict[str, Mechanism] = {
         draw=lambda rng: {"thinning": rng.uniform(0.75, 1.0)},
     ),
     "relaxation": Mechanism(
-        "path", solid, 0.15, frozenset({"time", "holds"}), draw=_arms
+        "path", solid, 0.15, frozenset({"time", "holds or rates"}), draw=_arms
     ),
 }

@@ -21,7 +21,7 @@ class Relaxation(Effect):
     name: ClassVar[str] = "relaxation"
     stage: ClassVar[Stage] = "force"
     groups: ClassVar[tuple[str, ...]] = ("rate or time",)
-    needs: ClassVar[frozenset[str]] = frozenset({"time", "holds"})
+    needs: ClassVar[frozenset[str]] = frozenset({"time", "holds or rates"})
 
     share: Float[Array, ""] | float = parameter(
         "1", "share of the load that relaxes in the end", typical=0.03, null=0.0
