@@ -1,5 +1,7 @@
 """The gap is a smooth Gaussian process that takes nothing from the base."""
 
+from dataclasses import replace
+
 import jax
 import numpy as np
 import pytest
@@ -13,8 +15,9 @@ from hdcal.inference.discrepancy import (
 
 
 def test_the_gap_takes_no_offset_and_no_slope(loading):
-    gap = build_discrepancy(loading.deformation)
-    basis = np.asarray(gap.columns(loading.deformation))
+    ramp = replace(loading, known=loading.known - {"unloading"})
+    gap = build_discrepancy(ramp)
+    basis = np.asarray(gap.columns(loading.deformation, loading.sense))
     assert basis.shape == (180, BASIS_SIZE)
     line = np.column_stack([np.ones(180), loading.deformation])
     norms = np.linalg.norm(line, axis=0)[:, None] * np.linalg.norm(basis, axis=0)
@@ -27,7 +30,7 @@ def kernel_error(length, project):
     """Return the largest error of the approximate kernel, as a share of sd²."""
     deformation, sd = np.linspace(0.02, 0.54, 27), 1.7
     gap = Discrepancy(0.28, 0.26, np.zeros((2, BASIS_SIZE)))
-    basis = np.asarray(gap.columns(deformation))
+    basis = np.asarray(gap.columns(deformation, np.ones(27)))
     approximate = (basis * np.asarray(prior_sd(sd, length)) ** 2) @ basis.T
     distance = deformation[:, None] - deformation
     # A length-scale is a share of the whole tested range.
@@ -52,3 +55,25 @@ def test_what_bends_has_the_right_kernel_at_any_length(length):
 def test_the_gaps_prior_has_a_slope_everywhere():
     slopes = jax.jacfwd(prior_sd, argnums=(0, 1))(1.0, 2.0)
     assert np.isfinite(slopes).all()
+
+
+def test_half_a_loop_has_an_offset_and_a_slope_of_its_own(loading):
+    """The middle is that of a ramp; what loading adds unloading takes away."""
+    assert "unloading" in loading.known
+    ramp = build_discrepancy(replace(loading, known=loading.known - {"unloading"}))
+    gap = build_discrepancy(loading)
+    place, still = np.linspace(0.02, 0.54, 40), np.zeros(40)
+    middle, up, down = (
+        np.asarray(gap.columns(place, movement))
+        for movement in (still, still + 1, still - 1)
+    )
+    assert gap.size == middle.shape[1] > ramp.size
+    np.testing.assert_allclose(middle[:, : ramp.size], ramp.columns(place, still))
+    np.testing.assert_allclose(up + down, 2.0 * middle, atol=1e-12)
+    half = up - middle
+    wedge = np.column_stack([np.ones(40), place])
+    left = wedge - half @ np.linalg.lstsq(half, wedge, rcond=None)[0]
+    assert np.max(np.abs(left)) < 1e-9
+    sd = np.asarray(gap.prior_sd(1.5, 0.3))
+    np.testing.assert_allclose(sd[: ramp.size], prior_sd(1.5, 0.3))
+    assert sd.shape == (gap.size,) and np.all(sd > 0.0)

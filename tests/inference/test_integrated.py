@@ -20,7 +20,6 @@ from hdcal.data.priors import (
 from hdcal.errors import InputError
 from hdcal.inference import compress, density, integrated
 from hdcal.inference import values as of_draw
-from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_counts import check_member_counts, integrated_kinds
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
@@ -306,8 +305,9 @@ def dense_log_likelihood(problem, case, values):
         own = centring[records.specimen][:, records.specimen]
         covariance += values["specimen_sd"] ** 2 * np.outer(elastic, elastic) * own
     if "discrepancy" in problem.integrated:
-        basis = np.asarray(problem.discrepancy.columns(records.deformation))
-        sd = np.asarray(prior_sd(values["gap_sd"], values["gap_length"]))
+        gap = problem.discrepancy
+        basis = np.asarray(gap.columns(records.deformation, records.sense))
+        sd = np.asarray(gap.prior_sd(values["gap_sd"], values["gap_length"]))
         covariance += (basis * sd**2) @ basis.T
     law = stats.multivariate_normal(np.zeros(rows), covariance)
     return law.logpdf(records.force - np.asarray(mean))
@@ -343,7 +343,9 @@ def rows_form(problem, case):
     """Return the same problem with its rows kept."""
     columns = None
     if problem.discrepancy is not None:
-        columns = problem.discrepancy.columns(case.records.deformation)
+        columns = problem.discrepancy.columns(
+            case.records.deformation, case.records.sense
+        )
     return dataclasses.replace(
         problem,
         records=case.records,

@@ -58,20 +58,25 @@ def values_of(problem, seed=0) -> dict:
     """Return parameters and members, all of them away from their nulls."""
     values = draw_truth(problem, jax.random.key(seed))
     values |= {"sigma": np.float64(0.7), "noise_correlation": np.float64(0.5)}
-    rng, basis = np.random.default_rng(seed), 20 if problem.discrepancy else 0
+    rng, gap = np.random.default_rng(seed), problem.discrepancy
     members = {
         "run_offset": rng.normal(0.0, 1.0, problem.runs),
         "specimen_deviation": rng.normal(0.0, 0.02, problem.specimens),
-        "gap_weights": rng.normal(0.0, 0.3, basis),
+        "gap_weights": rng.normal(0.0, 0.3, gap.size if gap else 0),
     }
     return values | {name: size for name, size in members.items() if len(size)}
+
+
+def moves(case):
+    """Return where the readings were taken and which way, for a leftover."""
+    return case.records.deformation, case.records.sense
 
 
 def bare(problem, case):
     """Return the same problem with its rows as they were measured."""
     columns = None
     if problem.discrepancy is not None:
-        columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
+        columns = np.asarray(problem.discrepancy.columns(*moves(case)))
     before = previous_rows(case.records) if problem.correlated else None
     return dataclasses.replace(
         problem, records=case.records, columns=columns, blocks=None, before=before
@@ -198,7 +203,7 @@ def test_derivatives_of_measured_rows_are_those_without_padding():
     effects = of_stage("force")
     problem = build_problem(case, effect_priors(), effects, with_gap=True)
     values = values_of(problem)
-    columns = np.asarray(problem.discrepancy.columns(case.records.deformation))
+    columns = np.asarray(problem.discrepancy.columns(*moves(case)))
     found = linearise(problem, values, case.records)
 
     @jax.jit
@@ -221,7 +226,10 @@ def test_derivatives_of_measured_rows_are_those_without_padding():
         np.testing.assert_allclose(
             found.slopes[name], slope, rtol=0, atol=1e-11 * scale, err_msg=name
         )
-    assert found.members.shape == (len(case.records.force), 3 + 2 + 20)
+    assert found.members.shape == (
+        len(case.records.force),
+        3 + 2 + problem.discrepancy.size,
+    )
     # A specimen's column: what its rows gain where the gear is stiffer.
     own = values["specimen_sd"] * np.asarray(gain) * (case.records.specimen == 1)
     scale = np.abs(own).max()

@@ -33,7 +33,7 @@ def stream(posterior, draw: int, rows: int, rng):
     prior = prior_from_posterior(posterior)
     at = np.resize(PLACES, rows)
     columns = np.column_stack([at, 0.0 * at, 0.0 * at + 1.0, 0.0 * at])
-    left = np.asarray(posterior.problem.discrepancy.columns(at))
+    left = np.asarray(posterior.problem.discrepancy.columns(at, 0.0 * at))
     coefficients, sd = prior.coefficients()[draw], np.sqrt(prior.variance[draw])
     force = np.hstack([columns, left]) @ coefficients + sd * rng.normal(size=rows)
     return at, force, np.hstack([columns, left]), coefficients
@@ -109,7 +109,9 @@ def test_the_fit_has_no_part_far_from_what_was_tested():
         draws, untested = values
         one = {name: column[5] for name, column in draws.items()}
         bends = gear_bends(untested, one)
-        _, fitted = bends.leftover(posterior.problem, one, place, np.ones(1))
+        _, fitted = bends.leftover(
+            posterior.problem, one, place, np.ones(1), np.ones(1)
+        )
         np.testing.assert_allclose(own, fitted, rtol=1e-9, atol=1e-12)
     inside, outside = (reader.leftover(np.array([at])) for at in (0.3, 1.5))
     assert np.abs(inside).max() > 0.1 and np.abs(outside).max() < 1e-9

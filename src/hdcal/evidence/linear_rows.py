@@ -80,6 +80,13 @@ def remove_base(
     return curves - (curves @ base) @ cho_solve((root, False), base.T)
 
 
+def restore_base(
+    rows: LinearRows, left: Float[np.ndarray, "g n"]
+) -> Float[np.ndarray, "g n"]:
+    """Return the curves of which `remove_base` leaves these: I + X S X' is inverse."""
+    return left + (left @ rows.base / rows.precision) @ rows.base.T
+
+
 def project(
     rows: LinearRows, correlation: float, curves: Float[np.ndarray, "g n"]
 ) -> Float[np.ndarray, "g n+p"]:

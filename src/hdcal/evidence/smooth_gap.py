@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.evidence.kernels import kernel_columns, visible_kernels
-from hdcal.evidence.linear_rows import project
+from hdcal.evidence.linear_rows import project, restore_base
 from hdcal.evidence.prepare import PreparedCase
 
 # Which covariate each kernel belongs to.
@@ -30,7 +30,7 @@ COVARIATES = {
 _WIDTH = 8
 # Prior scale of a component in noise sds: of a gap that has been detected, and of a
 # remainder beside an effect, where noise must not be called a gap.
-DETECTED, REMAINDER = 0.3, 0.03
+DETECTED, REMAINDER = 0.1, 0.03
 _DRAWS, _BURN_IN = 150, 50
 
 
@@ -93,7 +93,9 @@ def fit_smooth_gap(
     """
     rows, columns, groups = case.rows, basis.columns, basis.groups
     target = rows.reading if reading is None else reading
-    white = project(rows, correlation, np.concatenate([target[None], columns])).T
+    # What was put in is seen as the base model leaves it, so that it is weighed whole.
+    whole = restore_base(rows, columns)
+    white = project(rows, correlation, np.concatenate([target[None], whole])).T
     draws, variance, used = _gibbs(
         white[:, 0], white[:, 1:], groups, case.noise_sd, floor, rng
     )

@@ -151,7 +151,7 @@ def keep_or_compress(
         correlated: whether neighbours within a run may err alike.
     """
     padded, count = pad_records(records), len(records.force)
-    columns = discrepancy_columns(discrepancy, padded.deformation)
+    columns = discrepancy_columns(discrepancy, padded)
     before = previous_rows(records) if correlated else None
     kept: dict[str, Any] = dict.fromkeys(("records", "columns", "before", "blocks"))
     if not keep:

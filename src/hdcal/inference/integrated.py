@@ -8,7 +8,6 @@ from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
 from hdcal.inference import compress
-from hdcal.inference.discrepancy import prior_sd
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
@@ -73,7 +72,9 @@ def _linear(problem: Problem, values: Values, grouped, discrepancy, **rows) -> L
     scale: list[Any] = [jnp.full(other.count - 1, other.sd) for other in others]
     if "discrepancy" in problem.integrated:
         design.append(discrepancy)
-        scale.append(prior_sd(values["gap_sd"], values["gap_length"]))
+        assert problem.discrepancy is not None
+        own = problem.discrepancy.prior_sd(values["gap_sd"], values["gap_length"])
+        scale.append(own)
     return Linear(
         design=jnp.hstack([jnp.zeros((len(rows["residual"]), 0)), *design]),
         scale=jnp.concatenate([jnp.zeros(0), *scale]),

@@ -15,7 +15,6 @@ from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
 from hdcal.data.records import Array
-from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
@@ -71,7 +70,7 @@ def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     if "discrepancy" in problem.integrated:
         return value
     values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
-    return value - BASIS_SIZE * jnp.log(values["sigma"])
+    return value - problem.discrepancy.size * jnp.log(values["sigma"])
 
 
 @jax.jit

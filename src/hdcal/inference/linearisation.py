@@ -9,7 +9,7 @@ import numpy as np
 
 from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
-from hdcal.inference.discrepancy import discrepancy_columns, prior_sd
+from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import predict_rows
@@ -50,7 +50,7 @@ def linearise(
         records: the rows, not padded.
     """
     rows, padded = len(records.force), pad_records(records)
-    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded)
     sd, slopes, stiffening = jax.tree.map(
         lambda part: np.asarray(part)[:rows],
         _derivatives(
@@ -104,10 +104,13 @@ def _members(problem: Problem, values, records: Records, columns, stiffening):
         table.append(sd * stiffening[:, None] * own)
         place.append(values["specimen_deviation"] / sd)
     if columns is not None:
-        scale = np.asarray(_prior_sd(values["gap_sd"], values["gap_length"]))
+        own = problem.discrepancy, values["gap_sd"], values["gap_length"]
+        scale = np.asarray(_prior_sd(*own))
         table.append(columns * scale)
         place.append(values["gap_weights"] / scale)
     return np.concatenate(table, axis=1), np.concatenate(place)
 
 
-_prior_sd = jax.jit(prior_sd)
+@jax.jit
+def _prior_sd(discrepancy: Discrepancy, sd, length):
+    return discrepancy.prior_sd(sd, length)

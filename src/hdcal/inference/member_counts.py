@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from hdcal.data.case import Case
 from hdcal.errors import Finding, InputError
-from hdcal.inference.discrepancy import BASIS_SIZE
+from hdcal.inference.discrepancy import is_directed, leftover_size
 
 # Runs or specimens: of the kind that is eliminated one by one, and of any other, whose
 # cost grows with the cube of their number.
@@ -17,7 +17,7 @@ def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "discrepancy": BASIS_SIZE if with_gap else 0,
+        "discrepancy": leftover_size(is_directed(case.records)) if with_gap else 0,
     }
     return {kind: count for kind, count in counts.items() if count}
 

@@ -16,7 +16,6 @@ from jax.nn import log_sigmoid, softplus
 from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.discrepancy import BASIS_SIZE, prior_sd
 from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import with_gains
 from hdcal.inference.padding import measured
@@ -220,12 +219,12 @@ def _sample_structure(problem: Problem, values: dict) -> None:
             usual = jnp.sqrt(_mean_square(problem, problem.rows.force))
             seen = _mean_sd(problem, values, problem.specimens) / usual
             values[name] = _sample_members(name, sd, seen, problem.specimens)
-    if problem.discrepancy is not None:
+    if (gap := problem.discrepancy) is not None:
         for name in ("gap_sd", "gap_length"):
             values[name] = sample_site(name, priors[name])
         if "discrepancy" not in integrated:
-            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([BASIS_SIZE]))
-            scale = prior_sd(values["gap_sd"], values["gap_length"])
+            score = numpyro.sample("_gap", dist.Normal(0.0, 1.0).expand([gap.size]))
+            scale = gap.prior_sd(values["gap_sd"], values["gap_length"])
             values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 

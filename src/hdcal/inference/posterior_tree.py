@@ -82,7 +82,7 @@ def force_log_likelihood(
     if draws.energy.size * rows > MOST_LOG_LIKELIHOODS:
         return {TOTAL: densities(problem, draws.values)[1]}
     padded = pad_records(case.records)
-    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded)
     before = np.full(len(padded.force), -1)
     before[:rows] = previous_rows(case.records)
     each = _pointwise(problem, draws.values, padded, columns, before)

@@ -228,7 +228,7 @@ def build_problem(
     noise_sd = pilot_noise(records) if noise_sd is None else noise_sd
     members = member_counts(case, with_gap)
     rounded, correlated = noise_form(case, effects, members, noise_sd)
-    leftover = build_discrepancy(records.deformation) if with_gap else None
+    leftover = build_discrepancy(records) if with_gap else None
     columns, keep = _columns(records, reading), rounded or bool(effects)
     rows = keep_or_compress(records, columns, leftover, keep, correlated)
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)

@@ -63,7 +63,7 @@ def residuals(posterior: Posterior) -> Residuals:
     """Return the residuals of a calibration and the shapes found in them."""
     problem, records = posterior.problem, posterior.case.records
     padded = pad_records(records)
-    columns = discrepancy_columns(problem.discrepancy, padded.deformation)
+    columns = discrepancy_columns(problem.discrepancy, padded)
     fitted = _fit(problem, _thinned(posterior.draws), padded, columns)
     fitted = np.asarray(fitted)[: len(records.force)]
     residual = np.asarray(records.force) - fitted

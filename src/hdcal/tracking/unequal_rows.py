@@ -59,10 +59,11 @@ class UnequalRows:
             tested: whether the calibration's data hold such rows.
         """
         noise = 1.0 + self._growth * deformation**2
+        loop = self._untested.half_loop(deformation) / self._variance
         if tested:
-            return RowTerms(noise=noise)
+            return RowTerms(noise=noise, rest=loop)
         added = self._untested.at(deformation, temperature)
-        rest = added.rest**2 / self._variance
+        rest = added.rest**2 / self._variance + loop
         return RowTerms(added.shift, added.columns, noise, rest)
 
     def leftover(self, deformation: np.ndarray) -> np.ndarray:

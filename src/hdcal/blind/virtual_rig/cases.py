@@ -219,7 +219,7 @@ def _oracle(
 ) -> dict[str, float]:
     """Return the oracle's probabilities, where there is one effect for it to find."""
     on_mean = plan.kind == "effect" and plan.truth[0] not in NOISES
-    as_simulated = plan.loading in LOADINGS and plan.mix != RIGS
+    as_simulated = plan.loading in LOADINGS and plan.points == POINTS
     if not on_mean or plan.withheld or not as_simulated:
         return {}
     return oracle_probabilities(

@@ -103,7 +103,7 @@ def gear_forces(
         if untested is None:
             return force
         bends = gear_bends(untested, value)
-        left = gear_leftover(problem, value, bends, as_read)
+        left = gear_leftover(problem, value, bends, as_read, pressed)
         return force + own * value.get(MODULUS, 1.0) * left
 
     factor = jnp.broadcast_to(jnp.asarray(factor), (len(values["K"]), count))
@@ -116,7 +116,11 @@ def gear_bends(untested: Untested, value: Values) -> Bends:
 
 
 def gear_leftover(
-    problem: Problem, value: Values, bends: Bends, as_read: Float[Array, " n"]
+    problem: Problem,
+    value: Values,
+    bends: Bends,
+    as_read: Float[Array, " n"],
+    movement: Float[Array, " n"],
 ) -> Float[Array, " n"]:
     """Return what the fitted leftover and the bend of a draw add to the force [N].
 
@@ -128,13 +132,14 @@ def gear_leftover(
         value: one draw.
         bends: of the same draw, from `gear_bends`.
         as_read: deformation from the free shape, per mm as read.
+        movement: +1 where it rises, −1 where it falls, 0 for the mean of both.
     """
     place = shown(value, as_read, 0.0)[0] + value["deformation_offset"]
     pressed = jnp.where(as_read < 0.0, -1.0, 1.0)
     low, high = bends.above.growth.far, bends.above.growth.end
     known = jnp.clip(place, jnp.minimum(low, 0.0), jnp.maximum(high, 0.0))
     beyond = jnp.clip(place, low, high) + (place - known)
-    left, _ = bends.leftover(problem, value, beyond, pressed)
+    left, _ = bends.leftover(problem, value, beyond, pressed, movement)
     if problem.discrepancy is not None:
-        left = left + bends.leftover(problem, value, place, pressed)[1]
+        left = left + bends.leftover(problem, value, place, pressed, movement)[1]
     return acting(value, left)

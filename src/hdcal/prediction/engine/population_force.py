@@ -267,6 +267,7 @@ def leftover(
     if quantity == "load":
         at, _ = shown(value, at, 0.0)
     bends = conditions.untested.bends(value)
-    bend, fitted = bends.leftover(problem, value, at, conditions.loading)
+    movement = jnp.reshape(jnp.asarray(conditions.movement, float), 1)
+    bend, fitted = bends.leftover(problem, value, at, conditions.loading, movement)
     left = (bend + fitted)[0]
     return acting(value, left) if quantity == "load" else left

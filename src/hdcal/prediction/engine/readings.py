@@ -43,7 +43,7 @@ def readings(
         zero, moved = untested.drift(value, records.temperature, loading)
         mean, noise = force_of(problem, value, records, zero=zero, moved=moved)
         bends = untested.bends(value)
-        bend, fitted = bends.leftover(problem, value, at, loading)
+        bend, fitted = bends.leftover(problem, value, at, loading, records.sense)
         other, factor = 0.0, 1.0
         if problem.runs:
             sd = new_member_sd(value["run_offset_sd"], problem.runs)

@@ -102,7 +102,7 @@ class Bends(eqx.Module):
         sides = self.above.at(deformation), self.below.at(deformation)
         return tuple(jnp.where(over, *pair) for pair in zip(*sides, strict=True))
 
-    def leftover(self, problem: Problem, value: Values, deformation, loading):
+    def leftover(self, problem: Problem, value: Values, deformation, loading, movement):
         """Return the bend and the fitted leftover discrepancy of a draw [N], (n,) each.
 
         The bend has no part in what was tested, and the fit none in what is far from
@@ -113,28 +113,33 @@ class Bends(eqx.Module):
             value: the same draw.
             deformation: as read [mm], shape (n,).
             loading: sense of loading, along which the score is.
+            movement: +1 where the deformation rises, −1 where it falls, shape (n,).
         """
         mean, sd, share = self.law(deformation)
         bend = share * (mean + sd * loading * self.score)
         if problem.discrepancy is None or "gap_weights" not in value:
             return bend, jnp.zeros_like(bend)
         ends = self.above.growth.far, self.below.growth.far
-        columns = fitted_columns(problem.discrepancy, ends, deformation, share)
+        place = deformation, movement
+        columns = fitted_columns(problem.discrepancy, ends, place, share)
         return bend, columns @ value["gap_weights"]
 
 
 def fitted_columns(
-    discrepancy: Discrepancy, ends: tuple, deformation, share
+    discrepancy: Discrepancy, ends: tuple, place: tuple, share
 ) -> Float[Array, "n m"]:
     """Return what each weight of the fitted leftover discrepancy adds to readings [-].
 
     Args:
         discrepancy: of the problem.
         ends: of the tested deformation [mm].
-        deformation: as read [mm], shape (n,).
+        place: deformation as read [mm], and +1 where it rises or −1 where it falls,
+            each of shape (n,).
         share: how much of the bend is in, from `Bends.law`, shape (n,).
     """
-    return (1.0 - share)[:, None] * discrepancy.columns(jnp.clip(deformation, *ends))
+    deformation, movement = place
+    columns = discrepancy.columns(jnp.clip(deformation, *ends), movement)
+    return (1.0 - share)[:, None] * columns
 
 
 def spread_evenly(count: int, columns: int, seed: int) -> np.ndarray:

@@ -91,6 +91,22 @@ class UntestedReading:
         growths = tuple(bend.growth for bend in self._bends)
         return np.asarray(_leftover(self._problem.discrepancy, growths, deformation))
 
+    def half_loop(self, deformation: float) -> float:
+        """Return the mean square of half the fitted leftover's loop [N²].
+
+        A stream does not say which way it moves: of what goes with the direction the
+        middle is followed, and this is the variance about it.
+
+        Args:
+            deformation: as read [mm].
+        """
+        discrepancy = self._problem.discrepancy
+        if discrepancy is None or not discrepancy.directed:
+            return 0.0
+        growths = tuple(bend.growth for bend in self._bends)
+        at, weights = np.array([deformation]), self._values["gap_weights"]
+        return float(_half_loop(discrepancy, growths, at, weights))
+
     def _drift(self, deformation: float, temperature: float) -> tuple[float, float]:
         """Return sd, with the sign of the kelvins, and mean of the rig's drift [N]."""
         coldest, warmest = self._tested
@@ -154,10 +170,25 @@ def _reach(growth: Growth, deformation):
 @jax.jit
 def _leftover(discrepancy: Discrepancy, growths: tuple[Growth, Growth], deformation):
     """Return the columns of the fitted leftover; growths below and above."""
+    return _columns(discrepancy, growths, deformation, jnp.zeros_like(deformation))
+
+
+@jax.jit
+def _half_loop(discrepancy: Discrepancy, growths, deformation, weights):
+    """Return the mean square over draws of what loading adds to the middle."""
+    up, middle = (
+        _columns(discrepancy, growths, deformation, movement * jnp.ones(1))
+        for movement in (1.0, 0.0)
+    )
+    return jnp.mean((weights @ (up - middle)[0]) ** 2)
+
+
+def _columns(discrepancy: Discrepancy, growths, deformation, movement):
     below, above = growths
     over = deformation > above.far
     share = jnp.where(over, above.share(deformation), below.share(deformation))
-    return fitted_columns(discrepancy, (above.far, below.far), deformation, share)
+    ends = above.far, below.far
+    return fitted_columns(discrepancy, ends, (deformation, movement), share)
 
 
 @jax.jit

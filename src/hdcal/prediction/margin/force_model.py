@@ -64,9 +64,12 @@ class ForceModel(eqx.Module):
         factor = factor * (1.0 + more.get("gear", 0.0))
         quantity = self.whose.quantity
         force, _ = member_force(self.problem, value, quantity, there, factor)
-        at = jnp.reshape(jnp.asarray(there.deformation, float), 1)
+        at, movement = (
+            jnp.reshape(jnp.asarray(x, float), 1)
+            for x in (there.deformation, there.movement)
+        )
         bends = untested.bends(value)
-        _, fitted = bends.leftover(self.problem, value, at, there.loading)
+        _, fitted = bends.leftover(self.problem, value, at, there.loading, movement)
         return force + fitted[0] + sum(more.get(name, 0.0) for name in _ADDED)
 
     def _value(self, moved) -> dict:

@@ -1,0 +1,80 @@
+"""A leftover knows loading from unloading, where both were tested."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from rigs import cycles, make_case
+
+import hdcal
+from hdcal.inference.posterior import Posterior
+from hdcal.tracking.tracker import Tracker
+
+STIFFNESS, OPENING, NOISE = 195.0, 0.06, 0.3
+PLACES = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
+
+
+def truth(deformation, sense):
+    """Return the force of a loop that opens with the load, in no effect's form."""
+    shape = np.asarray(deformation) / 0.54
+    return STIFFNESS * deformation * (1.0 + OPENING * sense * shape**0.5)
+
+
+@cache
+def looped(*, told: bool = True) -> Posterior:
+    """Return the calibration with a leftover of a rig that draws such loops.
+
+    Where the loop is not `told` the data do not say that the gear was unloaded.
+    """
+    records = replace(cycles(96), temperature=np.full(96, 20.0))
+    known = {"unloading"} if told else set()
+    force = truth(records.deformation, records.sense)
+    force = force + np.random.default_rng(4).normal(0.0, NOISE, 96)
+    case = make_case(replace(records, force=force, known=frozenset(known)))
+    return hdcal.calibrate(case, with_gap=True, warmup=400, draws=400, chains=2, seed=1)
+
+
+def bands(posterior, direction):
+    """Return ends of the 95 % band of the mean with the leftover, (2, place) [N]."""
+    found = hdcal.predict(posterior, PLACES, [20.0], direction, allow_failed=True)
+    return found.with_gap_lo_N, found.with_gap_hi_N
+
+
+@pytest.mark.parametrize(("direction", "sense"), [("up", 1.0), ("down", -1.0)])
+def test_the_mean_of_each_direction_lies_in_its_own_band(direction, sense):
+    low, high = bands(looped(), direction)
+    true = truth(PLACES, sense)
+    assert np.all((low < true) & (true < high))
+    # The loop is a multiple of what is left open.
+    assert np.all(high - low < 0.4 * np.abs(true - truth(PLACES, -sense)) + 0.5)
+
+
+def test_without_it_both_means_lie_outside():
+    held = [
+        (low < truth(PLACES, sense)) & (truth(PLACES, sense) < high)
+        for sense, (low, high) in (
+            (1.0, bands(looped(told=False), "up")),
+            (-1.0, bands(looped(told=False), "down")),
+        )
+    ]
+    assert np.mean(held) < 0.5
+
+
+def test_a_margin_of_unloading_is_below_that_of_loading():
+    (up,), (down,) = (
+        hdcal.margin(looped(), 0.5, direction=way).levels for way in ("up", "down")
+    )
+    assert up.force_N.lo > down.force_N.hi
+
+
+def test_a_stream_counts_half_the_loop_as_noise():
+    """It does not say which way it moves: of 600 readings 95 % and more lie inside."""
+    rng = np.random.default_rng(3)
+    tracker, inside = Tracker(looped()), []
+    for row in range(600):
+        at, sense = float(rng.uniform(0.1, 0.5)), 1.0 if row // 40 % 2 else -1.0
+        force = float(truth(at, sense) + rng.normal(0.0, NOISE))
+        low, high = tracker.update(at, force)["force_N"]["predictive_95"]
+        inside.append(low < force < high)
+    assert np.mean(inside) > 0.93
