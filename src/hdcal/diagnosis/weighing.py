@@ -19,6 +19,7 @@ from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
 from hdcal.evidence.remainder_evidence import with_remainders
 from hdcal.evidence.row_means import MOST_ROWS, average_rows
+from hdcal.evidence.unseen_effects import with_unseen
 from hdcal.physics.effect import Effect
 
 # Changes of the stiffness, and of the log of the noise, that move no evidence much.
@@ -72,6 +73,7 @@ def weigh(
     names = list(evidence.table)
     prior = dict(zip(names, log_priors(names, evidence.on_noise), strict=True))
     evidence = with_bursts(evidence, shown, prior)
+    evidence = with_unseen(evidence, posterior_of(evidence).probabilities)
     return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
 
 

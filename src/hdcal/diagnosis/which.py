@@ -1,6 +1,7 @@
 """Which effect causes the gap: posterior over hypotheses, and how firm it is."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import starmap
 
 import numpy as np
@@ -20,8 +21,7 @@ from hdcal.diagnosis.model_posterior import (
     CARRIES,
     NAMED,
     ModelPosterior,
-    carried,
-    model_posterior,
+    posterior_of,
 )
 from hdcal.diagnosis.naming import naming
 from hdcal.diagnosis.verdict import Certificate, NotTestable, Remainder, Which
@@ -124,7 +124,7 @@ def sensitivity(evidence: CaseEvidence, effect: str) -> dict[str, float]:
             name: value + sum(moved.get(part, 0.0) for part in name.split("+"))
             for name, value in evidence.table.items()
         }
-        moved_posterior = model_posterior(table, carried(evidence), evidence.on_noise)
+        moved_posterior = posterior_of(replace(evidence, table=table))
         result[word] = float(moved_posterior.inclusion[effect])
     return result
 
