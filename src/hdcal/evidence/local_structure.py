@@ -1,7 +1,8 @@
 """Structure that no smooth function shows: in a stretch of rows, or with a period.
 
 Stretches are dyadic windows along each order of the rows; periods are those of
-Fourier's. They are too many for an evidence of each: of each family the direction that
+Fourier's, from row to row and by the clock: mains and thermostats know nothing of rows.
+They are too many for an evidence of each: of each family the direction that
 the data show most represents all, and its evidence is divided by their number, which
 is a lower bound of the family's own.
 """
@@ -16,7 +17,9 @@ from hdcal.evidence.prepare import PreparedCase
 
 # Windows are no shorter than this many rows, nor than this share of all.
 _SHORTEST, _FINEST = 2, 1.0 / 32.0
-_MOST_PERIODS = 96
+_MOST_PERIODS, _MOST_BY_TIME = 96, 384
+# Rows are uneven in time where a step is this many times a usual one.
+_UNEVEN = 1.5
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,34 @@ def direction_families(records: Records) -> list[DirectionFamily]:
         pairs = np.stack([table, table * deformation], axis=1).reshape(-1, rows)
         found.append(DirectionFamily(f"stretch of {name}", pairs, 2))
     count = min(rows // 2, _MOST_PERIODS)
-    turns = 2.0 * np.pi * np.arange(2, count + 1)[:, None] * order / rows
-    waves = np.stack([np.cos(turns), np.sin(turns)], axis=1).reshape(-1, rows)
-    return [*found, DirectionFamily("period", waves, 2)]
+    found.append(DirectionFamily("period", _waves(order / rows, count), 2))
+    clock = _clock(records)
+    if clock is not None:
+        found.append(DirectionFamily("period of time", _waves(*clock), 2))
+    return found
+
+
+def _clock(records: Records) -> tuple[np.ndarray, int] | None:
+    """Return when each row was read, from 0 to 1, and how many turns rows can show.
+
+    None where the time is not known, or says no more than the order of the rows.
+    """
+    # Each run has a clock of its own; together they go on.
+    step = np.maximum(np.diff(np.asarray(records.time, float)), 0.0)
+    moves = step[step > 0.0]
+    if "time" not in records.known or not len(moves):
+        return None
+    usual, whole = float(np.median(moves)), float(np.sum(moves))
+    if np.max(moves) < _UNEVEN * usual:
+        return None
+    at = np.concatenate([[0.0], np.cumsum(step)]) / whole
+    return at, min(int(0.5 * whole / usual), _MOST_BY_TIME)
+
+
+def _waves(place: np.ndarray, most: int) -> np.ndarray:
+    """Return cosine and sine of 2 and more turns over a place from 0 to 1."""
+    turns = 2.0 * np.pi * np.arange(2, most + 1)[:, None] * place
+    return np.stack([np.cos(turns), np.sin(turns)], axis=1).reshape(-1, len(place))
 
 
 def _windows(rows: int) -> np.ndarray:
