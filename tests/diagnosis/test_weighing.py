@@ -76,11 +76,12 @@ def test_an_effect_that_does_not_carry_the_gap_is_only_in_the_way():
 def test_a_pair_whose_second_is_not_seen_is_the_first_alone():
     table = {name: np.zeros(1) for name in ("none", "unknown", "a", "b", "a+b")}
     whole = model_posterior(table).probabilities
-    moved = model_posterior(table, unseen={"a+b": ("a", 0.75)})
+    moved = model_posterior(table, unseen={"a+b": {"a": 0.6, "b": 0.15}})
     assert moved.probabilities["a+b"] == pytest.approx(0.25 * whole["a+b"])
-    gained = moved.probabilities["a"] - whole["a"]
-    assert gained == pytest.approx(0.75 * whole["a+b"])
-    assert moved.inclusion["b"] == pytest.approx(whole["b"] + 0.25 * whole["a+b"])
+    for name, chance in (("a", 0.6), ("b", 0.15)):
+        gained = moved.probabilities[name] - whole[name]
+        assert gained == pytest.approx(chance * whole["a+b"])
+    assert moved.inclusion["b"] == pytest.approx(whole["b"] + 0.4 * whole["a+b"])
 
 
 def test_weighing_is_bayes_rule():

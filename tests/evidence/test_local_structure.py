@@ -14,15 +14,19 @@ from hdcal.physics.registry import EFFECTS
 LIBRARY = {name: EFFECTS[name] for name in ("coulomb_friction", "thermal_zero_drift")}
 
 
-def gained(period: float | None, *, told: bool) -> tuple[float, str]:
+def gained(
+    period: float | None, *, told: bool = True, pause: float = 0.0
+) -> tuple[float, str]:
     """Return how much unknown structure gains over none [nat], and along what.
 
     Args:
         period: of a hum of twice the noise [s]; None without one.
         told: whether the time of each row is known.
+        pause: in the middle of the rows [s].
     """
     case = simulated(rich(), seed=2)
-    records, clock = case.records, np.asarray(case.records.time)
+    clock = np.asarray(case.records.time) + pause * (np.arange(180) >= 90)
+    records = replace(case.records, time=clock)
     if period is not None:
         hum = 2.0 * np.sqrt(2.0) * NOISE * np.sin(2.0 * np.pi * clock / period)
         records = replace(records, force=records.force + hum)
@@ -41,6 +45,13 @@ def test_a_hum_by_the_clock_is_unknown_structure():
     assert kernel == "period of time"
     assert found > 30.0
     assert found > gained(7.3, told=False)[0] + 20.0
+
+
+@pytest.mark.parametrize("pause", [600.0, 86_400.0])
+def test_a_pause_weakens_it_and_does_not_hide_it(pause):
+    """The phase is lost there: one wave fits both parts of the rows by chance only."""
+    found = gained(7.3, pause=pause)[0]
+    assert 3.0 < found < gained(7.3)[0]
 
 
 def test_nothing_is_found_where_nothing_hums():

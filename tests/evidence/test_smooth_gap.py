@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from diagnosis_cases import rich, simulated
+from diagnosis_cases import NOISE, rich, simulated
 
 from hdcal.data.priors import effect_priors
 from hdcal.evidence.linear_rows import remove_base, restore_base
 from hdcal.evidence.prepare import prepare
-from hdcal.evidence.smooth_gap import additive_basis, fit_smooth_gap
+from hdcal.evidence.smooth_gap import DETECTED, additive_basis, fit_smooth_gap
 
 
 def test_what_is_restored_leaves_the_same():
@@ -17,12 +17,12 @@ def test_what_is_restored_leaves_the_same():
     np.testing.assert_allclose(remove_base(rows, restore_base(rows, left)), left)
 
 
-def sizes(effect, added, seed):
+def sizes(effect, added, seed, floor=DETECTED):
     """Return the fitted gap over the true one: middle and ends of a 90 % interval."""
     prepared = prepare(simulated(rich(), effect, seed=seed), effect_priors())
     true = np.sqrt(np.mean(remove_base(prepared.rows, added) ** 2))
     rng = np.random.default_rng(seed)
-    smooth = fit_smooth_gap(prepared, additive_basis(prepared), 0.0, rng)
+    smooth = fit_smooth_gap(prepared, additive_basis(prepared), 0.0, rng, floor=floor)
     return np.quantile(smooth.rms, (0.5, 0.05, 0.95)) / true
 
 
@@ -34,3 +34,17 @@ def test_a_gap_that_the_modulus_could_take_in_part_is_no_larger_for_that():
     )
     assert np.median(found[:, 0]) == pytest.approx(1.0, abs=0.12)
     assert np.count_nonzero((found[:, 1] < 1.0) & (found[:, 2] > 1.0)) >= 6
+
+
+def test_a_gap_of_half_the_noise_is_no_larger_for_what_is_looked_for_in_vain():
+    """Components that are not there add up: a prior scale of 0.3 shows what they do."""
+    kelvins = (rich().temperature - 20.0)[None]
+    rows = prepare(simulated(rich()), effect_priors()).rows
+    slope = 0.5 * NOISE / np.sqrt(np.mean(remove_base(rows, kelvins) ** 2))
+    drift = {"thermal_zero_drift": {"slope": slope}}
+    middles = [
+        np.median([sizes(drift, slope * kelvins, s, floor)[0] for s in range(12)])
+        for floor in (DETECTED, 0.3)
+    ]
+    assert middles[0] == pytest.approx(1.0, abs=0.15)
+    assert middles[1] > 1.15

@@ -12,24 +12,56 @@ from hdcal.inference.discrepancy import (
     build_discrepancy,
     prior_sd,
 )
+from hdcal.physics.registry import EFFECTS
 
 
-def test_the_gap_takes_no_offset_and_no_slope(loading):
-    ramp = replace(loading, known=loading.known - {"unloading"})
-    gap = build_discrepancy(ramp)
-    basis = np.asarray(gap.columns(loading.deformation, loading.sense))
-    assert basis.shape == (180, BASIS_SIZE)
-    line = np.column_stack([np.ones(180), loading.deformation])
+def unequal(records):
+    """Return the same rows, the later ones of unloading struck out."""
+    kept = np.flatnonzero((records.sense > 0.0) | (records.deformation > 0.45))
+    rows = {
+        name: np.asarray(column)[kept]
+        for name, column in vars(records).items()
+        if np.shape(column) == np.shape(records.force)
+    }
+    return replace(records, **rows)
+
+
+@pytest.mark.parametrize("tested", ["both ways alike", "little unloading", "ramp"])
+def test_the_gap_takes_no_offset_and_no_slope(loading, tested):
+    records = loading
+    if tested == "little unloading":
+        records = unequal(loading)
+    elif tested == "ramp":
+        records = replace(loading, known=loading.known - {"unloading"})
+    gap = build_discrepancy(records)
+    assert gap.directed == (tested != "ramp")
+    basis = np.asarray(gap.columns(records.deformation, records.sense))
+    count = len(records.force)
+    assert basis.shape == (count, gap.size)
+    line = np.column_stack([np.ones(count), records.deformation])
     norms = np.linalg.norm(line, axis=0)[:, None] * np.linalg.norm(basis, axis=0)
-    assert np.max(np.abs(line.T @ basis) / norms) < 1e-10
-    # It is not empty: what is left bends.
-    assert np.linalg.matrix_rank(basis, tol=1e-6) > 8
+    np.testing.assert_allclose(line.T @ basis / norms, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["coulomb_friction", "hysteresis", "viscous_damping"])
+def test_beside_an_effect_that_draws_loops_the_gap_has_none(loading, name):
+    """Else the effect's size would be the leftover's to choose."""
+    gap = build_discrepancy(loading, [EFFECTS[name]])
+    place, up = np.linspace(0.02, 0.54, 9), np.ones(9)
+    columns = [np.asarray(gap.columns(place, way * up)) for way in (1.0, -1.0)]
+    np.testing.assert_array_equal(*columns)
+    other = build_discrepancy(loading, [EFFECTS["thermal_zero_drift"]])
+    columns = [np.asarray(other.columns(place, way * up)) for way in (1.0, -1.0)]
+    assert np.max(np.abs(columns[0] - columns[1])) > 0.1
+    # A mixture holds draws of both models in one table.
+    assert gap.size == other.size
 
 
 def kernel_error(length, project):
     """Return the largest error of the approximate kernel, as a share of sd²."""
     deformation, sd = np.linspace(0.02, 0.54, 27), 1.7
     gap = Discrepancy(0.28, 0.26, np.zeros((2, BASIS_SIZE)))
+    assert gap.size == BASIS_SIZE
     basis = np.asarray(gap.columns(deformation, np.ones(27)))
     approximate = (basis * np.asarray(prior_sd(sd, length)) ** 2) @ basis.T
     distance = deformation[:, None] - deformation
@@ -70,6 +102,7 @@ def test_half_a_loop_has_an_offset_and_a_slope_of_its_own(loading):
     assert gap.size == middle.shape[1] > ramp.size
     np.testing.assert_allclose(middle[:, : ramp.size], ramp.columns(place, still))
     np.testing.assert_allclose(up + down, 2.0 * middle, atol=1e-12)
+    assert gap.looped and not ramp.looped
     half = up - middle
     wedge = np.column_stack([np.ones(40), place])
     left = wedge - half @ np.linalg.lstsq(half, wedge, rcond=None)[0]

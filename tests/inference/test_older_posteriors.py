@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from posteriors import plain_draws, ramp_case, written_posterior
-from rigs import make_gear
+from rigs import cycles, make_case, make_gear
 
 import hdcal
 from hdcal.errors import InputError
 from hdcal.inference import noise_form
-from hdcal.inference.held import PILOT_NOISE
+from hdcal.inference.held import LOOP, PILOT_NOISE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.serial_correlation import CORRELATION
 
@@ -21,6 +21,13 @@ def written(resolution: float = 0.0) -> Posterior:
     """Return a posterior of 30 readings whose pilot noise is about 0.6 N."""
     case = ramp_case(make_gear(resolution=resolution))
     return written_posterior(case, plain_draws(case, 400))
+
+
+def looped() -> Posterior:
+    """Return a quick calibration with a leftover of a rig that unloads too."""
+    case = make_case(cycles(96))
+    size = {"warmup": 100, "draws": 20, "chains": 2}
+    return hdcal.calibrate(case, with_gap=True, **size)
 
 
 def without_correlation(posterior: Posterior) -> Posterior:
@@ -85,3 +92,29 @@ def test_the_kept_form_decides_whether_a_file_is_whole(tmp_path):
             continue
         problem = Posterior.load(tmp_path / "posterior.nc").problem
         assert problem.rounded and not problem.correlated
+
+
+def test_a_leftover_of_before_it_knew_loading_from_unloading_is_read(tmp_path):
+    """It had twenty weights whatever was tested; a new file of such data has thirty."""
+    now = looped()
+    tree = now.tree.copy()
+    for group in ("posterior", "prior"):
+        held = tree[group].to_dataset()
+        if "gap_weights" in held:
+            last = held["gap_weights"].dims[-1]
+            tree[group] = xr.DataTree(held.isel({last: slice(20)}))
+    settings = {name: kept for name, kept in now.settings.items() if name != LOOP}
+    old = replace(now, tree=tree, settings=settings)
+    old.save(tmp_path / "posterior.nc")
+    back = Posterior.load(tmp_path / "posterior.nc")
+    assert back.draws["gap_weights"].shape[1] == 20
+    assert not back.problem.discrepancy.directed
+    up, down = (
+        hdcal.predict(back, [0.3], [20.0], way, allow_failed=True).with_gap_median_N
+        for way in ("up", "down")
+    )
+    assert up == pytest.approx(down)
+    # A new file that holds too few is damaged as ever.
+    replace(old, settings=now.settings).save(tmp_path / "posterior.nc")
+    with pytest.raises(InputError, match="damaged"):
+        Posterior.load(tmp_path / "posterior.nc")

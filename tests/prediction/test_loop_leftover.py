@@ -8,7 +8,9 @@ import pytest
 from rigs import cycles, make_case
 
 import hdcal
+from hdcal.calibration.figure.bands import distance_from_model
 from hdcal.inference.posterior import Posterior
+from hdcal.prediction.bands.bands import default_bands
 from hdcal.tracking.tracker import Tracker
 
 STIFFNESS, OPENING, NOISE = 195.0, 0.06, 0.3
@@ -66,6 +68,33 @@ def test_a_margin_of_unloading_is_below_that_of_loading():
         hdcal.margin(looped(), 0.5, direction=way).levels for way in ("up", "down")
     )
     assert up.force_N.lo > down.force_N.hi
+
+
+def test_beside_friction_the_leftover_has_no_loop():
+    """Else the friction of a rig that has nothing but friction would be anything."""
+    records = replace(cycles(96), temperature=np.full(96, 20.0))
+    force = STIFFNESS * records.deformation + 3.0 * records.sense
+    force = force + np.random.default_rng(5).normal(0.0, NOISE, 96)
+    case = make_case(replace(records, force=force))
+    size = {"warmup": 400, "draws": 400, "chains": 2, "seed": 1}
+    found = hdcal.calibrate(case, effects=["coulomb_friction"], with_gap=True, **size)
+    size = found.draws["coulomb_friction.force"]
+    assert np.std(size) < 0.1
+    assert np.mean(size) == pytest.approx(3.0, abs=4.0 * NOISE / np.sqrt(96))
+
+
+def test_readings_lie_about_the_bands_of_their_own_direction():
+    """In the figure: what the leftover adds to the physics goes with the direction."""
+    found = looped()
+    shown = default_bands(found)
+    left = hdcal.residuals(found)
+    away = distance_from_model(shown, left)
+    rising = left.direction > 0.0
+    middle = shown.physics_median_N[np.asarray(shown.direction) == "up"]
+    place = shown.deformation_mm[np.asarray(shown.direction) == "up"]
+    expected = left.measured - np.interp(left.deformation, place, middle)
+    for way in (rising, ~rising):
+        np.testing.assert_allclose(away[way], expected[way], atol=0.6)
 
 
 def test_a_stream_counts_half_the_loop_as_noise():

@@ -17,7 +17,7 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
-from hdcal.inference.held import PILOT_NOISE
+from hdcal.inference.held import LOOP, PILOT_NOISE
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.noise_form import (
     noise_grows,
@@ -181,7 +181,7 @@ def calibrate(
     own = _specifics(case, problem, found)
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
-    settings |= run_settings(found, began)
+    settings |= {LOOP: True} | run_settings(found, began)
     return Posterior(case, theory, chosen, priors, *parts, settings)
 
 

@@ -98,7 +98,7 @@ def model_posterior(
     table: Mapping[str, np.ndarray],
     carried: Mapping[str, float] | None = None,
     noise: Iterable[str] = (),
-    unseen: Mapping[str, tuple[str, float]] | None = None,
+    unseen: Mapping[str, Mapping[str, float]] | None = None,
 ) -> ModelPosterior:
     """Return the posterior over hypotheses.
 
@@ -108,8 +108,8 @@ def model_posterior(
         carried: of an effect with a remainder, the probability that the effect carries
             the gap; as far as it does not, the cause is unknown.
         noise: which of the effects are on the noise.
-        unseen: of a pair, the effect that acts alone as far as the other one cannot be
-            seen, and the probability of that.
+        unseen: of a pair, how probably each of its effects acts alone, the other one
+            being too small to be seen; at most 1 in all.
     """
     names = list(table)
     prior = log_priors(names, noise)[:, None]
@@ -121,9 +121,10 @@ def model_posterior(
         name = with_remainder(effect)
         share[UNKNOWN] += (1.0 - chance) * share[name]
         share[name] *= chance
-    for pair, (effect, chance) in (unseen or {}).items():
-        share[effect] += chance * share[pair]
-        share[pair] *= 1.0 - chance
+    for pair, alone in (unseen or {}).items():
+        for effect, chance in alone.items():
+            share[effect] += chance * share[pair]
+        share[pair] *= 1.0 - sum(alone.values())
     effects = [n for n in names if n not in (NONE, UNKNOWN) and "+" not in n]
     whole = {n: float(np.logaddexp.reduce(v)) for n, v in table.items()}
     return ModelPosterior(

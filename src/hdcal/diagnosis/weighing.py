@@ -73,7 +73,7 @@ def weigh(
     names = list(evidence.table)
     prior = dict(zip(names, log_priors(names, evidence.on_noise), strict=True))
     evidence = with_bursts(evidence, shown, prior)
-    evidence = with_unseen(evidence, posterior_of(evidence).probabilities)
+    evidence = with_unseen(evidence, posterior_of(evidence).inclusion)
     return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
 
 

@@ -40,8 +40,8 @@ class CaseEvidence:
         accounted: effects that the gear file already accounts for.
         closed: of each effect beside which a remainder was looked for, draws of the
             share of the gap that it closes, shape (d,).
-        unseen: of each pair of a likely effect, that effect, and the probability that
-            the other one is too small to be seen.
+        unseen: of each pair of a likely effect, how probably that effect acts alone,
+            the other one being too small to be seen.
     """
 
     prepared: PreparedCase
@@ -58,7 +58,7 @@ class CaseEvidence:
     not_excited: tuple[str, ...] = ()
     accounted: tuple[str, ...] = ()
     closed: dict[str, Float[np.ndarray, " d"]] = field(default_factory=dict)
-    unseen: dict[str, tuple[str, float]] = field(default_factory=dict)
+    unseen: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def effects(self) -> tuple[str, ...]:

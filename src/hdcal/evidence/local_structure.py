@@ -18,8 +18,9 @@ from hdcal.evidence.prepare import PreparedCase
 # Windows are no shorter than this many rows, nor than this share of all.
 _SHORTEST, _FINEST = 2, 1.0 / 32.0
 _MOST_PERIODS, _MOST_BY_TIME = 96, 384
-# Rows are uneven in time where a step is this many times a usual one.
-_UNEVEN = 1.5
+# Rows are uneven in time where a step is this many times a usual one. A pause counts as
+# no more than this many: over a long one no period keeps its phase.
+_UNEVEN, _PAUSE = 1.5, 30.0
 
 
 @dataclass(frozen=True)
@@ -70,14 +71,17 @@ def _clock(records: Records) -> tuple[np.ndarray, int] | None:
 
     None where the time is not known, or says no more than the order of the rows.
     """
-    # Each run has a clock of its own; together they go on.
     step = np.maximum(np.diff(np.asarray(records.time, float)), 0.0)
+    # Each run has a clock of its own.
+    step[np.diff(np.asarray(records.run)) != 0] = 0.0
     moves = step[step > 0.0]
     if "time" not in records.known or not len(moves):
         return None
-    usual, whole = float(np.median(moves)), float(np.sum(moves))
+    usual = float(np.median(moves))
     if np.max(moves) < _UNEVEN * usual:
         return None
+    step = np.minimum(step, _PAUSE * usual)
+    whole = float(np.sum(step))
     at = np.concatenate([[0.0], np.cumsum(step)]) / whole
     return at, min(int(0.5 * whole / usual), _MOST_BY_TIME)
 

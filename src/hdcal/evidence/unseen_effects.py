@@ -1,8 +1,8 @@
 """Second effects that are too small to be seen: a pair of which one is, is none.
 
 The prior of an amplitude reaches down to nothing, so that beside a true cause every
-other effect keeps a share of the evidence, at sizes that no reading shows. A pair means
-two effects that can be seen; as far as one cannot, the other acts alone.
+other effect on the mean keeps a share of the evidence, at sizes that no reading shows.
+A pair means two effects that can be seen; as far as one cannot, the other acts alone.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import ndtr
+from scipy import stats
 
 from hdcal.evidence.case_evidence import (
     LEAST_SEEN,
@@ -19,38 +19,43 @@ from hdcal.evidence.case_evidence import (
     pair_name,
 )
 from hdcal.evidence.closed_form import subspace_evidence
-from hdcal.evidence.inner_products import (
-    common_terms,
-    piece_products,
-    subspace_products,
-)
+from hdcal.evidence.inner_products import piece_products, subspace_products
 from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.prepare import PreparedCase, with_relative_noise
 from hdcal.evidence.remainder_evidence import beside_effects
 from hdcal.evidence.single_evidence import SingleEvidence, single_evidence
+from hdcal.inference.likelihood import log_interval
 
-# An effect of less probability alone hardly stands in a pair of any.
-_LEAST = 0.05
+# Effects that are less probable hardly stand in a pair that is; the likeliest of them
+# are enough.
+_LEAST, _MOST = 0.05, 4
 
 
 def with_unseen(
-    evidence: CaseEvidence, probabilities: Mapping[str, float]
+    evidence: CaseEvidence,
+    inclusion: Mapping[str, float],
 ) -> CaseEvidence:
-    """Return the evidence with how probably the second of each pair is not seen.
+    """Return the evidence with how probably one of each pair is not seen.
+
+    Of two effects that each could act alone, either may be the one that is not seen
+    beside the other: as often as the other is likelier than this one.
 
     Args:
         evidence: of every hypothesis.
-        probabilities: of each; effects that are likely alone are looked at.
+        inclusion: of each effect in all hypotheses; likely ones are looked at.
     """
-    likely = [n for n in evidence.effects if probabilities[n] >= _LEAST]
-    likely.sort(key=lambda name: -probabilities[name])
-    found: dict[str, tuple[str, float]] = {}
-    for name in likely:
-        for other, chance in _unseen_beside(evidence, name).items():
-            pair = pair_name(name, other)
-            # Of two likely effects the likelier one is the first.
-            if pair in evidence.table and other != name:
-                found.setdefault(pair, (name, chance))
+    likely = sorted(inclusion, key=lambda name: -inclusion[name])[:_MOST]
+    likely = [name for name in likely if inclusion[name] >= _LEAST]
+    hidden = {name: _unseen_beside(evidence, name) for name in likely}
+    found: dict[str, dict[str, float]] = {}
+    for first in likely:
+        for second, chance in hidden[first].items():
+            pair = pair_name(first, second)
+            if second == first or pair not in evidence.table:
+                continue
+            rival = inclusion[second] if first in hidden.get(second, {}) else 0.0
+            share = inclusion[first] / (inclusion[first] + rival)
+            found.setdefault(pair, {})[first] = share * chance
     return replace(evidence, unseen=found)
 
 
@@ -58,18 +63,18 @@ def _unseen_beside(evidence: CaseEvidence, name: str) -> dict[str, float]:
     """Return how probably each effect on the mean is not seen beside one."""
     case = _beside(evidence, name)
     rows = replace(case.rows, correlations=np.array([evidence.likeliest_correlation]))
-    sigma, noise_sd = case.priors["sigma"], case.noise_sd
+    sigma, least = case.priors["sigma"], LEAST_SEEN * case.noise_sd**2
     single = single_evidence(rows, evidence.piecewise, sigma, tolerant=False)
-    found = _unseen_pieces(evidence, rows, single, noise_sd)
+    found = _unseen_pieces(evidence, rows, single, least)
     spaces = evidence.subspaces
     for other in evidence.subspace_effects:
         own = spaces.of(other)
         products = subspace_products(rows, spaces.columns[own])
         scale, weight = spaces.scale[own], spaces.log_weight[own]
-        each = subspace_evidence(common_terms(rows), products, scale, weight, sigma)[0]
-        squares = scale**2 * products.spread[0].sum(axis=-1, keepdims=True)
-        unseen = squares < LEAST_SEEN * noise_sd**2
-        found[other] = _share(each, unseen.astype(float))
+        each = subspace_evidence(single.common, products, scale, weight, sigma)[0]
+        spread, pull = products.spread[0][:, None], products.be[0][:, None]
+        inside = _small(spread, pull, scale[..., None] ** 2, case.noise_sd**2, least)
+        found[other] = _share(each, inside)
     return found
 
 
@@ -81,9 +86,9 @@ def _beside(evidence: CaseEvidence, name: str) -> PreparedCase:
 
 
 def _unseen_pieces(
-    evidence: CaseEvidence, rows: LinearRows, single: SingleEvidence, noise_sd: float
+    evidence: CaseEvidence, rows: LinearRows, single: SingleEvidence, least: float
 ) -> dict[str, float]:
-    """Return how probably each effect in pieces is not seen in these rows."""
+    """Return how probably each effect in pieces leaves less than this square [N²]."""
     if not single.names:
         return {}
     shapes = np.concatenate([each.shapes for each in evidence.piecewise])
@@ -92,25 +97,39 @@ def _unseen_pieces(
     for index, name in enumerate(single.names):
         part = every.of(index)
         cells, mean, sd = part.cells, part.mean[0], part.sd[0]
-        length = np.sqrt(np.maximum(squares[cells.piece], 1e-300))
-        most = np.sqrt(LEAST_SEEN) * noise_sd / length
+        most = np.sqrt(least / np.maximum(squares[cells.piece], 1e-300))
         low, high = np.maximum(cells.low, -most), np.minimum(cells.high, most)
-        inside = _mass(low, high, mean, sd) / np.maximum(
-            _mass(cells.low, cells.high, mean, sd), 1e-300
-        )
-        found[name] = _share(part.log_evidence[0], np.clip(inside, 0.0, 1.0))
+        some = high > low
+        ends = np.stack([low, np.where(some, high, cells.high), cells.low, cells.high])
+        scaled = (ends - mean) / sd
+        gained = log_interval(scaled[0], scaled[1]) - log_interval(scaled[2], scaled[3])
+        inside = np.where(some, np.exp(np.minimum(np.asarray(gained), 0.0)), 0.0)
+        found[name] = _share(part.log_evidence[0], np.nan_to_num(inside))
     return found
 
 
-def _mass(low, high, mean, sd) -> Float[np.ndarray, " m"]:
-    """Return the probability of an interval of a normal; none where it is empty."""
-    low, high = (low - mean) / sd, (high - mean) / sd
-    flip = low > 0.0
-    low, high = np.where(flip, -high, low), np.where(flip, -low, high)
-    return np.where(high > low, ndtr(high) - ndtr(low), 0.0)
+def _small(spread, pull, variance, noise: float, least: float):
+    """Return the probability that a subspace leaves less than this square [N²].
+
+    Along each principal axis its size is normal; the sum of squares has the mean and
+    the variance of a gamma law, which stands for it.
+
+    Args:
+        spread: squared lengths of the axes, shape (b, 1, j).
+        pull: products of the axes, at their lengths, with the reading.
+        variance: of the prior along each, shape (b, t, 1).
+        noise: variance of the noise [N²].
+        least: the square [N²].
+    """
+    whole = noise + variance * spread
+    centre, own = variance * pull / whole, variance * noise / whole
+    mean = np.sum(spread * (centre**2 + own), axis=-1)
+    squared = 2.0 * np.sum(spread**2 * (own**2 + 2.0 * own * centre**2), axis=-1)
+    mean, squared = np.maximum(mean, 1e-300), np.maximum(squared, 1e-300)
+    return stats.gamma.cdf(least, mean**2 / squared, scale=squared / mean)
 
 
-def _share(log_weight: np.ndarray, part: np.ndarray) -> float:
+def _share(log_weight: Float[np.ndarray, "*m"], part: Float[np.ndarray, "*m"]) -> float:
     """Return the mean of a part of each, weighed by evidence."""
     weight = np.exp(log_weight - np.max(log_weight))
     return float(np.sum(weight * part) / np.sum(weight))

@@ -3,8 +3,11 @@
 A Gaussian process in the Hilbert-space approximation. Its basis is projected off
 an offset and a slope at the tested rows, so that it cannot take anything that
 stiffness and offsets can explain. Where loading and unloading were tested, half their
-difference is another such function. It knows no temperature.
+difference is another such function, unless an effect of the model draws loops itself.
+It knows no temperature.
 """
+
+from collections.abc import Sequence
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,71 +20,95 @@ from numpyro.contrib.hsgp.spectral_densities import (
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.padding import bucket_size, repeat_last_row
+from hdcal.physics.effect import Effect
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
 # tested deformation: enough for length-scales down to a tenth of the range.
 BASIS_SIZE = 20
 # The first of them are enough for half a loop, which is smooth between its turns.
-LOOP_SIZE = 8
+_LOOP_SIZE = 8
 BOUNDARY = 2.0
 
 
+# What an effect needs whose force goes with the direction of the movement.
+_DIRECTION = {"unloading", "rates"}
+
+
 class Discrepancy(eqx.Module):
-    """Where the discrepancy lives, and what was projected off its basis.
+    """Smooth functions of deformation, orthogonal to offset and slope at tested rows.
 
     Attributes:
         centre: middle of the tested deformation [mm].
         half_range: half the tested range [mm].
-        absorbed: offset and slope in each basis function.
-        directed: whether loading and unloading may differ, where both were tested.
+        absorbed: offset and slope in each function, the half loop's last.
+        directed: whether there are functions for half a loop.
+        loop: what they are multiplied by: 0 where an effect draws loops itself.
     """
 
     centre: float
     half_range: float
     absorbed: Float[Array, "2 m"]
     directed: bool = eqx.field(static=True, default=False)
+    loop: float = 1.0
 
     @property
     def size(self) -> int:
         """Number of weights."""
-        return leftover_size(self.directed)
+        return self.absorbed.shape[1]
+
+    @property
+    def looped(self) -> bool:
+        """Whether loading and unloading differ."""
+        return self.directed and float(self.loop) > 0.0
 
     def columns(
         self, deformation: Float[Array, " n"], movement: Float[Array, " n"]
     ) -> Float[Array, "n m"]:
-        """Return the projected basis at any deformations, tested or not.
-
-        Where loading and unloading may differ, half the loop has an offset and a slope
-        of its own: these the base model cannot explain.
+        """Return the projected functions at any deformations, tested or not.
 
         Args:
             deformation: as read [mm].
             movement: +1 where it rises, −1 where it falls, 0 for the mean of both.
         """
         scaled = (jnp.asarray(deformation) - self.centre) / self.half_range
-        smooth = _basis(scaled) - _line(scaled) @ self.absorbed
-        if not self.directed:
-            return smooth
-        half = jnp.concatenate([_line(scaled), smooth[:, :LOOP_SIZE]], axis=1)
-        half = jnp.asarray(movement)[:, None] * half
-        return jnp.concatenate([smooth, half], axis=1)
+        found = _functions(scaled, jnp.asarray(movement), directed=self.directed)
+        # Multiplied last, so that nothing of an unused loop is left.
+        used = jnp.where(jnp.arange(self.size) < BASIS_SIZE, 1.0, self.loop)
+        return used * (found - _line(scaled) @ self.absorbed)
 
     def prior_sd(self, sd, length) -> Float[Array, " m"]:
-        """Return the prior sd of the weights [N], as `prior_sd` those of one basis."""
+        """Return the prior sd of the weights [N], as `prior_sd` those of one basis.
+
+        Half a loop has an offset and a slope beside the smooth functions, of the size
+        of the discrepancy each.
+        """
         own = prior_sd(sd, length)
         if not self.directed:
             return own
-        return jnp.concatenate([own, jnp.full(2, sd), own[:LOOP_SIZE]])
+        return jnp.concatenate([own, jnp.full(2, sd), own[:_LOOP_SIZE]])
 
 
-def leftover_size(directed: bool) -> int:
-    """Return the number of weights of a discrepancy."""
-    return BASIS_SIZE + (2 + LOOP_SIZE) * directed
+def leftover_size(records: Records, *, loop: bool) -> int:
+    """Return the number of weights of the discrepancy of a case.
+
+    Args:
+        records: of the case.
+        loop: whether it may know loading from unloading; older calibrations may not.
+    """
+    return BASIS_SIZE + (2 + _LOOP_SIZE) * _is_directed(records, loop)
 
 
-def is_directed(records: Records) -> bool:
-    """Tell whether both loading and unloading were tested."""
-    return "unloading" in records.known
+def _is_directed(records: Records, loop: bool) -> bool:
+    return loop and "unloading" in records.known
+
+
+def _functions(scaled, movement, *, directed: bool):
+    """Return the functions before anything is projected off, shape (n, m)."""
+    smooth = _basis(scaled)
+    if not directed:
+        return smooth
+    half = jnp.concatenate([_line(scaled), smooth[:, :_LOOP_SIZE]], axis=1)
+    return jnp.concatenate([smooth, movement[:, None] * half], axis=1)
 
 
 def _basis(scaled):
@@ -93,17 +120,32 @@ def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
 
-def build_discrepancy(records: Records) -> Discrepancy:
-    """Project the basis off an offset and a slope at the tested rows."""
-    deformation = np.asarray(records.deformation)
+def build_discrepancy(
+    records: Records, effects: Sequence[type[Effect]] = (), *, loop: bool = True
+) -> Discrepancy:
+    """Project the functions off an offset and a slope at the tested rows.
+
+    Args:
+        records: tested rows.
+        effects: of the model; beside one whose force goes with the direction of the
+            movement half a loop would be a second name for the same thing.
+        loop: as `leftover_size`.
+    """
+    deformation, rows = np.asarray(records.deformation), len(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))
     centre, half_range = (low + high) / 2.0, (high - low) / 2.0
-    rows = len(deformation)
-    padded = repeat_last_row(deformation, bucket_size(rows))
-    scaled = (padded - centre) / half_range
-    line, basis = np.asarray(_line(scaled))[:rows], np.asarray(_basis(scaled))[:rows]
-    absorbed = np.linalg.lstsq(line, basis, rcond=None)[0]
-    return Discrepancy(centre, half_range, absorbed, is_directed(records))
+    place, movement = (
+        repeat_last_row(np.asarray(column), bucket_size(rows))
+        for column in ((deformation - centre) / half_range, records.sense)
+    )
+    directed = _is_directed(records, loop)
+    line, found = (
+        np.asarray(table)[:rows]
+        for table in (_line(place), _functions(place, movement, directed=directed))
+    )
+    absorbed = np.linalg.lstsq(line, found, rcond=None)[0]
+    taken = any(effect.needs & _DIRECTION for effect in effects)
+    return Discrepancy(centre, half_range, absorbed, directed, 0.0 if taken else 1.0)
 
 
 def discrepancy_columns(

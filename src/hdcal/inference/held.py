@@ -23,7 +23,7 @@ from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.hypotheses import HeldOrigin, LeftOut
 
 # The setting that holds the noise sd of the fit before sampling [N].
-PILOT_NOISE = "pilot_noise_N"
+PILOT_NOISE, LOOP = "pilot_noise_N", "leftover_loop"
 # The setting that says how probable each model of the loss of a moving gear is.
 LOSS = "loss"
 LossModel = Literal["viscous", "dry friction", "both"]
@@ -171,6 +171,8 @@ class HeldSettings:
     left_out: LeftOut | None = None
     # Of older files the pilot fit is made anew.
     pilot_noise_N: Size | None = None
+    # The leftover of older files does not know loading from unloading.
+    leftover_loop: bool = False
     loss: dict[LossModel, Share] | None = None
 
 

@@ -4,20 +4,27 @@ from collections.abc import Mapping
 
 from hdcal.data.case import Case
 from hdcal.errors import Finding, InputError
-from hdcal.inference.discrepancy import is_directed, leftover_size
+from hdcal.inference.discrepancy import leftover_size
 
 # Runs or specimens: of the kind that is eliminated one by one, and of any other, whose
 # cost grows with the cube of their number.
 _MOST_MEMBERS, _MOST_DENSE = 10_000, 500
 
 
-def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
-    """Return how many members of each kind have a parameter of their own."""
+def member_counts(case: Case, with_gap: bool, *, loop: bool = True) -> dict[str, int]:
+    """Return how many members of each kind have a parameter of their own.
+
+    Args:
+        case: records and labels.
+        with_gap: whether there is a leftover discrepancy.
+        loop: as `leftover_size`.
+    """
     known = case.records.known
+    weights = leftover_size(case.records, loop=loop)
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,
-        "discrepancy": leftover_size(is_directed(case.records)) if with_gap else 0,
+        "discrepancy": weights if with_gap else 0,
     }
     return {kind: count for kind, count in counts.items() if count}
 

@@ -18,7 +18,7 @@ from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.held import PILOT_NOISE, HeldModel, HeldSettings
+from hdcal.inference.held import LOOP, PILOT_NOISE, HeldModel, HeldSettings
 from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
 from hdcal.inference.posterior_limits import check_draws
 from hdcal.inference.problem import Problem, build_problem
@@ -61,13 +61,18 @@ class Posterior(Shown):
         self, case: Case, effects: Sequence[type[Effect]], with_gap: bool
     ) -> dict[str, tuple[int, ...]]:
         """Return the shape of each parameter that a draw of a model holds."""
-        return site_shapes(case, effects, with_gap, self._noise_sd)
+        return site_shapes(case, effects, with_gap, self._noise_sd, loop=self._loop)
 
     @property
     def _noise_sd(self) -> float | None:
         """What decided the form of the noise [N]; None in older files."""
         kept = self.settings.get(PILOT_NOISE)
         return None if kept is None else float(str(kept))
+
+    @property
+    def _loop(self) -> bool:
+        """Whether the leftover discrepancy may know loading from unloading."""
+        return bool(self.settings.get(LOOP, False))
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -107,6 +112,7 @@ class Posterior(Shown):
             theory=self.theory,
             with_gap=bool(self.settings["with_gap"]),
             noise_sd=self._noise_sd,
+            loop=self._loop,
         )
 
     @cached_property

@@ -37,6 +37,8 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
     levels = np.unique(bands.temperature_C)
     colours = temperature_colours(levels)
     solid = "down" if loading_side(left.deformation) < 0 else "up"
+    gap = posterior.problem.discrepancy
+    looped = gap is not None and gap.looped
     with style():
         figure, top, panels = _panels(len(levels))
         for rows in reversed(list(_curves(bands))):
@@ -44,11 +46,12 @@ def calibration_figure(posterior: Posterior, bands: Bands, left: Residuals) -> F
             strength = 1.0 / np.sqrt(len(levels))
             line = "-" if bands.direction[rows[0]] == solid else _DASHES
             _draw_curve(top, bands, rows, colours[level], line, strength)
-            # Around its own median unloading has the same bands as loading.
-            if bands.direction[rows[0]] == bands.direction[0]:
+            # Around its own median unloading has the same bands as loading, unless
+            # the leftover tells them apart.
+            if looped or bands.direction[rows[0]] == bands.direction[0]:
                 of = panels[level], bands, rows, colours[level], line
                 _draw_curve(*of, baseline=True)
-        distance = _distance(bands, left)
+        distance = distance_from_model(bands, left)
         nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
         for index, (axes, level) in enumerate(zip(panels, levels, strict=True)):
             here = nearest == index
@@ -86,15 +89,19 @@ def _panels(count: int) -> tuple[Figure, Axes, list[Axes]]:
     return figure, top, panels
 
 
-def _distance(bands: Bands, left: Residuals) -> np.ndarray:
+def distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
     """Return how far each reading is from the force model alone [N]."""
     if not np.isfinite(bands.with_gap_median_N).any():
         return left.residual
-    # The residuals are what the discrepancy leaves over too; it knows deformation only.
-    rows = next(_curves(bands))
-    leftover = (bands.with_gap_median_N - bands.physics_median_N)[rows]
-    x = left.deformation
-    return left.residual + np.interp(x, bands.deformation_mm[rows], leftover)
+    # The residuals are what the discrepancy leaves over too; it knows no temperature.
+    curves = {bands.direction[rows[0]]: rows for rows in _curves(bands)}
+    gap, found = bands.with_gap_median_N - bands.physics_median_N, left.residual.copy()
+    for direction, rows in curves.items():
+        rising = (left.direction >= 0.0) == (direction == "up")
+        here = rising if len(curves) > 1 else slice(None)
+        place = left.deformation[here]
+        found[here] += np.interp(place, bands.deformation_mm[rows], gap[rows])
+    return found
 
 
 def _curves(bands: Bands) -> Iterator[np.ndarray]:

@@ -94,6 +94,12 @@ def remarks(
             f"Dry friction turns its sign over a speed of {FRICTION_SPEED:g} mm/s: a "
             "gear that sticks creeps instead."
         )
+    gap = posterior.problem.discrepancy
+    if gap is not None and gap.looped:
+        yield (
+            "Of the leftover the middle of loading and unloading acts: what its loop "
+            "would damp is left out."
+        )
     if kept:
         yield "Frequency, damping and stiffness are those without the effects."
     step = float(np.median(np.diff(times)))

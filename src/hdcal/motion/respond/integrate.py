@@ -45,7 +45,7 @@ class _Leftover(eqx.Module):
     def __call__(self, deformation: Scalar) -> Scalar:
         """Return it at a deformation as read from the unloaded gear [N]."""
         place = jnp.reshape(deformation, 1)
-        # A loop is no matter of the moment: of a leftover that has one, its middle.
+        # The damping of a leftover's loop is left out, which the page says.
         still = jnp.zeros(1)
         left = gear_leftover(self.problem, self.value, self.bends, place, still)
         return left[0] - self.unloaded

@@ -101,7 +101,7 @@ class UntestedReading:
             deformation: as read [mm].
         """
         discrepancy = self._problem.discrepancy
-        if discrepancy is None or not discrepancy.directed:
+        if discrepancy is None or not discrepancy.looped:
             return 0.0
         growths = tuple(bend.growth for bend in self._bends)
         at, weights = np.array([deformation]), self._values["gap_weights"]
