@@ -7,7 +7,13 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.options import case_options, folder_options, json_option, read_given
+from hdcal.cli.options import (
+    case_options,
+    folder_options,
+    json_option,
+    read_given,
+    take_reading,
+)
 from hdcal.cli.sampling_options import sampling_options
 from hdcal.errors import Finding
 
@@ -40,7 +46,7 @@ from hdcal.errors import Finding
 @folder_options("Result folder to make [default: NAME-calibration].")
 @json_option
 @click.pass_obj
-def calibrate(console: Console, data, gear, columns, out, force, dynamic, **settings):
+def calibrate(console: Console, data, out, force, dynamic, **settings):
     """Calibrate the force model against DATA and write a result folder.
 
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
@@ -61,7 +67,9 @@ def calibrate(console: Console, data, gear, columns, out, force, dynamic, **sett
         size = ("chains", "warmup", "draws", "seed")
         wrong.attempt(check_settings, **{name: settings[name] for name in size})
         wrong.attempt(choose_effects, settings["effects"])
-        case = read_given(console, data, gear, columns, settings["theory"])
+        reading = take_reading(settings)
+        settings["theory"] = reading["theory"]
+        case = read_given(console, data, **reading)
         # Said now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"

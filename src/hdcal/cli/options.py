@@ -60,6 +60,11 @@ def reading_options(command: Callable) -> Callable:
             help="Read a quantity from a header of your own: force=Load[kgf].",
         ),
         click.option(
+            "--encoding",
+            metavar="NAME",
+            help="Of the data file's text [default: what it looks like].",
+        ),
+        click.option(
             "--gear",
             metavar="GEAR.toml",
             help="The gear file [default: gear.toml beside the data].",
@@ -69,13 +74,20 @@ def reading_options(command: Callable) -> Callable:
     return command
 
 
-def read_given(console: Console, data, gear, columns, theory) -> "Case | None":
+def take_reading(settings: dict) -> dict:
+    """Take the values of `reading_options` out of a command's settings."""
+    return {n: settings.pop(n) for n in ("gear", "columns", "theory", "encoding")}
+
+
+def read_given(
+    console: Console, data, gear, columns, theory, encoding
+) -> "Case | None":
     """Read the case that `case_options` named; what is wrong is kept by the console."""
     from hdcal.data.reading import read_case
 
     if columns is None:  # it could not be read, which is said already
         return None
-    read = partial(read_case, columns=columns, theory=theory)
+    read = partial(read_case, columns=columns, theory=theory, encoding=encoding)
     return console.wrong.attempt(read, data, gear)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
+from hdcal.data.header_words import guess_header
 from hdcal.data.units import COLUMN_UNITS, known_unit
 from hdcal.errors import quoted
 
@@ -26,12 +27,14 @@ class Column:
         header: as written in the file.
         position: 0 = first column.
         unit: one of COLUMN_UNITS[quantity]; empty for labels.
+        guessed: its header says so in other words than hdcal's own.
     """
 
     quantity: str
     header: str
     position: int
     unit: str = ""
+    guessed: bool = False
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,7 @@ class Columns:
         table: the whole table.
         sha256: hash of the file's bytes.
         findings: what is wrong with the file.
+        notes: what was guessed of it.
     """
 
     values: dict[str, np.ndarray]
@@ -52,6 +56,7 @@ class Columns:
     table: CsvTable
     sha256: str
     findings: FileFindings
+    notes: tuple[str, ...] = ()
 
     def find(self, mask: np.ndarray, quantity: str, problem: str, remedy: str) -> None:
         """Add one finding for each row where the mask, shape (n,), is true."""
@@ -125,6 +130,8 @@ def _named(
         return None
     if good:
         return good[0]
+    if not bad and (guessed := _guessed(quantity, table, findings)):
+        return guessed
     if bad:
         header, unit = bad[0]
         words = f"unknown unit '{unit}'" if unit else "the header names no unit"
@@ -134,6 +141,36 @@ def _named(
         remedy = _name_remedy(quantity, table.headers)
         findings.add(words, remedy, table.header_row, quantity)
     return None
+
+
+def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column | None:
+    """Return the column whose header means a quantity, in other words than ours."""
+    found = [
+        (Column(quantity, header, position, guess.unit, guessed=True), guess.whole)
+        for position, header in enumerate(table.headers)
+        if (guess := guess_header(header)) is not None and guess.quantity == quantity
+    ]
+    # One that names nothing else is meant rather than one that says more.
+    whole = [column for column, alone in found if alone]
+    likely = whole or [column for column, _ in found]
+    if len(likely) > 1 and quantity in REQUIRED:
+        names = " or ".join(quoted(column.header) for column in likely)
+        words = f"the {quantity} may be {names}"
+        remedy = f"Say which, as in `columns` '{quantity}={likely[0].header}'"
+        findings.add(words, remedy, table.header_row, likely[1].header)
+    if len(likely) != 1:
+        return None
+    (column,) = likely
+    if not column.unit and quantity not in LABELS:
+        words = f"may be the {quantity}, but names no unit"
+        units = ", ".join(COLUMN_UNITS[quantity])
+        remedy = (
+            f"Say `columns` '{quantity}={column.header}[UNIT]' with one of: {units}"
+        )
+        if quantity in REQUIRED:
+            findings.add(words, remedy, table.header_row, column.header)
+        return None
+    return column
 
 
 def _split(header: str) -> tuple[str, str]:
@@ -169,6 +206,8 @@ def _mapped(
     # a header may itself end in brackets, so the whole text is tried as well
     wholes = {_squeezed(wanted), _squeezed(name)}
     hits = [i for i, header in enumerate(table.headers) if _squeezed(header) in wholes]
+    if not hits and name.isdigit() and 0 < int(name) <= len(table.headers):
+        hits = [int(name) - 1]
     option = f"`columns` {quantity}="
     if not hits:
         near = get_close_matches(name, table.headers, 1, 0.4)

@@ -3,7 +3,7 @@
 import csv
 import io
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import compress
 from typing import Any
@@ -12,6 +12,15 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.findings import FileFindings
+from hdcal.data.table_start import (
+    TableStart,
+    find_start,
+    header_cells,
+    is_number,
+    split_line,
+    unit_in,
+)
+from hdcal.errors import quoted
 
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
 
@@ -19,6 +28,12 @@ _NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
 # same posterior everywhere. From 3.1 on pandas does so unasked, and warns if asked.
 _OLD = tuple(int(part) for part in pd.__version__.split(".")[:2]) < (3, 1)
 _EXACT: dict[str, Any] = {"float_precision": "round_trip"} if _OLD else {}
+_HEADLESS = (
+    "Begin with a header row such as deformation_mm,force_N, or say which column is "
+    "which, as in `columns` 'force=2[kN]'"
+)
+# Where the table begins is sought in as much of the file.
+_HEAD = 1 << 18
 # Pandas takes "+1E 2" for 100.
 _TORN = re.compile(rb"\+[0-9.,]+[eE]\s")
 
@@ -35,6 +50,7 @@ class CsvTable:
         body: the rows, UTF-8, each ended by a newline.
         filled: number of lines with any cell in them, whether they fit or not.
         skipped: number of empty lines between the rows.
+        notes: what was taken for titles and units.
     """
 
     headers: tuple[str, ...]
@@ -44,6 +60,7 @@ class CsvTable:
     body: bytes
     filled: int
     skipped: int
+    notes: tuple[str, ...] = ()
 
     def texts(self, columns: Iterable[int]) -> dict[int, list[str]]:
         """Cells of some columns as text without blanks around it, by position."""
@@ -85,12 +102,15 @@ class CsvTable:
         return {place: read[place] for place in wanted}
 
 
-def split_table(utf8: bytes, findings: FileFindings) -> CsvTable:
+def split_table(
+    utf8: bytes, findings: FileFindings, *, numbered: bool = False
+) -> CsvTable:
     """Split a text into headers and lines with the right number of cells.
 
     Args:
         utf8: text with plain newlines.
         findings: of the file; gets one for each line that does not fit.
+        numbered: columns are named by their numbers, so that no headers are needed.
 
     Returns:
         The table without the lines that do not fit.
@@ -101,11 +121,22 @@ def split_table(utf8: bytes, findings: FileFindings) -> CsvTable:
     if not utf8.strip():
         remedy = "Write a header row and at least 5 rows of readings"
         findings.refuse("the file is empty", remedy)
-    text = utf8.lstrip(b"\n")
-    header_row = len(utf8) - len(text) + 1
-    line, _, body = text.partition(b"\n")
-    separator, headers = _headers(line.decode(), findings, header_row)
-    lines = body.split(b"\n")
+    begin = _begin(utf8)
+    lines = utf8.split(b"\n")
+    top = begin.readings if begin.headers is None else begin.headers
+    separator, headers = _headers(lines[top].decode(), findings, top + 1)
+    if begin.headers is None or all(map(is_number, headers)):
+        if not numbered:
+            words = "the first row holds numbers where the headers should be"
+            findings.refuse(words, _HEADLESS, top + 1)
+        begin = TableStart(None, None, top)
+        headers = tuple(str(number + 1) for number in range(len(headers)))
+    if begin.units is not None:
+        units = split_line(lines[begin.units].decode(), separator)
+        headers = tuple(map(_with_unit, headers, units))
+    above = sum(bool(line.strip()) for line in lines[:top])
+    lines = lines[begin.readings :] or [b""]
+    body = b"\n".join(lines)
     mark = ord(separator)
     filled = _per_line(body, {*range(33, 256)} - {mark}) > 0
     cells = _per_line(body, {mark}) + 1
@@ -114,7 +145,7 @@ def split_table(utf8: bytes, findings: FileFindings) -> CsvTable:
         for index in np.flatnonzero(filled & (quotes > 0)):
             cells[index] = _quoted_cells(lines[index].decode(), separator)
     fits = filled & (cells == len(headers))
-    rows = np.arange(len(lines)) + header_row + 1
+    rows = np.arange(len(lines)) + begin.readings + 1
     findings.add_rows(
         (int(rows[index]), *_misfit(int(cells[index]), len(headers), separator))
         for index in np.flatnonzero(filled & ~fits)
@@ -122,13 +153,34 @@ def split_table(utf8: bytes, findings: FileFindings) -> CsvTable:
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
     return CsvTable(
         headers=headers,
-        header_row=header_row,
+        header_row=top + 1,
         rows=rows[fits],
         separator=separator,
         body=b"\n".join([*compress(lines, fits), b""]),
         filled=int(filled.sum()),
         skipped=int((~filled[:used]).sum()),
+        notes=tuple(_notes(begin, above, headers)),
     )
+
+
+def _begin(utf8: bytes) -> TableStart:
+    """Return where the table begins: below its first line, unless readings tell."""
+    first = len(utf8) - len(utf8.lstrip(b"\n"))
+    head = utf8[:_HEAD].decode(errors="ignore")
+    return find_start(head) or TableStart(first, None, first + 1)
+
+
+def _with_unit(header: str, unit: str) -> str:
+    return f"{header} [{unit_in(unit)}]" if unit else header
+
+
+def _notes(begin: TableStart, above: int, headers: tuple[str, ...]) -> Iterator[str]:
+    if above:
+        lines = "1 line" if above == 1 else f"{above} lines"
+        names = ", ".join(map(quoted, headers))
+        yield f"{lines} above the table taken for titles. Its columns: {names}"
+    if begin.units is not None:
+        yield f"row {begin.units + 1} taken for the units of the columns"
 
 
 def _per_line(text: bytes, counted: set[int]) -> np.ndarray:
@@ -147,11 +199,7 @@ def _headers(
         separator = ","
     if line.count('"') % 2:
         findings.refuse("a quotation mark is not closed", "Close it", row)
-    headers = tuple(cell.strip() for cell in _cells(line, separator))
-    if all(_is_number(header) for header in headers):
-        words = "the first row holds numbers where the headers should be"
-        remedy = "Begin with a header row such as deformation_mm,force_N"
-        findings.refuse(words, remedy, row)
+    headers = tuple(header_cells(line, separator))
     return separator, headers
 
 
@@ -175,18 +223,3 @@ def _misfit(cells: int, wanted: int, separator: str) -> tuple[str, str]:
     if separator == "," and cells > wanted:
         remedy += "; with decimal commas separate the columns by semicolons"
     return words, remedy
-
-
-def _cells(line: str, separator: str) -> list[str]:
-    try:
-        return next(csv.reader([line], delimiter=separator), [])
-    except csv.Error:  # a cell longer than the csv module will hold
-        return line.split(separator)
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True

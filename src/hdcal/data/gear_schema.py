@@ -67,6 +67,7 @@ class GearFile(BaseModel):
     gear: GearTable
     measurement: MeasurementTable = MeasurementTable()
     rig: RigTable = RigTable()
+    columns: dict[str, Annotated[str, Field(max_length=1000)]] = {}
     priors: dict[str, Any] = {}
 
 

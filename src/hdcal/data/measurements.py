@@ -1,6 +1,6 @@
 """From a CSV file to checked columns, runs and gears."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,12 +8,23 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.cells import read_cells
-from hdcal.data.columns import LABELS, QUANTITIES, REQUIRED, Columns, match_columns
-from hdcal.data.csv_table import split_table
+from hdcal.data.columns import (
+    LABELS,
+    QUANTITIES,
+    REQUIRED,
+    Column,
+    Columns,
+    match_columns,
+)
+from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
+from hdcal.errors import quoted
+
+# How a note begins that says what was guessed.
+ASSUMED = "ASSUMED: "
 
 
 @dataclass(frozen=True)
@@ -45,7 +56,9 @@ class Measurements:
 
 
 def read_measurements(
-    path: Path | str, mapping: Mapping[str, str] | None = None
+    path: Path | str,
+    mapping: Mapping[str, str] | None = None,
+    encoding: str | None = None,
 ) -> Measurements:
     """Read a CSV file of measurements.
 
@@ -53,12 +66,13 @@ def read_measurements(
         path: the file.
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
+        encoding: of the text; by default what it looks like.
 
     Raises:
         InputError: holds everything that is wrong with the file.
     """
     with FileFindings(str(path)) as findings:
-        columns = read_columns(path, mapping, findings)
+        columns = read_columns(path, mapping, findings, encoding=encoding)
         rows = len(columns.table.rows)
         specimen = _labels(columns.values.get("specimen"), rows)
         run = _runs(columns.values.get("run"), specimen, rows)
@@ -74,6 +88,7 @@ def read_columns(
     quantities: Sequence[str] = QUANTITIES,
     required: Sequence[str] = REQUIRED,
     fewest: int = FEWEST_ROWS,
+    encoding: str | None = None,
 ) -> Columns:
     """Read the columns of a CSV file that hold known quantities, right or wrong.
 
@@ -84,13 +99,16 @@ def read_columns(
         quantities: what to look for.
         required: which of them must be there.
         fewest: rows that are needed.
+        encoding: of the text; by default what it looks like.
 
     Raises:
         InputError: no table can be found in the file.
     """
-    utf8, sha256 = read_text(Path(path), findings)
-    table = split_table(utf8, findings)
-    used = match_columns(table, mapping or {}, quantities, required, findings)
+    utf8, sha256, guessed = read_text(Path(path), findings, encoding)
+    mapping = mapping or {}
+    numbered = any(wanted[:1].isdigit() for wanted in mapping.values())
+    table = split_table(utf8, findings, numbered=numbered)
+    used = match_columns(table, mapping, quantities, required, findings)
     values = read_cells(table, used, findings)
     for quantity, column in used.items():
         if quantity not in LABELS:
@@ -98,9 +116,27 @@ def read_columns(
             with np.errstate(over="ignore"):
                 converted = column_to_code(values[quantity], quantity, column.unit)
             values[quantity] = converted
-    columns = Columns(values, used, table, sha256, findings)
+    notes = tuple(_assumed(guessed, table, used))
+    columns = Columns(values, used, table, sha256, findings, notes)
     check_values(columns, fewest)
     return columns
+
+
+def _assumed(
+    encoding: str, table: CsvTable, used: Mapping[str, Column]
+) -> Iterator[str]:
+    """Yield what was guessed of a file, each with how to say otherwise."""
+    if encoding:
+        yield f"{ASSUMED}the text is {encoding}. If not, name its encoding"
+    for note in table.notes:
+        yield f"{ASSUMED}{note}"
+    for quantity, column in used.items():
+        if column.guessed:
+            unit = f" in {column.unit}" if column.unit else ""
+            yield (
+                f"{ASSUMED}{quoted(column.header)} is the {quantity}{unit}. If not, "
+                f"name the column, as in {quantity} = 'HEADER[UNIT]'"
+            )
 
 
 def _labels(labels: np.ndarray | None, rows: int) -> Labels:

@@ -30,15 +30,19 @@ def read_case(
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
     material: Path | None = None,
+    encoding: str | None = None,
 ) -> Case:
     """Read a case from a CSV file or from a folder.
 
     Args:
         data: a CSV file, or a folder holding data.csv and gear.toml.
         gear: a gear file; by default the gear.toml beside the data.
-        columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`.
+        columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
+            or the number of its column, `{"force": "2[kN]"}`; they stand for those of
+            the gear file's table [columns].
         theory: overrides the gear file's theory.
         material: stands for the material file that the gear names.
+        encoding: of the CSV file; by default what it looks like.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -49,11 +53,16 @@ def read_case(
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
     with Findings() as wrong:
-        measured, found = wrong.attempt(read_measurements, csv_path, columns), None
+        # The gear file may name the columns; what is wrong with it is told second.
+        found, of_gear = None, Findings()
         if gear is None and not os.path.exists(gear_path):
-            wrong.append(_no_gear(data))
+            of_gear.append(_no_gear(data))
         else:
-            found = wrong.attempt(read_gear, gear_path, theory, material)
+            found = of_gear.attempt(read_gear, gear_path, theory, material)
+        named = dict(found.source.get("columns", {}) if found is not None else {})
+        named |= columns or {}
+        measured = wrong.attempt(read_measurements, csv_path, named, encoding)
+        wrong += of_gear
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
@@ -67,6 +76,7 @@ def read_case(
         specimen_labels=measured.specimen.names,
         data_sha256=measured.columns.sha256,
         notes=(
+            *measured.columns.notes,
             *([_BESIDE] if gear is None and not folder else []),
             *_thick_wall(found),
             *_left_out(measured.columns),

@@ -11,19 +11,28 @@ CHUNK = 1 << 18
 LONGEST_LINE = 1 << 20
 LARGEST_FILE = 1 << 32
 
+# Encodings that test machines write beside Unicode: Western Europe, China, Japan.
+_ENCODINGS = ("cp1252", "gb18030", "cp932")
+# What is not ASCII tells, in so many lines of it.
+_JUDGED = 50
 _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
-def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
+def read_text(
+    path: Path, findings: FileFindings, encoding: str | None = None
+) -> tuple[bytes, str, str]:
     """Read a text file, refusing what is no text before it fills the memory.
 
     Args:
         path: where it is.
         findings: of the file.
+        encoding: of the text; by default UTF-8, UTF-16 with its mark, or what it looks
+            like.
 
     Returns:
         The text as UTF-8, without byte-order mark, each line ended by one newline;
-        and the hash of the file's own bytes.
+        the hash of the file's own bytes; and the encoding that it looks like, empty
+        where nothing was guessed.
 
     Raises:
         InputError: missing, unreadable, a folder, binary, or a line over 1 MiB.
@@ -31,7 +40,7 @@ def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:
         findings.refuse(*why)
     try:
-        raw = _stream(path, findings)
+        raw = _stream(path, findings, wide=encoding is not None)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
     except PermissionError:
@@ -39,19 +48,22 @@ def read_text(path: Path, findings: FileFindings) -> tuple[bytes, str]:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         findings.refuse(f"cannot be read ({reason})", "Check the name and the disk")
-    utf8 = _as_utf8(raw, findings)
+    utf8, guessed = _as_utf8(raw, findings, encoding)
     if b"\r" in utf8:
         utf8 = utf8.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return utf8, hashlib.sha256(raw).hexdigest()
+    return utf8, hashlib.sha256(raw).hexdigest(), guessed
 
 
-def _stream(path: Path, findings: FileFindings) -> bytes:
-    """The bytes; gives up at the first sign that this is not a table."""
-    kept, line, row, size, wide = [], 0, 1, 0, False
+def _stream(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
+    """The bytes; gives up at the first sign that this is not a table.
+
+    A text that is `wide` may hold zeros.
+    """
+    kept, line, row, size = [], 0, 1, 0
     with open(path, "rb") as stream:
         while chunk := stream.read(CHUNK):
             if not kept:
-                wide = chunk.startswith(_WIDE_MARKS)
+                wide = wide or chunk.startswith(_WIDE_MARKS)
             if chunk.startswith(b"PK\x03\x04") and not kept:
                 findings.refuse("is a workbook or an archive", "Save it as CSV")
             if not wide and b"\0" in chunk:
@@ -70,18 +82,42 @@ def _stream(path: Path, findings: FileFindings) -> bytes:
     return b"".join(kept)
 
 
-def _as_utf8(raw: bytes, findings: FileFindings) -> bytes:
+def _as_utf8(
+    raw: bytes, findings: FileFindings, encoding: str | None
+) -> tuple[bytes, str]:
+    """Return the text as UTF-8, and the encoding that was guessed."""
+    if encoding is not None:
+        return _decoded(raw, findings, encoding), ""
     if raw.startswith(_WIDE_MARKS):
-        try:
-            utf8 = raw.decode("utf-16").encode()
-        except UnicodeError:
-            findings.refuse("is broken UTF-16 text", "Save it as UTF-8 text")
-        if b"\0" in utf8:
-            findings.refuse("is a binary file", "Save it as UTF-8 text")
-        return utf8
+        return _decoded(raw, findings, "utf-16"), ""
     try:
         raw.decode("utf-8")
-    except UnicodeDecodeError as error:
-        row = raw.count(b"\n", 0, error.start) + 1
-        findings.refuse("is not UTF-8 text", "Save it as UTF-8 text", row)
-    return raw.removeprefix(codecs.BOM_UTF8)
+    except UnicodeDecodeError:
+        guessed = _looks_like(raw)
+        return _decoded(raw, findings, guessed), guessed
+    return raw.removeprefix(codecs.BOM_UTF8), ""
+
+
+def _decoded(raw: bytes, findings: FileFindings, encoding: str) -> bytes:
+    try:
+        utf8 = raw.decode(encoding).encode()
+    except LookupError:
+        remedy = "Name one that Python knows, such as cp1252 or gb18030"
+        findings.refuse(f"the `encoding` '{encoding}' is unknown", remedy)
+    except UnicodeError:
+        remedy = "Save it as UTF-8 text, or say its `encoding`"
+        findings.refuse(f"is broken {encoding.upper()} text", remedy)
+    if b"\0" in utf8:
+        findings.refuse("is a binary file", "Save it as UTF-8 text")
+    return utf8.removeprefix(codecs.BOM_UTF8)
+
+
+def _looks_like(raw: bytes) -> str:
+    """Return the likeliest encoding of a text that is not UTF-8."""
+    import charset_normalizer
+
+    lines = [line for line in raw.splitlines() if not line.isascii()]
+    found = charset_normalizer.from_bytes(
+        b"\n".join(lines[:_JUDGED]), cp_isolation=list(_ENCODINGS)
+    ).best()
+    return found.encoding if found is not None else _ENCODINGS[0]

@@ -5,7 +5,13 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
-from hdcal.cli.options import force_option, json_option, reading_options, seed_option
+from hdcal.cli.options import (
+    force_option,
+    json_option,
+    reading_options,
+    seed_option,
+    take_reading,
+)
 
 # With more cases than this reports are made only when asked for.
 MANY = 20
@@ -40,7 +46,7 @@ MANY = 20
 @force_option
 @json_option
 @click.pass_obj
-def diagnose(console: Console, cases, gear, columns, theory, out, force, **settings):
+def diagnose(console: Console, cases, out, force, **settings):
     """Find the gap between model and measurement of each CASE, and its cause.
 
     Of one CASE the result is DIR itself, of several DIR/NAME each.
@@ -56,9 +62,9 @@ def diagnose(console: Console, cases, gear, columns, theory, out, force, **setti
         wrong += implausible("jobs", settings["jobs"])
         wrong += implausible("seed", settings["seed"])
         wrong.attempt(choose_library, settings["library"], EFFECTS)
-        asked = None
-        if columns is not None:
-            asked = wrong.attempt(read_cases, cases, gear, columns, theory)
+        reading, asked = take_reading(settings), None
+        if reading["columns"] is not None:
+            asked = wrong.attempt(read_cases, cases, **reading)
         if out is None and asked is not None:
             out = asked.folder
         console.reserve_folder(out, force)

@@ -52,7 +52,7 @@ class AskedCases:
         return list(dict.fromkeys(f for each in self.refused.values() for f in each))
 
 
-def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
+def read_cases(paths: Sequence[str], **reading) -> AskedCases:
     """Read every case; one that cannot be used does not stop the others.
 
     Raises:
@@ -64,7 +64,7 @@ def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
         wrong = Findings()
         case = None
         try:
-            case = wrong.attempt(_read, path, gear, columns, theory)
+            case = wrong.attempt(_read, path, **reading)
         except (HdcalError, OSError):
             raise
         except Exception as error:
@@ -86,8 +86,8 @@ def read_cases(paths: Sequence[str], gear, columns, theory) -> AskedCases:
     return asked
 
 
-def _read(path: str, gear, columns, theory) -> Case:
-    case = read_case(path, gear, columns=columns, theory=theory)
+def _read(path: str, **reading) -> Case:
+    case = read_case(path, **reading)
     check_effect_priors(case)
     return case
 

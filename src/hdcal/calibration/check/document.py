@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from hdcal.calibration.check.answer import CheckAnswer, Ends
+from hdcal.data.measurements import ASSUMED
 from hdcal.report.document import Document, Facts, Section
 
 HEADLINE = "The input is in order."
@@ -44,6 +45,9 @@ def check_document(found: CheckAnswer) -> Document:
 
 def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
     data, gear = found.data, found.gear
+    guessed = [note for note in found.notes if note.startswith(ASSUMED)]
+    for note in guessed:
+        yield "assumed", note.removeprefix(ASSUMED)
     yield "gear", f"{gear.name}, {gear.material}, theory {gear.theory}"
     yield "rows", str(data.rows)
     for what, labels in (("runs", data.runs), ("specimens", data.specimens)):
@@ -65,7 +69,8 @@ def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
     for name, lack in found.effects.not_testable.items():
         yield "not testable", f"{name}: needs {', '.join(lack)}"
     for note in found.notes:
-        yield "note", note
+        if note not in guessed:
+            yield "note", note
 
 
 def _span(ends: Ends) -> str:

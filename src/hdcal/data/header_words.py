@@ -1,0 +1,88 @@
+"""What headers of test machines and loggers mean, in several languages.
+
+A guess: it is told before anything else, with how to correct it.
+"""
+
+import re
+from typing import NamedTuple
+
+from hdcal.data.units import known_unit
+
+# Words for each quantity, in lower case: English, German, French, Chinese.
+WORDS: dict[str, tuple[str, ...]] = {
+    "deformation": (
+        *("deformation", "displacement", "displacment", "deflection", "travel"),
+        *("stroke", "extension", "crosshead", "weg", "standardweg", "traversenweg"),
+        *("verformung", "verschiebung", "hub", "déformation", "déplacement"),
+        *("course", "位移", "变形", "行程"),
+    ),
+    "force": (
+        *("force", "load", "kraft", "standardkraft", "prüfkraft", "last", "charge"),
+        *("effort", "力", "载荷", "负荷"),
+    ),
+    "temperature": ("temperature", "temp", "temperatur", "température", "温度"),
+    "time": ("time", "zeit", "prüfzeit", "temps", "durée", "时间"),
+    "angle": ("angle", "winkel", "drehwinkel", "角度"),
+    "run": ("run", "lauf", "messung", "essai"),
+    "specimen": ("specimen", "gear", "serial", "probe", "prüfling", "éprouvette"),
+}
+# What says that a column is something else about the quantity.
+_OTHERWISE = {
+    *("setpoint", "set", "target", "command", "soll", "sollwert", "consigne"),
+    *("rate", "speed", "error", "max", "maximum", "min", "minimum", "peak", "mean"),
+    *("sd", "std", "deviation", "offset", "tare", "limit", "grenze"),
+}
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]\s*")
+_BEHIND = re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)(?P<unit>\S+)\s*")
+_LONGEST = 80
+_WIDE = re.compile("[\u4e00-\u9fff]")
+
+
+class Guess(NamedTuple):
+    """What a header is taken for.
+
+    Attributes:
+        quantity: that its column holds.
+        unit: known to `COLUMN_UNITS`; empty where none is named, and for labels.
+        whole: the header names the quantity and nothing else.
+    """
+
+    quantity: str
+    unit: str
+    whole: bool
+
+
+def guess_header(header: str) -> Guess | None:
+    """Return what a header means; None where that is not clear."""
+    if len(header) > _LONGEST:
+        return None
+    for pattern in (_BRACKETS, _BEHIND):
+        match = pattern.fullmatch(header)
+        if match is None:
+            continue
+        found = _quantity(match["name"])
+        if found is None:
+            continue
+        unit = known_unit(found.quantity, match["unit"])
+        if unit:
+            return found._replace(unit=unit)
+        if pattern is _BRACKETS and match["unit"]:
+            # Newtons per second are no force.
+            return None
+    found = _quantity(header)
+    return found if found is not None and found.whole else None
+
+
+def _quantity(name: str) -> Guess | None:
+    """Return the one quantity that a name speaks of."""
+    words = re.findall(r"[^\W\d_]+", name.lower())
+    if _OTHERWISE & {*words}:
+        return None
+    found = [
+        quantity
+        for quantity, known in WORDS.items()
+        if any(word in words or (_WIDE.match(word) and word in name) for word in known)
+    ]
+    if len(found) != 1:
+        return None
+    return Guess(found[0], "", len(words) == 1)

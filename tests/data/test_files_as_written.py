@@ -1,0 +1,251 @@
+"""Files as machines and people write them are read as they are meant, or refused.
+
+Each file copies a habit that its name tells; what it means stands beside it. To read
+one wrongly in silence is the only unforgivable error.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from hdcal.data.reading import read_case
+from hdcal.errors import InputError
+
+GEAR_TOML = """\
+[gear]
+wall_thickness_mm = 0.68
+radius_mm = 40.0
+length_mm = 70.0
+material = "40CrNiMoA"
+"""
+# Six readings in mm and N.
+DEFORMATION = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+FORCE = np.array([0.5, 21.0, 41.5, 62.0, 82.5, 103.0])
+TEMPERATURE = np.array([20.0, 20.5, 21.0, 21.5, 22.0, 22.5])
+
+
+class Written(NamedTuple):
+    """A file, how it is asked to be read, and what is told of it.
+
+    Attributes:
+        content: text, or bytes in another encoding.
+        told: parts of the notes, in their order.
+        asked: further arguments of `read_case`.
+        also: further columns as they are meant.
+    """
+
+    content: str | bytes
+    told: tuple[str, ...] = ()
+    asked: Mapping = MappingProxyType({})
+    also: Mapping = MappingProxyType({})
+
+
+def lines(separator=",", decimal=".", force=1.0, more=None, end="", form="{:.6g}"):
+    """Return the readings as lines of text.
+
+    Args:
+        separator: of the cells.
+        decimal: sign of the numbers.
+        force: unit of the force in newtons.
+        more: a third column.
+        end: what stands behind each line.
+        form: of each number.
+    """
+    table = [DEFORMATION, FORCE / force, *([] if more is None else [more])]
+    rows = [
+        separator.join(form.format(cell).replace(".", decimal) for cell in row) + end
+        for row in zip(*table, strict=True)
+    ]
+    return "\n".join(rows) + "\n"
+
+
+BODY, SEMI = lines(), lines(";", ",")
+WARM = {"temperature": TEMPERATURE}
+FILES = {
+    "hdcal's own": Written("deformation_mm,force_N\n" + BODY),
+    "a title above the headers": Written(
+        "Flexspline 12, second mounting\ndeformation_mm,force_N\n" + BODY,
+        ("1 line above",),
+    ),
+    "six lines of preamble as a test controller writes them": Written(
+        "MTS793|BTW|ENU|1|2|.|/|:|1|0|0|A\n\nData Header:,,,\nTime:,12.3,Sec,\n"
+        "Data Acquisition\nStation Name: rig 4\n"
+        "Axial Displacement (mm),Axial Force (kN)\n" + lines(force=1000.0),
+        ("lines above", "'Axial Displacement (mm)'", "'Axial Force (kN)'"),
+    ),
+    "units in a second header row": Written(
+        "Displacement,Force\nmm,N\n" + BODY,
+        ("row 2 taken for the units", "'Displacement [mm]'", "'Force [N]'"),
+    ),
+    "units in brackets in a second header row": Written(
+        "Weg;Kraft\n(mm);(N)\n" + SEMI, ("row 2 taken for the units", "'Weg [mm]'")
+    ),
+    "German, of a testing machine": Written(
+        "Prüfprotokoll 4711\n\nWeg [mm];Kraft [N];Temperatur [°C]\n"
+        + lines(";", ",", more=TEMPERATURE),
+        ("1 line above", "'Weg [mm]' is the deformation", "'Kraft [N]' is the force"),
+        also=WARM,
+    ),
+    "the same in Windows-1252": Written(
+        (
+            "Prüfprotokoll 4711\n\nWeg [mm];Kraft [N];Temperatur [°C]\n"
+            + lines(";", ",", more=TEMPERATURE)
+        ).encode("cp1252"),
+        ("the text is cp1252", "1 line above", "'Temperatur [°C]'"),
+        also=WARM,
+    ),
+    "the same, its encoding named": Written(
+        ("Weg [mm];Kraft [N]\n" + SEMI + "").encode("utf-16-le"),
+        ("'Weg [mm]' is the deformation",),
+        {"encoding": "utf-16-le"},
+    ),
+    "French": Written(
+        "Déplacement (mm);Effort (N)\n" + SEMI, ("'Déplacement (mm)'", "'Effort (N)'")
+    ),
+    "French in Windows-1252": Written(
+        ("Déplacement (mm);Effort (N)\n" + SEMI).encode("cp1252"),
+        ("the text is cp1252", "'Déplacement (mm)'"),
+    ),
+    "Chinese": Written("位移(mm),力(N)\n" + BODY, ("'位移(mm)'", "'力(N)'")),
+    "Chinese in GB18030": Written(
+        ("试验报告\n位移(mm),载荷(kN)\n" + lines(force=1000.0)).encode("gb18030"),
+        ("the text is gb18030", "1 line above", "'位移(mm)'", "'载荷(kN)'"),
+    ),
+    "UTF-16 with its mark, tabs": Written(
+        ("deformation_mm\tforce_N\n" + lines("\t")).encode("utf-16")
+    ),
+    "a logger that marks its headers": Written(
+        "# displacement_mm force is in N\n# displacement_mm\tload_N\n" + lines("\t"),
+        ("1 line above", "'displacement_mm'", "'load_N'"),
+    ),
+    "NumPy's savetxt": Written(
+        "# deformation_mm,force_N\n" + lines(form="{:.18e}"),
+    ),
+    "no headers, columns by number": Written(
+        BODY, (), {"columns": {"deformation": "1[mm]", "force": "2[N]"}}
+    ),
+    "no headers, force first": Written(
+        "\n".join(",".join(row.split(",")[::-1]) for row in BODY.split("\n")),
+        (),
+        {"columns": {"deformation": "2[mm]", "force": "1[N]"}},
+    ),
+    "a title, no headers": Written(
+        "specimen A\n" + BODY,
+        ("1 line above",),
+        {"columns": {"deformation": "1[mm]", "force": "2[N]"}},
+    ),
+    "kilonewtons behind a slash": Written(
+        "Travel / mm;Load / kN\n" + lines(";", ",", 1000.0),
+        ("'Travel / mm'", "'Load / kN' is the force in kN"),
+    ),
+    "units after an 'in'": Written(
+        "Weg in mm;Kraft in N\n" + SEMI, ("'Weg in mm'", "'Kraft in N'")
+    ),
+    "a title on every column of a spreadsheet": Written(
+        "Test 12;;\n;;\nWeg [mm];Kraft [N];Temperatur [°C]\n"
+        + lines(";", ",", more=TEMPERATURE),
+        ("lines above", "'Weg [mm]'"),
+        also=WARM,
+    ),
+    "a setpoint beside what was reached": Written(
+        "Displacement setpoint (mm),Displacement (mm),Force (N)\n"
+        + "\n".join(f"9,{row}" for row in BODY.split() if row)
+        + "\n",
+        ("'Displacement (mm)' is the deformation",),
+    ),
+    "a rate beside the force": Written(
+        "Displacement (mm),Force (N),Force rate (N/s)\n" + lines(more=TEMPERATURE),
+        ("'Force (N)' is the force", "columns not used"),
+    ),
+    "blank lines above and CRLF": Written(
+        ("\n\nReport\n\ndeformation_mm,force_N\n" + BODY).replace("\n", "\r\n"),
+        ("1 line above",),
+    ),
+    "headers in quotation marks": Written(
+        '"Displacement (mm)","Force (N)"\n' + BODY, ("'Displacement (mm)'",)
+    ),
+}
+
+
+def read(folder, written: Written, more: str = ""):
+    """Return the case of a file beside a gear file."""
+    raw = written.content
+    (folder / "data.csv").write_bytes(raw if isinstance(raw, bytes) else raw.encode())
+    (folder / "gear.toml").write_text(GEAR_TOML + more)
+    return read_case(folder, **written.asked)
+
+
+@pytest.mark.parametrize("habit", FILES)
+def test_a_file_is_read_as_it_is_meant(tmp_path, habit):
+    written = FILES[habit]
+    case = read(tmp_path, written)
+    np.testing.assert_allclose(case.records.deformation, DEFORMATION, atol=1e-12)
+    np.testing.assert_allclose(case.records.force, FORCE, rtol=1e-12)
+    for name, values in written.also.items():
+        assert name in case.records.known
+        np.testing.assert_allclose(getattr(case.records, name), values)
+    told = "\n".join(case.notes)
+    place = 0
+    for part in written.told:
+        assert part in told[place:], told
+        place = told.index(part, place)
+    # What was guessed is told first and says how to correct it.
+    guessed = [note.startswith("ASSUMED") for note in case.notes]
+    assert guessed == sorted(guessed, reverse=True)
+    own = habit == "hdcal's own"
+    assert not (own and any(guessed))
+
+
+REFUSED = {
+    "two columns that may be the force": (
+        "Displacement (mm),Force left (N),Force right (N)\n" + lines(more=TEMPERATURE),
+        "the force may be 'Force left (N)' or 'Force right (N)'",
+    ),
+    "a force without a unit": (
+        "Displacement (mm),Force\n" + BODY,
+        "the header names no unit",
+    ),
+    "a mass for a force": (
+        "Displacement (mm),Load (g)\n" + BODY,
+        "no column holds the force",
+    ),
+    "no headers and nothing said": (BODY, "numbers where the headers should be"),
+    "text of no encoding": (
+        b"deformation_mm,force_N\n\x81\x8d\xff\xfe\x00" + BODY.encode(),
+        "binary",
+    ),
+    "an encoding that does not exist": (
+        "deformation_mm,force_N\n" + BODY,
+        "the `encoding` 'klingon' is unknown",
+    ),
+}
+
+
+@pytest.mark.parametrize("habit", REFUSED)
+def test_what_can_be_meant_in_two_ways_is_asked(tmp_path, habit):
+    content, words = REFUSED[habit]
+    asked = {"encoding": "klingon"} if "encoding that" in habit else {}
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, Written(content, asked=asked))
+    assert any(words in str(finding) for finding in caught.value.findings)
+
+
+def test_a_gear_file_says_which_column_is_which(tmp_path):
+    """And `columns` says otherwise."""
+    content = "left,right,middle\n" + lines(more=FORCE + 1.0)
+    table = '\n[columns]\ndeformation = "left[mm]"\nforce = "middle[N]"\n'
+    case = read(tmp_path, Written(content), table)
+    np.testing.assert_allclose(case.records.force, FORCE + 1.0)
+    asked = {"columns": {"force": "right[N]"}}
+    case = read(tmp_path, Written(content, asked=asked), table)
+    np.testing.assert_allclose(case.records.force, FORCE)
+
+
+def test_wrong_cells_are_told_by_their_line_of_the_file(tmp_path):
+    content = "Report\n\nWeg;Kraft\nmm;N\n" + SEMI.replace("41,5", "x")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, Written(content))
+    assert [finding.row for finding in caught.value.findings] == [7]
