@@ -60,6 +60,11 @@ def reading_options(command: Callable) -> Callable:
             help="Read a quantity from a header of your own: force=Load[kgf].",
         ),
         click.option(
+            "--sheet",
+            metavar="NAME",
+            help="Of a workbook (.xlsx) [default: the one with readings].",
+        ),
+        click.option(
             "--encoding",
             metavar="NAME",
             help="Of the data file's text [default: what it looks like].",
@@ -76,18 +81,17 @@ def reading_options(command: Callable) -> Callable:
 
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
-    return {n: settings.pop(n) for n in ("gear", "columns", "theory", "encoding")}
+    names = ("gear", "columns", "theory", "encoding", "sheet")
+    return {name: settings.pop(name) for name in names}
 
 
-def read_given(
-    console: Console, data, gear, columns, theory, encoding
-) -> "Case | None":
+def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
     """Read the case that `case_options` named; what is wrong is kept by the console."""
     from hdcal.data.reading import read_case
 
     if columns is None:  # it could not be read, which is said already
         return None
-    read = partial(read_case, columns=columns, theory=theory, encoding=encoding)
+    read = partial(read_case, columns=columns, **how)
     return console.wrong.attempt(read, data, gear)
 
 

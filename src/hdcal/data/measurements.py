@@ -59,20 +59,22 @@ def read_measurements(
     path: Path | str,
     mapping: Mapping[str, str] | None = None,
     encoding: str | None = None,
+    sheet: str | None = None,
 ) -> Measurements:
-    """Read a CSV file of measurements.
+    """Read a file of measurements.
 
     Args:
         path: the file.
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
         encoding: of the text; by default what it looks like.
+        sheet: of a workbook; by default the one with readings.
 
     Raises:
         InputError: holds everything that is wrong with the file.
     """
     with FileFindings(str(path)) as findings:
-        columns = read_columns(path, mapping, findings, encoding=encoding)
+        columns = read_columns(path, mapping, findings, encoding=encoding, sheet=sheet)
         rows = len(columns.table.rows)
         specimen = _labels(columns.values.get("specimen"), rows)
         run = _runs(columns.values.get("run"), specimen, rows)
@@ -89,6 +91,7 @@ def read_columns(
     required: Sequence[str] = REQUIRED,
     fewest: int = FEWEST_ROWS,
     encoding: str | None = None,
+    sheet: str | None = None,
 ) -> Columns:
     """Read the columns of a CSV file that hold known quantities, right or wrong.
 
@@ -100,11 +103,12 @@ def read_columns(
         required: which of them must be there.
         fewest: rows that are needed.
         encoding: of the text; by default what it looks like.
+        sheet: of a workbook; by default the one with readings.
 
     Raises:
         InputError: no table can be found in the file.
     """
-    utf8, sha256, guessed = read_text(Path(path), findings, encoding)
+    utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
     mapping = mapping or {}
     numbered = any(wanted[:1].isdigit() for wanted in mapping.values())
     table = split_table(utf8, findings, numbered=numbered)
@@ -123,12 +127,10 @@ def read_columns(
 
 
 def _assumed(
-    encoding: str, table: CsvTable, used: Mapping[str, Column]
+    guessed: str, table: CsvTable, used: Mapping[str, Column]
 ) -> Iterator[str]:
     """Yield what was guessed of a file, each with how to say otherwise."""
-    if encoding:
-        yield f"{ASSUMED}the text is {encoding}. If not, name its encoding"
-    for note in table.notes:
+    for note in (*([guessed] if guessed else []), *table.notes):
         yield f"{ASSUMED}{note}"
     for quantity, column in used.items():
         if column.guessed:

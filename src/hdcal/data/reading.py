@@ -31,11 +31,13 @@ def read_case(
     theory: str | None = None,
     material: Path | None = None,
     encoding: str | None = None,
+    sheet: str | None = None,
 ) -> Case:
-    """Read a case from a CSV file or from a folder.
+    """Read a case from a CSV file, a workbook, or a folder.
 
     Args:
-        data: a CSV file, or a folder holding data.csv and gear.toml.
+        data: a CSV file or a workbook (.xlsx), or a folder holding data.csv and
+            gear.toml.
         gear: a gear file; by default the gear.toml beside the data.
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
@@ -43,6 +45,7 @@ def read_case(
         theory: overrides the gear file's theory.
         material: stands for the material file that the gear names.
         encoding: of the CSV file; by default what it looks like.
+        sheet: of a workbook (.xlsx); by default the one with readings.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -61,7 +64,7 @@ def read_case(
             found = of_gear.attempt(read_gear, gear_path, theory, material)
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns or {}
-        measured = wrong.attempt(read_measurements, csv_path, named, encoding)
+        measured = wrong.attempt(read_measurements, csv_path, named, encoding, sheet)
         wrong += of_gear
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)

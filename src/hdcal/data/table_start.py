@@ -14,7 +14,7 @@ from hdcal.data.units import COLUMN_UNITS, known_unit
 # Titles are sought in this many lines; so many lines of readings are a table.
 _TITLES, _READINGS = 200, 5
 _SEPARATORS = "\t;,"
-_MARKS = "#%/* \t"
+_MARK = re.compile(r"\s*[#%*/]+\s*")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -68,7 +68,8 @@ def split_line(line: str, separator: str) -> list[str]:
 
 def header_cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line of headers, which may be marked as a comment."""
-    return split_line(line.lstrip(_MARKS), separator)
+    mark = _MARK.match(line)
+    return split_line(line[mark.end() :] if mark else line, separator)
 
 
 def is_number(cell: str) -> bool:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
+from hdcal.data.workbook import MARK, read_sheet
 
 CHUNK = 1 << 18
 LONGEST_LINE = 1 << 20
@@ -19,20 +20,25 @@ _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 def read_text(
-    path: Path, findings: FileFindings, encoding: str | None = None
+    path: Path,
+    findings: FileFindings,
+    encoding: str | None = None,
+    sheet: str | None = None,
 ) -> tuple[bytes, str, str]:
     """Read a text file, refusing what is no text before it fills the memory.
+
+    Of a workbook a sheet is read as text.
 
     Args:
         path: where it is.
         findings: of the file.
         encoding: of the text; by default UTF-8, UTF-16 with its mark, or what it looks
             like.
+        sheet: of a workbook; by default the one with readings.
 
     Returns:
         The text as UTF-8, without byte-order mark, each line ended by one newline;
-        the hash of the file's own bytes; and the encoding that it looks like, empty
-        where nothing was guessed.
+        the hash of the file's own bytes; and what was guessed, in words.
 
     Raises:
         InputError: missing, unreadable, a folder, binary, or a line over 1 MiB.
@@ -40,6 +46,8 @@ def read_text(
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:
         findings.refuse(*why)
     try:
+        if _begins_with(path, MARK):
+            return read_sheet(path, findings, sheet)
         raw = _stream(path, findings, wide=encoding is not None)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
@@ -51,7 +59,13 @@ def read_text(
     utf8, guessed = _as_utf8(raw, findings, encoding)
     if b"\r" in utf8:
         utf8 = utf8.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return utf8, hashlib.sha256(raw).hexdigest(), guessed
+    note = f"the text is {guessed}. If not, name its encoding" if guessed else ""
+    return utf8, hashlib.sha256(raw).hexdigest(), note
+
+
+def _begins_with(path: Path, mark: bytes) -> bool:
+    with open(path, "rb") as stream:
+        return stream.read(len(mark)) == mark
 
 
 def _stream(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
@@ -64,8 +78,6 @@ def _stream(path: Path, findings: FileFindings, *, wide: bool) -> bytes:
         while chunk := stream.read(CHUNK):
             if not kept:
                 wide = wide or chunk.startswith(_WIDE_MARKS)
-            if chunk.startswith(b"PK\x03\x04") and not kept:
-                findings.refuse("is a workbook or an archive", "Save it as CSV")
             if not wide and b"\0" in chunk:
                 findings.refuse("is a binary file", "Save it as UTF-8 text")
             last = max(chunk.rfind(b"\n"), chunk.rfind(b"\r"))

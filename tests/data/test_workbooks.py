@@ -1,0 +1,84 @@
+"""A sheet of a workbook is read as a table; which one is asked where it is unclear."""
+
+import zipfile
+
+import numpy as np
+import openpyxl
+import pytest
+
+from hdcal.data.reading import read_case
+from hdcal.errors import InputError
+
+READINGS = [(0.1 * row, 0.02 * row + 0.0005) for row in range(7)]
+
+
+def book(folder, **sheets):
+    """Write a workbook of these sheets, rows of cells each, and return its path."""
+    made = openpyxl.Workbook()
+    made.remove(made.active)
+    for name, rows in sheets.items():
+        sheet = made.create_sheet(name)
+        for row in rows:
+            sheet.append(row)
+    path = folder / "book.xlsx"
+    made.save(path)
+    return path
+
+
+def read(path, folder, **asked):
+    return read_case(path, folder / "gear.toml", **asked)
+
+
+def test_a_testing_machines_workbook(folder):
+    """Parameters on one sheet; the curve on another, below a title, beside a gap."""
+    curve = [
+        ("Prüfling", 3),
+        (None, None, None),
+        (None, "Weg", "Kraft"),
+        (None, "mm", "kN"),
+        *((None, *row) for row in READINGS),
+    ]
+    parameters = [("Norm", "EN 10002"), ("Geschwindigkeit", 1.5)]
+    path = book(folder, Parameter=parameters, Kurve=curve)
+    case = read(path, folder)
+    deformation, force = np.array(READINGS).T
+    # A workbook holds sixteen digits.
+    np.testing.assert_allclose(case.records.deformation, deformation, rtol=1e-14)
+    np.testing.assert_allclose(case.records.force, 1000.0 * force)
+    assert "sheet 'Kurve' is meant" in case.notes[0]
+    assert all(note.startswith("ASSUMED") for note in case.notes[:4])
+
+
+def test_of_two_tables_one_has_to_be_named(folder):
+    head = ("deformation_mm", "force_kN")
+    other = [(x, 2.0 * f) for x, f in READINGS]
+    path = book(folder, first=[head, *READINGS], second=[head, *other])
+    with pytest.raises(InputError, match="2 sheets hold a table: 'first', 'second'"):
+        read(path, folder)
+    case = read(path, folder, sheet="second")
+    assert case.records.force[-1] == pytest.approx(2000.0 * READINGS[-1][1])
+    with pytest.raises(InputError, match="no `sheet` 'third'"):
+        read(path, folder, sheet="third")
+
+
+def test_a_workbook_without_readings_is_refused(folder):
+    path = book(folder, notes=[("nothing", "here")])
+    with pytest.raises(InputError, match="no sheet holds a table"):
+        read(path, folder)
+
+
+def test_an_archive_of_something_else_is_refused(folder):
+    path = folder / "other.xlsx"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("readme.txt", "no workbook")
+    with pytest.raises(InputError, match="no workbook that can be read"):
+        read(path, folder)
+
+
+def test_what_unpacks_to_too_much_is_refused_before_it_is_read(folder):
+    path = folder / "bomb.xlsx"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for part in range(5):
+            archive.writestr(f"xl/{part}.xml", b"0" * (1 << 26))
+    with pytest.raises(InputError, match="more than 256 MiB"):
+        read(path, folder)
