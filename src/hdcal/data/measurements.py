@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from hdcal.data.columns import (
 )
 from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
+from hdcal.data.frames import NAME, frame_text, is_frame
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
@@ -56,7 +58,7 @@ class Measurements:
 
 
 def read_measurements(
-    path: Path | str,
+    path: Any,
     mapping: Mapping[str, str] | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
@@ -64,7 +66,7 @@ def read_measurements(
     """Read a file of measurements.
 
     Args:
-        path: the file.
+        path: the file, or a table in memory (see `frame_text`).
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
         encoding: of the text; by default what it looks like.
@@ -73,7 +75,7 @@ def read_measurements(
     Raises:
         InputError: holds everything that is wrong with the file.
     """
-    with FileFindings(str(path)) as findings:
+    with FileFindings(NAME if is_frame(path) else str(path)) as findings:
         columns = read_columns(path, mapping, findings, encoding=encoding, sheet=sheet)
         rows = len(columns.table.rows)
         specimen = _labels(columns.values.get("specimen"), rows)
@@ -83,7 +85,7 @@ def read_measurements(
 
 
 def read_columns(
-    path: Path | str,
+    path: Any,
     mapping: Mapping[str, str] | None,
     findings: FileFindings,
     *,
@@ -96,7 +98,7 @@ def read_columns(
     """Read the columns of a CSV file that hold known quantities, right or wrong.
 
     Args:
-        path: the file.
+        path: the file, or a table in memory.
         mapping: quantity -> header with its unit in brackets, or None.
         findings: of the file; gets one for everything that is wrong.
         quantities: what to look for.
@@ -108,7 +110,10 @@ def read_columns(
     Raises:
         InputError: no table can be found in the file.
     """
-    utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
+    if is_frame(path):
+        utf8, sha256, guessed = frame_text(path)
+    else:
+        utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
     mapping = mapping or {}
     numbered = any(wanted[:1].isdigit() for wanted in mapping.values())
     table = split_table(utf8, findings, numbered=numbered)

@@ -3,11 +3,13 @@
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
+from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear
 from hdcal.data.loading import Motion, derive_motion
@@ -24,7 +26,7 @@ MANY = 3  # labels from which a spread between runs or specimens can be estimate
 
 
 def read_case(
-    data: Path | str,
+    data: Any,
     gear: Path | str | None = None,
     *,
     columns: Mapping[str, str] | None = None,
@@ -33,11 +35,12 @@ def read_case(
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> Case:
-    """Read a case from a CSV file, a workbook, or a folder.
+    """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
     Args:
         data: a CSV file or a workbook (.xlsx), or a folder holding data.csv and
-            gear.toml.
+            gear.toml; or a DataFrame, or arrays by name, under the headers of such
+            files.
         gear: a gear file; by default the gear.toml beside the data.
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
@@ -50,21 +53,24 @@ def read_case(
     Raises:
         InputError: holds everything that is wrong with either file.
     """
-    data = Path(data)
+    in_memory = is_frame(data)
+    table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
-    folder = os.path.isdir(data)
+    folder = not in_memory and os.path.isdir(data)
     csv_path = data / DATA_NAME if folder else data
     gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
     with Findings() as wrong:
         # The gear file may name the columns; what is wrong with it is told second.
         found, of_gear = None, Findings()
-        if gear is None and not os.path.exists(gear_path):
+        if gear is None and (in_memory or not os.path.exists(gear_path)):
             of_gear.append(_no_gear(data))
         else:
             found = of_gear.attempt(read_gear, gear_path, theory, material)
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns or {}
-        measured = wrong.attempt(read_measurements, csv_path, named, encoding, sheet)
+        measured = wrong.attempt(
+            read_measurements, table if in_memory else csv_path, named, encoding, sheet
+        )
         wrong += of_gear
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)
