@@ -20,6 +20,9 @@ wall_thickness_mm = 0.68
 radius_mm = 40.0
 length_mm = 70.0
 material = "40CrNiMoA"
+
+[measurement]
+deformation = "radial"
 """
 # Six readings in mm and N.
 DEFORMATION = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -164,6 +167,11 @@ FILES = {
         ("\n\nReport\n\ndeformation_mm,force_N\n" + BODY).replace("\n", "\r\n"),
         ("1 line above",),
     ),
+    "a column that says which gear": Written(
+        "deformation_mm,force_N,gear\n" + lines(more=np.array([7, 7, 7, 8, 8, 8.0])),
+        ("'gear' is the specimen",),
+        also={"specimen": [0, 0, 0, 1, 1, 1]},
+    ),
     "headers in quotation marks": Written(
         '"Displacement (mm)","Force (N)"\n' + BODY, ("'Displacement (mm)'",)
     ),
@@ -249,3 +257,12 @@ def test_wrong_cells_are_told_by_their_line_of_the_file(tmp_path):
     with pytest.raises(InputError) as caught:
         read(tmp_path, Written(content))
     assert [finding.row for finding in caught.value.findings] == [7]
+
+
+def test_that_a_deformation_is_radial_is_assumed_where_nobody_says_so(tmp_path):
+    """A diametral reading would double K."""
+    said = read(tmp_path, FILES["hdcal's own"])
+    (tmp_path / "gear.toml").write_text(GEAR_TOML.replace('deformation = "radial"', ""))
+    unsaid = read_case(tmp_path)
+    assert not said.notes
+    assert [note for note in unsaid.notes if note.startswith("ASSUMED: the deform")]

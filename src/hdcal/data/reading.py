@@ -13,7 +13,7 @@ from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear
 from hdcal.data.loading import Motion, derive_motion
-from hdcal.data.measurements import Measurements, read_measurements
+from hdcal.data.measurements import ASSUMED, Measurements, read_measurements
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, quoted
@@ -86,6 +86,7 @@ def read_case(
         data_sha256=measured.columns.sha256,
         notes=(
             *measured.columns.notes,
+            *_unsaid(found),
             *([_BESIDE] if gear is None and not folder else []),
             *_thick_wall(found),
             *_left_out(measured.columns),
@@ -165,6 +166,16 @@ def _left_out(columns: Columns) -> Iterator[str]:
         yield f"columns not used: {', '.join(extra)}"
     if skipped := columns.table.skipped:
         yield f"{skipped} empty lines between the readings were skipped"
+
+
+def _unsaid(gear: Gear) -> Iterator[str]:
+    """Yield what the gear file leaves to a default that much depends on."""
+    said = gear.source.get("measurement", {})
+    if gear.theory != SPRING and "deformation" not in said:
+        yield (
+            f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
+            "twice as large, the gear file has to say so"
+        )
 
 
 def _thick_wall(gear: Gear) -> Iterator[str]:
