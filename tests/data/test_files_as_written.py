@@ -46,7 +46,15 @@ class Written(NamedTuple):
     also: Mapping = MappingProxyType({})
 
 
-def lines(separator=",", decimal=".", force=1.0, more=None, end="", form="{:.6g}"):
+def lines(
+    separator=",",
+    decimal=".",
+    force=1.0,
+    more=None,
+    end="",
+    form="{:.6g}",
+    stretch=1.0,
+):
     """Return the readings as lines of text.
 
     Args:
@@ -56,8 +64,9 @@ def lines(separator=",", decimal=".", force=1.0, more=None, end="", form="{:.6g}
         more: a third column.
         end: what stands behind each line.
         form: of each number.
+        stretch: factor on the deformation.
     """
-    table = [DEFORMATION, FORCE / force, *([] if more is None else [more])]
+    table = [stretch * DEFORMATION, FORCE / force, *([] if more is None else [more])]
     rows = [
         separator.join(form.format(cell).replace(".", decimal) for cell in row) + end
         for row in zip(*table, strict=True)
@@ -99,6 +108,30 @@ FILES = {
         ).encode("cp1252"),
         ("the text is cp1252", "1 line above", "'Temperatur [°C]'"),
         also=WARM,
+    ),
+    "Windows-1252 with nothing but a degree sign": Written(
+        (
+            "Weg [mm];Kraft [N];Temperatur [°C]\n" + lines(";", ",", more=TEMPERATURE)
+        ).encode("cp1252"),
+        ("the text is cp1252", "'Temperatur [°C]' is the temperature"),
+        also=WARM,
+    ),
+    "Windows-1252 with nothing but micrometres": Written(
+        ("Weg [µm];Kraft [N]\n" + lines(";", ",", stretch=1000.0)).encode("cp1252"),
+        ("the text is cp1252", "'Weg [µm]' is the deformation in um"),
+    ),
+    "units in headers and in a row, the same": Written(
+        "Weg [mm];Kraft [N]\nmm;N\n" + SEMI, ("row 2 taken for the units", "'Weg [mm]'")
+    ),
+    "a header named without its unit, which stands below": Written(
+        "Standardweg;Standardkraft\nmm;N\n" + SEMI,
+        ("row 2 taken for the units",),
+        {"columns": {"deformation": "Standardweg", "force": "Standardkraft"}},
+    ),
+    "two columns of one header, one named by its number": Written(
+        "Weg [mm],Kraft [N],Kraft [N]\n" + lines(more=FORCE + 1.0),
+        ("'Weg [mm]' is the deformation",),
+        {"columns": {"force": "2"}},
     ),
     "the same, its encoding named": Written(
         ("Weg [mm];Kraft [N]\n" + SEMI + "").encode("utf-16-le"),
@@ -220,6 +253,22 @@ REFUSED = {
         "Displacement (mm),Load (g)\n" + BODY,
         "no column holds the force",
     ),
+    "thousands marked by points beside decimal commas": (
+        "Weg [mm];Kraft [N]\n" + "".join(f"0,{k}00;1.70{k}\n" for k in range(6)),
+        "decimal point among decimal commas",
+    ),
+    "thousands marked by commas beside decimal points": (
+        "Weg [mm]\tKraft [N]\n" + "".join(f"0.{k}00\t1,70{k}\n" for k in range(6)),
+        "decimal point among decimal commas",
+    ),
+    "a unit in the header and another one below": (
+        "Weg [mm];Kraft [N]\nmm;kN\n" + SEMI,
+        "'Kraft [N]' names N, and the row of units kN",
+    ),
+    "a diameter": (
+        "Durchmesser Weg [mm];Kraft [N]\n" + SEMI,
+        "no column holds the def",
+    ),
     "no headers and nothing said": (BODY, "numbers where the headers should be"),
     "text of no encoding": (
         b"deformation_mm,force_N\n\x81\x8d\xff\xfe\x00" + BODY.encode(),
@@ -239,6 +288,15 @@ def test_what_can_be_meant_in_two_ways_is_asked(tmp_path, habit):
     with pytest.raises(InputError) as caught:
         read(tmp_path, Written(content, asked=asked))
     assert any(words in str(finding) for finding in caught.value.findings)
+    told = [finding.problem for finding in caught.value.findings]
+    asks = [words for words in told if "may be" in words or "no column" in words]
+    assert len(asks) <= 1
+
+
+def test_a_temperature_of_no_rig_is_told(tmp_path):
+    content = "deformation_mm,force_N,temperature_K\n" + lines(more=TEMPERATURE)
+    case = read(tmp_path, Written(content))
+    assert any("Check the unit of the column" in note for note in case.notes)
 
 
 def test_a_gear_file_says_which_column_is_which(tmp_path):

@@ -49,5 +49,8 @@ def test_what_is_wrong_is_told_by_row_and_column(folder):
         hdcal.read_case(wrong, folder / "gear.toml")
     (found,) = caught.value.findings
     assert (found.file, found.row, found.column) == ("DataFrame", 10, "Kraft [kN]")
+    unequal = {"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}
+    with pytest.raises(InputError, match="is no table"):
+        hdcal.read_case(unequal, folder / "gear.toml")
     with pytest.raises(InputError, match="no gear file was named"):
         hdcal.read_case(FRAME)

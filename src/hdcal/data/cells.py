@@ -45,17 +45,20 @@ def read_cells(
         ]
         findings.add_rows(empty, column.header, "empty labels")
         values[column.quantity] = np.array(cells, object)
+    # One decimal sign serves a whole file: else a thousand passes for a one.
+    comma = table.separator != "," and any(
+        "," in cell for column in odd for cell in texts[column.position]
+    )
     for column in odd:
-        numbers, wrong = _read_numbers(table, texts[column.position])
+        numbers, wrong = _read_numbers(table, texts[column.position], comma)
         findings.add_rows(wrong, column.header, "cells that are no numbers")
         values[column.quantity] = numbers
     return values
 
 
 def _read_numbers(
-    table: CsvTable, cells: list[str]
+    table: CsvTable, cells: list[str], comma: bool
 ) -> tuple[np.ndarray, list[tuple[int, str, str]]]:
-    comma = table.separator != "," and any("," in cell for cell in cells)
     numbers, wrong = np.full(len(cells), np.nan), []
     for index, cell in enumerate(cells):
         try:
@@ -74,7 +77,7 @@ def read_number(cell: str, comma: bool) -> float:
 
     Args:
         cell: without blanks around it.
-        comma: whether its column is written with decimal commas.
+        comma: whether its file is written with decimal commas.
 
     Raises:
         CellError: it is no finite number.
@@ -88,7 +91,8 @@ def read_number(cell: str, comma: bool) -> float:
     if comma:
         if "." in cell and "," not in cell and any(map(str.isdigit, cell)):
             words = f"'{cell}' has a decimal point among decimal commas"
-            raise CellError(words, "Use one decimal sign in the whole column")
+            remedy = "Use one decimal sign in the whole file, and none for thousands"
+            raise CellError(words, remedy)
         point = cell if "." in cell else cell.replace(",", ".")
     if not _NUMBER.fullmatch(point):
         raise CellError(f"'{cell}' is not a number", "Write a plain number")

@@ -130,8 +130,11 @@ def _named(
         return None
     if good:
         return good[0]
+    before = len(findings)
     if not bad and (guessed := _guessed(quantity, table, findings)):
         return guessed
+    if len(findings) > before:
+        return None
     if bad:
         header, unit = bad[0]
         words = f"unknown unit '{unit}'" if unit else "the header names no unit"
@@ -156,7 +159,10 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
     if len(likely) > 1 and quantity in REQUIRED:
         names = " or ".join(quoted(column.header) for column in likely)
         words = f"the {quantity} may be {names}"
-        remedy = f"Say which, as in `columns` '{quantity}={likely[0].header}'"
+        remedy = (
+            f"Say which, as in `columns` '{quantity}={likely[0].position + 1}', the "
+            "number of the column"
+        )
         findings.add(words, remedy, table.header_row, likely[1].header)
     if len(likely) != 1:
         return None
@@ -206,6 +212,9 @@ def _mapped(
     # a header may itself end in brackets, so the whole text is tried as well
     wholes = {_squeezed(wanted), _squeezed(name)}
     hits = [i for i, header in enumerate(table.headers) if _squeezed(header) in wholes]
+    if not hits:
+        bare = [_squeezed(_split_brackets(header)[0]) for header in table.headers]
+        hits = [i for i, header in enumerate(bare) if header == _squeezed(name)]
     if not hits and name.isdigit() and 0 < int(name) <= len(table.headers):
         hits = [int(name) - 1]
     option = f"`columns` {quantity}="
@@ -218,7 +227,8 @@ def _mapped(
         return None
     if len(hits) > 1:
         words = f"{option}{wanted} fits {len(hits)} columns"
-        remedy = "Give the columns different headers"
+        numbers = " or ".join(str(hit + 1) for hit in hits)
+        remedy = f"Name it by its number, {numbers}"
         findings.add(words, remedy, table.header_row, name)
         return None
     header = table.headers[hits[0]]
@@ -226,7 +236,9 @@ def _mapped(
         return Column(quantity, header, hits[0])
     bracketed = unit is not None
     if not unit:
-        unit = header.rpartition("_")[2] if "_" in header else ""
+        guess, own = guess_header(header), _split_brackets(header)[1]
+        unit = own or (guess.unit if guess is not None else "")
+        unit = unit or (header.rpartition("_")[2] if "_" in header else "")
     known = known_unit(quantity, unit)
     if known is None:
         words = f"has no unit that is known for {quantity}"

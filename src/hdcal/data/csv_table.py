@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.findings import FileFindings
+from hdcal.data.header_words import guess_header
 from hdcal.data.table_start import (
     TableStart,
     find_start,
@@ -20,6 +21,7 @@ from hdcal.data.table_start import (
     split_line,
     unit_in,
 )
+from hdcal.data.units import known_unit
 from hdcal.errors import quoted
 
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
@@ -133,6 +135,7 @@ def split_table(
         headers = tuple(str(number + 1) for number in range(len(headers)))
     if begin.units is not None:
         units = split_line(lines[begin.units].decode(), separator)
+        findings.add_rows(_other_units(headers, units, begin.units + 1))
         headers = tuple(map(_with_unit, headers, units))
     above = sum(bool(line.strip()) for line in lines[:top])
     lines = lines[begin.readings :] or [b""]
@@ -171,7 +174,22 @@ def _begin(utf8: bytes) -> TableStart:
 
 
 def _with_unit(header: str, unit: str) -> str:
-    return f"{header} [{unit_in(unit)}]" if unit else header
+    guess = guess_header(header)
+    named = guess is not None and bool(guess.unit)
+    return f"{header} [{unit_in(unit)}]" if unit and not named else header
+
+
+def _other_units(
+    headers: Iterable[str], units: Iterable[str], row: int
+) -> Iterator[tuple[int, str, str]]:
+    """Yield what is wrong where a header and the row of units name two units."""
+    for header, unit in zip(headers, units, strict=False):
+        guess = guess_header(header)
+        if guess is None or not guess.unit or not unit:
+            continue
+        if known_unit(guess.quantity, unit_in(unit)) != guess.unit:
+            words = f"{quoted(header)} names {guess.unit}, and the row of units {unit}"
+            yield row, words, "Leave one of them out"
 
 
 def _notes(begin: TableStart, above: int, headers: tuple[str, ...]) -> Iterator[str]:

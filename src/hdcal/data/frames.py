@@ -6,6 +6,8 @@ from typing import Any
 
 import pandas as pd
 
+from hdcal.data.findings import FileFindings
+
 # What findings call it.
 NAME = "DataFrame"
 
@@ -19,16 +21,24 @@ def is_frame(data: Any) -> bool:
     )
 
 
-def frame_text(data: Any) -> tuple[bytes, str, str]:
+def frame_text(data: Any, findings: FileFindings) -> tuple[bytes, str, str]:
     """Return a table as text, cells separated by tabs, as `read_text` does.
 
     Args:
         data: a pandas DataFrame, another library's that can become one, or a mapping of
             names to arrays of one length.
+        findings: of the table.
+
+    Raises:
+        InputError: arrays of several lengths, or of more than one dimension.
     """
     if hasattr(data, "to_pandas"):
         data = data.to_pandas()
-    frame = pd.DataFrame(data)
+    try:
+        frame = pd.DataFrame(data)
+    except (ValueError, TypeError) as error:
+        remedy = "Give arrays of one length and one dimension, by name"
+        findings.refuse(f"is no table ({error})", remedy)
     # Each number in full, so that it is read back as it is.
     utf8 = frame.to_csv(sep="\t", index=False, lineterminator="\n").encode()
     return utf8, hashlib.sha256(utf8).hexdigest(), ""

@@ -31,6 +31,7 @@ _OTHERWISE = {
     *("setpoint", "set", "target", "command", "soll", "sollwert", "consigne"),
     *("rate", "speed", "error", "max", "maximum", "min", "minimum", "peak", "mean"),
     *("sd", "std", "deviation", "offset", "tare", "limit", "grenze"),
+    *("diameter", "durchmesser", "diamètre", "corrected", "korrigiert", "corrigé"),
 }
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]\s*")
 _BEHIND = re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)(?P<unit>\S+)\s*")

@@ -111,7 +111,7 @@ def read_columns(
         InputError: no table can be found in the file.
     """
     if is_frame(path):
-        utf8, sha256, guessed = frame_text(path)
+        utf8, sha256, guessed = frame_text(path, findings)
     else:
         utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
     mapping = mapping or {}

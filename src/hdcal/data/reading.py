@@ -21,6 +21,7 @@ from hdcal.errors import Finding, Findings, quoted
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 MOST_ROWS = 8  # listed in one note
+USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
 THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
@@ -89,6 +90,7 @@ def read_case(
             *_unsaid(found),
             *([_BESIDE] if gear is None and not folder else []),
             *_thick_wall(found),
+            *_unusual_temperature(measured),
             *_left_out(measured.columns),
             *_off_scale(measured, found),
             *_resets(measured, motion),
@@ -185,6 +187,15 @@ def _thick_wall(gear: Gear) -> Iterator[str]:
         yield (
             f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
             "is not thin, as the theories take it to be. Check both sizes, and units"
+        )
+
+
+def _unusual_temperature(measured: Measurements) -> Iterator[str]:
+    found = measured.columns.values.get("temperature")
+    if found is not None and not USUAL[0] <= np.median(found) <= USUAL[1]:
+        yield (
+            f"temperatures about {np.median(found):.4g} °C are far from those of any "
+            "rig. Check the unit of the column"
         )
 
 

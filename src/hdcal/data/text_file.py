@@ -14,6 +14,8 @@ LARGEST_FILE = 1 << 32
 
 # Encodings that test machines write beside Unicode: Western Europe, China, Japan.
 _ENCODINGS = ("cp1252", "gb18030", "cp932")
+# Signs and letters of Western languages; Chinese read as cp1252 has others.
+_WESTERN = {*"°µ²³äöüßÄÖÜéèêëàâçùûîïôÉÈÊÀÇ"}
 # What is not ASCII tells, in so many lines of it.
 _JUDGED = 50
 _WIDE_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -126,6 +128,10 @@ def _decoded(raw: bytes, findings: FileFindings, encoding: str) -> bytes:
 
 def _looks_like(raw: bytes) -> str:
     """Return the likeliest encoding of a text that is not UTF-8."""
+    # Degrees and micrometres alone look like Chinese to whoever counts letters.
+    signs = raw.decode("cp1252", errors="replace")
+    if {sign for sign in signs if not sign.isascii()} <= _WESTERN:
+        return "cp1252"
     import charset_normalizer
 
     lines = [line for line in raw.splitlines() if not line.isascii()]
