@@ -61,6 +61,14 @@ def test_of_two_tables_one_has_to_be_named(folder):
         read(path, folder, sheet="third")
 
 
+def test_what_another_kind_of_file_has_is_not_passed_over(folder):
+    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
+    with pytest.raises(InputError, match="no `encoding`"):
+        read(path, folder, encoding="cp1252")
+    with pytest.raises(InputError, match="no `sheet`"):
+        read_case(folder, sheet="only")
+
+
 def test_a_workbook_without_readings_is_refused(folder):
     path = book(folder, notes=[("nothing", "here")])
     with pytest.raises(InputError, match="no sheet holds a table"):

@@ -95,7 +95,8 @@ def read_number(cell: str, comma: bool) -> float:
             raise CellError(words, remedy)
         point = cell if "." in cell else cell.replace(",", ".")
     if not _NUMBER.fullmatch(point):
-        raise CellError(f"'{cell}' is not a number", "Write a plain number")
+        remedy = "Write a plain number, without a sign for thousands"
+        raise CellError(f"'{cell}' is not a number", remedy)
     number = float(point)
     if math.isinf(number):
         words = f"'{cell}' is too large for a finite number"

@@ -49,7 +49,13 @@ def read_text(
         findings.refuse(*why)
     try:
         if _begins_with(path, MARK):
+            if encoding is not None:
+                findings.refuse(
+                    "is a workbook, which has no `encoding`", "Leave it out"
+                )
             return read_sheet(path, findings, sheet)
+        if sheet is not None:
+            findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
         raw = _stream(path, findings, wide=encoding is not None)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")

@@ -46,7 +46,7 @@ def read_sheet(
         words = "no sheet holds a table of readings"
         if likely:
             words = f"{len(likely)} sheets hold a table: {names}"
-        findings.refuse(words, "Say which is meant by its `sheet`")
+        findings.refuse(words, "Say which with `sheet`")
     text = "\n".join(map("\t".join, _same(tables[likely[0]])))
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     told = len(tables) > 1 and sheet is None

@@ -74,7 +74,7 @@ def sampling_checks(
         _check(
             "chains agree (R-hat)",
             top <= MAX_RHAT,
-            f"the largest R-hat is {top:.3f} ({worst}), allowed {MAX_RHAT}",
+            f"the largest R-hat is {top:.4f} ({worst}), allowed {MAX_RHAT}",
         ),
         _check(
             "enough effective draws (bulk and tail ESS)",
