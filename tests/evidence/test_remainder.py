@@ -37,7 +37,7 @@ def evidence_of(case):
 @pytest.mark.thorough
 def test_friction_with_a_small_wave_is_friction_and_something_else():
     which = judged(waves(simulated(rich(), FRICTION, seed=1), 1.5 * NOISE)).which
-    assert which.verdict == "named"
+    assert which.verdict == "group" and which.describes_best
     assert which.effect == "coulomb_friction"
     assert which.remainder is not None
     assert which.remainder.probability > 0.9
