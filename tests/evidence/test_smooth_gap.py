@@ -36,6 +36,7 @@ def test_a_gap_that_the_modulus_could_take_in_part_is_no_larger_for_that():
     assert np.count_nonzero((found[:, 1] < 1.0) & (found[:, 2] > 1.0)) >= 6
 
 
+@pytest.mark.thorough
 def test_a_gap_of_half_the_noise_is_no_larger_for_what_is_looked_for_in_vain():
     """Components that are not there add up: a prior scale of 0.3 shows what they do."""
     kelvins = (rich().temperature - 20.0)[None]

@@ -57,6 +57,7 @@ def test_a_second_effect_that_is_there_is_seen():
     assert found[both]["coulomb_friction"] < 0.01
 
 
+@pytest.mark.thorough
 def test_of_two_lookalikes_either_may_be_the_one_that_is_not_seen():
     """A drift of the zero and an expanding frame: beside each the other is nothing."""
     library = LIBRARY | {"thermal_expansion": EFFECTS["thermal_expansion"]}

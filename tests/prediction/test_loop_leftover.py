@@ -70,6 +70,7 @@ def test_a_margin_of_unloading_is_below_that_of_loading():
     assert up.force_N.lo > down.force_N.hi
 
 
+@pytest.mark.thorough
 def test_beside_friction_the_leftover_has_no_loop():
     """Else the friction of a rig that has nothing but friction would be anything."""
     records = replace(cycles(96), temperature=np.full(96, 20.0))
