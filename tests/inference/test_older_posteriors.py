@@ -94,6 +94,7 @@ def test_the_kept_form_decides_whether_a_file_is_whole(tmp_path):
         assert problem.rounded and not problem.correlated
 
 
+@pytest.mark.thorough
 def test_a_leftover_of_before_it_knew_loading_from_unloading_is_read(tmp_path):
     """It had twenty weights whatever was tested; a new file of such data has thirty."""
     now = looped()

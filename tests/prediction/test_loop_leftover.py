@@ -52,6 +52,7 @@ def test_the_mean_of_each_direction_lies_in_its_own_band(direction, sense):
     assert np.all(high - low < 0.4 * np.abs(true - truth(PLACES, -sense)) + 0.5)
 
 
+@pytest.mark.thorough
 def test_without_it_both_means_lie_outside():
     held = [
         (low < truth(PLACES, sense)) & (truth(PLACES, sense) < high)
@@ -63,6 +64,7 @@ def test_without_it_both_means_lie_outside():
     assert np.mean(held) < 0.5
 
 
+@pytest.mark.thorough
 def test_a_margin_of_unloading_is_below_that_of_loading():
     (up,), (down,) = (
         hdcal.margin(looped(), 0.5, direction=way).levels for way in ("up", "down")

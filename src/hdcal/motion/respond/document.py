@@ -94,7 +94,8 @@ def remarks(
             f"Dry friction turns its sign over a speed of {FRICTION_SPEED:g} mm/s: a "
             "gear that sticks creeps instead."
         )
-    gap = posterior.problem.discrepancy
+    at_rest = not isinstance(posterior, DynamicPosterior)
+    gap = posterior.problem.discrepancy if at_rest else None
     if gap is not None and gap.looped:
         yield (
             "Of the leftover the middle of loading and unloading acts: what its loop "
