@@ -324,3 +324,10 @@ def test_that_a_deformation_is_radial_is_assumed_where_nobody_says_so(tmp_path):
     unsaid = read_case(tmp_path)
     assert not said.notes
     assert [note for note in unsaid.notes if note.startswith("ASSUMED: the deform")]
+
+
+def test_one_slip_of_the_decimal_sign_is_told_once(tmp_path):
+    content = "Weg [mm];Kraft [N]\n" + lines(";").replace("41.5", "41,5")
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, Written(content))
+    assert [finding.row for finding in caught.value.findings] == [4]

@@ -61,6 +61,12 @@ def test_of_two_tables_one_has_to_be_named(folder):
         read(path, folder, sheet="third")
 
 
+def test_the_ending_of_its_name_does_not_matter(folder):
+    path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
+    path.replace(folder / "data.csv")
+    assert len(read_case(folder).records.force) == len(READINGS)
+
+
 def test_what_another_kind_of_file_has_is_not_passed_over(folder):
     path = book(folder, only=[("deformation_mm", "force_kN"), *READINGS])
     with pytest.raises(InputError, match="no `encoding`"):

@@ -45,10 +45,12 @@ def read_cells(
         ]
         findings.add_rows(empty, column.header, "empty labels")
         values[column.quantity] = np.array(cells, object)
-    # One decimal sign serves a whole file: else a thousand passes for a one.
-    comma = table.separator != "," and any(
-        "," in cell for column in odd for cell in texts[column.position]
-    )
+    # One decimal sign serves a whole file, that of most cells: else a thousand passes
+    # for a one.
+    cells = [cell for column in odd for cell in texts[column.position]]
+    commas = sum("," in cell for cell in cells)
+    points = sum("." in cell and "," not in cell for cell in cells)
+    comma = table.separator != "," and commas > 0 and commas >= points
     for column in odd:
         numbers, wrong = _read_numbers(table, texts[column.position], comma)
         findings.add_rows(wrong, column.header, "cells that are no numbers")

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 from hdcal.data.units import known_unit
 
-# Words for each quantity, in lower case: English, German, French, Chinese.
+# Words for each quantity, in lower case: English, German, French, Chinese. One is
+# misspelt, as loggers spell it.
 WORDS: dict[str, tuple[str, ...]] = {
     "deformation": (
         *("deformation", "displacement", "displacment", "deflection", "travel"),

@@ -15,6 +15,7 @@ from hdcal.errors import quoted
 MARK = b"PK\x03\x04"
 # Largest content of an archive, unpacked, and rows of a sheet that are looked at.
 _LARGEST, _MOST_ROWS = 1 << 28, 1 << 20
+_BROKEN = "is no workbook that can be read", "Save it as CSV"
 # Rows with two numbers or more that make a sheet a table of readings.
 _READINGS = 5
 
@@ -64,10 +65,14 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, list[list[str]]]:
     try:
         with zipfile.ZipFile(path) as archive:
             size = sum(part.file_size for part in archive.infolist())
-        if size > _LARGEST:
-            findings.refuse("is a workbook of more than 256 MiB", "Save it as CSV")
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
-        try:
+    except (OSError, ValueError, zipfile.BadZipFile):
+        findings.refuse(*_BROKEN)
+    if size > _LARGEST:
+        findings.refuse("is a workbook of more than 256 MiB", "Save it as CSV")
+    try:
+        # Opened here: openpyxl asks for an ending of the name else.
+        with open(path, "rb") as stream:
+            book = openpyxl.load_workbook(stream, read_only=True, data_only=True)
             return {
                 each.title: [
                     [_text(cell) for cell in row]
@@ -75,10 +80,8 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, list[list[str]]]:
                 ]
                 for each in book.worksheets
             }
-        finally:
-            book.close()
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, SyntaxError, TypeError):
-        findings.refuse("is no workbook that can be read", "Save it as CSV")
+    except Exception:  # whatever a parser makes of a broken file
+        findings.refuse(*_BROKEN)
 
 
 def _text(cell: Any) -> str:
