@@ -13,6 +13,7 @@ from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
+from hdcal.calibration.init.command import init
 from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
@@ -55,8 +56,8 @@ _EPILOG = (
 def hdcal() -> None:
     """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
 
-    DATA and CASE are a CSV file of measurements with a gear file (--gear), or a folder
-    holding data.csv and gear.toml.
+    DATA and CASE are a file of measurements (CSV, or .xlsx) with a gear file (--gear),
+    or a folder holding data.csv and gear.toml.
     """
 
 
@@ -70,6 +71,7 @@ for _command in (
     respond,
     track,
     fit,
+    init,
     check,
     effects,
     audit,

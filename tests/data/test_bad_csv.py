@@ -212,8 +212,11 @@ def test_an_odd_name(tmp_path):
 
 
 def test_no_gear_says_what_to_do(folder):
+    """A file alone is of a spring; where sizes are needed one states them."""
     (folder / "gear.toml").unlink()
     (folder / "data.csv").write_text(H)
-    findings = findings_of(folder / "data.csv")
+    findings = findings_of(folder / "data.csv", theory="ring")
     assert len(findings) == 2
     assert "`gear`" in findings[1].remedy
+    # A folder is a case of two files.
+    assert "does not exist" in findings_of(folder)[1].problem

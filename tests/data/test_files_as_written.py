@@ -205,6 +205,62 @@ FILES = {
         ("'gear' is the specimen",),
         also={"specimen": [0, 0, 0, 1, 1, 1]},
     ),
+    "columns separated by blanks, as a simulation writes them": Written(
+        "  deformation_mm    force_N\n" + lines("      ", form="{:12.5f}", decimal="."),
+        ("separated by blanks",),
+    ),
+    "the same with titles, two blanks between headers of two words": Written(
+        "Run of 12 May\n\nDisplacement (mm)   Force (N)\n" + lines("  "),
+        ("separated by blanks", "'Displacement (mm)'"),
+    ),
+    "decimal commas between blanks": Written(
+        "Weg/mm  Kraft/N\n" + lines("  ", ","), ("separated by blanks", "'Weg/mm'")
+    ),
+    "a footer": Written(
+        "deformation_mm,force_N\n" + BODY + "\nEnd of test\nOperator: M. K.\n",
+        ("the last 2 lines taken for no readings",),
+    ),
+    "a logger started twice, each time with its headers": Written(
+        "Weg [mm];Kraft [N]\n"
+        + "\n".join(SEMI.split("\n")[:3])
+        + "\n\nMessung 2\nWeg [mm];Kraft [N]\n"
+        + "\n".join(SEMI.split("\n")[3:]),
+        ("the headers stand 2 times", "'Weg [mm]'"),
+        also={"run": [0, 0, 0, 1, 1, 1]},
+    ),
+    "LabVIEW, a block for each run": Written(
+        "LabVIEW Measurement\t\nWriter_Version\t2\n***End_of_Header***\t\n\n"
+        + "".join(
+            "Channels\t2\t\n***End_of_Header***\t\n"
+            "Weg (mm)\tKraft (N)\tComment\n"
+            + "".join(f"{row}\t\n" for row in lines("\t").split("\n")[k : k + 3])
+            + "\n"
+            for k in (0, 3)
+        ),
+        ("lines above the table", "the headers stand 2 times"),
+        also={"run": [0, 0, 0, 1, 1, 1]},
+    ),
+    "blocks that name their runs themselves": Written(
+        "deformation_mm,force_N,run\n"
+        + "".join(
+            "".join(f"{row},{name}\n" for row in BODY.split("\n")[k : k + 3])
+            + ("deformation_mm,force_N,run\n" if k == 0 else "")
+            for k, name in ((0, "a"), (3, "b"))
+        ),
+        ("the headers stand 2 times",),
+        also={"run": [0, 0, 0, 1, 1, 1]},
+    ),
+    "a temperature without a unit": Written(
+        "Weg [mm];Kraft [N];Temperatur\n" + lines(";", ",", more=TEMPERATURE),
+        ("'Temperatur', which may be the temperature, is not used",),
+    ),
+    "whole numbers and no decimals at all": Written(
+        "Weg [um];Kraft [N]\n"
+        + "".join(
+            f"{1000 * x:.0f};{y:g}\n" for x, y in zip(DEFORMATION, FORCE, strict=True)
+        ),
+        ("'Weg [um]'",),
+    ),
     "headers in quotation marks": Written(
         '"Displacement (mm)","Force (N)"\n' + BODY, ("'Displacement (mm)'",)
     ),
@@ -257,6 +313,11 @@ REFUSED = {
         "Weg [mm];Kraft [N]\n" + "".join(f"0,{k}00;1.70{k}\n" for k in range(6)),
         "decimal point among decimal commas",
     ),
+    "thousands marked by points in a column without decimals": (
+        "Weg [um];Kraft [N]\n"
+        "100;380\n200;567\n300;734\n400;981\n500;1.234\n600;1.402\n",
+        "'1.234' may be a thousand",
+    ),
     "thousands marked by commas beside decimal points": (
         "Weg [mm]\tKraft [N]\n" + "".join(f"0.{k}00\t1,70{k}\n" for k in range(6)),
         "decimal point among decimal commas",
@@ -268,6 +329,10 @@ REFUSED = {
     "a diameter": (
         "Durchmesser Weg [mm];Kraft [N]\n" + SEMI,
         "no column holds the def",
+    ),
+    "a reading that breaks off": (
+        "deformation_mm,force_N\n" + BODY + "0.6\n",
+        "has 1 cells where the header row has 2",
     ),
     "no headers and nothing said": (BODY, "numbers where the headers should be"),
     "text of no encoding": (
@@ -289,7 +354,7 @@ def test_what_can_be_meant_in_two_ways_is_asked(tmp_path, habit):
         read(tmp_path, Written(content, asked=asked))
     assert any(words in str(finding) for finding in caught.value.findings)
     told = [finding.problem for finding in caught.value.findings]
-    asks = [words for words in told if "may be" in words or "no column" in words]
+    asks = [w for w in told if "may be the" in w or "no column" in w]
     assert len(asks) <= 1
 
 

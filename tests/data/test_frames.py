@@ -52,5 +52,32 @@ def test_what_is_wrong_is_told_by_row_and_column(folder):
     unequal = {"deformation_mm": np.zeros(6), "force_N": np.zeros(5)}
     with pytest.raises(InputError, match="is no table"):
         hdcal.read_case(unequal, folder / "gear.toml")
-    with pytest.raises(InputError, match="no gear file was named"):
-        hdcal.read_case(FRAME)
+    with pytest.raises(InputError, match="no gear file says the sizes"):
+        hdcal.read_case(FRAME, theory="ring")
+
+
+def test_columns_that_are_only_counted_have_no_headers():
+    """The names 0 and 1 are no reading."""
+    counted = pd.DataFrame(FRAME[["deformation_mm", "Kraft [kN]"]].to_numpy())
+    asked = {"deformation": "1[mm]", "force": "2[kN]"}
+    found = hdcal.read_case(counted, columns=asked)
+    np.testing.assert_array_equal(found.records.deformation, FRAME["deformation_mm"])
+    with pytest.raises(InputError, match="numbers where the headers should be"):
+        hdcal.read_case(counted)
+
+
+def test_a_gear_may_be_stated_in_memory():
+    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
+    found = hdcal.read_case(FRAME, {**sizes, "deformation": "diametral"})
+    assert (found.gear.theory, found.gear.reading) == ("ring", "diametral")
+    same = {"gear": sizes, "measurement": {"deformation": "diametral"}}
+    assert hdcal.read_case(FRAME, same).gear == found.gear
+    with pytest.raises(InputError, match="unknown key") as caught:
+        hdcal.read_case(FRAME, {**sizes, "radius": 40.0})
+    assert str(caught.value.findings[0]).startswith("gear, column 'gear.radius'")
+
+
+def test_without_a_gear_a_stiffness_is_asked():
+    found = hdcal.read_case(FRAME)
+    assert (found.gear.theory, found.gear.name) == ("spring", "part")
+    assert "its stiffness is asked, no K" in " ".join(found.notes)

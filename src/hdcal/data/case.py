@@ -83,6 +83,7 @@ class Case:
         specimen_labels: label of each specimen index.
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
+        columns: quantity -> header with its unit, of headers that are not hdcal's own.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Case:
     specimen_labels: tuple[str, ...]
     data_sha256: str
     notes: tuple[str, ...] = ()
+    columns: dict[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         rows = len(self.records.force)

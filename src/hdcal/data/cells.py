@@ -11,6 +11,8 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.formula_cells import with_formula
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+# Whole numbers, their thousands behind points.
+_IN_THOUSANDS = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
 _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 
 
@@ -32,6 +34,13 @@ def read_cells(
     numeric = [c for c in columns.values() if c.quantity not in LABELS]
     numbers = table.numbers(c.position for c in numeric)
     values = {c.quantity: numbers[c.position] for c in numeric if c.position in numbers}
+    for column in (c for c in numeric if c.position in numbers):
+        suspect = np.flatnonzero(_may_be_thousands(numbers[column.position]))
+        if suspect.size:
+            cells = table.texts([column.position])[column.position]
+            if all(_IN_THOUSANDS.fullmatch(cell) for cell in cells):
+                wrong = ((int(table.rows[i]), *_thousand(cells[i])) for i in suspect)
+                findings.add_rows(wrong, column.header, "cells that may be thousands")
     # cell by cell, only where something odd stands in the column
     odd = [c for c in numeric if c.position not in numbers]
     texts = table.texts(c.position for c in (*labels, *odd))
@@ -68,6 +77,24 @@ def _read_numbers(
         except CellError as error:
             wrong.append((int(table.rows[index]), *error.args))
     return numbers, wrong
+
+
+def _may_be_thousands(numbers: np.ndarray) -> np.ndarray:
+    """Return which numbers of a column may be thousands written with a point.
+
+    Beside 567 a 1.234 with no other digits is more likely a thousand than a one.
+    """
+    whole = numbers == np.round(numbers)
+    size = np.abs(numbers)
+    parts = ~whole & (size >= 1.0)
+    usual = (whole | parts).all() and (whole & (size >= 100.0) & (size < 1000.0)).any()
+    return parts if usual else np.zeros(len(numbers), dtype=bool)
+
+
+def _thousand(cell: str) -> tuple[str, str]:
+    words = f"'{cell}' may be a thousand, as no other number here has decimals"
+    remedy = f"Write {cell.replace('.', '')} if it is one, else {cell}0"
+    return words, remedy
 
 
 class CellError(ValueError):

@@ -58,6 +58,24 @@ class Columns:
     findings: FileFindings
     notes: tuple[str, ...] = ()
 
+    def as_named(self) -> dict[str, str]:
+        """Return how a user would name each: its header or number, with its unit.
+
+        Those that hdcal's own headers name need no other name.
+        """
+        named = {}
+        for quantity, column in self.used.items():
+            if _split(column.header)[0] == quantity:
+                continue
+            guess = guess_header(column.header)
+            alone = self.table.headers.count(column.header) == 1
+            name = column.header if alone else str(column.position + 1)
+            told = alone and guess is not None and guess.unit == column.unit
+            named[quantity] = name if told else f"{name}[{column.unit}]"
+            if quantity in LABELS:
+                named[quantity] = name
+        return named
+
     def find(self, mask: np.ndarray, quantity: str, problem: str, remedy: str) -> None:
         """Add one finding for each row where the mask, shape (n,), is true."""
         rows = self.table.rows[mask].tolist()

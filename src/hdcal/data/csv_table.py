@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from hdcal.data.blanks import tabbed
+from hdcal.data.blocks import Blocks, find_blocks
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import guess_header
 from hdcal.data.table_start import (
@@ -123,7 +125,7 @@ def split_table(
     if not utf8.strip():
         remedy = "Write a header row and at least 5 rows of readings"
         findings.refuse("the file is empty", remedy)
-    begin = _begin(utf8)
+    begin, utf8, spaced = _begin(utf8)
     lines = utf8.split(b"\n")
     top = begin.readings if begin.headers is None else begin.headers
     separator, headers = _headers(lines[top].decode(), findings, top + 1)
@@ -138,7 +140,42 @@ def split_table(
         findings.add_rows(_other_units(headers, units, begin.units + 1))
         headers = tuple(map(_with_unit, headers, units))
     above = sum(bool(line.strip()) for line in lines[:top])
+    units = None if begin.units is None else lines[begin.units]
+    head = b"" if begin.headers is None else lines[top]
     lines = lines[begin.readings :] or [b""]
+    blocks = find_blocks(utf8, lines, head, units, separator, len(headers))
+    filled, cells = _filled_cells(lines, separator)
+    filled &= ~blocks.extra
+    fits = filled & (cells == len(headers))
+    rows = np.arange(len(lines)) + begin.readings + 1
+    findings.add_rows(
+        (int(rows[index]), *_misfit(int(cells[index]), len(headers), separator))
+        for index in np.flatnonzero(filled & ~fits)
+    )
+    used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
+    notes = (*_notes(begin, above, headers, spaced), *_block_notes(blocks))
+    kept = list(compress(lines, fits))
+    if blocks.block[-1] > 1 and not any(map(_is_run, headers)):
+        headers = (*headers, "run")
+        numbers = blocks.block[fits].tolist()
+        kept = [
+            b"%b%b%d" % (line, separator.encode(), n)
+            for line, n in zip(kept, numbers, strict=True)
+        ]
+    return CsvTable(
+        headers=headers,
+        header_row=top + 1,
+        rows=rows[fits],
+        separator=separator,
+        body=b"\n".join([*kept, b""]),
+        filled=int(filled.sum()),
+        skipped=int((~filled & ~blocks.extra)[:used].sum()),
+        notes=notes,
+    )
+
+
+def _filled_cells(lines: list[bytes], separator: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return which lines hold anything, and how many cells each has, by line."""
     body = b"\n".join(lines)
     mark = ord(separator)
     filled = _per_line(body, {*range(33, 256)} - {mark}) > 0
@@ -147,30 +184,38 @@ def split_table(
         quotes = _per_line(body, {ord('"')})
         for index in np.flatnonzero(filled & (quotes > 0)):
             cells[index] = _quoted_cells(lines[index].decode(), separator)
-    fits = filled & (cells == len(headers))
-    rows = np.arange(len(lines)) + begin.readings + 1
-    findings.add_rows(
-        (int(rows[index]), *_misfit(int(cells[index]), len(headers), separator))
-        for index in np.flatnonzero(filled & ~fits)
-    )
-    used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
-    return CsvTable(
-        headers=headers,
-        header_row=top + 1,
-        rows=rows[fits],
-        separator=separator,
-        body=b"\n".join([*compress(lines, fits), b""]),
-        filled=int(filled.sum()),
-        skipped=int((~filled[:used]).sum()),
-        notes=tuple(_notes(begin, above, headers)),
-    )
+    return filled, cells
 
 
-def _begin(utf8: bytes) -> TableStart:
-    """Return where the table begins: below its first line, unless readings tell."""
-    first = len(utf8) - len(utf8.lstrip(b"\n"))
+def _is_run(header: str) -> bool:
+    guess = guess_header(header)
+    return guess is not None and guess.quantity == "run"
+
+
+def _block_notes(blocks: Blocks) -> Iterator[str]:
+    many = int(blocks.block[-1])
+    if many > 1:
+        yield (
+            f"the headers stand {many} times, above {many} blocks of readings: each is "
+            "a run. If not, split the file"
+        )
+    if blocks.footers:
+        lines = "line" if blocks.footers == 1 else f"{blocks.footers} lines"
+        yield f"the last {lines} taken for no readings"
+
+
+def _begin(utf8: bytes) -> tuple[TableStart, bytes, bool]:
+    """Return where the table begins: below its first line, unless readings tell.
+
+    With it the text, tabs between its columns, and whether those were blanks before.
+    """
     head = utf8[:_HEAD].decode(errors="ignore")
-    return find_start(head) or TableStart(first, None, first + 1)
+    text = tabbed(utf8, head)
+    if text is not None:
+        utf8, head = text, text[:_HEAD].decode(errors="ignore")
+    first = len(utf8) - len(utf8.lstrip(b"\n"))
+    start = find_start(head) or TableStart(first, None, first + 1)
+    return start, utf8, text is not None
 
 
 def _with_unit(header: str, unit: str) -> str:
@@ -192,7 +237,11 @@ def _other_units(
             yield row, words, "Leave one of them out"
 
 
-def _notes(begin: TableStart, above: int, headers: tuple[str, ...]) -> Iterator[str]:
+def _notes(
+    begin: TableStart, above: int, headers: tuple[str, ...], spaced: bool
+) -> Iterator[str]:
+    if spaced:
+        yield "the columns are separated by blanks"
     if above:
         lines = "1 line" if above == 1 else f"{above} lines"
         names = ", ".join(map(quoted, headers))

@@ -1,6 +1,7 @@
 """Read the gear file: sizes, how it was measured, and what is believed of it."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,7 +12,13 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
 from hdcal.data.full_scale import FullScale
-from hdcal.data.gear_schema import GearFile, GearTable, check_schema, size_findings
+from hdcal.data.gear_schema import (
+    GearFile,
+    GearTable,
+    check_schema,
+    size_findings,
+    tables_of,
+)
 from hdcal.data.prior import Prior
 from hdcal.data.prior_entry import read_prior
 from hdcal.data.priors import (
@@ -40,12 +47,23 @@ IN_NEWTONS = ("force_offset", "sigma", "run_offset_sd", "gap_sd")
 NO_MATERIAL = "not stated"
 # That of any other gear that names none.
 _MATERIAL = "steel"
+# What findings call a gear that no file describes.
+IN_MEMORY = "gear"
+# The name of a part of which no size is known.
+PART = "part"
+
+
+def unsized() -> Gear:
+    """Return a part of which nothing is known: a spring of any stiffness."""
+    return read_gear({"name": PART, "theory": SPRING})
 
 
 def read_gear(
-    path: Path | str, theory: str | None = None, material: Path | None = None
+    source: Path | str | Mapping[str, Any],
+    theory: str | None = None,
+    material: Path | None = None,
 ) -> Gear:
-    """Read a gear file and merge its priors.
+    """Read a gear file, or what would stand in one, and merge its priors.
 
     Later ones win: shipped rig priors, the material's, those of certificates, those
     of the gear file. The certificate of a displacement gauge replaces no prior: it
@@ -56,15 +74,20 @@ def read_gear(
     with temperature.
 
     Args:
-        path: the TOML file.
+        source: the TOML file; or its tables as a mapping, where the names of the tables
+            may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
         material: stands for the material file that the gear names, wherever that is.
 
     Raises:
         InputError: holds everything that is wrong with the file.
     """
-    path = Path(path)
-    toml = read_toml(path, str(path))
+    if isinstance(source, Mapping):
+        path = Path(IN_MEMORY)
+        toml = TomlFile(IN_MEMORY, tables_of(source), "")
+    else:
+        path = Path(source)
+        toml = read_toml(path, str(path))
     with Findings() as wrong:
         model = wrong.attempt(check_schema, toml)
         wrong += size_findings(toml, theory)

@@ -88,6 +88,22 @@ def check_schema(toml: TomlFile) -> GearFile:
     return found
 
 
+def tables_of(source: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of a gear file from a mapping that may leave out their names.
+
+    A key that no table has is put into [gear], where the schema refuses it.
+    """
+    found: dict[str, Any] = {"gear": {}}
+    for key, value in source.items():
+        if key in GearFile.model_fields:
+            found[key] = value
+        elif key in MeasurementTable.model_fields:
+            found.setdefault("measurement", {})[key] = value
+        else:
+            found["gear"] = {**found["gear"], key: value}
+    return found
+
+
 def certificates_in(table: Mapping[str, Any]) -> dict[str, GaugeCertificate]:
     """Return the certificates in the tables of a gear file that was checked."""
     return MeasurementTable.model_validate(table.get("measurement", {})).certificates

@@ -11,15 +11,22 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.gear import at_full_scale, behind_filter, read_gear
+from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
+from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import ASSUMED, Measurements, read_measurements
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, Findings, quoted
+from hdcal.errors import Finding, Findings, InputError, quoted
 
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
+# What is told where no gear file was named, and none lies beside the data.
+UNSIZED = (
+    f"{ASSUMED}the part is a spring of which nothing is known but these readings: its "
+    "stiffness is asked, no K. For a gear, state its sizes in a gear file, named or as "
+    f"{GEAR_NAME} beside the data"
+)
 MOST_ROWS = 8  # listed in one note
 USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
 THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
@@ -28,7 +35,7 @@ MANY = 3  # labels from which a spread between runs or specimens can be estimate
 
 def read_case(
     data: Any,
-    gear: Path | str | None = None,
+    gear: Path | str | Mapping[str, Any] | None = None,
     *,
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
@@ -42,7 +49,10 @@ def read_case(
         data: a CSV file or a workbook (.xlsx), or a folder holding data.csv and
             gear.toml; or a DataFrame, or arrays by name, under the headers of such
             files.
-        gear: a gear file; by default the gear.toml beside the data.
+        gear: a gear file, or what would stand in one as a mapping, as in
+            `{"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}`; by
+            default the gear.toml beside the data, and where there is none a spring of
+            which only the stiffness is asked.
         columns: quantity -> header with its unit in brackets, `{"force": "Load[kgf]"}`,
             or the number of its column, `{"force": "2[kN]"}`; they stand for those of
             the gear file's table [columns].
@@ -59,14 +69,13 @@ def read_case(
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
     csv_path = data / DATA_NAME if folder else data
-    gear_path = Path(gear) if gear is not None else csv_path.parent / GEAR_NAME
     with Findings() as wrong:
         # The gear file may name the columns; what is wrong with it is told second.
-        found, of_gear = None, Findings()
-        if gear is None and (in_memory or not os.path.exists(gear_path)):
-            of_gear.append(_no_gear(data))
-        else:
-            found = of_gear.attempt(read_gear, gear_path, theory, material)
+        of_gear = Findings()
+        beside = None if in_memory else csv_path.parent / GEAR_NAME
+        found, told = of_gear.attempt(
+            _gear_of, gear, beside, folder, theory, material
+        ) or (None, ())
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns or {}
         measured = wrong.attempt(
@@ -87,14 +96,14 @@ def read_case(
         data_sha256=measured.columns.sha256,
         notes=(
             *measured.columns.notes,
-            *_unsaid(found),
-            *([_BESIDE] if gear is None and not folder else []),
+            *told,
             *_thick_wall(found),
             *_unusual_temperature(measured),
             *_left_out(measured.columns),
             *_off_scale(measured, found),
             *_resets(measured, motion),
         ),
+        columns=measured.columns.as_named(),
     )
 
 
@@ -163,11 +172,39 @@ def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
 def _left_out(columns: Columns) -> Iterator[str]:
     positions = {column.position for column in columns.used.values()}
     headers = enumerate(columns.table.headers)
-    extra = [quoted(header) for place, header in headers if place not in positions]
+    extra = [header for place, header in headers if place not in positions]
+    for header in extra:
+        guess = guess_header(header)
+        if guess is not None and not guess.unit and guess.quantity not in columns.used:
+            example = f"{guess.quantity} = '{header}[UNIT]'"
+            yield (
+                f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
+                f"used, as it names no unit. Name the column to use it, as in {example}"
+            )
     if extra:
-        yield f"columns not used: {', '.join(extra)}"
+        yield f"columns not used: {', '.join(map(quoted, extra))}"
     if skipped := columns.table.skipped:
         yield f"{skipped} empty lines between the readings were skipped"
+
+
+def _gear_of(
+    gear: Path | str | Mapping[str, Any] | None,
+    beside: Path | None,
+    folder: bool,
+    theory: str | None,
+    material: Path | None,
+) -> tuple[Gear, tuple[str, ...]]:
+    """Return the gear of a case, and what is to be told of how it was found."""
+    if gear is not None:
+        found = read_gear(gear, theory, material)
+        return found, tuple(_unsaid(found))
+    if beside is not None and (folder or os.path.exists(beside)):
+        found = read_gear(beside, theory, material)
+        return found, (*_unsaid(found), *([] if folder else [_BESIDE]))
+    if theory not in (None, SPRING) or material is not None:
+        words = "no gear file says the sizes that this needs"
+        raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
+    return unsized(), (UNSIZED,)
 
 
 def _unsaid(gear: Gear) -> Iterator[str]:
@@ -216,9 +253,3 @@ def _resets(measured: Measurements, motion: Motion) -> Iterator[str]:
             f"{', '.join(rows[:MOST_ROWS])}{more}), which counts as no measured "
             "unloading. Where a new mounting begins there, say so in a column `run`"
         )
-
-
-def _no_gear(data: Path) -> Finding:
-    words = "no gear file was named, and there is no gear.toml beside the data"
-    remedy = "Say `gear` FILE.toml, or use a folder with data.csv and gear.toml"
-    return Finding(str(data), words, remedy)

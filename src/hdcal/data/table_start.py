@@ -46,13 +46,15 @@ def find_start(text: str) -> TableStart | None:
         cells = {index: split_line(lines[index], separator) for index in filled}
         for place, first in enumerate(filled[:-1]):
             width = len(cells[first])
-            if width < 2 or not _is_reading(cells[first], width):
-                continue
-            # One of them may be spoiled: it is told of later.
-            block = filled[place : place + _READINGS]
-            if sum(_is_reading(cells[i], width) for i in block) < len(block) - 1:
+            if width < 2 or not is_reading(cells[first], width):
                 continue
             above = [index for index in filled[:place] if len(cells[index]) == width]
+            # One of them may be spoiled: it is told of later.
+            block = filled[place : place + _READINGS]
+            readings = sum(is_reading(cells[i], width) for i in block)
+            named = any(_names(cells[index]) for index in above[-2:])
+            if readings < len(block) - 1 and not named:
+                continue
             return _start(above, cells, filled[:place], first)
     return None
 
@@ -77,16 +79,17 @@ def is_number(cell: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
+def is_reading(cells: list[str], width: int) -> bool:
+    """Tell whether cells are as many as those of a reading, two of them numbers."""
+    numbers = sum(map(is_number, cells))
+    return len(cells) == width and numbers >= 2
+
+
 def unit_in(cell: str) -> str:
     """Return the unit that a cell holds and nothing else, empty without one."""
     bare = cell.strip("()[] ")
     known = any(known_unit(quantity, bare) for quantity in COLUMN_UNITS)
     return bare if known else ""
-
-
-def _is_reading(cells: list[str], width: int) -> bool:
-    numbers = sum(map(is_number, cells))
-    return len(cells) == width and numbers >= 2
 
 
 def _start(
@@ -100,7 +103,7 @@ def _start(
         every: filled lines above the readings.
         first: line of the readings.
     """
-    named = [i for i in above if any(guess_header(cell) for cell in cells[i])]
+    named = [i for i in above if _names(cells[i])]
     titled = bool(named) and above[0] not in named
     if above and above[0] == every[0] and all(cells[above[0]]) and not titled:
         # A whole first line names the columns, whatever is wrong below it.
@@ -112,6 +115,11 @@ def _start(
     if _are_units(cells, above[-1:]) and len(above) > 1:
         return TableStart(above[-2], above[-1], first)
     return TableStart(above[-1], None, first)
+
+
+def _names(cells: list[str]) -> bool:
+    """Tell whether cells are headers, some of a quantity that is known."""
+    return any(guess_header(cell) for cell in cells)
 
 
 def _are_units(cells: dict[int, list[str]], lines: list[int]) -> bool:

@@ -4,6 +4,7 @@ import codecs
 import hashlib
 from pathlib import Path
 
+from hdcal.data.array_files import HDF5, MATLAB, PARQUET, read_arrays
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.workbook import MARK, read_sheet
@@ -54,6 +55,9 @@ def read_text(
                     "is a workbook, which has no `encoding`", "Leave it out"
                 )
             return read_sheet(path, findings, sheet)
+        for kind in (PARQUET, MATLAB, HDF5):
+            if _begins_with(path, kind):
+                return read_arrays(path, findings, kind)
         if sheet is not None:
             findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
         raw = _stream(path, findings, wide=encoding is not None)

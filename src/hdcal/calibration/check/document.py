@@ -1,10 +1,14 @@
 """A check in words: the only place of its sentences."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from hdcal.calibration.check.answer import CheckAnswer, Ends
 from hdcal.data.measurements import ASSUMED
-from hdcal.report.document import Document, Facts, Section
+from hdcal.data.records import Records
+from hdcal.report.braille import scatter_lines
+from hdcal.report.document import Document, Facts, Section, Sentences
 
 HEADLINE = "The input is in order."
 DOUBTFUL = "The input can be read, but the stiffness it shows is not plausible."
@@ -32,22 +36,36 @@ OWN_SCATTER = (
 )
 
 
-def check_document(found: CheckAnswer) -> Document:
-    """Return the report of a check."""
+def check_document(
+    found: CheckAnswer, drawn: Records | None = None, *, lacking: bool = False
+) -> Document:
+    """Return the report of a check.
+
+    Args:
+        found: what was understood.
+        drawn: the readings, to be drawn with letters; None without a picture.
+        lacking: whether each effect that cannot be tested is listed.
+    """
+    sections = [Section("Data and gear", [Facts(list(_facts(found, lacking)))], True)]
+    if drawn is not None:
+        sections.append(Section("The readings", [Sentences(_picture(drawn))], True))
     return Document(
         name=found.case,
         kind="check",
         subtitle="what was read",
         headline=found.headline,
-        sections=[Section("Data and gear", [Facts(list(_facts(found)))], brief=True)],
+        sections=sections,
     )
 
 
-def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
+def _facts(found: CheckAnswer, lacking: bool) -> Iterator[tuple[str, str]]:
     data, gear = found.data, found.gear
     guessed = [note for note in found.notes if note.startswith(ASSUMED)]
     for note in guessed:
         yield "assumed", note.removeprefix(ASSUMED)
+    for note in found.notes:
+        if note not in guessed:
+            yield "note", note
     yield "gear", f"{gear.name}, {gear.material}, theory {gear.theory}"
     yield "rows", str(data.rows)
     for what, labels in (("runs", data.runs), ("specimens", data.specimens)):
@@ -66,11 +84,27 @@ def _facts(found: CheckAnswer) -> Iterator[tuple[str, str]]:
     yield "direction", ", ".join(f"{many} {word}" for word, many in moves if many)
     yield "also known", ", ".join(data.known) or "–"
     yield "effects to test", ", ".join(found.effects.testable)
-    for name, lack in found.effects.not_testable.items():
-        yield "not testable", f"{name}: needs {', '.join(lack)}"
-    for note in found.notes:
-        if note not in guessed:
-            yield "note", note
+    yield from _lacking(found, lacking)
+
+
+def _lacking(found: CheckAnswer, each: bool) -> Iterator[tuple[str, str]]:
+    """Yield what is needed to test the other effects, by effect or at once."""
+    lacking = found.effects.not_testable
+    if each:
+        for name, lack in lacking.items():
+            yield "not testable", f"{name}: needs {', '.join(lack)}"
+    elif lacking:
+        needs = dict.fromkeys(need for lack in lacking.values() for need in lack)
+        yield (
+            "not testable",
+            f"{len(lacking)} effects, for want of {', '.join(needs)} (--effects: each)",
+        )
+
+
+def _picture(records: Records) -> Sequence[str]:
+    labels = "deformation [mm]", "force [N]"
+    x, y = np.asarray(records.deformation), np.asarray(records.force)
+    return scatter_lines(x, y, labels)
 
 
 def _span(ends: Ends) -> str:

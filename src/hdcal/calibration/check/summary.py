@@ -20,6 +20,7 @@ from hdcal.calibration.check.document import (
 from hdcal.data.case import Case, Gear
 from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_schema import certificates_in
+from hdcal.data.gear_text import gear_text
 from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
@@ -59,6 +60,17 @@ def check_answer(case: Case) -> CheckAnswer:
         ),
         notes=(*doubt, *_scatter(case), *case.notes),
     )
+
+
+def gear_file(case: Case) -> str:
+    """Return a gear file for readings that came without one."""
+    gear = case.gear
+    measured = {
+        "deformation": gear.reading,
+        "reference_temperature_C": gear.reference_temperature,
+    }
+    named = {"name": case.name, "theory": gear.theory}
+    return gear_text(named, measured, case.columns)
 
 
 def _certificates(gear: Gear) -> tuple[StatedError, ...]:

@@ -55,14 +55,14 @@ def reserve_folder(
 
 
 def reserve_file(
-    target: Path | str, *, force: bool = False, beginning: str = ""
+    target: Path | str, *, force: bool = False, beginning: str | bytes = b""
 ) -> TargetFile:
     """Reserve a file; the rules are those of a folder.
 
     Args:
         target: the file to make.
-        force: whether an older table may be replaced.
-        beginning: of the text of such a table.
+        force: whether an older one may be replaced.
+        beginning: of such a file.
 
     Raises:
         InputError: it exists, is a folder, another process writes it, or its parent
@@ -75,10 +75,11 @@ def reserve_file(
         if not force:
             remedy = "Name another file, or say `force` to replace it"
             raise _refusal(target, "exists already", remedy)
-        _check(place, "`force` replaces such tables only: name another file")
+        _check(place, "`force` replaces such a file only: name another one")
 
+    begins = beginning.encode() if isinstance(beginning, str) else beginning
     with _refused(target):
-        return _reserve(partial(TargetFile, beginning=beginning), target, judge)
+        return _reserve(partial(TargetFile, beginning=begins), target, judge)
 
 
 def write_whole(target: Path | str, text: str) -> None:
@@ -92,7 +93,7 @@ def write_whole(target: Path | str, text: str) -> None:
     def judge(_: TargetFile) -> None:
         raise _refusal(target, "exists already", "Move it away")
 
-    make = partial(TargetFile, beginning="")
+    make = partial(TargetFile, beginning=b"")
     try:
         place = _reserve(make, target, judge, sweeping=False)
     except OSError as error:

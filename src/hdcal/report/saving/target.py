@@ -210,10 +210,10 @@ class TargetFile(Target):
     """A place for a file of its own.
 
     Attributes:
-        beginning: of the text of a table that may be replaced.
+        beginning: of a file that may be replaced.
     """
 
-    beginning: str
+    beginning: bytes
     # Size and SHA-256 of the table that was there when the place was reserved.
     _older: tuple[int, str] | None = field(default=None, init=False)
 
@@ -244,8 +244,8 @@ class TargetFile(Target):
             Foreign: it does not, or is not.
             OSError: it cannot be read.
         """
-        beginning = self.beginning.encode()
-        if not is_file(self.path) or _first(self.path, len(beginning)) != beginning:
+        begins = _first(self.path, len(self.beginning)) if is_file(self.path) else None
+        if begins != self.beginning:
             raise Foreign("is no table that hdcal wrote")
         found = size_and_sha256(self.path)
         if self._older not in (None, found):

@@ -1,0 +1,127 @@
+"""`hdcal init`: ask for what a gear file needs, and write a case folder."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import click
+
+from hdcal.cli.command import command
+from hdcal.cli.console import Console
+from hdcal.cli.options import json_option
+from hdcal.errors import Finding, InputError
+
+# Key of the gear file -> its option, what is asked, and the usual answer.
+_ASKED: dict[str, tuple[str, str, str | float | None]] = {
+    "wall_thickness_mm": ("--wall", "Wall thickness [mm]", None),
+    "radius_mm": ("--radius", "Radius, to the middle of the wall [mm]", None),
+    "length_mm": ("--length", "Length of the gear [mm]", None),
+    "material": ("--material", "Material", "steel"),
+    "deformation": ("--deformation", "Deformation as read, radial or diametral", None),
+    "reference_temperature_C": ("--temperature", "Reference temperature [°C]", 20.0),
+}
+_TEXTS = ("material", "deformation")
+
+
+def _asked(command):
+    for key, (option, words, default) in reversed(_ASKED.items()):
+        usual = "" if default is None else f" [default: {default}]"
+        kind = str if key in _TEXTS else float
+        add = click.option(option, key, type=kind, help=f"{words}{usual}.")
+        command = add(command)
+    return command
+
+
+@command(short_help="Ask for a gear's sizes, and write a case folder.")
+@click.argument("folder", metavar="FOLDER")
+@_asked
+@click.option("--data", metavar="FILE", help="Readings to copy there, as data.csv.")
+@json_option
+@click.pass_obj
+def init(console: Console, folder, data, **given):
+    """Write FOLDER with a gear file, from options or from answers to questions."""
+    stated = dict(_answers(given))
+    from hdcal.data.gear import read_gear
+    from hdcal.data.gear_text import gear_text
+    from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
+
+    tables = {"name": Path(folder).resolve().name, **stated}
+    case = None
+    with console.wrong:
+        if data is None:
+            console.wrong.attempt(read_gear, tables)
+        else:
+            case = console.wrong.attempt(read_case, data, tables)
+    measured = {
+        key: tables.pop(key) for key in ("deformation", "reference_temperature_C")
+    }
+    columns = {} if case is None else case.columns
+    files = {GEAR_NAME: gear_text(tables, measured, columns).encode()}
+    if data is not None:
+        files[DATA_NAME] = Path(data).read_bytes()
+    _write(Path(folder), files)
+    next_step = f"hdcal calibrate {folder} --out result"
+    if data is None:
+        next_step = f"put your readings there as {DATA_NAME}, then {next_step}"
+    console.words(f"{', '.join(files)} written into {folder}. Next: {next_step}")
+    if console.json:
+        console.data({"status": "ok", "folder": folder, "files": [*files]})
+    return 0
+
+
+def _answers(given: dict) -> Iterator[tuple[str, str | float]]:
+    """Yield what is stated, asking for what is not on a terminal.
+
+    Raises:
+        InputError: something has no usual answer, and nobody can be asked.
+    """
+    terminal = sys.stdin is not None and sys.stdin.isatty()
+    missing = [
+        Finding(option, "is not stated", "State it, or call hdcal from a terminal")
+        for key, (option, _, default) in _ASKED.items()
+        if given[key] is None and default is None and not terminal
+    ]
+    if missing:
+        raise InputError(missing)
+    for key, (_, words, default) in _ASKED.items():
+        if given[key] is not None:
+            yield key, given[key]
+        elif not terminal:
+            assert default is not None
+            yield key, default
+        else:
+            kind = str if key in _TEXTS else float
+            yield key, click.prompt(words, default=default, type=kind, err=True)
+
+
+def _write(folder: Path, files: dict[str, bytes]) -> None:
+    """Write files into a folder that may be there already; none of theirs is replaced.
+
+    Raises:
+        InputError: one of them is there already, or cannot be written.
+    """
+    from hdcal.report.saving.reserve import reserve_file
+
+    made = not folder.exists()
+    if made and not folder.parent.is_dir():
+        words = "its parent folder does not exist"
+        raise InputError([Finding(str(folder), words, "Make that first")])
+    if not made and not folder.is_dir():
+        raise InputError([Finding(str(folder), "is a file", "Name a folder")])
+    if there := [name for name in files if (folder / name).exists()]:
+        words = f"holds {' and '.join(there)} already"
+        raise InputError([Finding(str(folder), words, "Name another folder")])
+    if made:
+        folder.mkdir()
+    try:
+        with ExitStack() as held:
+            places = {
+                name: held.enter_context(reserve_file(folder / name)) for name in files
+            }
+            for name, content in files.items():
+                places[name].write(content)
+    except BaseException:
+        if made and not any(folder.iterdir()):
+            folder.rmdir()
+        raise

@@ -1,0 +1,85 @@
+"""What stands between and below the readings of a file: further blocks, and footers.
+
+A logger that is started again writes its titles and headers again: each block is a run.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hdcal.data.table_start import is_reading, split_line
+
+
+class Blocks(NamedTuple):
+    """Which lines below the first headers are readings.
+
+    Attributes:
+        extra: titles, headers, units and footers, shape (lines,).
+        block: number of the block that each line stands in, from 1, shape (lines,).
+        footers: the lines below the last reading.
+    """
+
+    extra: np.ndarray
+    block: np.ndarray
+    footers: int
+
+
+def find_blocks(
+    text: bytes,
+    lines: Sequence[bytes],
+    head: bytes,
+    units: bytes | None,
+    separator: str,
+    width: int,
+) -> Blocks:
+    """Return the blocks of a file.
+
+    Args:
+        text: the whole file.
+        lines: below the first headers and their units.
+        head: the line of those headers; empty without one.
+        units: the line of their units, or None.
+        separator: of the cells.
+        width: cells of a reading.
+    """
+
+    def reads(index: int) -> bool:
+        cells = split_line(lines[index].decode(), separator)
+        return is_reading(cells, width)
+
+    extra = np.zeros(len(lines), dtype=bool)
+    block = np.ones(len(lines), dtype=int)
+    wanted = head.strip()
+    again = bool(wanted) and text.count(wanted) > 1
+    for index in [
+        i for i, line in enumerate(lines) if again and line.strip() == wanted
+    ]:
+        extra[index] = True
+        block[index:] += 1
+        if units is not None and lines[index + 1 : index + 2] == [units]:
+            extra[index + 1] = True
+        above = index - 1
+        while above >= 0 and not extra[above] and not reads(above):
+            extra[above] = True
+            above -= 1
+    below = len(lines)
+    while below > 0 and _is_footer(lines[below - 1].decode(), separator, width):
+        below -= 1
+    filled = [bool(line.strip()) for line in lines[below:]]
+    if any(filled) and below > 0:
+        extra[below:] = True
+        return Blocks(extra, block, sum(filled))
+    return Blocks(extra, block, 0)
+
+
+def _is_footer(line: str, separator: str, width: int) -> bool:
+    """Tell whether a line holds words, and not as many cells as a reading.
+
+    A reading that breaks off holds numbers only, and is told of as such.
+    """
+    cells = [cell for cell in split_line(line, separator) if cell]
+    if not cells:
+        return True
+    worded = any(letter.isalpha() for letter in cells[0])
+    return worded and len(split_line(line, separator)) != width

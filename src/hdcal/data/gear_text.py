@@ -1,0 +1,42 @@
+"""Write a gear file: what is known of a gear and of its readings, as TOML."""
+
+import json
+from collections.abc import Iterator, Mapping
+
+_LEFT_OUT = """\
+# theory = "spring" asks for the stiffness alone. For a gear leave it out and state
+# its sizes instead:
+# wall_thickness_mm = 0.68
+# radius_mm = 40.0             # to the neutral surface
+# length_mm = 70.0
+# material = "steel"           # or the name of another one, or a file"""
+
+
+def gear_text(
+    gear: Mapping[str, str | float],
+    measurement: Mapping[str, str | float],
+    columns: Mapping[str, str],
+) -> str:
+    """Return the text of a gear file.
+
+    Args:
+        gear: the table [gear]; the keys that are known.
+        measurement: the table [measurement].
+        columns: quantity -> header with its unit, the table [columns].
+    """
+    tables = {"gear": gear, "measurement": measurement, "columns": columns}
+    return "\n".join(
+        line for name, rows in tables.items() for line in _table(name, rows)
+    )
+
+
+def _table(name: str, rows: Mapping[str, str | float]) -> Iterator[str]:
+    if not rows:
+        return
+    yield f"[{name}]"
+    for key, value in rows.items():
+        # A text in TOML's quotes is written as in JSON.
+        yield f"{key} = {json.dumps(value, ensure_ascii=False)}"
+    if rows.get("theory") == "spring":
+        yield _LEFT_OUT
+    yield ""

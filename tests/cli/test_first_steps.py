@@ -1,0 +1,103 @@
+"""The first hour with files of one's own: seen, drawn, described, begun."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import pytest
+from commands import Hdcal
+
+import hdcal as library
+
+LOG = "Weg [mm];Kraft [kN]\n" + "".join(f"0,{k}5;0,0{k}1\n" for k in range(1, 8))
+SIZES = ["--wall", ".68", "--radius", "40", "--length", "70"]
+BEGUN = [*SIZES, "--deformation", "diametral"]
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    path = tmp_path / "log.csv"
+    path.write_text(LOG)
+    return path
+
+
+def test_a_file_alone_is_shown_and_drawn(here: Hdcal, log: Path):
+    done = here("check", log)
+    assert done.returncode == 0
+    assert done.stdout.index("is a spring") < done.stdout.index("gear: part")
+    assert "'Kraft [kN]' is the force in kN" in done.stdout
+    picture = [line for line in done.stdout.splitlines() if "┤" in line]
+    # The first and the last reading, each in its corner.
+    assert picture[0].lstrip().startswith("71 ┤") and picture[-1][-60:-59] != "⠀"
+    assert picture[0][-1] != "⠀" and picture[0][-60:-59] == "⠀"
+
+
+def test_the_gear_file_it_writes_says_the_same(here: Hdcal, log: Path):
+    written = log.parent / "gear.toml"
+    assert here("check", log, "--write-gear", written).returncode == 0
+    columns = {"deformation": "Weg [mm]", "force": "Kraft [kN]"}
+    assert tomllib.loads(written.read_text())["columns"] == columns
+    found = json.loads(here("check", log, "--json").stdout)
+    assert not any("is the force" in note for note in found["notes"])
+    assert found["data"]["force_N"] == [11.0, 71.0]
+    # Beside a gear file there is no other to write.
+    again = here("check", log, "--write-gear", log.parent / "other.toml")
+    assert again.returncode == 2 and "--write-gear" in again.stderr
+    assert not (log.parent / "other.toml").exists()
+
+
+@pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
+def test_the_readings_as_a_picture(here: Hdcal, log: Path, ending, begins):
+    picture = log.with_suffix(f".{ending}")
+    done = here("check", log, "--plot", picture)
+    assert done.returncode == 0 and "┤" not in done.stdout
+    assert picture.read_bytes().startswith(begins)
+    refused = here("check", log, "--plot", picture)
+    assert refused.returncode == 2 and "exists already" in refused.stderr
+    assert here("check", log, "--plot", picture, "--force").returncode == 0
+    # What hdcal did not write is never replaced.
+    picture.write_text("mine")
+    assert here("check", log, "--plot", picture, "--force").returncode == 2
+    assert picture.read_text() == "mine"
+
+
+def test_a_case_is_begun(here: Hdcal, log: Path):
+    folder = log.parent / "rig"
+    done = here("init", folder, *BEGUN, "--data", log, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["files"] == ["gear.toml", "data.csv"]
+    case = library.read_case(folder)
+    assert (case.gear.reading, case.gear.theory) == ("diametral", "ring")
+    assert float(case.records.force[-1]) == 71.0
+    assert (folder / "data.csv").read_bytes() == log.read_bytes()
+    again = here("init", folder, *BEGUN)
+    assert again.returncode == 2 and "holds gear.toml already" in again.stderr
+
+
+def test_readings_may_lie_in_the_folder_already(here: Hdcal, log: Path):
+    assert here("init", log.parent, *BEGUN).returncode == 0
+    assert library.read_case(log).gear.reading == "diametral"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (SIZES, "--deformation: is not stated"),
+        (["--wall", "50", *BEGUN[2:]], "not thinner than the radius"),
+        ([*SIZES, "--deformation", "radiall"], "Did you mean 'radial'?"),
+        ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
+        ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),
+    ],
+)
+def test_nothing_is_begun_with_what_is_wrong(here: Hdcal, tmp_path, given, words):
+    done = here("init", tmp_path / "rig", *given)
+    assert done.returncode == 2 and words in done.stderr
+    assert not (tmp_path / "rig").exists()
+
+
+def test_a_case_cannot_begin_where_there_is_no_place(here: Hdcal, log: Path):
+    within = here("init", log.parent / "no" / "rig", *BEGUN)
+    assert within.returncode == 2 and "parent folder" in within.stderr
+    onto = here("init", log, *BEGUN)
+    assert onto.returncode == 2 and "is a file" in onto.stderr
+    assert log.read_text() == LOG
