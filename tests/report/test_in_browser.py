@@ -58,6 +58,9 @@ def test_every_figure_shows(seen: Seen, place: str):
         assert 0.5 * room < image["width"] <= room
         assert image["height"] > 50
     assert frame["text"] > 1000
+    # One answer first: the rest is folded, but on paper.
+    assert frame["first"] < (1500 if place != "paper" else 1e6)
+    assert frame["first"] == frame["text"] or place != "paper"
 
 
 @pytest.mark.parametrize("place", WIDTHS)

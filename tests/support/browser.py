@@ -45,6 +45,10 @@ function measure(name, frame) {
     for (const sheet of page.styleSheets) for (const rule of sheet.cssRules)
       if (rule instanceof frame.contentWindow.CSSMediaRule)
         rule.media.mediaText = rule.media.mediaText === "print" ? "all" : "not all";
+  const first = page.body.innerText.length;
+  // On paper everything is open by itself.
+  if (name !== "paper")
+    for (const folded of page.querySelectorAll("details")) folded.open = true;
   const inside = node => node.parentElement && node.parentElement.closest(".wide");
   const past = [...page.body.querySelectorAll("*")].filter(node =>
     node.getBoundingClientRect().right > root.clientWidth + 1 &&
@@ -52,8 +56,10 @@ function measure(name, frame) {
   found[name] = {
     width: root.scrollWidth,
     past: past.map(node => node.outerHTML.slice(0, 80)),
+    first: first,
     text: page.body.innerText.length,
-    images: [...page.images].map(image => {
+    canvases: page.querySelectorAll("canvas").length,
+    images: [...page.images].filter(image => image.offsetParent).map(image => {
       const box = image.getBoundingClientRect();
       return {natural: image.naturalWidth, width: box.width, height: box.height};
     }),
@@ -74,13 +80,28 @@ for (const name in widths) {
 }
 </script>"""
 
+_PLAY = """<!DOCTYPE html><meta charset="utf-8"><body><script>
+const frame = document.createElement("iframe");
+frame.style = "border: 0; height: 2000px; width: %(width)spx";
+frame.onload = async () => {
+  const result = document.createElement("pre");
+  const act = async page => { %(script)s };
+  result.textContent = JSON.stringify(await act(frame.contentDocument));
+  result.id = "found";
+  document.body.append(result);
+};
+frame.src = %(page)s;
+document.body.append(frame);
+</script>"""
+
 
 @dataclass(frozen=True)
 class Seen:
     """What the browser made of a page.
 
     Attributes:
-        frames: by phone, desk and paper: width, what lies past it, text and images.
+        frames: by phone, desk and paper: width, what lies past it, images that show,
+            canvases, letters of the text, and those before anything is unfolded.
         complaints: lines of the browser's console.
         requests: everything that was asked of the network.
     """
@@ -103,17 +124,35 @@ def chromium() -> str:
 def look(page: Path, scratch: Path) -> Seen:
     """Open a page as wide as a phone, a desk's screen and a sheet of paper."""
     widths = {"phone": PHONE, "desk": DESK, "paper": PAPER}
-    measuring = scratch / "measuring.html"
     text = {"widths": json.dumps(widths), "page": json.dumps(page.as_uri())}
-    measuring.write_text(_MEASURE % text, "utf-8")
     log = scratch / "network.json"
+    found, complaints = _found(_MEASURE % text, scratch, f"--log-net-log={log}")
+    return Seen(found, complaints, _requests(log))
+
+
+def play(page: Path, scratch: Path, script: str) -> dict:
+    """Open a page in a frame, and return what a script beside it finds.
+
+    Args:
+        page: as wide as a desk's screen.
+        scratch: a folder.
+        script: body of an asynchronous function of `page`, the document in the frame.
+    """
+    text = {"script": script, "page": json.dumps(page.as_uri()), "width": DESK}
+    return _found(_PLAY % text, scratch)[0]
+
+
+def _found(measuring: str, scratch: Path, *options: str) -> tuple[dict, list[str]]:
+    """Return what a measuring page found, and what the browser complained of."""
+    place = scratch / "measuring.html"
+    place.write_text(measuring, "utf-8")
     # Time inside the page runs ahead, so that it waits for nothing of its own.
-    options = [f"--log-net-log={log}", "--dump-dom", "--virtual-time-budget=20000"]
-    done = _run(scratch, [*options, measuring.as_uri()])
+    asked = ["--dump-dom", "--virtual-time-budget=20000", *options, place.as_uri()]
+    done = _run(scratch, asked)
     result = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
     assert result, done.stdout[-2000:] + done.stderr[-2000:]
     complaints = [line for line in done.stderr.splitlines() if "CONSOLE" in line]
-    return Seen(json.loads(unescape(result[1])), complaints, _requests(log))
+    return json.loads(unescape(result[1])), complaints
 
 
 def print_pages(page: Path, scratch: Path) -> int:

@@ -30,6 +30,14 @@ class ResidualShape:
     words: Words
 
 
+@dataclass(frozen=True)
+class LocalStiffness:
+    """The slope of a parabola through the readings, by least squares, at one place."""
+
+    deformation_mm: float
+    stiffness_N_per_mm: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class CalibrationAnswer(PosteriorAnswer):
     """What `hdcal calibrate` answers; summary.json.
@@ -41,6 +49,7 @@ class CalibrationAnswer(PosteriorAnswer):
         next_steps: what would make the answer better, most urgent first.
         effects: in the model.
         with_gap: whether the model has a leftover discrepancy.
+        bend: where the residuals of a straight line bend, its slope at both ends.
     """
 
     schema: Literal["hdcal.calibration/1"] = "hdcal.calibration/1"
@@ -54,3 +63,4 @@ class CalibrationAnswer(PosteriorAnswer):
     next_steps: Sentences
     effects: tuple[str, ...]
     with_gap: bool
+    bend: tuple[LocalStiffness, ...] = ()

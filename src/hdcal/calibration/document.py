@@ -1,9 +1,9 @@
 """A calibration in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
-from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.calibration.answer import CalibrationAnswer, LocalStiffness
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.checks import PLAUSIBLE
 from hdcal.inference.posterior import Posterior
@@ -41,14 +41,17 @@ _REMEDY: Mapping[str, str] = {
     "curvature": "Unload as well as load, take finer steps at small deformation, or "
     "re-seat the gear and repeat: each separates some causes of curvature.",
     "end": "Take more readings near the largest deformation, loading and unloading.",
-    "direction": "Try the effect coulomb_friction.",
-    "temperature": "Try the effect thermal_zero_drift.",
+    "direction": "Diagnose: `hdcal diagnose` weighs what can part loading from "
+    "unloading, friction and hysteresis among it.",
+    "temperature": "Diagnose: `hdcal diagnose` weighs what a change of temperature "
+    "does.",
     "temperature x deformation": "Check the prior of alpha for this material.",
-    "time": "Try the effect charge_leakage, and repeat the first point at the end.",
+    "time": "Diagnose: `hdcal diagnose` weighs what drifts. Repeat the first point at "
+    "the end.",
     "order": "Repeat the first point at the end: it tells drift from stiffness.",
     NEIGHBOURS: "Repeat the ramp in other mountings: their scatter tells what "
     "neighbours that err alike hide.",
-    SCATTER: "Try the effect heteroscedastic_noise.",
+    SCATTER: "Calibrate with the effect heteroscedastic_noise.",
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
@@ -58,12 +61,24 @@ _LACKING: Mapping[str, str] = {
 }
 
 
-def headline(found: Interval) -> str:
-    """Return the stiffness at the reference temperature in one sentence."""
+def headline(found: Interval, bend: Sequence[LocalStiffness] = ()) -> str:
+    """Return the stiffness at the reference temperature in one sentence.
+
+    Args:
+        found: of a straight line.
+        bend: its slope at several places, where the readings bend.
+    """
     middle, span = estimate(found)
+    slopes = " to ".join(
+        f"{each.stiffness_N_per_mm:.3g} N/mm at {each.deformation_mm:.2g} mm"
+        for each in bend
+    )
+    told = (
+        f". That is a straight line; the readings bend, from {slopes}" if bend else ""
+    )
     return (
         f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
-        f"interval {span} N/mm, per millimetre as read."
+        f"interval {span} N/mm, per millimetre as read{told}."
     )
 
 
@@ -95,7 +110,7 @@ def calibration_document(
         f"({found.data.name}), theory “{found.gear.theory}”"
         f"{', with ' * bool(effects)}{effects}.",
         # Of a failed calibration the page shows it struck through.
-        headline=headline(found.stiffness_N_per_mm),
+        headline=headline(found.stiffness_N_per_mm, found.bend),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[
@@ -108,7 +123,7 @@ def calibration_document(
             *_theories(found),
             _residuals(found),
             check_section(found.checks),
-            Section("Data", [Facts(data_rows(posterior.case))]),
+            Section("Data", [Facts(data_rows(posterior.case))], appendix=True),
             prior_section(posterior),
         ],
         provenance=provenance_rows(posterior, command),
@@ -175,7 +190,8 @@ def _theories(found: CalibrationAnswer) -> Iterator[Section]:
         "Data identify the stiffness only, that is K times the theory's stiffness; the "
         "rows are one posterior seen through each theory."
     )
-    yield Section("K under each theory", [table, Text(one), Text(found.K_note)])
+    blocks = [table, Text(one), Text(found.K_note)]
+    yield Section("K under each theory", blocks, appendix=True)
 
 
 def _residuals(found: CalibrationAnswer) -> Section:

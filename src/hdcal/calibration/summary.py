@@ -1,8 +1,15 @@
 """A calibration as an answer, and all that its result folder holds."""
 
+from collections.abc import Iterator
 from functools import cache
 
-from hdcal.calibration.answer import CalibrationAnswer, ResidualShape
+import numpy as np
+
+from hdcal.calibration.answer import (
+    CalibrationAnswer,
+    LocalStiffness,
+    ResidualShape,
+)
 from hdcal.calibration.document import (
     ARTICLE_NOTE,
     calibration_document,
@@ -14,10 +21,14 @@ from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.report.document import spoken_of
 from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report
+
+# Where the slope of a bend is told: shares of the readings below.
+NEAR_ENDS = (0.1, 0.9)
 
 
 def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
@@ -42,7 +53,8 @@ def calibration_answer(
     left = left or residuals(posterior)
     steps = tuple(next_steps(posterior, left))
     stiffness = credible_interval(posterior.draws["stiffness"])
-    entries = posterior_entries(posterior, headline(stiffness), steps)
+    bend = tuple(_bend(posterior, left))
+    entries = posterior_entries(posterior, headline(stiffness, bend), steps)
     found = *left.structure, *left.noise
     entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(
@@ -56,7 +68,20 @@ def calibration_answer(
         next_steps=steps,
         effects=tuple(effect.name for effect in posterior.effects),
         with_gap=bool(posterior.settings["with_gap"]),
+        bend=bend,
     )
+
+
+def _bend(posterior: Posterior, left: Residuals) -> Iterator[LocalStiffness]:
+    """Yield the slope near both ends of a curve that a straight line does not fit."""
+    seen = any(shape.name == "curvature" for shape in left.structure)
+    if not seen or posterior.effects or posterior.settings["with_gap"]:
+        return
+    parabola = np.polyfit(left.deformation, left.measured, 2)
+    for place in np.quantile(left.deformation, NEAR_ENDS):
+        yield LocalStiffness(
+            float(place), float(np.polyval(np.polyder(parabola), place))
+        )
 
 
 def calibration_report(
@@ -82,14 +107,23 @@ def calibration_report(
             "sampler": sampler_figure(posterior),
         }
 
+    def charts():
+        from hdcal.calibration.chart import calibration_charts
+
+        # Of a failed calibration there is the marked figure alone.
+        if not posterior.usable:
+            return {}
+        return {"calibration": calibration_charts(posterior, bands(), left)}
+
     return Report(
-        calibration_document(posterior, found, command),
+        spoken_of(calibration_document(posterior, found, command), posterior.theory),
         found,
         "summary.json",
         figures,
         kept=["calibration"],
         tables=lambda: {"bands.csv": bands().columns()},
         others=lambda: [(FILE_NAME, posterior.to_netcdf())],
+        charts=charts,
     )
 
 

@@ -73,12 +73,16 @@ def verdict_document(
             _corrected(found, refit),
             Section("What this cannot say", [Sentences(found.limits)], brief=True),
             *([Section("Remarks", [Sentences(found.notes)], True)] * bool(found.notes)),
-            *([] if case is None else [Section("Data", [Facts(data_rows(case))])]),
+            *([] if case is None else [_data(case)]),
         ],
         provenance=[] if case is None else _provenance(case, found, command),
         failed=found.reasons,
         failed_words=_FAILED,
     )
+
+
+def _data(case: Case) -> Section:
+    return Section("Data", [Facts(data_rows(case))], appendix=True)
 
 
 def _next_runs(found: VerdictAnswer) -> Section:

@@ -7,7 +7,7 @@ from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.many_cases import REFUSED, AskedCases, Refused
 from hdcal.diagnosis.words import count_words, verdict_word
-from hdcal.report.document import Document, Section, Table
+from hdcal.report.document import Document, Section, Table, spoken_of
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
 from hdcal.report.words import hypothesis, known, newton, percent
@@ -27,7 +27,7 @@ def document_and_answer(
     """
     if not asked.many:
         (one,) = found.values()
-        return verdict_document(one), one
+        return spoken_of(verdict_document(one), one.gear.theory), one
     together = verdicts_answer(found, asked.refused)
     return overview_document(together), together
 

@@ -15,6 +15,7 @@ from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.report.document import spoken_of
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
 
@@ -98,7 +99,9 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
         return drawn
 
     return Report(
-        verdict_document(found, verdict.case, command, refit),
+        spoken_of(
+            verdict_document(found, verdict.case, command, refit), found.gear.theory
+        ),
         found,
         "verdict.json",
         figures,

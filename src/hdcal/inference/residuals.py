@@ -29,6 +29,9 @@ from hdcal.inference.values import correlation_of, predict_rows
 # posterior's own.
 _DRAWS = 200
 
+# How a warning begins that a shape is left in the residuals.
+SHAPED = "This takes the model's shape for right, but its residuals have one."
+
 
 @dataclass(frozen=True)
 class Residuals:
@@ -156,8 +159,7 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     remedy = "Diagnose, or calibrate with a gap" if plain else "Diagnose"
     return (
         *(
-            "This takes the model's shape for right, but its residuals have one. "
-            f"{shape.words.rstrip('.')}. {remedy}."
+            f"{SHAPED} {shape.words.rstrip('.')}. {remedy}."
             for shape in (left.structure if shapes else ())
         ),
         *(fault.words for fault in left.noise),

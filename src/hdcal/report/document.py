@@ -4,10 +4,15 @@ A document holds texts and the names of figures, no numbers and no files: `html_
 `terminal_lines` and `notebook_html` show it, each in its own medium.
 """
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any, ClassVar, Literal
 
+from hdcal.data.theory_names import SPRING
+
+# Sentences beside the headline: the first screen has three in all.
+MOST_SAID = 2
 Tone = Literal["good", "caution", "bad", "neutral"]
 
 
@@ -114,11 +119,13 @@ class Section:
         heading: of the section.
         blocks: in their order; figures are left out in a terminal.
         brief: shown also where room is scarce, in a terminal and in a notebook.
+        appendix: how the answer was come by; after all that says something of it.
     """
 
     heading: str
     blocks: Sequence[Block]
     brief: bool = False
+    appendix: bool = False
 
 
 @dataclass(frozen=True)
@@ -139,7 +146,7 @@ class Document:
         kind: what it is, such as "calibration".
         subtitle: one sentence below the name.
         headline: the answer in one sentence.
-        answers: sentences that complete it.
+        answers: sentences that complete it; the first ones stand beside the headline.
         next_steps: what to do next, most urgent first.
         notices: what to be aware of.
         sections: the evidence.
@@ -164,6 +171,27 @@ class Document:
     )
 
     @property
+    def said(self) -> Sequence[str]:
+        """Return what is said at once, beside the headline."""
+        return self.answers[:MOST_SAID]
+
+    @property
+    def more(self) -> Sequence[str]:
+        """Return what else completes the answer."""
+        return self.answers[MOST_SAID:]
+
+    @property
+    def lead(self) -> Picture | None:
+        """Return the picture that is shown beside the answer; None without one."""
+        pictures = (
+            block
+            for section in self.sections
+            for block in section.blocks
+            if isinstance(block, Picture)
+        )
+        return next(pictures, None)
+
+    @property
     def next_step(self) -> str | None:
         """Return the most urgent of the next steps, or None."""
         return self.next_steps[0] if self.next_steps else None
@@ -174,3 +202,48 @@ def notices(
 ) -> tuple[Notice, ...]:
     """Return notices by title; those without a sentence are left out."""
     return tuple(Notice(title, said, tone) for title, said in found if said)
+
+
+# "gear", where it is not the file of that name.
+_GEAR = re.compile(r"\b([Gg])ear(s?)\b(?! file|\.toml)")
+
+
+def spoken_of(document: Document, theory: str) -> Document:
+    """Return a document that speaks of a part where no gear need be meant.
+
+    What is measured as a spring may be anything that gives way. What a user named
+    stays: it stands in the name, the subtitle and the appendix.
+
+    Args:
+        document: written of a gear.
+        theory: of the model.
+    """
+    if theory != SPRING:
+        return document
+    sections = [
+        section if section.appendix else _of_part(section)
+        for section in document.sections
+    ]
+    said = _of_part(replace(document, sections=(), provenance=()))
+    return replace(
+        said,
+        name=document.name,
+        subtitle=document.subtitle,
+        sections=sections,
+        provenance=document.provenance,
+    )
+
+
+def _of_part(held: Any) -> Any:
+    """Return a document or a piece of one, in other words."""
+    if isinstance(held, str):
+        told = held.replace("influence coefficient K", "stiffness K")
+        return _GEAR.sub(lambda g: ("P" if g[1] == "G" else "p") + f"art{g[2]}", told)
+    if is_dataclass(held) and not isinstance(held, type):
+        # A picture is called for by its name.
+        kept = {"name"} if isinstance(held, Picture) else set()
+        changed = {f.name for f in fields(held)} - kept
+        return replace(held, **{n: _of_part(getattr(held, n)) for n in changed})
+    if isinstance(held, list | tuple | frozenset):
+        return type(held)(map(_of_part, held))
+    return held

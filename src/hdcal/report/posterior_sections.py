@@ -81,7 +81,7 @@ def check_section(checks: Sequence[Check]) -> Section:
         for check in checks
     ]
     table = Table(columns, rows, long=frozenset({"what was found"}))
-    return Section("Checks", [table, _SAMPLER])
+    return Section("Checks", [table, _SAMPLER], appendix=True)
 
 
 def prior_section(posterior: Posterior) -> Section:
@@ -92,4 +92,5 @@ def prior_section(posterior: Posterior) -> Section:
         if name in posterior.draws
     ]
     columns = ["parameter", "believed before the data", "source"]
-    return Section("Priors", [Table(columns, rows, long=frozenset({"source"}))])
+    table = Table(columns, rows, long=frozenset({"source"}))
+    return Section("Priors", [table], appendix=True)

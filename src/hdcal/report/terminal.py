@@ -40,7 +40,10 @@ def terminal_lines(
         yield RichText("FAILED: this result must not be used.", "bold red")
         yield from _lines(document.failed, "red")
     else:
-        yield from _lines([document.headline, *document.answers], indent=0)
+        yield from _lines([document.headline, *document.said], indent=0)
+        if document.more:
+            yield RichText("\nIn detail", "bold")
+            yield from _lines(document.more)
     for section in document.sections:
         if section.brief:
             yield RichText(f"\n{printable(section.heading)}", "bold")
@@ -48,7 +51,7 @@ def terminal_lines(
                 yield from _block(block)
     for notice in document.notices:
         yield from _titled(notice.title, notice.sentences, _COLOURS[notice.tone])
-    yield from _titled("What to do next", document.next_steps)
+    yield from _titled("What to do next", document.next_steps[:1])
     if folder is not None:
         how = f"  (open {opened})" if opened else ""
         yield RichText(f"\nThe result: {printable(folder)}{how}")

@@ -1,12 +1,13 @@
 """A report's files: the page, the JSON answer, the figures and the tables."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 
+from hdcal.report.chart import Chart
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document
 from hdcal.report.html import html_page
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 A = TypeVar("A", covariant=True)
 Tables = Mapping[str, Mapping[str, np.ndarray]]
+Charts = Mapping[str, Sequence[Chart]]
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Report(Generic[A]):
             all of them.
         tables: makes the columns of the CSV files, by the names of the files.
         others: makes the content of other files, each with its name.
+        charts: the document's pictures that can be touched, by name.
     """
 
     document: Document
@@ -44,6 +47,7 @@ class Report(Generic[A]):
     kept: Collection[str] | None = None
     tables: Callable[[], Tables] = dict
     others: Callable[[], Iterable[tuple[str, bytes]]] = tuple
+    charts: Callable[[], Charts] = dict
 
 
 def write_report(report: Report, target: TargetFolder) -> None:
@@ -58,7 +62,9 @@ def write_report(report: Report, target: TargetFolder) -> None:
         NotWritable: the disk refused.
     """
     # Drawn before the folder is begun: what fails there touches no disk.
-    files = report_files(report.document, report.figures(), report.kept)
+    files = report_files(
+        report.document, report.figures(), report.kept, report.charts()
+    )
     with target.filled() as folder:
         write_numbers(report, folder)
         write_files(files, folder)
@@ -83,6 +89,7 @@ def report_files(
     document: Document,
     figures: Mapping[str, "Figure"],
     kept: Collection[str] | None = None,
+    charts: Charts | None = None,
 ) -> dict[str, bytes]:
     """Return the page and the pictures of a report by the names of their files.
 
@@ -90,12 +97,14 @@ def report_files(
         document: the report.
         figures: of the document's pictures, by name.
         kept: figures that become files of their own too; by default all of them.
+        charts: pictures that can be touched, by name.
     """
     from hdcal.report.canvas import render
 
     title = f"{document.name}: {document.kind}"
     images = {name: render(figure, "svg", title) for name, figure in figures.items()}
-    files = {PAGE: html_page(document, images).encode("utf-8", "xmlcharrefreplace")}
+    page = html_page(document, images, charts=charts)
+    files = {PAGE: page.encode("utf-8", "xmlcharrefreplace")}
     for name in figures if kept is None else kept:
         files[f"{name}.svg"] = images[name]
         files[f"{name}.png"] = render(figures[name], "png", title)

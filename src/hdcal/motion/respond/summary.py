@@ -10,6 +10,7 @@ from hdcal.motion.respond.answer import (
 )
 from hdcal.motion.respond.document import headline, next_steps, response_document
 from hdcal.motion.respond.respond import Response
+from hdcal.report.document import spoken_of
 from hdcal.report.parameters import INTERVAL
 from hdcal.report.write import Report
 
@@ -54,7 +55,10 @@ def response_report(response: Response, command: str = "") -> Report[ResponseAns
 
     found = response_answer(response)
     return Report(
-        response_document(response, found, command),
+        spoken_of(
+            response_document(response, found, command),
+            response.posterior.case.gear.theory,
+        ),
         found,
         "response.json",
         figures,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from hdcal.inference.residuals import SHAPED
 from hdcal.prediction.margin.number_words import (
     NEARLY_ALL,
     RAREST,
@@ -85,8 +86,13 @@ def headline(found: Margin) -> str:
 
 
 def next_steps(found: Margin) -> Iterator[str]:
-    """Yield what to do about a small capacity and about untested conditions."""
+    """Yield what to do about what the model lacks, a small capacity, or no test."""
     level, limit = found.worst, found.limit_force_N
+    if any(words.startswith(SHAPED) for words in found.remarks):
+        yield (
+            "Diagnose before you rely on this, or calibrate with a gap: the residuals "
+            "have a shape that these bounds leave out."
+        )
     if limit is not None and limit < level.capacity_N:
         yield (
             f"Provide {newtons(level.capacity_N)}{in_tension(found)}: that is enough "

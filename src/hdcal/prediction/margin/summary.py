@@ -13,6 +13,7 @@ from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
 from hdcal.prediction.margin.stated import BudgetLine
+from hdcal.report.document import spoken_of
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report
 
@@ -82,6 +83,7 @@ def margin_report(
 
     answer = margin_answer(found, posterior, seed=seed)
     document = whole_document(answer, posterior, command)
+    document = spoken_of(document, posterior.theory)
     others = []
     if certificate is not None:
         page = certificate_page(answer, posterior, certificate)

@@ -1,0 +1,104 @@
+"""A picture that one can touch: its numbers, for a browser that may run scripts.
+
+What is drawn beside it as an image is shown on paper and where no script runs.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+# Digits of a number: more than a screen shows when it is zoomed in.
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Series:
+    """One curve, or one set of points.
+
+    Attributes:
+        label: what it is called beside its value.
+        x: shape (n,); of a curve in ascending order.
+        y: shape (n,); NaN where there is nothing.
+        colour: #RRGGBB; empty for that of the text around it.
+        points: drawn as points, else as a line.
+        width: of the line; 0 for the edge of a band.
+        dashed: whether the line is.
+    """
+
+    label: str
+    x: np.ndarray
+    y: np.ndarray
+    colour: str
+    points: bool = False
+    width: float = 2.0
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Series over one axis.
+
+    Attributes:
+        x: what the axis shows, with its unit.
+        y: likewise.
+        series: in the order of the legend.
+        bands: pairs of series (upper, lower) by their places, and the opacity of what
+            lies between them.
+        height: in pixels.
+    """
+
+    x: str
+    y: str
+    series: Sequence[Series]
+    bands: Sequence[tuple[int, int, float]] = field(default=())
+    height: int = 380
+
+    def plain(self) -> dict:
+        """Return it as the page's script takes it: all series over the same places."""
+        shared = [series.x for series in self.series if not series.points]
+        places = [np.unique(np.concatenate(shared))] if shared else []
+        places += [series.x for series in self.series if series.points]
+        over = np.concatenate(places)
+        order = np.argsort(over, kind="stable")
+        begin, columns = len(over) - sum(len(x) for x in places[bool(shared) :]), []
+        for series in self.series:
+            if series.points:
+                column = np.full(len(over), np.nan)
+                column[begin : begin + len(series.y)] = series.y
+                begin += len(series.y)
+            else:
+                outside = {"left": np.nan, "right": np.nan}
+                column = np.interp(over, series.x, series.y, **outside)
+            columns.append(column)
+        return {
+            "x": self.x,
+            "y": self.y,
+            "height": self.height,
+            "bands": [list(band) for band in self.bands],
+            "series": [
+                {
+                    "label": each.label,
+                    "colour": each.colour,
+                    "points": each.points,
+                    "width": each.width,
+                    "dashed": each.dashed,
+                }
+                for each in self.series
+            ],
+            "data": [_numbers(column[order]) for column in (over, *columns)],
+        }
+
+
+def charts_json(charts: Sequence[Chart]) -> str:
+    """Return charts as the text of a script element, in which nothing can end it."""
+    text = json.dumps([chart.plain() for chart in charts], separators=(",", ":"))
+    return text.replace("<", "\\u003c")
+
+
+def _numbers(values: np.ndarray) -> list[float | None]:
+    return [
+        float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
+        for value in values
+    ]

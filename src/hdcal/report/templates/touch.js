@@ -1,0 +1,100 @@
+// Puts charts that one can touch in the place of images: drag to zoom, wheel too, drag
+// with shift to pan, click twice to see all again. Without this the images stay.
+"use strict";
+function touch(figure) {
+  const charts = JSON.parse(figure.querySelector("script").textContent);
+  const room = document.createElement("div");
+  room.className = "touch";
+  const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name);
+  const sync = uPlot.sync(Math.random().toString());
+  let drawn = [];
+
+  function limits(plot, low, high) {
+    for (const each of drawn) each.setScale("x", {min: low, max: high});
+  }
+
+  function moving(plot) {
+    const over = plot.over;
+    over.addEventListener("wheel", event => {
+      event.preventDefault();
+      const at = plot.posToVal(event.offsetX, "x"), by = event.deltaY < 0 ? 0.8 : 1.25;
+      const {min, max} = plot.scales.x;
+      limits(plot, at - (at - min) * by, at + (max - at) * by);
+    }, {passive: false});
+    over.addEventListener("mousedown", down => {
+      if (!down.shiftKey) return;
+      down.stopImmediatePropagation();
+      const {min, max} = plot.scales.x, from = down.clientX;
+      const unit = (max - min) / over.clientWidth;
+      const move = event => {
+        const shift = (from - event.clientX) * unit;
+        limits(plot, min + shift, max + shift);
+      };
+      const up = () => {
+        document.removeEventListener("mousemove", move);
+        document.removeEventListener("mouseup", up);
+      };
+      document.addEventListener("mousemove", move);
+      document.addEventListener("mouseup", up);
+    }, {capture: true});
+  }
+
+  function shown(value) {
+    return value == null ? "–" : Number(value.toPrecision(5)).toString();
+  }
+
+  function draw() {
+    for (const plot of drawn) plot.destroy();
+    const line = ink("--line"), text = ink("--soft");
+    const hue = each => each.colour || ink("--ink").trim();
+    const every = charts.flatMap(chart => chart.data[0]);
+    const ends = {min: Math.min(...every), max: Math.max(...every)};
+    const margin = 0.02 * (ends.max - ends.min);
+    drawn = charts.map(chart => new uPlot({
+      width: room.clientWidth,
+      height: Math.min(chart.height, 0.9 * room.clientWidth),
+      cursor: {sync: {key: sync.key, scales: ["x", null]}, drag: {x: true, y: false}},
+      scales: {x: {time: false, range: (_, low, high) =>
+        low === ends.min && high === ends.max ? [low - margin, high + margin] : [low, high]}},
+      legend: {markers: {
+        width: 0, fill: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
+      }},
+      axes: [chart.x, chart.y].map(label => ({
+        label: label, stroke: text, grid: {stroke: line, width: 1},
+        ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
+      })),
+      series: [{label: chart.x, value: (_, value) => shown(value)}].concat(
+        chart.series.map(each => ({
+          label: each.label, stroke: hue(each), width: each.points ? 0 : each.width,
+          dash: each.dashed ? [3, 4] : undefined,
+          paths: each.points ? () => null : undefined,
+          points: {show: each.points, size: 6, fill: hue(each), width: 0},
+          value: (_, value) => shown(value),
+        }))),
+      bands: chart.bands.map(([high, low, strength]) => ({
+        series: [high + 1, low + 1],
+        fill: chart.series[high].colour +
+          Math.round(255 * strength).toString(16).padStart(2, "0"),
+      })),
+      hooks: {ready: [moving]},
+    }, chart.data, room));
+    drawn.forEach((plot, which) => {
+      sync.sub(plot);
+      // Ends of bands are told of one curve; of several they would fill the page.
+      const edges = charts[which].series.map(each => !each.points && each.width === 0);
+      if (charts[which].bands.length < 4) return;
+      const rows = plot.root.querySelectorAll(".u-legend .u-series");
+      edges.forEach((edge, k) => { if (edge) rows[k + 1].hidden = true; });
+    });
+  }
+
+  figure.querySelector("img").after(room);
+  figure.classList.add("touched");
+  draw();
+  new ResizeObserver(() => {
+    for (const plot of drawn)
+      plot.setSize({width: room.clientWidth, height: Math.min(plot.height, 0.9 * room.clientWidth)});
+  }).observe(room);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+}
+for (const figure of document.querySelectorAll("figure[data-touch]")) touch(figure);

@@ -1,0 +1,75 @@
+"""Pictures that one can touch: the same numbers, and a browser that moves them."""
+
+import json
+
+import numpy as np
+import pytest
+from browser import Seen, look, play
+from commands import Done
+
+from hdcal.report.chart import Chart, Series, charts_json
+
+X = np.array([0.0, 1.0, 2.0, 3.0])
+CURVE = Series("curve </script>", X, 10.0 * X, "#0072B2")
+TORN = Series("torn", X, np.array([0.0, 1.0, np.nan, 3.0]), "#0072B2")
+POINTS = Series(
+    "points", np.array([2.5, 0.5, 0.5]), np.array([1.0, 2.0, 3.0]), "", True
+)
+CHART = Chart("x [mm]", "y [N]", [CURVE, TORN, POINTS], [(0, 1, 0.2)])
+
+
+def test_series_share_their_places():
+    """Curves go on where points lie, by a straight line; points are nowhere else."""
+    text = charts_json([CHART])
+    assert "</script>" not in text
+    (plain,) = json.loads(text)
+    x, curve, torn, points = plain["data"]
+    assert x == [0.0, 0.5, 0.5, 1.0, 2.0, 2.5, 3.0]
+    assert curve == [10.0 * at for at in x]
+    assert torn == [0.0, 0.5, 0.5, 1.0, None, None, 3.0]
+    assert points == [None, 2.0, 3.0, None, None, 1.0, None]
+    assert plain["series"][0]["label"] == CURVE.label
+    assert plain["bands"] == [[0, 1, 0.2]]
+
+
+@pytest.fixture(scope="module")
+def seen(calibrated: tuple[Done, object], tmp_path_factory) -> Seen:
+    return look(calibrated[1] / "report.html", tmp_path_factory.mktemp("browser"))
+
+
+def test_screens_show_charts_and_paper_the_images(seen: Seen):
+    drawn = {place: len(frame["images"]) for place, frame in seen.frames.items()}
+    assert drawn["phone"] == drawn["desk"] == drawn["paper"] - 1
+    assert seen.frames["desk"]["canvases"] == 2
+    assert not seen.complaints and not seen.requests
+
+
+TURN = """
+const all = name => [...page.querySelectorAll(name)];
+const canvas = all("canvas"), over = all(".u-over");
+const pictures = () => canvas.map(each => each.toDataURL());
+const later = () => new Promise(done => setTimeout(done, 300));
+await later();
+const first = pictures();
+const box = over[0].getBoundingClientRect();
+const at = {clientX: box.x + 300, clientY: box.y + 100, bubbles: true,
+  cancelable: true};
+over[0].dispatchEvent(new WheelEvent("wheel", {deltaY: -100, ...at}));
+await later();
+const turned = pictures();
+over[0].dispatchEvent(new MouseEvent("mousemove", at));
+await later();
+const told = all(".u-legend .u-value").map(each => each.innerText);
+over[1].dispatchEvent(new MouseEvent("dblclick", at));
+over[0].dispatchEvent(new MouseEvent("dblclick", at));
+await later();
+return {turned: turned.map((each, k) => each !== first[k]),
+  back: pictures().map((each, k) => each === first[k]), told: told};
+"""
+
+
+def test_the_wheel_zooms_both_and_two_clicks_show_all(calibrated, tmp_path):
+    found = play(calibrated[1] / "report.html", tmp_path, TURN)
+    assert found["turned"] == [True, True]
+    assert found["back"] == [True, True]
+    assert sum(value not in ("", "–", "--") for value in found["told"]) >= 4
