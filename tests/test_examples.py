@@ -1,5 +1,7 @@
 """Every example runs as it stands and ends with what it claims."""
 
+import ast
+import json
 import runpy
 import subprocess
 import sys
@@ -47,3 +49,32 @@ def test_an_example_is_a_program_of_its_own(tmp_path: Path):
 
 def test_every_example_is_run():
     assert {path.name for path in EXAMPLES.glob("*.py")} == set(LAST_LINES)
+
+
+@pytest.mark.thorough
+def test_the_notebook_runs_from_its_first_cell_to_its_last(tmp_path, monkeypatch):
+    """In its order, as a notebook runs it: the last line of a cell is shown."""
+    import matplotlib
+    from matplotlib import pyplot
+
+    monkeypatch.chdir(tmp_path)
+    written = json.loads((EXAMPLES / "from_a_dataframe.ipynb").read_text("utf-8"))
+    cells = [cell for cell in written["cells"] if cell["cell_type"] == "code"]
+    assert not any(cell["outputs"] for cell in cells)
+    names: dict[str, object] = {}
+    shown: list[object] = []
+    with matplotlib.rc_context({"backend": "agg"}):
+        for cell in cells:
+            *lines, last = ast.parse(cell["source"]).body
+            module = ast.Module(lines, [])
+            exec(compile(module, "cell", "exec"), names)
+            end = ast.unparse(last)
+            if isinstance(last, ast.Expr):
+                shown.append(eval(end, names))
+            else:
+                exec(end, names)
+        pyplot.close("all")
+    assert names["inside"]
+    kinds = {type(one).__name__ for one in shown}
+    assert kinds == {"DataFrame", "Posterior", "Axes", "Margin", "NoneType"}
+    assert "Kraft [N]" in " ".join(names["case"].notes)

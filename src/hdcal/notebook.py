@@ -1,8 +1,13 @@
-"""How a result shows itself in a notebook: by the document that its room writes."""
+"""How a result shows itself in a notebook: in words, as a table, as a drawing.
+
+What tells of a class stands in its own room; here are names only, so that nothing loads
+before it is asked for.
+"""
 
 from importlib import import_module
+from typing import Any
 
-# Class of a result -> who tells of it; a name, so that nothing loads before it shows.
+# Class of a result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
@@ -14,15 +19,87 @@ TELLERS = {
     "Verdict": "diagnosis.summary.verdict_report",
     "WaveGenerator": "design.summary.generator_report",
 }
+# -> what its table is made of: rows, or columns by name.
+TABLES = {
+    "Bands": "report.tables.own_columns",
+    "DynamicPosterior": "report.parameters.parameter_estimates",
+    "InverseDesign": "design.chart.candidate_rows",
+    "Margin": "prediction.margin.chart.level_rows",
+    "Posterior": "report.parameters.parameter_estimates",
+    "Response": "report.tables.own_columns",
+    "Study": "report.tables.own_columns",
+    "Verdict": "diagnosis.chart.hypothesis_columns",
+    "WaveGenerator": "design.chart.spring_rows",
+}
+# -> its chart.
+CHARTS = {
+    "Bands": "prediction.bands.chart.bands_chart",
+    "InverseDesign": "design.chart.candidate_chart",
+    "Margin": "prediction.margin.chart.margin_chart",
+    "Posterior": "calibration.chart.posterior_chart",
+    "Response": "motion.respond.chart.response_chart",
+    "Study": "design.study.chart.study_chart",
+    "Verdict": "diagnosis.chart.verdict_chart",
+    "WaveGenerator": "design.chart.generator_chart",
+}
 
 
 class Shown:
     """A result that shows what matters most of it in a notebook's cell."""
 
+    def __repr__(self) -> str:
+        name, document = type(self).__name__, self._document
+        said = "FAILED, do not use" if document.failed else document.headline
+        return f"<{name}: {said}>"
+
     def _repr_html_(self) -> str:
-        known = (kind.__name__ for kind in type(self).__mro__)
-        teller = next(TELLERS[name] for name in known if name in TELLERS)
-        room, _, name = f"hdcal.{teller}".rpartition(".")
-        told = getattr(import_module(room), name)(self)
-        html = import_module("hdcal.report.html")
-        return html.notebook_html(getattr(told, "document", told))
+        return import_module("hdcal.report.html").notebook_html(self._document)
+
+    @property
+    def _document(self) -> Any:
+        told = self._ask(TELLERS)
+        return getattr(told, "document", told)
+
+    def to_frame(self) -> Any:
+        """Return its main table as pandas' DataFrame.
+
+        It holds parameters, rows, levels, hypotheses or designs.
+        """
+        return import_module("hdcal.data.frames").frame_of(self._columns)
+
+    def to_datatree(self) -> Any:
+        """Return its main table as xarray's DataTree; draws are in ArviZ' groups."""
+        if (tree := getattr(self, "tree", None)) is not None:
+            return tree
+        return import_module("hdcal.report.tables").datatree(self._columns)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw it with matplotlib.
+
+        Args:
+            ax: Axes where to; by default new axes of pyplot's.
+
+        Returns:
+            These Axes.
+        """
+        drawer = import_module("hdcal.report.chart_figure")
+        return drawer.draw_chart(self._ask(CHARTS), ax)
+
+    @property
+    def _columns(self) -> dict[str, list]:
+        return import_module("hdcal.report.tables").as_columns(self._ask(TABLES))
+
+    def _ask(self, table: dict[str, str]) -> Any:
+        """Return what the room of this class has to say of it.
+
+        Raises:
+            NotImplementedError: it has nothing of the kind.
+        """
+        known = [kind.__name__ for kind in type(self).__mro__]
+        # A moving gear is no gear at rest: what is said of that one is not inherited.
+        known = known[:1] if known[0] in TELLERS else known
+        name = next((name for name in known if name in table), None)
+        if name is None:
+            raise NotImplementedError(f"of a {known[0]} there is no such drawing")
+        room, _, asked = f"hdcal.{table[name]}".rpartition(".")
+        return getattr(import_module(room), asked)(self)

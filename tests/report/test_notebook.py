@@ -3,7 +3,10 @@
 import inspect
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import xarray as xr
+from matplotlib.figure import Figure
 from moving import still_posterior
 from posteriors import single
 from verdicts import named
@@ -66,3 +69,49 @@ def test_a_quick_verdict_says_that_nothing_was_sampled(results):
     assert words in quick._repr_html_()
     assert words not in results["Verdict"][0]._repr_html_()
     assert (verdict_answer(quick).seed, verdict_answer(quick).quick) == (3, True)
+
+
+@pytest.mark.parametrize("name", sorted(set(TELLERS) - {"DynamicPosterior"}))
+def test_a_result_is_a_line_a_table_and_a_drawing(name: str, results):
+    found, _ = results[name]
+    assert repr(found).startswith(f"<{name}") and len(repr(found)) < 400
+    frame = found.to_frame()
+    assert len(frame) and not frame.columns.duplicated().any()
+    axes = Figure().add_subplot()
+    assert found.plot(axes) is axes
+    assert axes.get_xlabel() and axes.get_ylabel() and axes.has_data()
+    tree = found.to_datatree()
+    assert isinstance(tree, xr.DataTree)
+    if name != "Posterior":
+        assert set(frame.columns) == set(tree.to_dataset().data_vars)
+
+
+def test_tables_hold_what_the_results_say(results):
+    margin, verdict = results["Margin"][0], results["Verdict"][0]
+    (level,) = margin.to_frame().itertuples()
+    assert level.upper_bound_N == margin.worst.upper_bound_N
+    assert level.force_N_median == margin.worst.force_N.median
+    frame = verdict.to_frame().set_index("hypothesis")
+    assert frame.probability.to_dict() == verdict.which.probabilities
+    assert frame.probability.is_monotonic_decreasing
+    bands, posterior = results["Bands"][0], results["Posterior"][0]
+    np.testing.assert_array_equal(bands.to_frame().tested, bands.tested)
+    parameters = posterior.to_frame().set_index("name")
+    low, middle, high = parameters.loc["K", ["lo", "median", "hi"]]
+    assert low < middle < high
+    assert posterior.to_datatree() is posterior.tree
+
+
+def test_pyplot_is_asked_where_no_axes_are_given(results):
+    import matplotlib
+    from matplotlib import pyplot
+
+    with matplotlib.rc_context({"backend": "agg"}):
+        axes = results["Bands"][0].plot()
+        assert axes.figure.number in pyplot.get_fignums()
+        pyplot.close(axes.figure)
+
+
+def test_a_failed_result_says_so_in_its_line(results):
+    failed = replace(results["Verdict"][0], reasons=("the sampler diverged",))
+    assert repr(failed) == "<Verdict: FAILED, do not use>"

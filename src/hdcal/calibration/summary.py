@@ -113,7 +113,7 @@ def calibration_report(
         # Of a failed calibration there is the marked figure alone.
         if not posterior.usable:
             return {}
-        return {"calibration": calibration_charts(posterior, bands(), left)}
+        return {"calibration": calibration_charts(bands(), left)}
 
     return Report(
         spoken_of(calibration_document(posterior, found, command), posterior.theory),

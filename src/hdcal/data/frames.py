@@ -1,9 +1,10 @@
-"""From a table in memory to the text that files are read from."""
+"""Tables in memory: to the text that files are read from, and from columns."""
 
 import hashlib
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from hdcal.data.findings import FileFindings
@@ -19,6 +20,11 @@ def is_frame(data: Any) -> bool:
         or hasattr(data, "to_csv")
         or hasattr(data, "to_pandas")
     )
+
+
+def frame_of(columns: Mapping[str, Any]) -> pd.DataFrame:
+    """Return columns by name as a data frame."""
+    return pd.DataFrame({name: np.asarray(each) for name, each in columns.items()})
 
 
 def frame_text(data: Any, findings: FileFindings) -> tuple[bytes, str, str]:

@@ -45,7 +45,7 @@ from hdcal.prediction.engine.loading_sense import capacity_findings
 from hdcal.prediction.engine.sizes import SIZES
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InverseDesign(Shown):
     """The design that keeps the limits, and what it was chosen among.
 

@@ -27,7 +27,7 @@ MOST_TRAVEL = 0.25
 _ALONG = 9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WaveGenerator(Shown):
     """The elastic wave generator that meets a window, and how it was judged.
 

@@ -189,7 +189,7 @@ class NextRun:
     cost: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Verdict(Shown):
     """Where, which, how far, and what to do next.
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+# Okabe and Ito's colours, told apart by every kind of colour vision.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 # Digits of a number: more than a screen shows when it is zoomed in.
 _DIGITS = 6
 

@@ -33,7 +33,7 @@ MOST_DESIGNS, MOST_AXES, MOST_MATERIALS = 100_000, 4, 20
 _BLOCK = 2_000_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Study(Shown):
     """The force of every design; one entry of each column per design.
 

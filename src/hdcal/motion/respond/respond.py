@@ -33,7 +33,7 @@ _MOST_SWINGS = 20_000
 _TIMES = 10_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Response(Shown):
     """The motion under a force; one entry per time.
 

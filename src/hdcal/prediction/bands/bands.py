@@ -35,7 +35,7 @@ _BLOCK = 1000
 _MOST_TEMPERATURES = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Bands(Shown):
     """Equal-tailed bands of the force as read [N]; one entry per row.
 

@@ -109,7 +109,7 @@ def sizes_needed(of: Level | ModelBound, sense: LoadingSense) -> tuple[float, fl
     return ends_along(of.lower_bound_N, of.upper_bound_N, sense)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Margin(StatedUncertainty, Shown):
     """The force needed at a deformation, and the margin of a capacity.
 

@@ -71,7 +71,7 @@ class BudgetCheck:
     words: Words
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class StatedUncertainty:
     """The force of one future member at the worst temperature, as a result is stated.
 
