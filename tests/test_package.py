@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from hdcal.data.resources import pages
+
 ROOT = Path(__file__).parents[1]
 
 FOREIGN = {
@@ -20,10 +22,11 @@ FOREIGN = {
 
 LIST_PRIORS = """
 import hdcal
-from hdcal.data.resources import priors_folder
+from hdcal.data.resources import pages, priors_folder
 
 print(hdcal.__file__)
 print(*sorted(entry.name for entry in priors_folder().iterdir()))
+print(*pages())
 """
 
 READ_TABLES = """
@@ -100,6 +103,7 @@ def test_data_are_found_away_from_the_checkout(
     assert printed[0].startswith(str(place))
     names = {Path(name).name for name in shipped("priors")}
     assert set(printed[1].split()) == names
+    assert printed[2].split() == list(pages())
     printed = run(sys.executable, "-c", READ_TABLES, cwd=tmp_path, env=environment)
     assert printed.startswith(str(place)) and printed.split()[1] == "1.0"
 

@@ -305,4 +305,4 @@ def test_a_section_of_a_report(tree: Path):
     said = run(tree, "-m", "hdcal", "audit", "--out", "made")
     assert "Moral" in said and "Print the data beside the claims." in said
     page = (tree / "made" / "report.html").read_text("utf-8")
-    assert "<h2>Moral</h2>" in page
+    assert "<summary>Moral</summary>" in page

@@ -6,6 +6,7 @@ Heavy imports stay inside the commands, so that `hdcal --help` answers at once.
 import os
 import signal
 import sys
+from pathlib import Path
 
 import click
 
@@ -17,6 +18,8 @@ from hdcal.calibration.init.command import init
 from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
+from hdcal.cli.here import what_next
+from hdcal.cli.topics import show_completion, show_topic
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
@@ -24,9 +27,12 @@ from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
+from hdcal.report.plain import printable
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+# Where a shell's completion asks.
+COMPLETE = "_HDCAL_COMPLETE"
 # 128 + SIGPIPE, as shells say it of a tool whose reader went away.
 NOBODY_READS = 141
 
@@ -44,7 +50,11 @@ _EPILOG = (
 )
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
+@click.group(
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_EPILOG,
+    invoke_without_command=True,
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -53,12 +63,19 @@ _EPILOG = (
     callback=_show_version,
     help="Show the version and stop.",
 )
-def hdcal() -> None:
+@click.pass_context
+def hdcal(context: click.Context) -> None:
     """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
 
     DATA and CASE are a file of measurements (CSV, or .xlsx) with a gear file (--gear),
     or a folder holding data.csv and gear.toml.
     """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+        if steps := list(what_next(Path.cwd())):
+            click.echo("\nIn this folder one could:")
+            for step in steps:
+                click.echo(f"  {printable(step)}")
 
 
 for _command in (
@@ -76,6 +93,8 @@ for _command in (
     effects,
     audit,
     blind,
+    show_topic,
+    show_completion,
 ):
     hdcal.add_command(_command)
 
@@ -83,6 +102,9 @@ for _command in (
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every outcome is an exit code and plain words."""
     given = sys.argv[1:] if arguments is None else arguments
+    if COMPLETE in os.environ:
+        # A shell asks for what may follow, and click answers and ends the process.
+        hdcal.main([], "hdcal")
     console = Console(json="--json" in given)
     console.prepare()
     _hear_interruptions()

@@ -8,6 +8,7 @@ import pytest
 from commands import Hdcal
 
 import hdcal as library
+from hdcal.cli.here import what_next
 
 LOG = "Weg [mm];Kraft [kN]\n" + "".join(f"0,{k}5;0,0{k}1\n" for k in range(1, 8))
 SIZES = ["--wall", ".68", "--radius", "40", "--length", "70"]
@@ -101,3 +102,38 @@ def test_a_case_cannot_begin_where_there_is_no_place(here: Hdcal, log: Path):
     onto = here("init", log, *BEGUN)
     assert onto.returncode == 2 and "is a file" in onto.stderr
     assert log.read_text() == LOG
+
+
+def test_alone_it_says_what_one_could_do_here(here: Hdcal, log: Path):
+    (log.parent / "rig").mkdir()
+    (log.parent / "rig" / "data.csv").write_text(LOG)
+    (log.parent / "old result").mkdir()
+    (log.parent / "old result" / "posterior.nc").write_text("")
+    said = here().stdout
+    _, steps = said.split("In this folder one could:\n")
+    assert "Usage: hdcal" in said and "  hdcal check log.csv\n" in steps
+    assert "  hdcal calibrate rig --out result\n" in steps
+    assert "  hdcal margin 'old result' " in steps
+    empty = log.parent / "rig" / "empty"
+    empty.mkdir()
+    assert not list(what_next(empty)) and not list(what_next(empty / "gone"))
+
+
+def test_pages_are_read_in_the_terminal(here: Hdcal):
+    listed = here("help").stdout
+    assert "own-csv " in listed and "hysteresis" in listed and "schemas" not in listed
+    names = [line.split()[0] for line in listed.splitlines()]
+    assert len(names) == len({*names}) > 30
+    page = here("help", "own-csv").stdout
+    assert "Use your own measurements" in page and "hdcal init" in page
+    wrong = here("help", "hysteresi")
+    assert wrong.returncode == 2 and "Did you mean 'hysteresis'?" in wrong.stderr
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_completes(hdcal: Hdcal, here: Hdcal, shell: str):
+    source = here("completion", shell).stdout
+    assert "_HDCAL_COMPLETE" in source
+    asked = {"_HDCAL_COMPLETE": f"{shell}_complete", "COMP_WORDS": "hdcal cal"}
+    done = hdcal(env={**asked, "COMP_CWORD": "cal" if shell == "fish" else "1"})
+    assert done.returncode == 0 and "calibrate" in done.stdout, done.stderr

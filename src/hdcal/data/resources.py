@@ -4,6 +4,9 @@ from importlib.resources import files
 from importlib.resources.abc import Traversable
 from typing import Any
 
+# Pages that are made when the documentation is built.
+_FOR_THE_WEB = ("api", "schemas")
+
 
 def priors_folder() -> Traversable:
     """Folder of the prior tables: `rig.toml`, `effects.toml` and the materials.
@@ -21,6 +24,22 @@ def datasets_folder() -> Traversable:
         FileNotFoundError: the installation carries no data sets.
     """
     return _shipped("datasets")
+
+
+def pages() -> dict[str, Traversable]:
+    """Return the pages of the documentation by their names, how-tos first.
+
+    Raises:
+        FileNotFoundError: the installation carries none.
+    """
+    root = _shipped("docs")
+    found: dict[str, Traversable] = {}
+    for folder in (root / "howto", root, root / "effects"):
+        for page in sorted(folder.iterdir(), key=lambda page: page.name):
+            name, dot, kind = page.name.rpartition(".")
+            if dot and kind == "md" and name not in ("index", *_FOR_THE_WEB):
+                found[name] = page
+    return found
 
 
 def _shipped(name: str) -> Traversable:

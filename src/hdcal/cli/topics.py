@@ -1,0 +1,54 @@
+"""`hdcal help` and `hdcal completion`: what can be read and done without the web."""
+
+import click
+
+from hdcal.cli.command import command
+from hdcal.cli.console import Console
+from hdcal.errors import Finding, InputError
+
+_SHELLS = ("bash", "zsh", "fish")
+
+
+@command("help", short_help="A page of the documentation, in the terminal.")
+@click.argument("topic", required=False)
+@click.pass_obj
+def show_topic(console: Console, topic):
+    """Show a page of the documentation; without TOPIC list them.
+
+    The library's effects are topics too, as in `hdcal help hysteresis`.
+    """
+    from hdcal.data.resources import pages
+    from hdcal.data.toml_file import did_you_mean
+
+    found = pages()
+    if topic is None:
+        width = max(map(len, found))
+        for name, page in found.items():
+            heading = page.read_text("utf-8").lstrip("# ").partition("\n")[0]
+            console.result(f"  {name:{width}}  {heading}")
+        return 0
+    if topic not in found:
+        remedy = did_you_mean(topic, list(found))
+        raise InputError([Finding("topic", f"no page is called '{topic}'", remedy)])
+    from rich.markdown import Markdown
+
+    console.table(Markdown(found[topic].read_text("utf-8"), hyperlinks=False))
+    return 0
+
+
+@command("completion", short_help="Completion of commands for a shell.")
+@click.argument("shell", type=click.Choice(_SHELLS))
+@click.pass_context
+def show_completion(context: click.Context, shell):
+    """Print what makes SHELL complete commands and options of hdcal.
+
+    Put its output in ~/.bashrc (bash), in ~/.zshrc after compinit (zsh), or in
+    ~/.config/fish/completions/hdcal.fish (fish).
+    """
+    from click.shell_completion import get_completion_class
+
+    kind = get_completion_class(shell)
+    assert kind is not None
+    source = kind(context.find_root().command, {}, "hdcal", "_HDCAL_COMPLETE").source()
+    context.obj.result(source)
+    return 0
