@@ -89,6 +89,32 @@ def test_a_line_for_every_line_good_or_bad(here: Hdcal, monkeypatch):
     assert "one false alarm in 10000 readings" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "table",
+    [
+        [b"deformation_mm,force_N,run", b"0.1,19.8,3", b"0.2,x,3", b"0.2,38.9,3"],
+        [b"Weg [um];Kraft [kN];run", b"100;0,0198;3", b"200;9", b"200;0,0389;3"],
+    ],
+)
+def test_csv_is_followed_as_its_json_would_be(here: Hdcal, monkeypatch, table):
+    answers = []
+    rows = (
+        b'{"deformation_mm": 0.1, "force_N": 19.8, "run": 3}',
+        b"what is no reading",
+        b'{"deformation_mm": 0.2, "force_N": 38.9, "run": 3}',
+    )
+    for lines in (table, rows):
+        feed(monkeypatch, *lines)
+        done = here("track", "--gear", GEAR)
+        assert done.returncode == 2
+        # Units are converted to the last digit but one.
+        digits = {"parse_float": lambda text: f"{float(text):.9g}"}
+        answers.append([json.loads(a, **digits) for a in done.stdout.splitlines()])
+    for of_table, of_rows in zip(*answers, strict=True):
+        of_table.pop("error", None), of_rows.pop("error", None)
+        assert of_table == of_rows
+
+
 def test_nothing_in_nothing_out(here: Hdcal, monkeypatch):
     feed(monkeypatch)
     done = here("track", "--gear", GEAR)

@@ -48,7 +48,8 @@ def track(console: Console, known, gear, **settings):
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
     "force_N": 37.8}, where known with temperature_C, time_s and run (a label of the
-    mounting). Each is answered at once by a line on standard output.
+    mounting); or the first line is a header row such as deformation_mm,force_N, and the
+    others are CSV. Each reading is answered at once by a line on standard output.
     """
     if (known is None) == (gear is None):
         remedy = "Name a result folder of hdcal calibrate, or --gear GEAR.toml"

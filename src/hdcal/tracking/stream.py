@@ -1,9 +1,11 @@
-"""Readings as JSON lines in, what the tracker makes of them as JSON lines out."""
+"""Readings as JSON or CSV in, what the tracker makes of them as JSON lines out."""
 
 import json
 from collections.abc import Iterator
+from itertools import chain
 from typing import Any, BinaryIO, TextIO
 
+from hdcal.tracking.csv_lines import csv_lines
 from hdcal.tracking.tracker import SCHEMA, Tracker
 
 # A longer line is no reading; the rest of it is thrown away unread.
@@ -23,16 +25,22 @@ def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
     Args:
         tracker: that takes the readings.
         source: JSON objects with `deformation_mm` and `force_N`, and where known
-            `temperature_C`, `time_s` and `run`.
+            `temperature_C`, `time_s` and `run`; or a header row and lines of CSV.
         sink: takes a line for each.
 
     Returns:
         How many lines were no reading.
     """
     bad = 0
-    for line in _lines(source):
+    lines = _lines(source)
+    first = next(lines, None)
+    table = None if first is None else csv_lines(first)
+    if first is not None and table is None:
+        lines = chain([first], lines)
+    for line in lines:
         try:
-            found = tracker.update(**read_line(line))
+            plain = read_line(line) if table is None else table.read(_text(line))
+            found = tracker.update(**plain)
         except ValueError as error:
             bad += 1
             found = {"schema": SCHEMA, "status": "error", "row": tracker.skip()}
@@ -40,6 +48,20 @@ def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
         sink.write(_ENCODER.encode(found) + "\n")
         sink.flush()
     return bad
+
+
+def _text(line: bytes) -> str:
+    """Return a line as text.
+
+    Raises:
+        ValueError: it is too long, or none.
+    """
+    if len(line) > _LONGEST:
+        raise ValueError(f"the line is longer than {_LONGEST} bytes")
+    try:
+        return line.decode().strip("\r\n")
+    except UnicodeDecodeError:
+        raise ValueError("the line is no UTF-8 text") from None
 
 
 def read_line(line: bytes) -> dict[str, Any]:
@@ -53,7 +75,10 @@ def read_line(line: bytes) -> dict[str, Any]:
     try:
         plain = json.loads(line)
     except (ValueError, RecursionError):
-        words = "the line is no JSON; one reading is one line such as"
+        words = (
+            "the line is no JSON, nor of a table whose first row names deformation and "
+            "force; one reading is one line such as"
+        )
         raise ValueError(f"{words} {_EXAMPLE}") from None
     if not isinstance(plain, dict):
         raise ValueError(f"the line is no object such as {_EXAMPLE}")

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from datetime import date
 
 from hdcal.data.certificates import ZEROS, is_stated
+from hdcal.data.measurements import ASSUMED
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED
@@ -95,6 +96,11 @@ def _measured(posterior: Posterior) -> Facts:
         ("SHA-256 of the data", case.data_sha256),
         ("certificates of the rig", "; ".join(parts)),
     ]
+    guessed = [note for note in case.notes if note.startswith(ASSUMED)]
+    if guessed:
+        # How to say otherwise is for whoever reads the file, not for who signs.
+        said = (note.removeprefix(ASSUMED).partition(". ")[0] for note in guessed)
+        rows.append(("assumed", "; ".join(said)))
     return Facts(rows)
 
 

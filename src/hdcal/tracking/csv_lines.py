@@ -1,0 +1,69 @@
+"""Readings as lines of CSV: a header row once, then one reading a line."""
+
+from typing import Any
+
+import numpy as np
+
+from hdcal.data.cells import CellError, read_number
+from hdcal.data.columns import LABELS, Column, match_columns
+from hdcal.data.csv_table import CsvTable
+from hdcal.data.findings import FileFindings
+from hdcal.data.table_start import header_cells, split_line
+from hdcal.data.units import column_to_code
+from hdcal.errors import InputError
+
+# What a tracker takes of a reading.
+_TAKEN = ("deformation", "force", "temperature", "time", "run")
+
+
+class CsvLines:
+    """Reads the lines below a header row, whose headers are those of files.
+
+    Args:
+        header: the header row.
+
+    Raises:
+        InputError: it does not say which columns are deformation and force.
+    """
+
+    def __init__(self, header: str):
+        marks = max(";\t,", key=header.count)
+        headers = tuple(header_cells(header, marks))
+        table = CsvTable(headers, 1, np.zeros(0, int), marks, b"", 0, 0)
+        with FileFindings("standard input") as wrong:
+            self._columns: dict[str, Column] = match_columns(
+                table, {}, _TAKEN, _TAKEN[:2], wrong
+            )
+        self._separator, self._width = marks, len(headers)
+
+    def read(self, line: str) -> dict[str, Any]:
+        """Return the arguments of `Tracker.update` from a line.
+
+        Raises:
+            ValueError: it holds no reading.
+        """
+        cells = split_line(line, self._separator)
+        if len(cells) != self._width:
+            raise ValueError(f"{len(cells)} cells where the header has {self._width}")
+        found: dict[str, Any] = {}
+        for quantity, column in self._columns.items():
+            cell = cells[column.position]
+            if quantity in LABELS:
+                found[quantity] = cell
+                continue
+            comma = self._separator != "," and "," in cell
+            try:
+                number = np.array([read_number(cell, comma)])
+            except CellError as error:
+                raise ValueError(f"{quantity}: {error.args[0]}") from None
+            found[quantity] = float(column_to_code(number, quantity, column.unit)[0])
+        return found
+
+
+def csv_lines(header: bytes) -> CsvLines | None:
+    """Return the reader of a stream that begins with a header row, else None."""
+    try:
+        text = header.decode("utf-8-sig").strip()
+        return None if text.startswith("{") else CsvLines(text)
+    except (UnicodeDecodeError, InputError):
+        return None
