@@ -104,7 +104,8 @@ assert deformation.dtype == jnp.float32
     + "found = hdcal.force(gear, 210e3, 0.1, deformation)",
     "a theory": GEAR + "found = hdcal.THEORIES['cup'](gear, 210e3)",
     "a profile": GEAR
-    + "found = hdcal.ring_profile(gear, 210e3, 0.3, [0.0, 1.0]).stress",
+    + "from hdcal.physics.profile import ring_profile\n"
+    + "found = ring_profile(gear, 210e3, 0.3, [0.0, 1.0]).stress",
     "a gear in what is differentiated": GEAR
     + """
 import jax

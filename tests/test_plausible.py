@@ -22,6 +22,7 @@ from hdcal.data.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, range_of
 from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import InputError
+from hdcal.prediction.tolerance_factors import k_factor
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
 MATERIAL = """
@@ -185,7 +186,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("alarm_rows", "forget", "reopen", "seed"),
     ),
     (
-        lambda run, **asked: hdcal.k_factor(**{"size": 3, **asked}),
+        lambda run, **asked: k_factor(**{"size": 3, **asked}),
         {},
         ("size", "content", "confidence"),
     ),

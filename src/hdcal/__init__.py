@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
-    from hdcal.classical.audit.article import Claim
-    from hdcal.classical.audit.audit import audit
     from hdcal.classical.fit.fit import PolynomialFit, fit
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
@@ -29,19 +27,16 @@ if TYPE_CHECKING:
     from hdcal.motion.respond.respond import Response, respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
-    from hdcal.physics.profile import Profile, ring_profile
     from hdcal.physics.registry import EFFECTS
     from hdcal.physics.theory import THEORIES
     from hdcal.prediction.bands.bands import Bands, predict
     from hdcal.prediction.margin.margin import margin
     from hdcal.prediction.margin.result import Margin
-    from hdcal.prediction.tolerance_factors import k_factor, wilks_size
     from hdcal.tracking.tracker import Tracker
 
 _HOMES = {
     "Bands": "prediction.bands.bands",
     "Case": "data.case",
-    "Claim": "classical.audit.article",
     "DynamicPosterior": "inference.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
@@ -57,7 +52,6 @@ _HOMES = {
     "PolynomialFit": "classical.fit.fit",
     "Posterior": "inference.posterior",
     "Prior": "data.priors",
-    "Profile": "physics.profile",
     "Records": "data.records",
     "Residuals": "inference.residuals",
     "Response": "motion.respond.respond",
@@ -67,25 +61,21 @@ _HOMES = {
     "Tracker": "tracking.tracker",
     "Verdict": "diagnosis.verdict",
     "WaveGenerator": "design.wave_generator",
-    "audit": "classical.audit.audit",
     "calibrate": "calibration.calibrate",
     "calibrate_dynamic": "motion.dynamic_calibration",
     "diagnose": "diagnosis.diagnose",
     "fit": "classical.fit.fit",
     "force": "physics.chain",
     "inverse_design": "design.inverse_design",
-    "k_factor": "prediction.tolerance_factors",
     "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
     "predict": "prediction.bands.bands",
     "read_case": "data.reading",
     "residuals": "inference.residuals",
     "respond": "motion.respond.respond",
-    "ring_profile": "physics.profile",
     "study": "design.study.study",
     "summarise": "calibration.summary",
     "wave_generator": "design.wave_generator",
-    "wilks_size": "prediction.tolerance_factors",
 }
 
 __all__ = [*sorted(_HOMES)]

@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 from scipy.stats import qmc
 
-import hdcal
 from hdcal.errors import InputError
 from hdcal.prediction.engine.mixture import Mixture, weighted_quantile
+from hdcal.prediction.tolerance_factors import k_factor, wilks_size
 
 # One-sided normal factors at 95 % confidence, Owen (1963), Sandia SCR-607; to two
 # or three decimals also CMH-17, vol. 1, tables of k_B and k_A.
@@ -26,13 +26,13 @@ PUBLISHED = {
 @pytest.mark.parametrize("size", PUBLISHED)
 def test_classical_factors_are_the_published_ones(size):
     b, a = PUBLISHED[size]
-    assert hdcal.k_factor(size, 0.90, 0.95) == pytest.approx(b, abs=6e-4)
-    assert hdcal.k_factor(size, 0.99, 0.95) == pytest.approx(a, abs=6e-4)
+    assert k_factor(size, 0.90, 0.95) == pytest.approx(b, abs=6e-4)
+    assert k_factor(size, 0.99, 0.95) == pytest.approx(a, abs=6e-4)
 
 
 def test_the_handbook_example():
     # NIST/SEMATECH e-Handbook, 7.2.6.3: n = 43, p = 0.90, γ = 0.99.
-    assert hdcal.k_factor(43, 0.90, 0.99) == pytest.approx(1.8740, abs=1e-4)
+    assert k_factor(43, 0.90, 0.99) == pytest.approx(1.8740, abs=1e-4)
 
 
 def reference_posterior(size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -55,7 +55,7 @@ def bayesian_factor(size: int, content: float, *, narrowed=1.0) -> float:
 @pytest.mark.parametrize("size", [5, 10, 30])
 @pytest.mark.parametrize("content", [0.90, 0.99])
 def test_with_the_reference_prior_the_bound_is_the_classical_one(size, content):
-    classical = hdcal.k_factor(size, content, 0.95)
+    classical = k_factor(size, content, 0.95)
     assert bayesian_factor(size, content) == pytest.approx(classical, abs=1e-3)
     # What parity must notice: a population believed too narrow by 2 %.
     assert abs(bayesian_factor(size, content, narrowed=0.98) - classical) > 1e-2
@@ -63,25 +63,25 @@ def test_with_the_reference_prior_the_bound_is_the_classical_one(size, content):
 
 def test_wilks_sizes_are_the_published_ones():
     one = [(0.90, 29), (0.95, 59), (0.99, 299)]
-    assert [(p, hdcal.wilks_size(p, 0.95)) for p, _ in one] == one
+    assert [(p, wilks_size(p, 0.95)) for p, _ in one] == one
     two = [(0.90, 46), (0.95, 93), (0.99, 473)]
-    assert [(p, hdcal.wilks_size(p, 0.95, sides=2)) for p, _ in two] == two
+    assert [(p, wilks_size(p, 0.95, sides=2)) for p, _ in two] == two
 
 
 def test_one_less_than_wilks_is_not_enough():
     for content in (0.90, 0.99):
-        size = hdcal.wilks_size(content, 0.95)
+        size = wilks_size(content, 0.95)
         assert 1.0 - content**size >= 0.95 > 1.0 - content ** (size - 1)
 
 
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda: hdcal.k_factor(1),
-        lambda: hdcal.k_factor(10, 1.0),
-        lambda: hdcal.k_factor(10, 0.9, 0.0),
-        lambda: hdcal.wilks_size(0.0),
-        lambda: hdcal.wilks_size(0.9, 0.95, sides=3),
+        lambda: k_factor(1),
+        lambda: k_factor(10, 1.0),
+        lambda: k_factor(10, 0.9, 0.0),
+        lambda: wilks_size(0.0),
+        lambda: wilks_size(0.9, 0.95, sides=3),
     ],
 )
 def test_what_has_no_factor_is_refused(ask):
@@ -91,5 +91,5 @@ def test_what_has_no_factor_is_refused(ask):
 
 def test_everything_wrong_is_said_at_once():
     with pytest.raises(InputError) as caught:
-        hdcal.k_factor(0, 99.0, 95.0)
+        k_factor(0, 99.0, 95.0)
     assert len(caught.value.findings) == 3

@@ -19,8 +19,8 @@ from hdcal.notebook import TELLERS, Shown
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
 # Classes of the public face that are input, a part of a result, or a tool.
-NO_RESULTS = {"Case", "Claim", "Effect", "Finding", "Gear", "Geometry", "HdcalError"}
-NO_RESULTS |= {"InputError", "Noise", "NotUsable", "PolynomialFit", "Prior", "Profile"}
+NO_RESULTS = {"Case", "Effect", "Finding", "Gear", "Geometry", "HdcalError"}
+NO_RESULTS |= {"InputError", "Noise", "NotUsable", "PolynomialFit", "Prior"}
 NO_RESULTS |= {"Records", "Residuals", "Rows", "Tracker"}
 
 
