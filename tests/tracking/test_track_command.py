@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from commands import MAIN, XB1, Hdcal
 
+from hdcal.tracking.live import LivePicture
 from hdcal.tracking.stream import read_line
 
 GEAR = XB1 / "gear.toml"
@@ -113,6 +114,41 @@ def test_csv_is_followed_as_its_json_would_be(here: Hdcal, monkeypatch, table):
     for of_table, of_rows in zip(*answers, strict=True):
         of_table.pop("error", None), of_rows.pop("error", None)
         assert of_table == of_rows
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def answered(row: int, mean: float, **more) -> dict:
+    level = {"mean": mean, "credible_95": [mean - 1.0, mean + 1.0]}
+    return {
+        "status": "ok",
+        "row": row,
+        "stiffness_N_per_mm": level,
+        "alarm": row > 8,
+    } | more
+
+
+@pytest.mark.parametrize("sink", [Terminal(), io.StringIO()])
+def test_a_picture_follows_the_stream(sink, monkeypatch):
+    """In a terminal each in the place of the last one; elsewhere one at the end."""
+    picture = LivePicture(sink)
+    monkeypatch.setattr("hdcal.tracking.live._PAUSE", 0.0)
+    picture.draw()
+    picture.take({"status": "error", "row": 1})
+    for row in range(2, 11):
+        picture.take(answered(row, 200.0 + row))
+    pictures = sink.getvalue().count("stiffness [N/mm]")
+    assert pictures == 9 * sink.isatty()
+    assert sink.getvalue().count("\x1b[16A") == max(pictures - 1, 0)
+    picture.draw()
+    last = sink.getvalue().rpartition("stiffness [N/mm]")[2]
+    assert "readings with alarm: 2" in last and "\n  211 ┤" in last
+    assert last.splitlines()[-1].split() == ["2", "reading", "10"]
 
 
 def test_nothing_in_nothing_out(here: Hdcal, monkeypatch):
