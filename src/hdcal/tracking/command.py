@@ -64,7 +64,8 @@ def track(console: Console, known, gear, plot, **settings):
     start = load_gear(gear) if known is None else load_posterior(known)
     tracker, bad = Tracker(start, **settings), 0
     console.words(tracker.describe())
-    picture = LivePicture(sys.stderr)
+    alone = sys.stderr.isatty() and not sys.stdout.isatty()
+    picture = LivePicture(sys.stderr, live=alone)
     watch = [picture.take] if plot else []
     try:
         bad = answer_lines(tracker, sys.stdin.buffer, sys.stdout, *watch)

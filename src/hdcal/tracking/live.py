@@ -16,11 +16,13 @@ class LivePicture:
     """Draws the stiffness over the readings, with the ends of its interval.
 
     Args:
-        sink: where to; anything but a terminal gets one picture, at the end.
+        sink: where to.
+        live: whether it is a terminal that shows nothing else; else there is one
+            picture, at the end.
     """
 
-    def __init__(self, sink: TextIO):
-        self._sink, self._terminal = sink, sink.isatty()
+    def __init__(self, sink: TextIO, *, live: bool):
+        self._sink, self._live = sink, live
         self._rows: list[tuple[float, ...]] = []
         self._alarms = 0
         self._lines, self._next = 0, 0.0
@@ -33,7 +35,7 @@ class LivePicture:
         self._rows.append((answer["row"], found["mean"], *found["credible_95"]))
         del self._rows[:-_SHOWN]
         self._alarms += bool(answer["alarm"])
-        if self._terminal and time.monotonic() >= self._next:
+        if self._live and time.monotonic() >= self._next:
             self.draw()
             self._next = time.monotonic() + _PAUSE
 
@@ -43,13 +45,11 @@ class LivePicture:
         if not len(rows):
             return
         at, level = np.repeat(rows[:, 0], 3), rows[:, 1:].ravel()
-        labels = (
-            "reading",
-            f"stiffness [N/mm], 95 %; readings with alarm: {self._alarms}",
-        )
+        heading = f"stiffness [N/mm], 95 %; readings with alarm: {self._alarms}"
+        labels = "reading", heading
         lines = scatter_lines(at, level, labels)
         if self._lines:
             self._sink.write(_UP.format(self._lines) + _REST)
         self._sink.write("\n".join(lines) + "\n")
         self._sink.flush()
-        self._lines = len(lines) if self._terminal else 0
+        self._lines = len(lines) if self._live else 0
