@@ -231,13 +231,13 @@ FILES = {
     "LabVIEW, a block for each run": Written(
         "LabVIEW Measurement\t\nWriter_Version\t2\n***End_of_Header***\t\n\n"
         + "".join(
-            "Channels\t2\t\n***End_of_Header***\t\n"
+            "Channels\t2\t\nSamples\t40\t40\n***End_of_Header***\t\n"
             "Weg (mm)\tKraft (N)\tComment\n"
             + "".join(f"{row}\t\n" for row in lines("\t").split("\n")[k : k + 3])
             + "\n"
             for k in (0, 3)
         ),
-        ("lines above the table", "the headers stand 2 times"),
+        ("lines above the table", "the headers stand 2 times", "3 lines between"),
         also={"run": [0, 0, 0, 1, 1, 1]},
     ),
     "blocks that name their runs themselves": Written(

@@ -3,12 +3,12 @@
 A logger that is started again writes its titles and headers again: each block is a run.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from hdcal.data.table_start import is_reading, split_line
+from hdcal.data.table_start import is_number, is_reading, split_line
 
 
 class Blocks(NamedTuple):
@@ -17,11 +17,13 @@ class Blocks(NamedTuple):
     Attributes:
         extra: titles, headers, units and footers, shape (lines,).
         block: number of the block that each line stands in, from 1, shape (lines,).
-        footers: the lines below the last reading.
+        titles: lines with something in them above repeated headers.
+        footers: the same below the last reading.
     """
 
     extra: np.ndarray
     block: np.ndarray
+    titles: int
     footers: int
 
 
@@ -43,14 +45,10 @@ def find_blocks(
         separator: of the cells.
         width: cells of a reading.
     """
-
-    def reads(index: int) -> bool:
-        cells = split_line(lines[index].decode(), separator)
-        return is_reading(cells, width)
-
+    reads = _reader(lines, separator, width)
     extra = np.zeros(len(lines), dtype=bool)
     block = np.ones(len(lines), dtype=int)
-    wanted = head.strip()
+    wanted, titles = head.strip(), 0
     again = bool(wanted) and text.count(wanted) > 1
     for index in [
         i for i, line in enumerate(lines) if again and line.strip() == wanted
@@ -62,15 +60,33 @@ def find_blocks(
         above = index - 1
         while above >= 0 and not extra[above] and not reads(above):
             extra[above] = True
+            titles += bool(lines[above].strip())
             above -= 1
     below = len(lines)
     while below > 0 and _is_footer(lines[below - 1].decode(), separator, width):
         below -= 1
-    filled = [bool(line.strip()) for line in lines[below:]]
-    if any(filled) and below > 0:
+    footers = sum(bool(line.strip()) for line in lines[below:]) if below else 0
+    if footers:
         extra[below:] = True
-        return Blocks(extra, block, sum(filled))
-    return Blocks(extra, block, 0)
+    return Blocks(extra, block, titles, footers)
+
+
+def _reader(
+    lines: Sequence[bytes], separator: str, width: int
+) -> Callable[[int], bool]:
+    """Return what tells whether a line reads as the first reading does."""
+
+    def cells(index: int) -> list[str]:
+        return split_line(lines[index].decode(), separator)
+
+    first = next((i for i in range(len(lines)) if is_reading(cells(i), width)), None)
+    begins = 0 if first is None else [*map(is_number, cells(first))].index(True)
+
+    def reads(index: int) -> bool:
+        found = cells(index)
+        return is_reading(found, width) and is_number(found[begins])
+
+    return reads
 
 
 def _is_footer(line: str, separator: str, width: int) -> bool:

@@ -199,6 +199,8 @@ def _block_notes(blocks: Blocks) -> Iterator[str]:
             f"the headers stand {many} times, above {many} blocks of readings: each is "
             "a run. If not, split the file"
         )
+    if blocks.titles:
+        yield f"{blocks.titles} lines between the blocks taken for their titles"
     if blocks.footers:
         lines = "line" if blocks.footers == 1 else f"{blocks.footers} lines"
         yield f"the last {lines} taken for no readings"
