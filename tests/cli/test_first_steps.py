@@ -9,6 +9,7 @@ from commands import Hdcal
 
 import hdcal as library
 from hdcal.cli.here import what_next
+from hdcal.data.resources import priors_folder
 
 LOG = "Weg [mm];Kraft [kN]\n" + "".join(f"0,{k}5;0,0{k}1\n" for k in range(1, 8))
 SIZES = ["--wall", ".68", "--radius", "40", "--length", "70"]
@@ -47,6 +48,15 @@ def test_the_gear_file_it_writes_says_the_same(here: Hdcal, log: Path):
     assert not (log.parent / "other.toml").exists()
 
 
+def test_a_unit_that_was_stated_stays_in_the_gear_file(here: Hdcal, tmp_path):
+    (tmp_path / "log.csv").write_text(LOG.replace("Kraft [kN]", "force_N"))
+    asked = ["check", "log.csv", "--column", "force=force_N[kN]", "--json"]
+    done = here(*asked, "--write-gear", "gear.toml")
+    assert json.loads(done.stdout)["data"]["force_N"] == [11.0, 71.0]
+    again = here("check", "log.csv", "--json")
+    assert json.loads(again.stdout)["data"]["force_N"] == [11.0, 71.0]
+
+
 @pytest.mark.parametrize(("ending", "begins"), [("png", b"\x89PNG"), ("svg", b"<?xml")])
 def test_the_readings_as_a_picture(here: Hdcal, log: Path, ending, begins):
     picture = log.with_suffix(f".{ending}")
@@ -56,6 +66,8 @@ def test_the_readings_as_a_picture(here: Hdcal, log: Path, ending, begins):
     refused = here("check", log, "--plot", picture)
     assert refused.returncode == 2 and "exists already" in refused.stderr
     assert here("check", log, "--plot", picture, "--force").returncode == 0
+    other = here("check", log, "--plot", log.with_suffix(".pdf"))
+    assert other.returncode == 2 and "neither .png nor .svg" in other.stderr
     # What hdcal did not write is never replaced.
     picture.write_text("mine")
     assert here("check", log, "--plot", picture, "--force").returncode == 2
@@ -73,6 +85,16 @@ def test_a_case_is_begun(here: Hdcal, log: Path):
     assert (folder / "data.csv").read_bytes() == log.read_bytes()
     again = here("init", folder, *BEGUN)
     assert again.returncode == 2 and "holds gear.toml already" in again.stderr
+
+
+def test_a_material_of_ones_own_is_found_from_the_new_folder(here: Hdcal, tmp_path):
+    text = (priors_folder() / "steel.toml").read_text("utf-8")
+    (tmp_path / "my.toml").write_text(text)
+    assert here("init", "rig", *BEGUN, "--material", "my.toml").returncode == 0
+    (tmp_path / "rig" / "data.csv").write_text(LOG)
+    assert here("check", "rig").returncode == 0
+    folder = here("init", "other", *BEGUN, "--data", "rig")
+    assert folder.returncode == 2 and "is a folder" in folder.stderr
 
 
 def test_readings_may_lie_in_the_folder_already(here: Hdcal, log: Path):
@@ -117,6 +139,10 @@ def test_alone_it_says_what_one_could_do_here(here: Hdcal, log: Path):
     empty = log.parent / "rig" / "empty"
     empty.mkdir()
     assert not list(what_next(empty)) and not list(what_next(empty / "gone"))
+    for odd in ("x;reboot.csv", "-o.csv"):
+        (empty / odd).write_text("")
+    said = {*what_next(empty)}
+    assert said == {"hdcal check 'x;reboot.csv'", "hdcal check ./-o.csv"}
 
 
 def test_pages_are_read_in_the_terminal(here: Hdcal):

@@ -216,6 +216,23 @@ FILES = {
     "decimal commas between blanks": Written(
         "Weg/mm  Kraft/N\n" + lines("  ", ","), ("separated by blanks", "'Weg/mm'")
     ),
+    "blanks before the commas": Written("deformation_mm ,force_N\n" + lines(" ,"), ()),
+    "blanks behind the commas": Written(
+        "Deformation [mm], Force [N]\n" + lines(", "), ("'Deformation [mm]'",)
+    ),
+    "blocks, and somebody says which column is the run": Written(
+        "deformation_mm,force_N,Mounting\n"
+        + "".join(f"{row},7\n" for row in BODY.split()[:3])
+        + "deformation_mm,force_N,Mounting\n"
+        + "".join(f"{row},8\n" for row in BODY.split()[3:]),
+        ("the headers stand 2 times. If not",),
+        {"columns": {"run": "Mounting"}},
+        also={"run": [0, 0, 0, 1, 1, 1]},
+    ),
+    "headers twice, one below the other": Written(
+        "deformation_mm,force_N\ndeformation_mm,force_N\n" + BODY,
+        ("the headers stand 2 times. If not",),
+    ),
     "a footer": Written(
         "deformation_mm,force_N\n" + BODY + "\nEnd of test\nOperator: M. K.\n",
         ("the last 2 lines taken for no readings",),
@@ -317,6 +334,33 @@ REFUSED = {
         "Weg [um];Kraft [N]\n"
         "100;380\n200;567\n300;734\n400;981\n500;1.234\n600;1.402\n",
         "'1.234' may be a thousand",
+    ),
+    "an exact thousand marked by a point": (
+        "deformation_um;force_N\n"
+        "100;200\n200;400\n300;600\n400;800\n500;1.000\n600;1.201\n",
+        "'1.000' may be a thousand",
+    ),
+    "the same beside a remark with a comma": (
+        "deformation_um;force_N;Remark\n100;250;ok, fine\n200;500;\n300;750;\n"
+        "400;999;\n500;1.251;\n",
+        "'1.251' may be a thousand",
+    ),
+    "a broken reading above a repeated header": (
+        "deformation_mm;force_N\n" + lines(";") + "0.6;ERR\n0.7\n"
+        "deformation_mm;force_N\n" + lines(";"),
+        "'ERR' is not a number",
+    ),
+    "a last reading that breaks off in its exponent": (
+        "deformation_mm,force_N\n" + BODY + "6.0e-1\n",
+        "has 1 cells where the header row has 2",
+    ),
+    "a cell more in the last rows, which begin with a time": (
+        "clock,deformation_mm,force_N\n"
+        + "".join(
+            f"2026-11-25T10:0{k},{row}" + ",x" * (k > 3) + "\n"
+            for k, row in enumerate(BODY.split())
+        ),
+        "has 4 cells where the header row has 3",
     ),
     "thousands marked by commas beside decimal points": (
         "Weg [mm]\tKraft [N]\n" + "".join(f"0.{k}00\t1,70{k}\n" for k in range(6)),

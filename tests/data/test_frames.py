@@ -72,6 +72,13 @@ def test_a_gear_may_be_stated_in_memory():
     assert (found.gear.theory, found.gear.reading) == ("ring", "diametral")
     same = {"gear": sizes, "measurement": {"deformation": "diametral"}}
     assert hdcal.read_case(FRAME, same).gear == found.gear
+    # Whatever comes first, and what was handed over stays as it is.
+    late = {"deformation": "diametral", **sizes, "measurement": {}}
+    assert hdcal.read_case(FRAME, late).gear.reading == "diametral"
+    assert late["measurement"] == {}
+    for wrong in ({"gear": "x", **sizes}, {"measurement": 3, **late, **same}):
+        with pytest.raises(InputError):
+            hdcal.read_case(FRAME, {**wrong, "deformation": "radial"})
     with pytest.raises(InputError, match="unknown key") as caught:
         hdcal.read_case(FRAME, {**sizes, "radius": 40.0})
     assert str(caught.value.findings[0]).startswith("gear, column 'gear.radius'")
@@ -81,3 +88,8 @@ def test_without_a_gear_a_stiffness_is_asked():
     found = hdcal.read_case(FRAME)
     assert (found.gear.theory, found.gear.name) == ("spring", "part")
     assert "its stiffness is asked, no K" in " ".join(found.notes)
+
+
+def test_an_index_with_a_name_is_a_column():
+    found = hdcal.read_case(FRAME.set_index(["run", "time_s"]))
+    assert found.run_labels == ("a", "b") and "time" in found.records.known

@@ -1,5 +1,9 @@
 """What a document says first, and of what it speaks."""
 
+from dataclasses import replace
+
+import pytest
+
 from hdcal.report.document import (
     Document,
     Facts,
@@ -49,6 +53,19 @@ def test_a_spring_is_a_part():
     assert (kept, found.provenance) == (DOCUMENT.sections[1], DOCUMENT.provenance)
     assert found.lead.name == "gear" and found.lead.caption == "The part."
     assert spoken_of(DOCUMENT, "ring") is DOCUMENT
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ("Gear gear-2 of gears.", "Part gear-2 of parts."),
+        ("`gear` and --gear GEAR.toml", "`gear` and --gear GEAR.toml"),
+        ("the gear file, [gear], gear.csv", "the gear file, [gear], gear.csv"),
+        ("of one gear. Its gear, too", "of one part. Its part, too"),
+    ],
+)
+def test_names_and_options_are_no_gears(said, told):
+    assert spoken_of(replace(DOCUMENT, headline=said), "spring").headline == told
 
 
 def test_the_answer_comes_first_and_once():

@@ -130,6 +130,9 @@ def test_a_picture_follows_the_stream(live, monkeypatch):
     monkeypatch.setattr("hdcal.tracking.live._PAUSE", 0.0)
     picture.draw()
     picture.take({"status": "error", "row": 1})
+    unknown = answered(1, 200.0)
+    unknown["stiffness_N_per_mm"]["credible_95"] = None
+    picture.take(unknown)
     for row in range(2, 11):
         picture.take(answered(row, 200.0 + row))
     pictures = sink.getvalue().count("stiffness [N/mm]")
@@ -139,6 +142,12 @@ def test_a_picture_follows_the_stream(live, monkeypatch):
     last = sink.getvalue().rpartition("stiffness [N/mm]")[2]
     assert "readings with alarm: 2" in last and "\n211 ┤" in last
     assert last.splitlines()[-1].split() == ["2", "reading", "10"]
+
+
+def test_a_comma_that_was_decimal_stays_so(here: Hdcal, monkeypatch):
+    feed(monkeypatch, b"Weg [mm];Kraft [N]", b"0,1;19,8", b"0,2;1.234")
+    first, second = map(json.loads, here("track", "--gear", GEAR).stdout.splitlines())
+    assert first["status"] == "ok" and "decimal point among" in second["error"]
 
 
 def test_nothing_in_nothing_out(here: Hdcal, monkeypatch):

@@ -24,7 +24,9 @@ def posterior_chart(posterior: Posterior) -> Chart:
 def calibration_charts(bands: Bands, left: Residuals) -> tuple[Chart, Chart]:
     """Return force over deformation, and the distance of readings from the fit."""
     curves, between = band_curves(bands)
-    around, edges = band_curves(bands, baseline=True)
+    # Of several temperatures each has its own band around the fit.
+    alone = len(np.unique(bands.temperature_C)) == 1
+    around, edges = band_curves(bands, baseline=True) if alone else ([], [])
     force = [*curves, *_readings(left, left.measured, "measured")]
     distance = distance_from_model(bands, left)
     rest = [*around, *_readings(left, distance, "measured − fit")]

@@ -5,7 +5,7 @@ from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer, LocalStiffness
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
-from hdcal.inference.checks import PLAUSIBLE
+from hdcal.inference.checks import INDEPENDENT, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
 from hdcal.inference.residuals import Residuals
@@ -26,7 +26,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.provenance import data_rows, provenance_rows
-from hdcal.report.words import estimate, label, with_labels
+from hdcal.report.words import estimate, label, number, with_labels
 
 ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
@@ -35,6 +35,10 @@ ARTICLE_NOTE = (
 _IMPLAUSIBLE = (
     "First look at the units of the columns, and at sizes and [measurement] of the "
     "gear file: what comes out is not what such a gear is believed to be."
+)
+_ALIKE = (
+    "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and "
+    "`hdcal diagnose` weighs both."
 )
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {
@@ -55,9 +59,9 @@ _REMEDY: Mapping[str, str] = {
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
-    "temperature": "Measure at a second temperature: only then do data speak of α.",
     "unloading": "Unload too: without it friction and hysteresis cannot be seen.",
     "specimen": "Measure a second gear: one gear says nothing about the next one.",
+    "temperature": "Measure at a second temperature: only then do data speak of α.",
 }
 
 
@@ -70,7 +74,7 @@ def headline(found: Interval, bend: Sequence[LocalStiffness] = ()) -> str:
     """
     middle, span = estimate(found)
     slopes = " to ".join(
-        f"{each.stiffness_N_per_mm:.3g} N/mm at {each.deformation_mm:.2g} mm"
+        f"{number(each.stiffness_N_per_mm, 3.0)} N/mm at {each.deformation_mm:.2g} mm"
         for each in bend
     )
     told = (
@@ -90,8 +94,9 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
             "still fails, look at the data and leave effects out."
         ]
     known = posterior.case.records.known
-    odd = any(c.name == PLAUSIBLE and c.outcome == "warning" for c in posterior.checks)
-    steps = [_IMPLAUSIBLE] * odd
+    warned = {check.name for check in posterior.checks if check.outcome == "warning"}
+    steps = [_IMPLAUSIBLE] * (PLAUSIBLE in warned)
+    steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
     steps += [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))

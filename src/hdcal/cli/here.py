@@ -1,9 +1,10 @@
 """What one could do next with what lies in a folder."""
 
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-_TABLES = {".csv", ".txt", ".tsv", ".xlsx", ".parquet", ".mat"}
+_TABLES = {".csv", ".txt", ".tsv", ".lvm", ".dat", ".xlsx", ".parquet", ".mat"}
 # So many of a kind are named.
 _MOST = 3
 _RESULTS = {
@@ -18,22 +19,30 @@ def what_next(folder: Path) -> Iterator[str]:
         entries = sorted(folder.iterdir())
     except OSError:
         return
-    cases = [e for e in [folder, *entries] if (e / "data.csv").is_file()]
+    cases = [e for e in [folder, *entries] if _is_file(e / "data.csv")]
     tables = [
         e for e in entries if e.suffix.lower() in _TABLES and e.name != "data.csv"
     ]
     for case in cases[:_MOST]:
-        name = "." if case == folder else case.name
+        name = "." if case == folder else _quoted(case.name)
         yield f"hdcal calibrate {name} --out result"
         yield f"hdcal diagnose {name} --out verdict"
     for table in tables[:_MOST]:
         yield f"hdcal check {_quoted(table.name)}"
     for entry in entries:
         for file, command in _RESULTS.items():
-            if (entry / file).is_file():
+            if _is_file(entry / file):
                 yield command.format(name=_quoted(entry.name))
                 break
 
 
 def _quoted(name: str) -> str:
-    return f"'{name}'" if " " in name else name
+    """Return a name as a shell takes it, and no option."""
+    return shlex.quote(f"./{name}" if name.startswith("-") else name)
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # in a folder that may not be read
+        return False

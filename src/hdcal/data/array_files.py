@@ -58,20 +58,34 @@ def _matlab(path: Path, findings: FileFindings) -> tuple[dict[str, np.ndarray], 
         held = loadmat(path, simplify_cells=True)
     except Exception as error:  # whatever a parser makes of a broken file
         findings.refuse(f"is no .mat file that can be read ({error})", "Save it anew")
-    arrays = dict(_arrays(held))
+    found = list(_arrays(held))
+    arrays = dict(found)
+    twice = [name for name in arrays if [n for n, _ in found].count(name) > 1]
+    if twice:
+        words = f"holds {', '.join(map(quoted, twice))} more than once"
+        findings.refuse(words, "Save one run in a file, or give each a name")
     vectors = {name: array for name, array in arrays.items() if array.ndim == 1}
     lengths = [len(array) for array in vectors.values()]
     usual = [size for size in {*lengths} if lengths.count(size) > 1]
     matrices = {name: array for name, array in arrays.items() if array.ndim == 2}
     names = ", ".join(map(quoted, arrays))
     if len(usual) == 1:
-        return {n: a for n, a in vectors.items() if len(a) == usual[0]}, ""
+        taken = {n: a for n, a in vectors.items() if len(a) == usual[0]}
+        left = [name for name in held if name not in taken and name[:2] != "__"]
+        left = [n for n in left if not _holds(held[n], taken)]
+        note = f"not read of the file: {', '.join(map(quoted, left))}" if left else ""
+        return taken, note
     if not usual and len(matrices) == 1:
         ((name, matrix),) = matrices.items()
         columns = {str(k + 1): column for k, column in enumerate(matrix.T)}
         return columns, f"the matrix {quoted(name)} holds the readings"
     words = f"holds no one table of readings: {names or 'no arrays'}"
     findings.refuse(words, "Save vectors of one length, and nothing else")
+
+
+def _holds(value: Any, taken: dict[str, np.ndarray]) -> bool:
+    """Tell whether a variable is a structure of nothing but what was taken."""
+    return isinstance(value, dict) and {*value} <= {*taken}
 
 
 def _arrays(held: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:

@@ -28,7 +28,9 @@ def tabbed(utf8: bytes, head: str) -> bytes | None:
 def _width(line: str) -> int:
     """Return how many numbers a line of numbers only holds, between blanks."""
     cells = line.split()
-    return len(cells) if all(map(is_number, cells)) else 0
+    # A comma at the end of a number separates it from the next.
+    whole = all(is_number(cell) and cell == cell.strip(",") for cell in cells)
+    return len(cells) if whole else 0
 
 
 def _cells(line: str, width: int) -> str:

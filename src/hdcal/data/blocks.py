@@ -45,7 +45,7 @@ def find_blocks(
         separator: of the cells.
         width: cells of a reading.
     """
-    reads = _reader(lines, separator, width)
+    titled = _titled(lines, separator, width)
     extra = np.zeros(len(lines), dtype=bool)
     block = np.ones(len(lines), dtype=int)
     wanted, titles = head.strip(), 0
@@ -58,7 +58,7 @@ def find_blocks(
         if units is not None and lines[index + 1 : index + 2] == [units]:
             extra[index + 1] = True
         above = index - 1
-        while above >= 0 and not extra[above] and not reads(above):
+        while above >= 0 and not extra[above] and titled(above):
             extra[above] = True
             titles += bool(lines[above].strip())
             above -= 1
@@ -71,10 +71,13 @@ def find_blocks(
     return Blocks(extra, block, titles, footers)
 
 
-def _reader(
+def _titled(
     lines: Sequence[bytes], separator: str, width: int
 ) -> Callable[[int], bool]:
-    """Return what tells whether a line reads as the first reading does."""
+    """Return what tells whether a line above repeated headers is a title, or empty.
+
+    A line that begins as readings do is one of them, however it goes on.
+    """
 
     def cells(index: int) -> list[str]:
         return split_line(lines[index].decode(), separator)
@@ -82,20 +85,32 @@ def _reader(
     first = next((i for i in range(len(lines)) if is_reading(cells(i), width)), None)
     begins = 0 if first is None else [*map(is_number, cells(first))].index(True)
 
-    def reads(index: int) -> bool:
+    def titled(index: int) -> bool:
         found = cells(index)
-        return is_reading(found, width) and is_number(found[begins])
+        if len(found) == width and is_number(found[begins]):
+            return False
+        if begins > 0 and len(found) == width:
+            # Readings begin with a label, as titles do: those hold no number.
+            return not any(map(is_number, found))
+        return not _counts(next(filter(None, found), ""))
 
-    return reads
+    return titled
+
+
+def _counts(cell: str) -> bool:
+    """Tell whether a cell begins as a number or a time does."""
+    return cell.lstrip("+-.,")[:1].isdigit()
 
 
 def _is_footer(line: str, separator: str, width: int) -> bool:
     """Tell whether a line holds words, and not as many cells as a reading.
 
-    A reading that breaks off holds numbers only, and is told of as such.
+    A reading that breaks off begins with a number or a time, and is told of as such;
+    so is one with a cell too many.
     """
-    cells = [cell for cell in split_line(line, separator) if cell]
-    if not cells:
+    cells = split_line(line, separator)
+    filled = [cell for cell in cells if cell]
+    if not filled:
         return True
-    worded = any(letter.isalpha() for letter in cells[0])
-    return worded and len(split_line(line, separator)) != width
+    words = any(letter.isalpha() for letter in filled[0]) and not _counts(filled[0])
+    return words and len(cells) != width and sum(map(is_number, filled)) < 2

@@ -34,13 +34,6 @@ def read_cells(
     numeric = [c for c in columns.values() if c.quantity not in LABELS]
     numbers = table.numbers(c.position for c in numeric)
     values = {c.quantity: numbers[c.position] for c in numeric if c.position in numbers}
-    for column in (c for c in numeric if c.position in numbers):
-        suspect = np.flatnonzero(_may_be_thousands(numbers[column.position]))
-        if suspect.size:
-            cells = table.texts([column.position])[column.position]
-            if all(_IN_THOUSANDS.fullmatch(cell) for cell in cells):
-                wrong = ((int(table.rows[i]), *_thousand(cells[i])) for i in suspect)
-                findings.add_rows(wrong, column.header, "cells that may be thousands")
     # cell by cell, only where something odd stands in the column
     odd = [c for c in numeric if c.position not in numbers]
     texts = table.texts(c.position for c in (*labels, *odd))
@@ -64,6 +57,14 @@ def read_cells(
         numbers, wrong = _read_numbers(table, texts[column.position], comma)
         findings.add_rows(wrong, column.header, "cells that are no numbers")
         values[column.quantity] = numbers
+    for column in numeric:
+        # Beside decimal commas a point was refused.
+        if not comma and _may_hold_thousands(values[column.quantity]):
+            cells = table.texts([column.position])[column.position]
+            wrong = (
+                (int(table.rows[i]), *_thousand(cells[i])) for i in _thousands(cells)
+            )
+            findings.add_rows(wrong, column.header, "cells that may be thousands")
     return values
 
 
@@ -79,16 +80,23 @@ def _read_numbers(
     return numbers, wrong
 
 
-def _may_be_thousands(numbers: np.ndarray) -> np.ndarray:
-    """Return which numbers of a column may be thousands written with a point.
+def _may_hold_thousands(numbers: np.ndarray) -> bool:
+    """Tell whether to look closer: all is whole or above one, some hundreds whole."""
+    whole, size = numbers == np.round(numbers), np.abs(numbers)
+    hundreds = whole & (size >= 100.0) & (size < 1000.0)
+    return bool((whole | (size >= 1.0)).all() and hundreds.any())
 
-    Beside 567 a 1.234 with no other digits is more likely a thousand than a one.
+
+def _thousands(cells: list[str]) -> list[int]:
+    """Return which cells may be thousands written with a point.
+
+    Beside 567 a 1.234, or a 1.000, is more likely a thousand than a one, where all
+    others are whole.
     """
-    whole = numbers == np.round(numbers)
-    size = np.abs(numbers)
-    parts = ~whole & (size >= 1.0)
-    usual = (whole | parts).all() and (whole & (size >= 100.0) & (size < 1000.0)).any()
-    return parts if usual else np.zeros(len(numbers), dtype=bool)
+    if not all(_IN_THOUSANDS.fullmatch(cell) for cell in cells):
+        return []
+    pointed = [index for index, cell in enumerate(cells) if "." in cell]
+    return pointed if len(pointed) < len(cells) else []
 
 
 def _thousand(cell: str) -> tuple[str, str]:

@@ -65,7 +65,8 @@ class Columns:
         """
         named = {}
         for quantity, column in self.used.items():
-            if _split(column.header)[0] == quantity:
+            own, unit = _split(column.header)
+            if own == quantity and known_unit(quantity, unit) in (column.unit, None):
                 continue
             guess = guess_header(column.header)
             alone = self.table.headers.count(column.header) == 1

@@ -107,7 +107,11 @@ class CsvTable:
 
 
 def split_table(
-    utf8: bytes, findings: FileFindings, *, numbered: bool = False
+    utf8: bytes,
+    findings: FileFindings,
+    *,
+    numbered: bool = False,
+    labelled: bool = False,
 ) -> CsvTable:
     """Split a text into headers and lines with the right number of cells.
 
@@ -115,6 +119,7 @@ def split_table(
         utf8: text with plain newlines.
         findings: of the file; gets one for each line that does not fit.
         numbered: columns are named by their numbers, so that no headers are needed.
+        labelled: somebody said which column holds the runs.
 
     Returns:
         The table without the lines that do not fit.
@@ -153,14 +158,16 @@ def split_table(
         for index in np.flatnonzero(filled & ~fits)
     )
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
-    notes = (*_notes(begin, above, headers, spaced), *_block_notes(blocks))
-    kept = list(compress(lines, fits))
-    if blocks.block[-1] > 1 and not any(map(_is_run, headers)):
+    kept, notes = list(compress(lines, fits)), [*_notes(begin, above, headers, spaced)]
+    runs = np.unique(blocks.block[fits], return_inverse=True)[1] + 1
+    alone = not labelled and not any(map(_is_run, headers))
+    notes += _block_notes(blocks, int(runs.max(initial=1)) * alone)
+    if runs.max(initial=1) > 1 and alone:
         headers = (*headers, "run")
-        numbers = blocks.block[fits].tolist()
+        mark = separator.encode()
         kept = [
-            b"%b%b%d" % (line, separator.encode(), n)
-            for line, n in zip(kept, numbers, strict=True)
+            b"%b%b%d" % (line, mark, run)
+            for line, run in zip(kept, runs.tolist(), strict=True)
         ]
     return CsvTable(
         headers=headers,
@@ -170,7 +177,7 @@ def split_table(
         body=b"\n".join([*kept, b""]),
         filled=int(filled.sum()),
         skipped=int((~filled & ~blocks.extra)[:used].sum()),
-        notes=notes,
+        notes=tuple(notes),
     )
 
 
@@ -192,13 +199,17 @@ def _is_run(header: str) -> bool:
     return guess is not None and guess.quantity == "run"
 
 
-def _block_notes(blocks: Blocks) -> Iterator[str]:
+def _block_notes(blocks: Blocks, runs: int) -> Iterator[str]:
+    """Yield what was made of repeated headers, titles and footers.
+
+    Args:
+        blocks: of the file.
+        runs: that blocks were made to; 0 where the file names its runs itself.
+    """
     many = int(blocks.block[-1])
     if many > 1:
-        yield (
-            f"the headers stand {many} times, above {many} blocks of readings: each is "
-            "a run. If not, split the file"
-        )
+        each = f", above {runs} blocks of readings: each is a run" * (runs > 1)
+        yield f"the headers stand {many} times{each}. If not, split the file"
     if blocks.titles:
         yield f"{blocks.titles} lines between the blocks taken for their titles"
     if blocks.footers:

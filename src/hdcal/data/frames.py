@@ -46,6 +46,8 @@ def frame_text(data: Any, findings: FileFindings) -> tuple[bytes, str, str]:
         remedy = "Give arrays of one length and one dimension, by name"
         findings.refuse(f"is no table ({error})", remedy)
     # Each number in full, so that it is read back as it is.
+    if any(name is not None for name in frame.index.names):
+        frame = frame.reset_index()
     # Columns that are only counted have no headers: they are asked for by number.
     named = not all(str(name).isdigit() for name in frame.columns)
     text = frame.to_csv(sep="\t", index=False, header=named, lineterminator="\n")

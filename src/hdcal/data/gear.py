@@ -236,7 +236,7 @@ def _named_material(
         # A slip of the pen only: the nearest name may be quite another steel.
         near = get_close_matches(name, shipped, n=1, cutoff=0.85)
         hint = f"Did you mean '{near[0]}'? " if near else ""
-        known = f"Shipped are: {', '.join(shipped)}"
+        known = f"Shipped are: {', '.join(shipped)}; 'steel' is any steel"
         remedy = f"{hint}{known}; for another one give the path of a .toml file"
         raise toml.error(words, remedy, "gear.material")
     facts = read_priors(given or folder / name, MATERIAL_UNITS, name)

@@ -94,13 +94,18 @@ def tables_of(source: Mapping[str, Any]) -> dict[str, Any]:
     A key that no table has is put into [gear], where the schema refuses it.
     """
     found: dict[str, Any] = {"gear": {}}
+    found |= {key: source[key] for key in source if key in GearFile.model_fields}
     for key, value in source.items():
         if key in GearFile.model_fields:
-            found[key] = value
-        elif key in MeasurementTable.model_fields:
-            found.setdefault("measurement", {})[key] = value
-        else:
-            found["gear"] = {**found["gear"], key: value}
+            continue
+        name = "measurement" if key in MeasurementTable.model_fields else "gear"
+        table = found.get(name, {})
+        if not isinstance(table, Mapping):
+            continue  # refused by the schema
+        if key in table:
+            words = f"is stated twice, alone and in the table [{name}]"
+            raise InputError([Finding(key, words, "State it once")])
+        found[name] = {**table, key: value}
     return found
 
 

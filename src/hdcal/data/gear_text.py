@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping
 
+_LONGEST = 200
 _LEFT_OUT = """\
 # theory = "spring" asks for the stiffness alone. For a gear leave it out and state
 # its sizes instead:
@@ -36,6 +37,9 @@ def _table(name: str, rows: Mapping[str, str | float]) -> Iterator[str]:
     yield f"[{name}]"
     for key, value in rows.items():
         # A text in TOML's quotes is written as in JSON.
+        if key == "name":
+            # Of a file, whose name may hold anything; the schema takes so many letters.
+            value = "".join(c for c in str(value) if c.isprintable())[:_LONGEST]
         yield f"{key} = {json.dumps(value, ensure_ascii=False)}"
     if rows.get("theory") == "spring":
         yield _LEFT_OUT

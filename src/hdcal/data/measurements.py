@@ -116,7 +116,8 @@ def read_columns(
         utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
     mapping = mapping or {}
     numbered = any(wanted[:1].isdigit() for wanted in mapping.values())
-    table = split_table(utf8, findings, numbered=numbered)
+    named = {"numbered": numbered, "labelled": "run" in mapping}
+    table = split_table(utf8, findings, **named)
     used = match_columns(table, mapping, quantities, required, findings)
     values = read_cells(table, used, findings)
     for quantity, column in used.items():

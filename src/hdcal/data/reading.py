@@ -88,7 +88,7 @@ def read_case(
     motion = _motion(measured)
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
-        name=(data.resolve().name if folder else data.stem) or "case",
+        name=_name(data, folder, sheet),
         gear=at_full_scale(found, _full_scale(measured, found)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
@@ -105,6 +105,12 @@ def read_case(
         ),
         columns=measured.columns.as_named(),
     )
+
+
+def _name(data: Path, folder: bool, sheet: str | None) -> str:
+    """Return what the case is called, after its file and the sheet that was named."""
+    name = (data.resolve().name if folder else data.stem) or "case"
+    return name if sheet is None else f"{name}-{sheet}"
 
 
 def _full_scale(measured: Measurements, gear: Gear) -> FullScale:

@@ -57,6 +57,10 @@ def read_text(
             return read_sheet(path, findings, sheet)
         for kind in (PARQUET, MATLAB, HDF5):
             if _begins_with(path, kind):
+                if encoding is not None or sheet is not None:
+                    findings.refuse(
+                        "holds arrays, without `encoding` or `sheet`", "Leave it out"
+                    )
                 return read_arrays(path, findings, kind)
         if sheet is not None:
             findings.refuse("is no workbook, and has no `sheet`", "Leave it out")

@@ -35,6 +35,8 @@ class CsvLines:
                 table, {}, _TAKEN, _TAKEN[:2], wrong
             )
         self._separator, self._width = marks, len(headers)
+        # One decimal sign serves a whole stream, once a comma was one.
+        self._comma = False
 
     def read(self, line: str) -> dict[str, Any]:
         """Return the arguments of `Tracker.update` from a line.
@@ -51,9 +53,9 @@ class CsvLines:
             if quantity in LABELS:
                 found[quantity] = cell
                 continue
-            comma = self._separator != "," and "," in cell
+            self._comma |= self._separator != "," and "," in cell
             try:
-                number = np.array([read_number(cell, comma)])
+                number = np.array([read_number(cell, self._comma)])
             except CellError as error:
                 raise ValueError(f"{quantity}: {error.args[0]}") from None
             found[quantity] = float(column_to_code(number, quantity, column.unit)[0])

@@ -32,6 +32,8 @@ class LivePicture:
         if answer["status"] != "ok":
             return
         found = answer["stiffness_N_per_mm"]
+        if found["credible_95"] is None:
+            return
         self._rows.append((answer["row"], found["mean"], *found["credible_95"]))
         del self._rows[:-_SHOWN]
         self._alarms += bool(answer["alarm"])

@@ -1,5 +1,6 @@
 """`hdcal check`: read and validate, compute nothing."""
 
+import sys
 from functools import partial
 
 import click
@@ -39,7 +40,10 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         if write_gear and case is not None and UNSIZED not in case.notes:
             words = "writes a gear file where there is none, and one was read here"
             raise InputError([Finding("write_gear", words, "Edit that one")])
-        beginning = _SVG if str(plot).endswith(".svg") else _PNG
+        if plot is not None and not plot.lower().endswith((".png", ".svg")):
+            words = f"'{plot}' ends in neither .png nor .svg"
+            raise InputError([Finding("plot", words, "Name such a file")])
+        beginning = _SVG if str(plot).lower().endswith(".svg") else _PNG
         asked = {write_gear: _GEAR, plot: beginning}
         places = {
             name: place
@@ -56,7 +60,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     from hdcal.calibration.check.summary import check_answer, gear_file
 
     found = check_answer(case)
-    drawn = None if plot else case.records
+    drawn = None if plot or not _shows_braille() else case.records
     code = console.answer(check_document(found, drawn, lacking=effects), found)
     if write_gear:
         places[write_gear].write(gear_file(case).encode())
@@ -69,3 +73,12 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         places[plot].write(render(readings_figure(case), kind, case.name))
         console.words(f"the picture: {plot}")
     return code
+
+
+def _shows_braille() -> bool:
+    """Tell whether standard output takes letters beyond those of its language."""
+    try:
+        "\u2801".encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -1,5 +1,6 @@
 """`hdcal init`: ask for what a gear file needs, and write a case folder."""
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -47,10 +48,15 @@ def init(console: Console, folder, data, **given):
     from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
 
     tables = {"name": Path(folder).resolve().name, **stated}
+    if str(tables["material"]).endswith(".toml"):
+        # A gear file names another file as seen from its own folder.
+        tables["material"] = os.path.abspath(str(tables["material"]))
     case = None
     with console.wrong:
         if data is None:
             console.wrong.attempt(read_gear, tables)
+        elif Path(data).is_dir():
+            raise InputError([Finding("data", "is a folder", "Name a file")])
         else:
             case = console.wrong.attempt(read_case, data, tables)
     measured = {

@@ -1,5 +1,6 @@
 """The certificate of a margin: what a person signs, on one printed page."""
 
+import re
 from collections.abc import Iterator
 from datetime import date
 
@@ -20,6 +21,8 @@ FILE, TEMPLATE = "certificate.html", "certificate.html.j2"
 _UNTESTED = "What was not tested, and what the result rests on"
 # Letters of a name in the title; the whole of it stands below.
 _LONGEST = 60
+# How a note goes on to say how it could be otherwise.
+_OTHERWISE = re.compile(r"\. (?:If|For|Name|Its) ")
 # What certificates of the rig may state, by site of the model.
 _OF_GAUGES = {
     "force_gain": "gain of the load cell",
@@ -99,7 +102,7 @@ def _measured(posterior: Posterior) -> Facts:
     guessed = [note for note in case.notes if note.startswith(ASSUMED)]
     if guessed:
         # How to say otherwise is for whoever reads the file, not for who signs.
-        said = (note.removeprefix(ASSUMED).partition(". ")[0] for note in guessed)
+        said = (_OTHERWISE.split(note.removeprefix(ASSUMED))[0] for note in guessed)
         rows.append(("assumed", "; ".join(said)))
     return Facts(rows)
 
