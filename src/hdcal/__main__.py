@@ -6,6 +6,7 @@ Heavy imports stay inside the commands, so that `hdcal --help` answers at once.
 import os
 import signal
 import sys
+from functools import partial
 from pathlib import Path
 
 import click
@@ -50,11 +51,7 @@ _EPILOG = (
 )
 
 
-@click.group(
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog=_EPILOG,
-    invoke_without_command=True,
-)
+@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
 @click.option(
     "--version",
     is_flag=True,
@@ -63,19 +60,12 @@ _EPILOG = (
     callback=_show_version,
     help="Show the version and stop.",
 )
-@click.pass_context
-def hdcal(context: click.Context) -> None:
+def hdcal() -> None:
     """Calibrate the force model of a harmonic-drive flexspline, and say what it lacks.
 
     DATA and CASE are a file of measurements (CSV, or .xlsx) with a gear file (--gear),
     or a folder holding data.csv and gear.toml.
     """
-    if context.invoked_subcommand is None:
-        click.echo(context.get_help())
-        if steps := list(what_next(Path.cwd())):
-            click.echo("\nIn this folder one could:")
-            for step in steps:
-                click.echo(f"  {printable(step)}")
 
 
 for _command in (
@@ -123,6 +113,10 @@ def _run(arguments: list[str], console: Console) -> int:
         code = hdcal.main(arguments, "hdcal", standalone_mode=False, obj=console)
         return code if isinstance(code, int) else DONE
     except click.UsageError as error:
+        if not [one for one in arguments if one != "--json"]:
+            none = Finding("command line", "names no command", "See hdcal --help")
+            console.findings([none], partial(_show_commands, error))
+            return BAD_INPUT
         found = usage_error(error)
         # Click would repeat what was written, however long.
         short = click.UsageError(ended(found.problem), error.ctx)
@@ -158,6 +152,15 @@ def _run(arguments: list[str], console: Console) -> int:
         what = " ".join(str(error).split())[:200] or "no further words"
         words = f"internal error ({type(error).__name__}: {what}); please report it, "
         return _failed(error, words + "with what HDCAL_DEBUG=1 prints", console)
+
+
+def _show_commands(error: click.UsageError) -> None:
+    """Show what there is, and what one could do here."""
+    assert error.ctx is not None
+    click.echo(error.ctx.find_root().get_help(), err=True)
+    if steps := list(what_next(Path.cwd())):
+        lines = "\n  ".join(map(printable, steps))
+        click.echo(f"\nIn this folder one could:\n  {lines}", err=True)
 
 
 def _failed(error: Exception, words: str, console: Console) -> int:

@@ -131,8 +131,9 @@ def test_alone_it_says_what_one_could_do_here(here: Hdcal, log: Path):
     (log.parent / "rig" / "data.csv").write_text(LOG)
     (log.parent / "old result").mkdir()
     (log.parent / "old result" / "posterior.nc").write_text("")
-    said = here().stdout
-    _, steps = said.split("In this folder one could:\n")
+    done = here()
+    assert done.returncode == 2 and not done.stdout
+    said, steps = done.stderr.split("In this folder one could:\n")
     assert "Usage: hdcal" in said and "  hdcal check log.csv\n" in steps
     assert "  hdcal calibrate rig --out result\n" in steps
     assert "  hdcal margin 'old result' " in steps

@@ -4,6 +4,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
+from hdcal.cli.options import json_option
 from hdcal.errors import Finding, InputError
 
 _SHELLS = ("bash", "zsh", "fish")
@@ -11,6 +12,7 @@ _SHELLS = ("bash", "zsh", "fish")
 
 @command("help", short_help="A page of the documentation, in the terminal.")
 @click.argument("topic", required=False)
+@json_option
 @click.pass_obj
 def show_topic(console: Console, topic):
     """Show a page of the documentation; without TOPIC list them.
@@ -22,8 +24,10 @@ def show_topic(console: Console, topic):
 
     found = pages()
     if topic is None:
+        if console.json:
+            console.data({"status": "ok", "topics": list(found)})
         width = max(map(len, found))
-        for name, page in found.items():
+        for name, page in found.items() if not console.json else ():
             heading = page.read_text("utf-8").lstrip("# ").partition("\n")[0]
             console.result(f"  {name:{width}}  {heading}")
         return 0
@@ -32,12 +36,17 @@ def show_topic(console: Console, topic):
         raise InputError([Finding("topic", f"no page is called '{topic}'", remedy)])
     from rich.markdown import Markdown
 
-    console.table(Markdown(found[topic].read_text("utf-8"), hyperlinks=False))
+    text = found[topic].read_text("utf-8")
+    if console.json:
+        console.data({"status": "ok", "topic": topic, "text": text})
+    else:
+        console.table(Markdown(text, hyperlinks=False))
     return 0
 
 
 @command("completion", short_help="Completion of commands for a shell.")
 @click.argument("shell", type=click.Choice(_SHELLS))
+@json_option
 @click.pass_context
 def show_completion(context: click.Context, shell):
     """Print what makes SHELL complete commands and options of hdcal.
@@ -50,5 +59,8 @@ def show_completion(context: click.Context, shell):
     kind = get_completion_class(shell)
     assert kind is not None
     source = kind(context.find_root().command, {}, "hdcal", "_HDCAL_COMPLETE").source()
-    context.obj.result(source)
+    if context.obj.json:
+        context.obj.data({"status": "ok", "shell": shell, "source": source})
+    else:
+        context.obj.result(source)
     return 0

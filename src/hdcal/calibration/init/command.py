@@ -13,23 +13,33 @@ from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 from hdcal.errors import Finding, InputError
 
-# Key of the gear file -> its option, what is asked, and the usual answer.
-_ASKED: dict[str, tuple[str, str, str | float | None]] = {
-    "wall_thickness_mm": ("--wall", "Wall thickness [mm]", None),
-    "radius_mm": ("--radius", "Radius, to the middle of the wall [mm]", None),
-    "length_mm": ("--length", "Length of the gear [mm]", None),
-    "material": ("--material", "Material", "steel"),
-    "deformation": ("--deformation", "Deformation as read, radial or diametral", None),
-    "reference_temperature_C": ("--temperature", "Reference temperature [°C]", 20.0),
+# Parameter -> its key in the gear file, its option, what is asked, the usual answer.
+_ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
+    "wall_thickness": ("wall_thickness_mm", "--wall", "Wall thickness [mm]", None),
+    "radius": ("radius_mm", "--radius", "Radius to the middle of the wall [mm]", None),
+    "length": ("length_mm", "--length", "Length of the gear [mm]", None),
+    "material": ("material", "--material", "Material", "steel"),
+    "reading": (
+        "deformation",
+        "--deformation",
+        "Deformation as read, radial or diametral",
+        None,
+    ),
+    "reference_temperature": (
+        "reference_temperature_C",
+        "--temperature",
+        "Reference temperature [°C]",
+        20.0,
+    ),
 }
-_TEXTS = ("material", "deformation")
+_TEXTS = ("material", "reading")
 
 
 def _asked(command):
-    for key, (option, words, default) in reversed(_ASKED.items()):
+    for name, (_, option, words, default) in reversed(_ASKED.items()):
         usual = "" if default is None else f" [default: {default}]"
-        kind = str if key in _TEXTS else float
-        add = click.option(option, key, type=kind, help=f"{words}{usual}.")
+        kind = str if name in _TEXTS else float
+        add = click.option(option, name, type=kind, help=f"{words}{usual}.")
         command = add(command)
     return command
 
@@ -85,19 +95,19 @@ def _answers(given: dict) -> Iterator[tuple[str, str | float]]:
     terminal = sys.stdin is not None and sys.stdin.isatty()
     missing = [
         Finding(option, "is not stated", "State it, or call hdcal from a terminal")
-        for key, (option, _, default) in _ASKED.items()
-        if given[key] is None and default is None and not terminal
+        for name, (_, option, _, default) in _ASKED.items()
+        if given[name] is None and default is None and not terminal
     ]
     if missing:
         raise InputError(missing)
-    for key, (_, words, default) in _ASKED.items():
-        if given[key] is not None:
-            yield key, given[key]
+    for name, (key, _, words, default) in _ASKED.items():
+        if given[name] is not None:
+            yield key, given[name]
         elif not terminal:
             assert default is not None
             yield key, default
         else:
-            kind = str if key in _TEXTS else float
+            kind = str if name in _TEXTS else float
             yield key, click.prompt(words, default=default, type=kind, err=True)
 
 
