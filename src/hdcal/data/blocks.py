@@ -3,7 +3,7 @@
 A logger that is started again writes its titles and headers again: each block is a run.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,6 +69,37 @@ def find_blocks(
     if footers:
         extra[below:] = True
     return Blocks(extra, block, titles, footers)
+
+
+def with_runs(lines: Sequence[bytes], runs: np.ndarray, separator: str) -> list[bytes]:
+    """Return lines with the number of their run as a last cell.
+
+    Args:
+        lines: readings.
+        runs: of each line, from 1, shape (n,).
+        separator: of the cells.
+    """
+    mark = separator.encode()
+    each = zip(lines, runs.tolist(), strict=True)
+    return [b"%b%b%d" % (line, mark, run) for line, run in each]
+
+
+def block_notes(blocks: Blocks, runs: int) -> Iterator[str]:
+    """Yield what was made of repeated headers, titles and footers.
+
+    Args:
+        blocks: of the file.
+        runs: that blocks were made to; 0 where the file names its runs itself.
+    """
+    many = int(blocks.block[-1])
+    if many > 1:
+        each = f", above {runs} blocks of readings: each is a run" * (runs > 1)
+        yield f"the headers stand {many} times{each}. If not, split the file"
+    if blocks.titles:
+        yield f"{blocks.titles} lines between the blocks taken for their titles"
+    if blocks.footers:
+        lines = "line" if blocks.footers == 1 else f"{blocks.footers} lines"
+        yield f"the last {lines} taken for no readings"
 
 
 def _titled(

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.blanks import tabbed
-from hdcal.data.blocks import Blocks, find_blocks
+from hdcal.data.blocks import block_notes, find_blocks, with_runs
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import guess_header
 from hdcal.data.table_start import (
@@ -161,14 +161,9 @@ def split_table(
     kept, notes = list(compress(lines, fits)), [*_notes(begin, above, headers, spaced)]
     runs = np.unique(blocks.block[fits], return_inverse=True)[1] + 1
     alone = not labelled and not any(map(_is_run, headers))
-    notes += _block_notes(blocks, int(runs.max(initial=1)) * alone)
+    notes += block_notes(blocks, int(runs.max(initial=1)) * alone)
     if runs.max(initial=1) > 1 and alone:
-        headers = (*headers, "run")
-        mark = separator.encode()
-        kept = [
-            b"%b%b%d" % (line, mark, run)
-            for line, run in zip(kept, runs.tolist(), strict=True)
-        ]
+        headers, kept = (*headers, "run"), with_runs(kept, runs, separator)
     return CsvTable(
         headers=headers,
         header_row=top + 1,
@@ -197,24 +192,6 @@ def _filled_cells(lines: list[bytes], separator: str) -> tuple[np.ndarray, np.nd
 def _is_run(header: str) -> bool:
     guess = guess_header(header)
     return guess is not None and guess.quantity == "run"
-
-
-def _block_notes(blocks: Blocks, runs: int) -> Iterator[str]:
-    """Yield what was made of repeated headers, titles and footers.
-
-    Args:
-        blocks: of the file.
-        runs: that blocks were made to; 0 where the file names its runs itself.
-    """
-    many = int(blocks.block[-1])
-    if many > 1:
-        each = f", above {runs} blocks of readings: each is a run" * (runs > 1)
-        yield f"the headers stand {many} times{each}. If not, split the file"
-    if blocks.titles:
-        yield f"{blocks.titles} lines between the blocks taken for their titles"
-    if blocks.footers:
-        lines = "line" if blocks.footers == 1 else f"{blocks.footers} lines"
-        yield f"the last {lines} taken for no readings"
 
 
 def _begin(utf8: bytes) -> tuple[TableStart, bytes, bool]:
