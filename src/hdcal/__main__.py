@@ -20,7 +20,7 @@ from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
-from hdcal.cli.topics import show_completion, show_topic
+from hdcal.cli.topics import COMPLETE, show_completion, show_topic
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
@@ -32,8 +32,6 @@ from hdcal.report.plain import printable
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-# Where a shell's completion asks.
-COMPLETE = "_HDCAL_COMPLETE"
 # 128 + SIGPIPE, as shells say it of a tool whose reader went away.
 NOBODY_READS = 141
 

@@ -155,24 +155,20 @@ def test_a_gear_that_is_not_linear_is_told_by_its_residuals():
     assert outcome(found, "residuals are noise") == "warning"
 
 
-def spoiled(**changes):
-    """Return a case with some columns replaced."""
-    case = moving_case(0)
-    return replace(case, records=replace(case.records, **changes))
-
-
 @pytest.mark.parametrize(
-    ("case", "words"),
+    ("columns", "labels", "words"),
     [
-        (spoiled(known=frozenset()), "no column holds the time"),
-        (spoiled(time=np.repeat(np.arange(100.0), 2)), "not later than"),
-        (spoiled(force_sd=np.full(200, 0.5)), "gives an sd of the force"),
-        (replace(moving_case(0), run_labels=("1", "2")), "several runs"),
+        ({"known": frozenset()}, {}, "no column holds the time"),
+        ({"time": np.repeat(np.arange(100.0), 2)}, {}, "not later than"),
+        ({"force_sd": np.full(200, 0.5)}, {}, "gives an sd of the force"),
+        ({}, {"run_labels": ("1", "2")}, "several runs"),
     ],
 )
-def test_what_is_no_time_series_is_refused(case, words):
+def test_what_is_no_time_series_is_refused(columns, labels, words):
+    case = moving_case(0)
+    spoiled = replace(case, records=replace(case.records, **columns), **labels)
     with pytest.raises(InputError, match=words):
-        calibrate_dynamic(case)
+        calibrate_dynamic(spoiled)
 
 
 def test_every_fault_is_told_at_once():

@@ -10,10 +10,8 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.prediction.bands.chart import AXIS, FORCE, band_curves
+from hdcal.report.canvas import thinned
 from hdcal.report.chart import Chart, Series
-
-# More readings than this make a page of many megabytes, and tell no more.
-_MOST = 2000
 
 
 def posterior_chart(posterior: Posterior) -> Chart:
@@ -39,7 +37,7 @@ def calibration_charts(bands: Bands, left: Residuals) -> tuple[Chart, Chart]:
 def _readings(left: Residuals, y: np.ndarray, words: str) -> Iterator[Series]:
     """Yield the readings of each direction as points."""
     kept = np.zeros(len(y), dtype=bool)
-    kept[:: -(-len(y) // _MOST)] = True
+    kept[thinned(len(y))] = True
     ways = movement_words(left.deformation)
     for sense, colour in ((1, ""), (-1, "#8a949c")):
         rows = kept & (left.direction == sense)

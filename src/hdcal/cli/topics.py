@@ -7,6 +7,8 @@ from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 from hdcal.errors import Finding, InputError
 
+# Where a shell's completion asks.
+COMPLETE = "_HDCAL_COMPLETE"
 _SHELLS = ("bash", "zsh", "fish")
 
 
@@ -26,8 +28,9 @@ def show_topic(console: Console, topic):
     if topic is None:
         if console.json:
             console.data({"status": "ok", "topics": list(found)})
+            return 0
         width = max(map(len, found))
-        for name, page in found.items() if not console.json else ():
+        for name, page in found.items():
             heading = page.read_text("utf-8").lstrip("# ").partition("\n")[0]
             console.result(f"  {name:{width}}  {heading}")
         return 0
@@ -58,7 +61,7 @@ def show_completion(context: click.Context, shell):
 
     kind = get_completion_class(shell)
     assert kind is not None
-    source = kind(context.find_root().command, {}, "hdcal", "_HDCAL_COMPLETE").source()
+    source = kind(context.find_root().command, {}, "hdcal", COMPLETE).source()
     if context.obj.json:
         context.obj.data({"status": "ok", "shell": shell, "source": source})
     else:

@@ -50,9 +50,9 @@ def find_blocks(
     block = np.ones(len(lines), dtype=int)
     wanted, titles = head.strip(), 0
     again = bool(wanted) and text.count(wanted) > 1
-    for index in [
-        i for i, line in enumerate(lines) if again and line.strip() == wanted
-    ]:
+    for index, line in enumerate(lines if again else ()):
+        if line.strip() != wanted:
+            continue
         extra[index] = True
         block[index:] += 1
         if units is not None and lines[index + 1 : index + 2] == [units]:

@@ -159,10 +159,15 @@ def split_table(
     )
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
     kept, notes = list(compress(lines, fits)), [*_notes(begin, above, headers, spaced)]
-    runs = np.unique(blocks.block[fits], return_inverse=True)[1] + 1
-    alone = not labelled and not any(map(_is_run, headers))
-    notes += block_notes(blocks, int(runs.max(initial=1)) * alone)
-    if runs.max(initial=1) > 1 and alone:
+    runs, many = blocks.block[fits], 1
+    if blocks.block[-1] > 1:
+        # Headers twice, one below the other, begin no run.
+        runs = np.unique(runs, return_inverse=True)[1] + 1
+        many = int(runs.max(initial=1))
+    if labelled or any(map(_is_run, headers)):
+        many = 0
+    notes += block_notes(blocks, many)
+    if many > 1:
         headers, kept = (*headers, "run"), with_runs(kept, runs, separator)
     return CsvTable(
         headers=headers,

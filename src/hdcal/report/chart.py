@@ -5,7 +5,7 @@ What is drawn beside it as an image is shown on paper and where no script runs.
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Chart:
     x: str
     y: str
     series: Sequence[Series]
-    bands: Sequence[tuple[int, int, float]] = field(default=())
+    bands: Sequence[tuple[int, int, float]] = ()
     height: int = 380
 
     def plain(self) -> dict:
@@ -80,13 +80,7 @@ class Chart:
             "height": self.height,
             "bands": [list(band) for band in self.bands],
             "series": [
-                {
-                    "label": each.label,
-                    "colour": each.colour,
-                    "points": each.points,
-                    "width": each.width,
-                    "dashed": each.dashed,
-                }
+                {n: v for n, v in vars(each).items() if n not in ("x", "y")}
                 for each in self.series
             ],
             "data": [_numbers(column[order]) for column in (over, *columns)],

@@ -45,16 +45,11 @@ def check(console: Console, effects, write_gear, plot, force, **given):
             raise InputError([Finding("plot", words, "Name such a file")])
         beginning = _SVG if str(plot).lower().endswith(".svg") else _PNG
         asked = {write_gear: _GEAR, plot: beginning}
-        places = {
-            name: place
-            for name, text in asked.items()
-            if name is not None
-            and (
-                place := console.hold(
-                    partial(reserve_file, name, force=force, beginning=text)
-                )
-            )
-        }
+        places = {}
+        for name, text in asked.items():
+            if name is not None:
+                reserve = partial(reserve_file, name, force=force, beginning=text)
+                places[name] = console.hold(reserve)
     assert case is not None
     from hdcal.calibration.check.document import check_document
     from hdcal.calibration.check.summary import check_answer, gear_file

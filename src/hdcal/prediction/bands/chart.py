@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hdcal.prediction.bands.bands import Bands
+from hdcal.report.canvas import beyond
 from hdcal.report.chart import COLOURS, Chart, Series
 
 # Kind of a band, what it is called, and how strongly it is filled.
@@ -61,13 +62,9 @@ def band_curves(
 def _middle(x, middle, tested, named: str, colour: str) -> Iterator[Series]:
     """Yield the median, where it was tested and where not."""
     inside = np.asarray(tested, dtype=bool)
-    outside = ~inside
-    # One row of the other kind lets the two meet.
-    outside[1:] |= ~inside[:-1]
-    outside[:-1] |= ~inside[1:]
     for words, rows, dashed in (
         (f"force model{named} [N]", inside, False),
-        (f"not tested{named} [N]", outside, True),
+        (f"not tested{named} [N]", beyond(inside), True),
     ):
         if rows.any():
             y = np.where(rows, middle, np.nan)
