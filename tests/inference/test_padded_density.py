@@ -115,10 +115,11 @@ def test_padded_rows_have_the_density_of_the_measured_ones(name: str):
     values = values_of(problem)
     found, slow = (EXPAND(p, values) for p in (problem, bare(problem, case)))
     np.testing.assert_allclose(float(found[0]), float(slow[0]), **CLOSE)
+    # Terms as large as the density cancel in a small slope: to their rounding.
+    rounding = 4.0 * np.finfo(float).eps * abs(float(slow[0]))
+    close = CLOSE | {"atol": CLOSE["atol"] + rounding}
     for site, slope in slow[1].items():
-        np.testing.assert_allclose(found[1][site], slope, **CLOSE, err_msg=site)
-        scale = np.abs(np.asarray(slope)).max()
-        np.testing.assert_allclose(found[1][site], slope, rtol=0, atol=1e-11 * scale)
+        np.testing.assert_allclose(found[1][site], slope, **close, err_msg=site)
     assert np.isfinite(float(found[0]))
     if problem.integrated:
         key = jax.random.key(1)

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
+from hdcal.evidence.effect_curves import padded_records
 from hdcal.physics.history import load_cycle
 
 # Ends of the curve, as shares of the largest deformation.
@@ -148,7 +150,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         beside=x,
     )
     # Whole cycles: where loading and unloading differ in slope, half of one is no less.
-    cycle = np.asarray(load_cycle(records.sense, records.run, records.specimen))
+    cycle = np.asarray(_load_cycle(padded_records(records)))[: len(x)]
     yield Contrast(
         "order",
         (cycle - cycle.mean()) * x,
@@ -156,6 +158,11 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "the slope {way} from cycle to cycle, which moves the force by {size} in all",
         beside=x,
     )
+
+
+@jax.jit
+def _load_cycle(records: Records):
+    return load_cycle(records.sense, records.run, records.specimen)
 
 
 def _held(records: Records) -> np.ndarray:
