@@ -307,3 +307,14 @@ def test_numbers_in_words():
         "–",
     ]
     assert likely({"a": 0.3, "b": 0.65, "c": 0.05}) == ["b", "a"]
+
+
+def test_a_pair_that_nothing_describes_better_is_told_beside_unknown():
+    pair = "coulomb_friction+progressive_stiffening"
+    weighed = {"none": 0.0, "unknown": 1.0, pair: 13.0, "hysteresis+unknown": 12.8}
+    words = said(KINDS["unknown"](), which={"log_evidence": weighed})
+    assert "better than coulomb friction and progressive stiffening" in words
+    weighed["hysteresis+unknown"] = 13.1
+    for without in (weighed, {}):
+        words = said(KINDS["unknown"](), which={"log_evidence": without})
+        assert "effects act at once" not in words

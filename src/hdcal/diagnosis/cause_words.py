@@ -6,6 +6,7 @@ from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.groups import JOINED
 from hdcal.diagnosis.seen_words import what_is_seen
 from hdcal.diagnosis.verdict import Closure, NotTestable, Which
+from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.physics.groups import GROUPS
 from hdcal.report.words import (
     capital,
@@ -123,7 +124,22 @@ def unknown(found: VerdictAnswer) -> Iterator[str]:
             f"The cause may lie outside the library ({percent(chance)}); next comes "
             f"{hypothesis(best)} ({percent(chances[best])})."
         )
+    yield from _two_at_once(found.which)
     yield from _shrinks(found, "the best correction there is")
+
+
+def _two_at_once(which: Which) -> Iterator[str]:
+    """Say which pair describes the readings best, where none with unknown does better.
+
+    One such pair among hundreds counts little beforehand, and so it comes behind.
+    """
+    weighed = {n: e for n, e in which.log_evidence.items() if known(e)}
+    best = max(weighed, key=lambda name: weighed[name], default=NONE)
+    if "+" in best and UNKNOWN not in best.split("+"):
+        yield (
+            f"Or two effects act at once: nothing describes the readings better than "
+            f"{hypothesis(best)}, though few rigs have just these two."
+        )
 
 
 def _beside(which: Which, what: str) -> Iterator[str]:
