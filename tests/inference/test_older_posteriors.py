@@ -119,16 +119,3 @@ def test_a_leftover_of_before_it_knew_loading_from_unloading_is_read(tmp_path):
     replace(old, settings=now.settings).save(tmp_path / "posterior.nc")
     with pytest.raises(InputError, match="damaged"):
         Posterior.load(tmp_path / "posterior.nc")
-
-
-def test_an_effect_that_has_got_a_parameter_since_is_calibrated_again(tmp_path):
-    names = ("cos_1", "sin_1", "cos_2", "sin_2", "cos_3", "sin_3")
-    case = ramp_case()
-    draws = plain_draws(case, 40) | {f"ovality.{n}": np.zeros(40) for n in names}
-    now = written_posterior(case, draws, effects=("ovality",))
-    bare = xr.DataTree(now.tree["posterior"].to_dataset().drop_vars("ovality.sin_3"))
-    tree = now.tree.copy()
-    tree["posterior"] = bare
-    replace(now, tree=tree).save(tmp_path / "posterior.nc")
-    with pytest.raises(InputError, match=r"before there was ovality\.sin_3.* again"):
-        Posterior.load(tmp_path / "posterior.nc")

@@ -1,7 +1,7 @@
 """The calibrated posterior: draws, what they rest on, and whether they may be used."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
-from hdcal.inference.checks import Check, listed
+from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.held import LOOP, PILOT_NOISE, HeldModel, HeldSettings
 from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
@@ -207,22 +207,12 @@ class Posterior(Shown):
                 settings=model.settings,
             )
             sites = found.sites(case, chosen, settings.with_gap)
-            _check_age(tree, sites, file)
             check_draws(tree, sites)
             _check_mixture(tree, chosen, settings)
             model.check_diagnoses(sites)
             return found
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error
-
-
-def _check_age(tree: xr.DataTree, sites: Iterable[str], file) -> None:
-    """Refuse a calibration of an effect that has got a parameter more since."""
-    held = tree["posterior"].to_dataset()
-    younger = [site for site in sites if "." in site and site not in held]
-    if younger:
-        words = f"was calibrated before there was {listed(younger)}"
-        raise InputError([Finding(str(file), words, "Calibrate again")])
 
 
 def _check_mixture(tree: xr.DataTree, effects, settings: HeldSettings) -> None:

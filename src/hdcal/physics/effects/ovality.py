@@ -14,12 +14,11 @@ def _share(meaning: str, typical: float) -> Float[Array, ""] | float:
 
 
 class Ovality(Effect):
-    """F → F + k ω Σ (cₘ cos mθ + sₘ sin mθ), m = 1 … 3.
+    """F → F + k ω (c₁ cos θ + s₁ sin θ + c₂ cos 2θ + s₂ sin 2θ).
 
-    The same as k (1 + Σ eₘ cos m(θ − φₘ)), linear in its amplitudes.
+    The same as k (1 + e₁ cos(θ − φ₁) + e₂ cos 2(θ − φ₂)), linear in its amplitudes.
 
-    Source: ISO 1101 (circularity); first harmonics of a wall of uneven thickness:
-    once off its axis, twice oval, thrice as three jaws leave it.
+    Source: ISO 1101 (circularity); first harmonics of a wall of uneven thickness.
     """
 
     name: ClassVar[str] = "ovality"
@@ -31,13 +30,10 @@ class Ovality(Effect):
     sin_1: Float[Array, ""] | float = _share("stiffness, once per turn, sine", -0.01)
     cos_2: Float[Array, ""] | float = _share("stiffness, twice per turn, cosine", 0.01)
     sin_2: Float[Array, ""] | float = _share("stiffness, twice per turn, sine", 0.015)
-    cos_3: Float[Array, ""] | float = _share("stiffness, thrice a turn, cosine", 0.004)
-    sin_3: Float[Array, ""] | float = _share("stiffness, thrice a turn, sine", -0.003)
 
     def apply(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:
         """Return the force with the stiffness of the loaded diameter."""
         angle = rows.records.angle
         gain = self.cos_1 * jnp.cos(angle) + self.sin_1 * jnp.sin(angle)
         gain += self.cos_2 * jnp.cos(2.0 * angle) + self.sin_2 * jnp.sin(2.0 * angle)
-        gain += self.cos_3 * jnp.cos(3.0 * angle) + self.sin_3 * jnp.sin(3.0 * angle)
         return signal + rows.stiffness * rows.deformation * gain
