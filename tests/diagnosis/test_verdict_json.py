@@ -314,7 +314,9 @@ def test_a_pair_that_nothing_describes_better_is_told_beside_unknown():
     weighed = {"none": 0.0, "unknown": 1.0, pair: 13.0, "hysteresis+unknown": 12.8}
     words = said(KINDS["unknown"](), which={"log_evidence": weighed})
     assert "better than coulomb friction and progressive stiffening" in words
+    assert "No single effect in the library" in words
     weighed["hysteresis+unknown"] = 13.1
     for without in (weighed, {}):
         words = said(KINDS["unknown"](), which={"log_evidence": without})
         assert "effects act at once" not in words
+        assert "Nothing in the library explains it" in words

@@ -112,11 +112,12 @@ def unknown(found: VerdictAnswer) -> Iterator[str]:
     chances = found.which.probabilities
     chance = chances.get("unknown")
     others = [name for name in chances if name != "unknown"]
+    together = list(_two_at_once(found.which))
     yield what_is_seen(found)
     if not others or not known(chance) or chance >= _SURE:
         yield (
-            "Nothing in the library explains it: most likely the cause lies outside "
-            f"({percent(chance)})."
+            f"{'No single effect' if together else 'Nothing'} in the library explains "
+            f"it: most likely the cause lies outside ({percent(chance)})."
         )
     else:
         best = max(others, key=lambda name: or_zero(chances[name]))
@@ -124,7 +125,7 @@ def unknown(found: VerdictAnswer) -> Iterator[str]:
             f"The cause may lie outside the library ({percent(chance)}); next comes "
             f"{hypothesis(best)} ({percent(chances[best])})."
         )
-    yield from _two_at_once(found.which)
+    yield from together
     yield from _shrinks(found, "the best correction there is")
 
 
