@@ -92,8 +92,9 @@ FIRST_ARRAYS = {
     "the force, compiled before anything else": GEAR
     + """
 import jax
+from hdcal.physics.theory import THEORIES
 found = jax.jit(hdcal.force)(gear, 210e3, 0.1, 0.3)
-assert abs(float(found) - hdcal.THEORIES["ring"](gear, 210e3) * 0.1 * 0.3) < 1e-13
+assert abs(float(found) - THEORIES["ring"](gear, 210e3) * 0.1 * 0.3) < 1e-13
 """,
     "the force of an array from before": """
 import jax.numpy as jnp
@@ -102,7 +103,9 @@ assert deformation.dtype == jnp.float32
 """
     + GEAR
     + "found = hdcal.force(gear, 210e3, 0.1, deformation)",
-    "a theory": GEAR + "found = hdcal.THEORIES['cup'](gear, 210e3)",
+    "a theory": GEAR
+    + "from hdcal.physics.theory import THEORIES\n"
+    + "found = THEORIES['cup'](gear, 210e3)",
     "a profile": GEAR
     + "from hdcal.physics.profile import ring_profile\n"
     + "found = ring_profile(gear, 210e3, 0.3, [0.0, 1.0]).stress",

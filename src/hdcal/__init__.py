@@ -9,58 +9,46 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
-    from hdcal.classical.fit.fit import PolynomialFit, fit
+    from hdcal.classical.fit.fit import fit
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
     from hdcal.data.reading import read_case
     from hdcal.data.records import Geometry, Records
-    from hdcal.design.inverse_design import InverseDesign, inverse_design
-    from hdcal.design.study.study import Study, study
-    from hdcal.design.wave_generator import WaveGenerator, wave_generator
+    from hdcal.design.inverse_design import inverse_design
+    from hdcal.design.study.study import study
+    from hdcal.design.wave_generator import wave_generator
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.verdict import Verdict
-    from hdcal.errors import Finding, HdcalError, InputError, NotUsable
+    from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.inference.dynamic_posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
-    from hdcal.inference.residuals import Residuals, residuals
+    from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
-    from hdcal.motion.respond.respond import Response, respond
+    from hdcal.motion.respond.respond import respond
     from hdcal.physics.chain import force
     from hdcal.physics.effect import Effect, Noise, Rows, parameter
     from hdcal.physics.registry import EFFECTS
-    from hdcal.physics.theory import THEORIES
-    from hdcal.prediction.bands.bands import Bands, predict
+    from hdcal.prediction.bands.bands import predict
     from hdcal.prediction.margin.margin import margin
-    from hdcal.prediction.margin.result import Margin
     from hdcal.tracking.tracker import Tracker
 
 _HOMES = {
-    "Bands": "prediction.bands.bands",
     "Case": "data.case",
     "DynamicPosterior": "inference.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
-    "Finding": "errors",
     "Gear": "data.case",
     "Geometry": "data.records",
     "HdcalError": "errors",
     "InputError": "errors",
-    "InverseDesign": "design.inverse_design",
-    "Margin": "prediction.margin.result",
     "Noise": "physics.effect",
     "NotUsable": "errors",
-    "PolynomialFit": "classical.fit.fit",
     "Posterior": "inference.posterior",
     "Prior": "data.priors",
     "Records": "data.records",
-    "Residuals": "inference.residuals",
-    "Response": "motion.respond.respond",
     "Rows": "physics.effect",
-    "Study": "design.study.study",
-    "THEORIES": "physics.theory",
     "Tracker": "tracking.tracker",
     "Verdict": "diagnosis.verdict",
-    "WaveGenerator": "design.wave_generator",
     "calibrate": "calibration.calibrate",
     "calibrate_dynamic": "motion.dynamic_calibration",
     "diagnose": "diagnosis.diagnose",
