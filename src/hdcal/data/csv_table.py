@@ -12,9 +12,10 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.blanks import tabbed
-from hdcal.data.blocks import block_notes, find_blocks, with_runs
+from hdcal.data.blocks import Blocks, block_notes, find_blocks, with_runs
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import guess_header
+from hdcal.data.line_cells import filled_cells, misfit
 from hdcal.data.table_start import (
     TableStart,
     find_start,
@@ -25,8 +26,6 @@ from hdcal.data.table_start import (
 )
 from hdcal.data.units import known_unit
 from hdcal.errors import quoted
-
-_NAMES = {",": "comma", ";": "semicolon", "\t": "tab"}
 
 # The nearest double, not a fast approximation of it: the same file must give the
 # same posterior everywhere. From 3.1 on pandas does so unasked, and warns if asked.
@@ -132,38 +131,24 @@ def split_table(
         findings.refuse("the file is empty", remedy)
     begin, utf8, spaced = _begin(utf8)
     lines = utf8.split(b"\n")
+    begin, separator, headers = _columns(begin, lines, findings, numbered=numbered)
     top = begin.readings if begin.headers is None else begin.headers
-    separator, headers = _headers(lines[top].decode(), findings, top + 1)
-    if begin.headers is None or all(map(is_number, headers)):
-        if not numbered:
-            words = "the first row holds numbers where the headers should be"
-            findings.refuse(words, _HEADLESS, top + 1)
-        begin = TableStart(None, None, top)
-        headers = tuple(str(number + 1) for number in range(len(headers)))
-    if begin.units is not None:
-        units = split_line(lines[begin.units].decode(), separator)
-        findings.add_rows(_other_units(headers, units, begin.units + 1))
-        headers = tuple(map(_with_unit, headers, units))
     above = sum(bool(line.strip()) for line in lines[:top])
     units = None if begin.units is None else lines[begin.units]
     head = b"" if begin.headers is None else lines[top]
     lines = lines[begin.readings :] or [b""]
     blocks = find_blocks(utf8, lines, head, units, separator, len(headers))
-    filled, cells = _filled_cells(lines, separator)
+    filled, cells = filled_cells(lines, separator)
     filled &= ~blocks.extra
     fits = filled & (cells == len(headers))
     rows = np.arange(len(lines)) + begin.readings + 1
     findings.add_rows(
-        (int(rows[index]), *_misfit(int(cells[index]), len(headers), separator))
+        (int(rows[index]), *misfit(int(cells[index]), len(headers), separator))
         for index in np.flatnonzero(filled & ~fits)
     )
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
     kept, notes = list(compress(lines, fits)), [*_notes(begin, above, headers, spaced)]
-    runs, many = blocks.block[fits], 1
-    if blocks.block[-1] > 1:
-        # Headers twice, one below the other, begin no run.
-        runs = np.unique(runs, return_inverse=True)[1] + 1
-        many = int(runs.max(initial=1))
+    runs, many = _runs(blocks, fits)
     if labelled or any(map(_is_run, headers)):
         many = 0
     notes += block_notes(blocks, many)
@@ -181,17 +166,36 @@ def split_table(
     )
 
 
-def _filled_cells(lines: list[bytes], separator: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return which lines hold anything, and how many cells each has, by line."""
-    body = b"\n".join(lines)
-    mark = ord(separator)
-    filled = _per_line(body, {*range(33, 256)} - {mark}) > 0
-    cells = _per_line(body, {mark}) + 1
-    if b'"' in body:
-        quotes = _per_line(body, {ord('"')})
-        for index in np.flatnonzero(filled & (quotes > 0)):
-            cells[index] = _quoted_cells(lines[index].decode(), separator)
-    return filled, cells
+def _columns(
+    begin: TableStart, lines: list[bytes], findings: FileFindings, *, numbered: bool
+) -> tuple[TableStart, str, tuple[str, ...]]:
+    """Return where the table begins, its separator, and its headers with their units.
+
+    Numbers are no headers: where columns go by their numbers these stand for them.
+    """
+    top = begin.readings if begin.headers is None else begin.headers
+    separator, headers = _headers(lines[top].decode(), findings, top + 1)
+    if begin.headers is None or all(map(is_number, headers)):
+        if not numbered:
+            words = "the first row holds numbers where the headers should be"
+            findings.refuse(words, _HEADLESS, top + 1)
+        begin = TableStart(None, None, top)
+        headers = tuple(str(number + 1) for number in range(len(headers)))
+    if begin.units is not None:
+        units = split_line(lines[begin.units].decode(), separator)
+        findings.add_rows(_other_units(headers, units, begin.units + 1))
+        headers = tuple(map(_with_unit, headers, units))
+    return begin, separator, headers
+
+
+def _runs(blocks: Blocks, fits: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return the run of each row that fits, from 1, and how many runs there are."""
+    runs = blocks.block[fits]
+    if blocks.block[-1] == 1:
+        return runs, 1
+    # Headers twice, one below the other, begin no run.
+    runs = np.unique(runs, return_inverse=True)[1] + 1
+    return runs, int(runs.max(initial=1))
 
 
 def _is_run(header: str) -> bool:
@@ -245,13 +249,6 @@ def _notes(
         yield f"row {begin.units + 1} taken for the units of the columns"
 
 
-def _per_line(text: bytes, counted: set[int]) -> np.ndarray:
-    """How many bytes of some kinds each line holds."""
-    others = bytes(set(range(256)) - counted - {ord("\n")})
-    kept = text.translate(None, others)
-    return np.array([len(line) for line in kept.split(b"\n")])
-
-
 def _headers(
     line: str, findings: FileFindings, row: int
 ) -> tuple[str, tuple[str, ...]]:
@@ -263,25 +260,3 @@ def _headers(
         findings.refuse("a quotation mark is not closed", "Close it", row)
     headers = tuple(header_cells(line, separator))
     return separator, headers
-
-
-def _quoted_cells(line: str, separator: str) -> int:
-    """Number of cells; -1 for an open quotation mark, which would go on below."""
-    reader = csv.reader([line, ""], delimiter=separator)
-    try:
-        cells = len(next(reader, []))
-    except csv.Error:  # a cell longer than the csv module will hold
-        cells = len(line.split(separator))
-    # An open cell takes the empty line below along.
-    open_ended = reader.line_num > 1 or line.count('"') % 2
-    return -1 if open_ended else cells
-
-
-def _misfit(cells: int, wanted: int, separator: str) -> tuple[str, str]:
-    if cells < 0:
-        return "a quotation mark is not closed", "Close it"
-    words = f"has {cells} cells where the header row has {wanted}"
-    remedy = f"Write {wanted} cells separated by a {_NAMES[separator]}"
-    if separator == "," and cells > wanted:
-        remedy += "; with decimal commas separate the columns by semicolons"
-    return words, remedy

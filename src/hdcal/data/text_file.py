@@ -49,21 +49,8 @@ def read_text(
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:
         findings.refuse(*why)
     try:
-        if _begins_with(path, MARK):
-            if encoding is not None:
-                findings.refuse(
-                    "is a workbook, which has no `encoding`", "Leave it out"
-                )
-            return read_sheet(path, findings, sheet)
-        for kind in (PARQUET, MATLAB, HDF5):
-            if _begins_with(path, kind):
-                if encoding is not None or sheet is not None:
-                    findings.refuse(
-                        "holds arrays, without `encoding` or `sheet`", "Leave it out"
-                    )
-                return read_arrays(path, findings, kind)
-        if sheet is not None:
-            findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
+        if (held := _of_program(path, findings, encoding, sheet)) is not None:
+            return held
         raw = _stream(path, findings, wide=encoding is not None)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
@@ -77,6 +64,25 @@ def read_text(
         utf8 = utf8.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     note = f"the text is {guessed}. If not, name its encoding" if guessed else ""
     return utf8, hashlib.sha256(raw).hexdigest(), note
+
+
+def _of_program(
+    path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
+) -> tuple[bytes, str, str] | None:
+    """Return a workbook's sheet, or a file of arrays, as text; None of other files."""
+    if _begins_with(path, MARK):
+        if encoding is not None:
+            findings.refuse("is a workbook, which has no `encoding`", "Leave it out")
+        return read_sheet(path, findings, sheet)
+    for kind in (PARQUET, MATLAB, HDF5):
+        if _begins_with(path, kind):
+            if encoding is not None or sheet is not None:
+                words = "holds arrays, without `encoding` or `sheet`"
+                findings.refuse(words, "Leave it out")
+            return read_arrays(path, findings, kind)
+    if sheet is not None:
+        findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
+    return None
 
 
 def _begins_with(path: Path, mark: bytes) -> bool:
