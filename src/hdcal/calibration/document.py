@@ -73,9 +73,11 @@ def headline(found: Interval, bend: Sequence[LocalStiffness] = ()) -> str:
         bend: its slope at several places, where the readings bend.
     """
     middle, span = estimate(found)
+    # Three digits of each slope.
     slopes = " to ".join(
-        f"{number(each.stiffness_N_per_mm, 3.0)} N/mm at {each.deformation_mm:.2g} mm"
+        f"{number(slope, slope)} N/mm at {each.deformation_mm:.2g} mm"
         for each in bend
+        for slope in [each.stiffness_N_per_mm]
     )
     told = (
         f". That is a straight line; the readings bend, from {slopes}" if bend else ""

@@ -29,6 +29,8 @@ from hdcal.report.write import Report
 
 # Where the slope of a bend is told: shares of the readings below.
 NEAR_ENDS = (0.1, 0.9)
+# Slopes that differ by less of their size are those of a loop or a wave, of no bend.
+_SAME_SLOPE = 0.1
 
 
 def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
@@ -77,11 +79,12 @@ def _bend(posterior: Posterior, left: Residuals) -> Iterator[LocalStiffness]:
     seen = any(shape.name == "curvature" for shape in left.structure)
     if not seen or posterior.effects or posterior.settings["with_gap"]:
         return
-    parabola = np.polyfit(left.deformation, left.measured, 2)
-    for place in np.quantile(left.deformation, NEAR_ENDS):
-        yield LocalStiffness(
-            float(place), float(np.polyval(np.polyder(parabola), place))
-        )
+    slope = np.polyder(np.polyfit(left.deformation, left.measured, 2))
+    places = np.quantile(left.deformation, NEAR_ENDS)
+    low, high = np.polyval(slope, places)
+    if abs(high - low) > _SAME_SLOPE * max(abs(low), abs(high)):
+        yield LocalStiffness(float(places[0]), float(low))
+        yield LocalStiffness(float(places[1]), float(high))
 
 
 def calibration_report(

@@ -98,6 +98,14 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
             drawn["bands"] = calibration_figure(fit, bands(), residuals(fit))
         return drawn
 
+    def charts():
+        from hdcal.calibration.chart import calibration_charts
+
+        # Of a failed fit there is the marked figure alone.
+        if refit is None or not refit[1].usable:
+            return {}
+        return {"bands": calibration_charts(bands(), residuals(refit[1]))}
+
     return Report(
         spoken_of(
             verdict_document(found, verdict.case, command, refit), found.gear.theory
@@ -107,6 +115,7 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
         figures,
         tables=lambda: {} if refit is None else {"bands.csv": bands().columns()},
         others=lambda: _models(verdict),
+        charts=charts,
     )
 
 
@@ -124,7 +133,8 @@ def write_verdict(
     told = verdict_report(verdict, command)
     write_numbers(told, folder)
     if report:
-        write_files(report_files(told.document, told.figures()), folder)
+        files = report_files(told.document, told.figures(), None, told.charts())
+        write_files(files, folder)
     return told.answer
 
 

@@ -21,7 +21,7 @@ def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
     for high, low, strength in chart.bands:
         top, bottom = chart.series[high], chart.series[low]
         look = {"color": top.colour, "alpha": strength, "linewidth": 0.0}
-        label = top.label.partition(",")[0]
+        label = top.label.rpartition(",")[0] or top.label
         axes.fill_between(top.x, bottom.y, top.y, label=label, **look)
     for series in chart.series:
         colour = series.colour or _INK

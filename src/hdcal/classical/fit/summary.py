@@ -86,8 +86,14 @@ def fit_report(
 
         return {"fit": fit_figure(case, fits)}
 
+    def charts():
+        from hdcal.classical.fit.chart import fit_charts
+
+        return {"fit": fit_charts(case, fits)}
+
     found = fit_answer(case, fits, at=at, posterior=posterior)
-    return Report(fit_document(case, found, command), found, "fit.json", figures)
+    document = fit_document(case, found, command)
+    return Report(document, found, "fit.json", figures, charts=charts)
 
 
 def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:

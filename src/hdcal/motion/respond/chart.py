@@ -4,6 +4,12 @@ from hdcal.motion.respond.respond import Response
 from hdcal.report.chart import COLOURS, Chart, Series
 
 
+def response_charts(response: Response) -> tuple[Chart, Chart]:
+    """Return the force over time, and what it does to the deformation."""
+    force = Series("force [N]", response.time_s, response.force_N, "")
+    return Chart("time [s]", "force [N]", [force], height=240), response_chart(response)
+
+
 def response_chart(response: Response) -> Chart:
     """Return the pointwise band of the deformation over time."""
     ends = {

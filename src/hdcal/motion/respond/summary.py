@@ -53,6 +53,11 @@ def response_report(response: Response, command: str = "") -> Report[ResponseAns
 
         return {"response": response_figure(response)}
 
+    def charts():
+        from hdcal.motion.respond.chart import response_charts
+
+        return {"response": response_charts(response)}
+
     found = response_answer(response)
     return Report(
         spoken_of(
@@ -63,6 +68,7 @@ def response_report(response: Response, command: str = "") -> Report[ResponseAns
         "response.json",
         figures,
         tables=lambda: {"response.csv": response.columns()},
+        charts=charts,
     )
 
 

@@ -52,7 +52,7 @@ def band_curves(
                 continue
             between.append((len(curves), len(curves) + 1, strength))
             for y, side in ((high, "97.5 %"), (low, "2.5 %")):
-                label = f"{words}, {side}{named} [N]"
+                label = f"{words}{named}, {side} [N]"
                 curves.append(Series(label, x, y - zero, colour, width=0.0))
         if not baseline:
             curves += _middle(x, middle, bands.tested[rows], named, colour)

@@ -223,17 +223,19 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
     yield (
         f"{one} with a probability of {chance(risk.probability)}: reliability index "
         f"β = {index(risk.beta)}. The share of {_many(found)} that do {span} "
-        "(95 % credible interval); "
+        "(95 % credible interval, 2.5 % beyond either end); "
         + (
-            f"with {sure} confidence it is {most}, β {index(risk.beta_at_confidence)}."
+            f"taken from one side, with {sure} confidence it is {most}, β "
+            f"{index(risk.beta_at_confidence)}."
             if risk.at_confidence < NEARLY_ALL
             else f"at {sure} confidence it may be all of them."
         )
     )
-    if risk.probability > risk.hi:
+    if risk.probability > risk.at_confidence:
+        beyond = "the interval" if risk.probability > risk.hi else "that bound"
         yield (
-            "The probability lies above the interval of the share because what is "
-            "least likely of the gear, of its zero or of its scatter makes most of it."
+            f"The probability lies above {beyond} of the share because what is least "
+            "likely of the gear, of its zero or of its scatter makes most of it."
         )
     if risk.rests_on:
         yield risk.rests_on

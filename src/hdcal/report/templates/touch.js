@@ -43,6 +43,13 @@ function touch(figure) {
     return value == null ? "–" : Number(value.toPrecision(5)).toString();
   }
 
+  const isEdge = each => !each.points && each.width === 0;
+
+  // The lower end of each band by its upper one, of those without lines.
+  function bandsOf(chart) {
+    return Object.fromEntries(chart.bands.filter(([high]) => isEdge(chart.series[high])));
+  }
+
   function draw() {
     for (const plot of drawn) plot.destroy();
     const line = ink("--line"), text = ink("--soft");
@@ -50,12 +57,13 @@ function touch(figure) {
     const every = charts.flatMap(chart => chart.data[0]);
     const ends = {min: Math.min(...every), max: Math.max(...every)};
     const margin = 0.02 * (ends.max - ends.min);
-    drawn = charts.map(chart => new uPlot({
+    drawn = charts.map(chart => { const band = bandsOf(chart); return new uPlot({
       width: room.clientWidth,
       height: Math.min(chart.height, 0.9 * room.clientWidth),
       cursor: {sync: {key: sync.key, scales: ["x", null]}, drag: {x: true, y: false}},
       scales: {x: {time: false, range: (_, low, high) =>
-        low === ends.min && high === ends.max ? [low - margin, high + margin] : [low, high]}},
+        low === chart.data[0][0] && high === chart.data[0].at(-1)
+          ? [ends.min - margin, ends.max + margin] : [low, high]}},
       legend: {markers: {
         width: 0, fill: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
       }},
@@ -64,12 +72,14 @@ function touch(figure) {
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
       })),
       series: [{label: chart.x, value: (_, value) => shown(value)}].concat(
-        chart.series.map(each => ({
-          label: each.label, stroke: hue(each), width: each.points ? 0 : each.width,
+        chart.series.map((each, k) => ({
+          label: k in band ? each.label.replace(/, [^,]*( \[[^\]]*\])$/, "$1") : each.label,
+          stroke: hue(each), width: each.points ? 0 : each.width,
           dash: each.dashed ? [3, 4] : undefined,
           paths: each.points ? () => null : undefined,
           points: {show: each.points, size: 6, fill: hue(each), width: 0},
-          value: (_, value) => shown(value),
+          value: (plot, value, _, row) => k in band && value != null
+            ? shown(plot.data[band[k] + 1][row]) + " … " + shown(value) : shown(value),
         }))),
       bands: chart.bands.map(([high, low, strength]) => ({
         series: [high + 1, low + 1],
@@ -77,14 +87,16 @@ function touch(figure) {
           Math.round(255 * strength).toString(16).padStart(2, "0"),
       })),
       hooks: {ready: [moving]},
-    }, chart.data, room));
+    }, chart.data, room); });
     drawn.forEach((plot, which) => {
       sync.sub(plot);
-      // Ends of bands are told of one curve; of several they would fill the page.
-      const edges = charts[which].series.map(each => !each.points && each.width === 0);
-      if (charts[which].bands.length < 4) return;
+      // Both ends of a band share a line; bands of several curves would fill the page.
+      const {series, bands} = charts[which], band = bandsOf(charts[which]);
       const rows = plot.root.querySelectorAll(".u-legend .u-series");
-      edges.forEach((edge, k) => { if (edge) rows[k + 1].hidden = true; });
+      series.forEach((each, k) => {
+        if (isEdge(each) && (bands.length > 3 || !(k in band)))
+          rows[k + 1].style.display = "none";
+      });
     });
   }
 
