@@ -96,3 +96,44 @@ def test_what_unpacks_to_too_much_is_refused_before_it_is_read(folder):
             archive.writestr(f"xl/{part}.xml", b"0" * (1 << 26))
     with pytest.raises(InputError, match="more than 256 MiB"):
         read(path, folder)
+
+
+HEAD = [("Weg", "Kraft"), ("mm", "kN")]
+
+
+def test_sheets_of_one_kind_are_specimens(folder):
+    """The second holds its numbers as texts with commas, below a title."""
+    other = [(f"{x:.3f}".replace(".", ","), f"{2 * f:.4f}") for x, f in READINGS]
+    other = [(x, f.replace(".", ",")) for x, f in other]
+    sheets = {
+        "Protokoll": [("Prüfer", "M. Weber")],
+        "Probe 1": [*HEAD, *READINGS],
+        "Probe 2": [("Probe 2",), (), *HEAD, *other],
+    }
+    path = book(folder, **sheets)
+    with pytest.raises(InputError, match=r"with a \*, as in 'Probe\*'"):
+        read(path, folder)
+    case = read(path, folder, sheet="Probe*")
+    deformation, force = np.array(READINGS).T
+    np.testing.assert_allclose(case.records.deformation, np.tile(deformation, 2))
+    wanted = np.append(1000.0 * force, 2000.0 * force)
+    np.testing.assert_allclose(case.records.force, wanted, atol=0.051)
+    assert case.specimen_labels == ("Probe 1", "Probe 2")
+    assert np.array_equal(case.records.specimen, np.repeat([0, 1], len(READINGS)))
+    assert any("each sheet is a specimen" in note for note in case.notes)
+    assert case.name == "book-Probe"
+
+
+def test_of_joined_sheets_a_finding_names_sheet_and_row(folder):
+    spoiled = [*READINGS[:3], (0.3, "broken"), *READINGS[4:]]
+    titled = [("Probe 2",), (), *HEAD, *spoiled]
+    path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": titled})
+    with pytest.raises(InputError, match=r"sheet 'Probe 2', row 8.*broken"):
+        read(path, folder, sheet="Probe*")
+
+
+def test_sheets_of_other_columns_are_not_joined(folder):
+    other = [("Weg", "Kraft"), ("mm", "N"), *READINGS]
+    path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": other})
+    with pytest.raises(InputError, match="'Probe 1' and 'Probe 2' have other columns"):
+        read(path, folder, sheet="Probe*")

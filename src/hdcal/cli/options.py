@@ -62,7 +62,8 @@ def reading_options(command: Callable) -> Callable:
         click.option(
             "--sheet",
             metavar="NAME",
-            help="Of a workbook (.xlsx) [default: the one with readings].",
+            help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
+            "several, each a specimen.",
         ),
         click.option(
             "--encoding",

@@ -1,9 +1,9 @@
 """What is wrong with one file, collected while it is read."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings, InputError, quoted
 
 LISTED = 20  # findings of one kind that are spelled out before "and N more"
 
@@ -13,11 +13,16 @@ class FileFindings(Findings):
 
     Args:
         file: how the user named it.
+
+    Attributes:
+        places: sheet and row of each row of a table that was joined from several
+            sheets; empty of any other.
     """
 
     def __init__(self, file: str):
         super().__init__()
         self.file = file
+        self.places: Sequence[tuple[str, int]] = ()
 
     def add(
         self,
@@ -27,7 +32,11 @@ class FileFindings(Findings):
         column: str | None = None,
     ) -> None:
         """Add one finding; its parts are those of `Finding`."""
-        self.append(Finding(self.file, problem, remedy, row, column))
+        file = self.file
+        if self.places and row is not None:
+            sheet, row = self.places[row - 1]
+            file = f"{file}, sheet {quoted(sheet)}"
+        self.append(Finding(file, problem, remedy, row, column))
 
     def add_rows(
         self,

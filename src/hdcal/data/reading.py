@@ -59,7 +59,8 @@ def read_case(
         theory: overrides the gear file's theory.
         material: stands for the material file that the gear names.
         encoding: of the CSV file; by default what it looks like.
-        sheet: of a workbook (.xlsx); by default the one with readings.
+        sheet: of a workbook (.xlsx); by default the one with readings. With a *, as in
+            `Probe*`, it stands for several, each a specimen.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -110,7 +111,7 @@ def read_case(
 def _name(data: Path, folder: bool, sheet: str | None) -> str:
     """Return what the case is called, after its file and the sheet that was named."""
     name = (data.resolve().name if folder else data.stem) or "case"
-    return name if sheet is None else f"{name}-{sheet}"
+    return name if sheet is None else f"{name}-{sheet.replace('*', '').strip()}"
 
 
 def _full_scale(measured: Measurements, gear: Gear) -> FullScale:

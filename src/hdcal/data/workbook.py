@@ -4,11 +4,12 @@ import datetime
 import hashlib
 import zipfile
 from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.table_start import is_number
+from hdcal.data.table_start import find_start, is_number
 from hdcal.errors import quoted
 
 # What begins so is a ZIP archive, as workbooks are.
@@ -16,8 +17,12 @@ MARK = b"PK\x03\x04"
 # Largest content of an archive, unpacked, and rows of a sheet that are looked at.
 _LARGEST, _MOST_ROWS = 1 << 28, 1 << 20
 _BROKEN = "is no workbook that can be read", "Save it as CSV"
+# Rows in which a table of several begins.
+_TOP = 300
+_WHICH = "Say which with `sheet`; with a *, as in 'Probe*', each is a specimen"
 # Rows with two numbers or more that make a sheet a table of readings.
 _READINGS = 5
+Rows = list[list[str]]
 
 
 def read_sheet(
@@ -28,7 +33,8 @@ def read_sheet(
     Args:
         path: of the workbook.
         findings: of the file.
-        sheet: its name; by default the only one that holds a table of readings.
+        sheet: its name; by default the only one that holds a table of readings. With a
+            * it stands for every such sheet, each of which is a specimen.
 
     Returns:
         The text as UTF-8, the hash of the file's own bytes, and which sheet was taken
@@ -38,24 +44,70 @@ def read_sheet(
         InputError: it is no workbook, or it is not clear which sheet is meant.
     """
     tables = _sheets(path, findings)
-    if sheet is not None and sheet not in tables:
+    named = [n for n in tables if sheet in (None, n) or fnmatchcase(n, sheet)]
+    if not named:
         names = ", ".join(map(quoted, tables))
         findings.refuse(f"has no `sheet` {quoted(sheet)}", f"Name one of: {names}")
-    likely = [sheet] if sheet else [n for n, t in tables.items() if _is_table(t)]
-    if len(likely) != 1:
-        names = ", ".join(map(quoted, likely or tables))
+    several = sheet is not None and "*" in sheet
+    exact = sheet is not None and not several
+    likely = named if exact else [name for name in named if _is_table(tables[name])]
+    if not likely or (len(likely) > 1 and not several):
+        names = ", ".join(map(quoted, likely or named))
         words = "no sheet holds a table of readings"
         if likely:
             words = f"{len(likely)} sheets hold a table: {names}"
-        findings.refuse(words, "Say which with `sheet`")
-    text = "\n".join(map("\t".join, _same(tables[likely[0]])))
+        findings.refuse(words, _WHICH)
+    found = {name: _same(tables[name]) for name in likely}
+    rows = _specimens(found, findings) if several else found[likely[0]]
+    text = "\n".join(map("\t".join, rows))
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    told = len(tables) > 1 and sheet is None
-    note = f"sheet {quoted(likely[0])} is meant. If not, name the sheet" * told
-    return text.encode() + b"\n", digest, note
+    names = ", ".join(map(quoted, likely))
+    note = f"sheet {names} is meant. If not, name the sheet" * (len(tables) > 1)
+    if several:
+        note = f"each sheet is a specimen: {names}"
+    return text.encode() + b"\n", digest, "" if exact else note
 
 
-def _sheets(path: Path, findings: FileFindings) -> dict[str, list[list[str]]]:
+def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
+    """Return sheets of the same columns one below the other, with what each is called.
+
+    Raises:
+        InputError: their columns differ.
+    """
+    first, wanted = next(iter(sheets)), []
+    joined: Rows = []
+    places: list[tuple[str, int]] = []
+    for name, rows in sheets.items():
+        start = find_start("\n".join(map("\t".join, rows[:_TOP])))
+        if start is None or start.headers is None:
+            findings.refuse(f"sheet {quoted(name)} has no row of headers", _WHICH)
+        lines = [at for at in (start.headers, start.units) if at is not None]
+        above = [rows[at] for at in lines]
+        if not joined:
+            wanted = above
+            joined = [[*above[0], "specimen"], *([*row, ""] for row in above[1:])]
+            places = [(name, at + 1) for at in lines]
+        if above != wanted:
+            words = f"sheets {quoted(first)} and {quoted(name)} have other columns"
+            findings.refuse(words, _WHICH)
+        filled = [at for at in range(start.readings, len(rows)) if any(rows[at])]
+        joined += [[*_with_points(rows[at]), name] for at in filled]
+        places += [(name, at + 1) for at in filled]
+    findings.places = places
+    return joined
+
+
+def _with_points(row: list[str]) -> list[str]:
+    """Return a row with decimal points, where a sheet's texts have commas.
+
+    Numbers of other sheets have points, and one sign serves a whole table.
+    """
+    if any("." in cell for cell in row if is_number(cell)):
+        return row
+    return [cell.replace(",", ".") if is_number(cell) else cell for cell in row]
+
+
+def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
     """Return the cells of every sheet as text, by name."""
     try:
         import openpyxl
@@ -105,7 +157,7 @@ def _is_table(rows: Iterable[list[str]]) -> bool:
     return False
 
 
-def _same(rows: list[list[str]]) -> list[list[str]]:
+def _same(rows: Rows) -> Rows:
     """Return rows without the columns that are empty throughout."""
     width = max(map(len, rows), default=0)
     whole = [row + [""] * (width - len(row)) for row in rows]

@@ -1,0 +1,94 @@
+"""What pages show of a run is what the run says: words exactly, numbers nearly.
+
+Draws differ in their last digits from machine to machine.
+"""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from commands import Hdcal
+
+ROOT = Path(__file__).parents[1]
+NUMBER = r"-?\d+(?:\.\d+)?"
+# Numbers of effective draws, of all numbers of these pages: they scatter themselves.
+DRAWS = 1000.0
+SHOWN = re.compile(
+    r"^    (hdcal [^\n]+)$|^```text\n(.*?)^```$", re.DOTALL | re.MULTILINE
+)
+
+
+def shown_runs(page: str) -> list[tuple[str, str]]:
+    """Return each command of a page with the output that is shown of it, if any."""
+    runs: list[tuple[str, str]] = []
+    for found in SHOWN.finditer(page):
+        if found[1]:
+            runs.append((found[1], ""))
+        elif not found[2].startswith("hdcal: "):  # an error of another command
+            runs[-1] = (runs[-1][0], found[2])
+    return runs
+
+
+def differences(shown: str, printed: str) -> list[str]:
+    """Return what a page shows and a run did not print."""
+    printed = " ".join(printed.split())
+    found = []
+    for piece in re.split(r"^\s*…\s*$", shown, flags=re.MULTILINE):
+        words = " ".join(piece.split())
+        parts = map(re.escape, re.split(NUMBER, words))
+        there = re.search(f"({NUMBER})".join(parts), printed)
+        if there is None:
+            found.append(words)
+            continue
+        pairs = zip(re.findall(NUMBER, words), there.groups(), strict=True)
+        found += [f"{a} for {b}" for a, b in pairs if not near(a, b)]
+    return found
+
+
+def near(shown: str, printed: str) -> bool:
+    """Tell whether two numbers are of the same law, for all that draws scatter."""
+    a, b = float(shown), float(printed)
+    digit = 10.0 ** -len(shown.partition(".")[2])
+    share = 0.5 if min(a, b) > DRAWS and digit == 1.0 else 0.05
+    return abs(a - b) <= max(share * abs(a), 10.0 * digit if digit < 1.0 else 0.0)
+
+
+def test_a_page_that_shows_something_else_is_caught():
+    printed = "The force is 79.9 N (72.9\n … 87.6 N), and\n\nmore 0.9902 than that."
+    assert not differences(
+        "The force is 79.8 N (72.9 …\n87.7 N),\n  …\nmore 0.9905", printed
+    )
+    assert differences("The force is 99.8 N (72.9 … 87.7 N)", printed) == [
+        "99.8 for 79.9"
+    ]
+    assert differences("The stiffness is 79.8 N", printed)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("page", ["tutorial", "study", "design"])
+def test_a_page_shows_what_its_commands_print(hdcal: Hdcal, tmp_path: Path, page: str):
+    (tmp_path / "datasets").symlink_to(ROOT / "datasets")
+    runs = shown_runs((ROOT / "docs" / f"{page}.md").read_text("utf-8"))
+    assert any(shown for _, shown in runs)
+    wanted = max(place for place, (_, shown) in enumerate(runs) if shown)
+    wrong = []
+    for command, shown in runs[: wanted + 1]:
+        if shown or "calibrate" in command:
+            done = hdcal(*shlex.split(command)[1:], cwd=tmp_path)
+            assert done.returncode == 0, command + done.stderr
+            wrong += differences(shown, done.stdout + done.stderr)
+    assert not wrong
+
+
+@pytest.mark.thorough
+def test_the_readme_states_what_the_demo_finds(hdcal: Hdcal, tmp_path: Path):
+    place = ROOT / "datasets" / "xb1-100-80"
+    done = hdcal("calibrate", place, "--out", tmp_path / "result", "--json")
+    found = json.loads(done.stdout)["stiffness_N_per_mm"]
+    said = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    stated = re.search(r"stiffness is (\d+) N/mm, (\d+) to (\d+) with 95 %", said)
+    assert stated is not None
+    for words, end in zip(stated.groups(), ("median", "lo", "hi"), strict=True):
+        assert float(words) == pytest.approx(found[end], abs=1.0)
