@@ -1,5 +1,6 @@
 """The first hour with files of one's own: seen, drawn, described, begun."""
 
+import io
 import json
 import tomllib
 from pathlib import Path
@@ -32,6 +33,33 @@ def test_a_file_alone_is_shown_and_drawn(here: Hdcal, log: Path):
     # The first and the last reading, each in its corner.
     assert picture[0].lstrip().startswith("71 ┤") and picture[-1][-60:-59] != "⠀"
     assert picture[0][-1] != "⠀" and picture[0][-60:-59] == "⠀"
+
+
+class Terminal(io.StringIO):
+    """Somebody who answers."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+OPEN = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
+
+
+def test_what_the_gear_file_leaves_open_is_asked_on_a_terminal(
+    here: Hdcal, log: Path, monkeypatch
+):
+    (log.parent / "gear.toml").write_text(OPEN + 'material = "steel"\n')
+    assumed = "the deformation is radial"
+    assert assumed in here("check", log).stdout
+    monkeypatch.setattr("sys.stdin", Terminal("diametral\n"))
+    done = here("check", log)
+    assert "radial or diametral" in done.stderr
+    assert done.returncode == 0 and assumed not in done.stdout
+    assert "diametral" in done.stdout
+    # A program is asked nothing, and is told.
+    monkeypatch.setattr("sys.stdin", Terminal(""))
+    notes = json.loads(here("check", log, "--json").stdout)["notes"]
+    assert any(assumed in note for note in notes)
 
 
 def test_the_gear_file_it_writes_says_the_same(here: Hdcal, log: Path):

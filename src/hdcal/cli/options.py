@@ -1,5 +1,6 @@
 """Options that several commands share."""
 
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, get_args
@@ -87,13 +88,23 @@ def take_reading(settings: dict) -> dict:
 
 
 def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
-    """Read the case that `case_options` named; what is wrong is kept by the console."""
-    from hdcal.data.reading import read_case
+    """Read the case that `case_options` named; what is wrong is kept by the console.
+
+    On a terminal it asks for what the gear file leaves open.
+    """
+    from hdcal.data.reading import leaves_reading_open, read_case
 
     if columns is None:  # it could not be read, which is said already
         return None
     read = partial(read_case, columns=columns, **how)
-    return console.wrong.attempt(read, data, gear)
+    case = console.wrong.attempt(read, data, gear)
+    asks = sys.stdin is not None and sys.stdin.isatty() and not console.json
+    if case is None or not asks or not leaves_reading_open(case.gear):
+        return case
+    kinds = click.Choice(["radial", "diametral"])
+    words = "Deformation as read, radial or diametral"
+    told = click.prompt(words, default="radial", type=kinds, err=True)
+    return console.wrong.attempt(partial(read, reading=told), data, gear)
 
 
 def json_option(command: Callable) -> Callable:

@@ -62,6 +62,7 @@ def read_gear(
     source: Path | str | Mapping[str, Any],
     theory: str | None = None,
     material: Path | None = None,
+    reading: str | None = None,
 ) -> Gear:
     """Read a gear file, or what would stand in one, and merge its priors.
 
@@ -78,6 +79,7 @@ def read_gear(
             may be left out, as in `{"radius_mm": 40.0, "deformation": "radial"}`.
         theory: overrides the theory that K multiplies, not what K's prior means.
         material: stands for the material file that the gear names, wherever that is.
+        reading: of the deformation, `radial` or `diametral`, where the file is silent.
 
     Raises:
         InputError: holds everything that is wrong with the file.
@@ -88,6 +90,10 @@ def read_gear(
     else:
         path = Path(source)
         toml = read_toml(path, str(path))
+    measurement = toml.table.get("measurement", {})
+    if reading is not None and isinstance(measurement, dict):
+        said = {"measurement": {"deformation": reading, **measurement}}
+        toml = replace(toml, table={**toml.table, **said})
     with Findings() as wrong:
         model = wrong.attempt(check_schema, toml)
         wrong += size_findings(toml, theory)

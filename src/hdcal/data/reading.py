@@ -42,6 +42,7 @@ def read_case(
     material: Path | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
+    reading: str | None = None,
 ) -> Case:
     """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
@@ -61,6 +62,8 @@ def read_case(
         encoding: of the CSV file; by default what it looks like.
         sheet: of a workbook (.xlsx); by default the one with readings. With a *, as in
             `Probe*`, it stands for several, each a specimen.
+        reading: of the deformation, `radial` or `diametral`, where the gear file is
+            silent; by default it is taken for radial, and said to be so.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -75,7 +78,7 @@ def read_case(
         of_gear = Findings()
         beside = None if in_memory else csv_path.parent / GEAR_NAME
         found, told = of_gear.attempt(
-            _gear_of, gear, beside, folder, theory, material
+            _gear_of, gear, beside, folder, (theory, material, reading)
         ) or (None, ())
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns or {}
@@ -198,15 +201,15 @@ def _gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     beside: Path | None,
     folder: bool,
-    theory: str | None,
-    material: Path | None,
+    asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and what is to be told of how it was found."""
+    theory, material, _ = asked
     if gear is not None:
-        found = read_gear(gear, theory, material)
+        found = read_gear(gear, *asked)
         return found, tuple(_unsaid(found))
     if beside is not None and (folder or os.path.exists(beside)):
-        found = read_gear(beside, theory, material)
+        found = read_gear(beside, *asked)
         return found, (*_unsaid(found), *([] if folder else [_BESIDE]))
     if theory not in (None, SPRING) or material is not None:
         words = "no gear file says the sizes that this needs"
@@ -214,10 +217,15 @@ def _gear_of(
     return unsized(), (UNSIZED,)
 
 
+def leaves_reading_open(gear: Gear) -> bool:
+    """Tell whether a gear file is silent of radial or diametral, and K hangs on it."""
+    said = gear.source.get("measurement", {})
+    return gear.theory != SPRING and "deformation" not in said
+
+
 def _unsaid(gear: Gear) -> Iterator[str]:
     """Yield what the gear file leaves to a default that much depends on."""
-    said = gear.source.get("measurement", {})
-    if gear.theory != SPRING and "deformation" not in said:
+    if leaves_reading_open(gear):
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
             "twice as large, the gear file has to say so"

@@ -44,10 +44,11 @@ def read_sheet(
         InputError: it is no workbook, or it is not clear which sheet is meant.
     """
     tables = _sheets(path, findings)
-    named = [n for n in tables if sheet in (None, n) or fnmatchcase(n, sheet)]
+    named = [n for n in tables if sheet in (None, n) or fnmatchcase(n, sheet or "")]
     if not named:
         names = ", ".join(map(quoted, tables))
-        findings.refuse(f"has no `sheet` {quoted(sheet)}", f"Name one of: {names}")
+        words = f"has no `sheet` {quoted(sheet or '')}"
+        findings.refuse(words, f"Name one of: {names}")
     several = sheet is not None and "*" in sheet
     exact = sheet is not None and not several
     likely = named if exact else [name for name in named if _is_table(tables[name])]
