@@ -1,6 +1,7 @@
 """What resembles a cause and is none is not called one."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from rigs import make_case
 from slices import slice_of
 
 from hdcal.diagnosis import which as which_effect
+from hdcal.diagnosis.adequacy import chance_of_so_few_runs
 from hdcal.diagnosis.naming import Naming, Tally
 from hdcal.evidence.bursts import log_sign_odds
 from hdcal.evidence.quantisation import rounding_step
@@ -58,6 +60,29 @@ def test_a_burst_is_not_outliers():
     scattered = np.arange(8, 180, 15)
     signs = np.resize([1.0, -1.0, -1.0], len(scattered))
     assert changed(struck(scattered, signs)).which.effect == "outliers"
+
+
+@pytest.mark.thorough
+def test_wild_readings_in_one_place_are_not_outliers():
+    """Up and down, as of blocks in another order: no sign lasts, but the place does."""
+    signs = np.resize([1.0, 1.0, -1.0, -1.0, 1.0, -1.0], 12)
+    which = changed(struck(np.arange(65, 77), signs)).which
+    assert which.verdict not in ("named", "group") and which.doubted
+
+
+def test_places_of_wild_readings_are_counted():
+    """All places of four among nine, against the law of the number of runs."""
+    every = []
+    for places in combinations(range(9), 4):
+        wild = np.zeros(9, bool)
+        wild[list(places)] = True
+        every.append(wild)
+    parts = [np.split(w, np.flatnonzero(w[1:] != w[:-1]) + 1) for w in every]
+    runs = np.array([sum(bool(part[0]) for part in each) for each in parts])
+    for wild, count in zip(every, runs, strict=True):
+        chance = chance_of_so_few_runs(wild)
+        assert chance == pytest.approx(np.mean(runs <= count))
+    assert chance_of_so_few_runs(np.zeros(9, bool)) == 1.0
 
 
 def test_friction_is_named_beside_readings_that_are_very_wild(monkeypatch):

@@ -26,6 +26,9 @@ def test_what_was_counted_is_of_effects_of_the_library():
     assert all(0 <= t.wrong <= t.said for t in counted.called.values())
     # Of an effect that nobody has counted nothing is known.
     assert counted.may_be_named("own_effect")
+    # Of a few cases it is enough that all of them were others.
+    few = Naming({"a": Tally(3, 3), "b": Tally(3, 0)}, Tally(0, 0), Tally(0, 0))
+    assert few.may_be_named("b") and not few.may_be_named("a")
 
 
 def with_counts(monkeypatch, wrong: int):
@@ -98,7 +101,7 @@ def test_whose_name_others_got_is_counted():
         "drift": Tally(1, 1),
     }
     text = "\n".join(lines(cases(), cases()))
-    assert "# Not named: none." in text
+    assert "# Not named: drift." in text
     # Five of a kind tell something.
     text = "\n".join(lines(5 * cases(), cases()))
     assert "# Not named: drift." in text and "drift = [5, 5]" in text

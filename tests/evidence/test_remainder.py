@@ -9,7 +9,12 @@ from scipy.stats import multivariate_normal
 
 from hdcal.data.priors import effect_priors
 from hdcal.evidence.compute_evidence import compute_evidence
-from hdcal.evidence.remainder_evidence import closed_by, with_remainders
+from hdcal.evidence.remainder_evidence import (
+    beside_effects,
+    closed_by,
+    with_remainders,
+)
+from hdcal.evidence.single_evidence import evidence_of_none
 from hdcal.physics.registry import EFFECTS
 
 FRICTION = {"coulomb_friction": {"force": 3.0}}
@@ -49,6 +54,23 @@ def test_a_wave_with_a_little_friction_is_unknown():
     little = {"coulomb_friction": {"force": 0.4}}
     which = judged(waves(simulated(rich(), little, seed=1), 3.0)).which
     assert which.verdict == "unknown"
+
+
+def test_what_a_loose_shape_explains_is_not_explained_again_by_a_remainder():
+    """An amplifier drifts upwards: a leak could only sink, but for its loose shape."""
+    drift = {"amplifier_drift": {"rate": 1.5e-3}}
+    case = simulated(rich(), drift, seed=3)
+    names = ("charge_leakage", "amplifier_drift", "relaxation")
+    library = {name: EFFECTS[name] for name in names}
+    found = compute_evidence(case, library, effect_priors())
+    likely = int(np.argmax(found.weight_of_correlations))
+    sigma = found.prepared.priors["sigma"]
+    loose = found.table["charge_leakage"][likely] - found.table["none"][likely]
+    assert loose > 5.0
+    for name in names:
+        base = beside_effects(found, [name])
+        beside = evidence_of_none(base.rows, sigma)[likely]
+        assert beside > found.table[name][likely] - 3.0, name
 
 
 def test_without_a_remainder_there_is_little_probability_of_one():

@@ -8,6 +8,7 @@ differ as far as evidence allows. It moves no probability.
 from collections.abc import Mapping
 
 import numpy as np
+from scipy import stats
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
@@ -52,6 +53,23 @@ def leaves_most(evidence: CaseEvidence, hypothesis: str, effect: str) -> bool:
     return float(np.median(closed)) < _MOST
 
 
+def chance_of_so_few_runs(wild: np.ndarray) -> float:
+    """Return how probable it is that wild readings stand together as they do.
+
+    Each goes wrong by itself, so that any places among the readings are as probable:
+    the law of the number of runs is that of Wald and Wolfowitz (1940), one-sided.
+
+    Args:
+        wild: which readings are, in their order, shape (n,).
+    """
+    if not wild.any():
+        return 1.0
+    runs = int(wild[0]) + int(np.sum(wild[1:] & ~wild[:-1]))
+    # Of the gaps between other readings, and both ends, those that hold a run.
+    gaps = int(np.sum(~wild)) + 1
+    return float(stats.hypergeom.cdf(runs, len(wild), gaps, int(wild.sum())))
+
+
 def leaves_more_than_noise(
     evidence: CaseEvidence,
     hypothesis: str,
@@ -82,8 +100,11 @@ def leaves_more_than_noise(
         if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
             return True
         if library[noise].mixture:
+            wild = is_noisy(relative)
+            if chance_of_so_few_runs(wild) < _LEAST:
+                return True
             # Wild readings say nothing of the mean, however far off they are.
-            kept &= ~is_noisy(relative)
+            kept &= ~wild
         prepared = with_relative_noise(prepared, relative)
     _, directions = declared_directions(evidence, case)
     directions = Directions(*(column[kept] for column in vars(directions).values()))

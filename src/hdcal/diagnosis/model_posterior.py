@@ -10,7 +10,7 @@ from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence, with_remai
 
 # Prior probabilities of none, unknown, all effects with a remainder and all pairs;
 # the effects alone share the rest.
-PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_REMAINDER, PRIOR_PAIRS = 0.5, 0.1, 0.1, 0.03
+PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_REMAINDER, PRIOR_PAIRS = 0.5, 0.1, 0.15, 0.03
 # Odds of each effect on the noise, whatever goes on in the mean.
 PRIOR_NOISE = 0.02
 NAMED = 0.9

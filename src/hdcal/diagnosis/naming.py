@@ -15,8 +15,8 @@ from scipy import stats
 
 # An effect whose name other causes get more often than this is not named.
 _MOST_OTHERS = 0.15
-# Fewer cases than these tell nothing.
-_FEWEST = 5
+# Before anything is counted: of five cases half of one is by another cause.
+_BEFORE = 0.5, 5
 _CONFIDENCE = 0.95
 
 
@@ -54,15 +54,11 @@ class Naming:
     names: Tally
     groups: Tally
 
-    def counted(self, effect: str) -> Tally | None:
-        """Return what was counted of an effect; None of too few cases."""
-        found = self.called.get(effect)
-        return found if found is not None and found.said >= _FEWEST else None
-
     def may_be_named(self, effect: str) -> bool:
         """Tell whether few enough other causes get this name, as far as is known."""
-        found = self.counted(effect)
-        return found is None or found.rate <= _MOST_OTHERS
+        found = self.called.get(effect, Tally(0, 0))
+        wrong, said = found.wrong + _BEFORE[0], found.said + _BEFORE[1]
+        return wrong / said <= _MOST_OTHERS
 
 
 def naming_file() -> str:

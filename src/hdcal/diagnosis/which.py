@@ -60,7 +60,7 @@ def identify_cause(
     word = "group" if mistaken else word
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     effect = best if suspected else None
-    counted = naming().counted(effect or "")
+    counted = naming().called.get(effect or "")
     return Which(
         verdict=word,
         effect=effect,
