@@ -1,6 +1,9 @@
 """A response as a chart: the deformation over time."""
 
+import numpy as np
+
 from hdcal.motion.respond.respond import Response
+from hdcal.report.canvas import beyond
 from hdcal.report.chart import COLOURS, Chart, Series
 
 
@@ -12,19 +15,18 @@ def response_charts(response: Response) -> tuple[Chart, Chart]:
 
 def response_chart(response: Response) -> Chart:
     """Return the pointwise band of the deformation over time."""
-    ends = {
-        "97.5 %": response.deformation_hi_mm,
-        "2.5 %": response.deformation_lo_mm,
-        "median": response.deformation_median_mm,
-    }
+    time, colour = response.time_s, COLOURS[0]
+    ends = {"97.5 %": response.deformation_hi_mm, "2.5 %": response.deformation_lo_mm}
     series = [
-        Series(
-            f"deformation, {name} [mm]",
-            response.time_s,
-            y,
-            COLOURS[0],
-            width=2.0 * (name == "median"),
-        )
+        Series(f"deformation, {name} [mm]", time, y, colour, width=0.0)
         for name, y in ends.items()
     ]
+    tested = np.asarray(response.tested)
+    for words, rows, dashed in (
+        ("median [mm]", tested, False),
+        ("median, not tested [mm]", beyond(tested), True),
+    ):
+        if rows.any():
+            y = np.where(rows, response.deformation_median_mm, np.nan)
+            series.append(Series(words, time, y, colour, dashed=dashed))
     return Chart("time [s]", "deformation [mm]", series, [(0, 1, 0.3)])

@@ -144,7 +144,8 @@ def _motion() -> Section:
         "The band holds the deformation with 95 % probability at each time taken by "
         "itself. Gears of different frequency get out of step, so that late in a "
         "vibration the band is wide and its median swings less than any one gear. "
-        "Hatched: outside what was calibrated. The numbers are in response.csv.",
+        "Hatched or dotted: outside what was calibrated. The numbers are in "
+        "response.csv.",
         tall=True,
     )
     return Section("Force and deformation over time", [picture])
