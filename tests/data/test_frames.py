@@ -93,3 +93,31 @@ def test_without_a_gear_a_stiffness_is_asked():
 def test_an_index_with_a_name_is_a_column():
     found = hdcal.read_case(FRAME.set_index(["run", "time_s"]))
     assert found.run_labels == ("a", "b") and "time" in found.records.known
+
+
+def test_a_unit_against_its_header_is_told():
+    table = FRAME.rename(columns={"deformation_mm": "disp_um", "Kraft [kN]": "F_kN"})
+    case = hdcal.read_case(table)
+    assert case.records.deformation.max() == FRAME["deformation_mm"].max() / 1000.0
+    np.testing.assert_array_equal(
+        case.records.force, hdcal.read_case(FRAME).records.force
+    )
+    case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
+    assert case.records.force.max() == FRAME["Kraft [kN]"].max()
+    assert any("in N, as was said, though it names kN" in n for n in case.notes)
+
+
+def test_columns_are_named_in_a_mapping():
+    with pytest.raises(InputError, match="is no mapping"):
+        hdcal.read_case(FRAME, columns=["force=Kraft [kN]"])
+    plain = FRAME.rename(columns={"Kraft [kN]": "load cell 2 kN"})
+    case = hdcal.read_case(plain, columns={"force": "2[kN]"})
+    assert case.records.force.max() == 1000.0 * FRAME["Kraft [kN]"].max()
+
+
+def test_steel_is_assumed_aloud():
+    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
+    silent = hdcal.read_case(FRAME, sizes)
+    assert any("the gear is of steel" in note for note in silent.notes)
+    told = hdcal.read_case(FRAME, {**sizes, "material": "17-4PH"})
+    assert not any("the gear is of steel" in note for note in told.notes)

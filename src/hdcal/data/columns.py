@@ -28,6 +28,7 @@ class Column:
         position: 0 = first column.
         unit: one of COLUMN_UNITS[quantity]; empty for labels.
         guessed: its header says so in other words than hdcal's own.
+        against: another unit, which its header names itself.
     """
 
     quantity: str
@@ -35,6 +36,7 @@ class Column:
     position: int
     unit: str = ""
     guessed: bool = False
+    against: str = ""
 
 
 @dataclass(frozen=True)
@@ -254,20 +256,21 @@ def _mapped(
     if quantity in LABELS:
         return Column(quantity, header, hits[0])
     bracketed = unit is not None
-    if not unit:
-        guess, own = guess_header(header), _split_brackets(header)[1]
-        unit = own or (guess.unit if guess is not None else "")
-        unit = unit or (header.rpartition("_")[2] if "_" in header else "")
-    known = known_unit(quantity, unit)
+    guess, own = guess_header(header), _split_brackets(header)[1]
+    own = own or (guess.unit if guess is not None else "")
+    own = own or (header.rpartition("_")[2] if "_" in header else "")
+    known = known_unit(quantity, unit or own)
     if known is None:
         words = f"has no unit that is known for {quantity}"
         if bracketed:
-            words = f"unknown unit '{unit}' for {quantity}"
+            words = f"unknown unit '{unit or own}' for {quantity}"
         units = ", ".join(COLUMN_UNITS[quantity])
         remedy = f"Write {option}'{name}[UNIT]' with one of: {units}"
         findings.add(words, remedy, table.header_row, header)
         return None
-    return Column(quantity, header, hits[0], known)
+    against = known_unit(quantity, own) if own else None
+    against = against if against not in (None, known) else ""
+    return Column(quantity, header, hits[0], known, against=against)
 
 
 def _split_brackets(text: str) -> tuple[str, str | None]:

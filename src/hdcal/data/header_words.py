@@ -13,6 +13,7 @@ from hdcal.data.units import known_unit
 WORDS: dict[str, tuple[str, ...]] = {
     "deformation": (
         *("deformation", "displacement", "displacment", "deflection", "travel"),
+        *("disp",),
         *("stroke", "extension", "crosshead", "weg", "standardweg", "traversenweg"),
         *("verformung", "verschiebung", "hub", "déformation", "déplacement"),
         *("course", "位移", "变形", "行程"),
@@ -62,7 +63,9 @@ def guess_header(header: str) -> Guess | None:
         match = pattern.fullmatch(header)
         if match is None:
             continue
-        found = _quantity(match["name"])
+        # A letter means a force where a unit of force is beside it.
+        force = Guess("force", "", True) if match["name"] == "F" else None
+        found = _quantity(match["name"]) or force
         if found is None:
             continue
         unit = known_unit(found.quantity, match["unit"])

@@ -139,6 +139,11 @@ def _assumed(
     for note in (*([guessed] if guessed else []), *table.notes):
         yield f"{ASSUMED}{note}"
     for quantity, column in used.items():
+        if column.against:
+            yield (
+                f"{ASSUMED}{quoted(column.header)} is in {column.unit}, as was said, "
+                f"though it names {column.against}"
+            )
         if column.guessed:
             unit = f" in {column.unit}" if column.unit else ""
             yield (

@@ -68,6 +68,10 @@ def read_case(
     Raises:
         InputError: holds everything that is wrong with either file.
     """
+    if columns is not None and not isinstance(columns, Mapping):
+        remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
+        raise InputError([Finding("columns", "is no mapping", remedy)])
+    columns = {name: str(header) for name, header in (columns or {}).items()}
     in_memory = is_frame(data)
     table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
@@ -81,7 +85,7 @@ def read_case(
             _gear_of, gear, beside, folder, (theory, material, reading)
         ) or (None, ())
         named = dict(found.source.get("columns", {}) if found is not None else {})
-        named |= columns or {}
+        named |= columns
         measured = wrong.attempt(
             read_measurements, table if in_memory else csv_path, named, encoding, sheet
         )
@@ -229,6 +233,11 @@ def _unsaid(gear: Gear) -> Iterator[str]:
         yield (
             f"{ASSUMED}the deformation is radial. If it is diametral, which makes K "
             "twice as large, the gear file has to say so"
+        )
+    if gear.theory != SPRING and "material" not in gear.source.get("gear", {}):
+        yield (
+            f"{ASSUMED}the gear is of steel. If not, which changes K and what heat "
+            "does, the gear file has to name its material"
         )
 
 

@@ -28,6 +28,8 @@ _ALIASES = {
     "μm": "um",  # Greek mu
     "°C": "C",
     "°F": "F",
+    "degC": "C",
+    "degF": "F",
     "°": "deg",
 }
 _PINT_NAMES = {"C": "degC", "F": "degF"}  # coulomb and farad to Pint

@@ -33,6 +33,10 @@ from hdcal.prediction.engine.untested import with_untested
 # Rows predicted at a time: with 4000 draws a block takes 32 MB, on unloading 64 MB.
 _BLOCK = 1000
 _MOST_TEMPERATURES = 6
+# A room that is logged: bands at its temperatures are one band [K].
+_SAME_TEMPERATURE = 3.0
+# So many times the largest tested deformation are another unit.
+_SLIP = 100.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -202,7 +206,8 @@ def _quantiles(causes: Sequence[Cause], models, path: Records, count: int, tails
 
 def _check(cause: Cause, deformation, temperature, direction, interval, seed) -> None:
     """Refuse what cannot be asked, slips of the unit as the data's reader does."""
-    gear, findings = cause.posterior.case.gear, []
+    case, findings = cause.posterior.case, []
+    gear, tested = case.gear, case.records.deformation
 
     def find(name, problem, remedy):
         findings.append(Finding(name, problem, remedy))
@@ -213,6 +218,9 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
         findings += wrong
     elif (worst := float(np.max(np.abs(deformation)))) >= gear.reach:
         problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
+        find("deformation", problem, "Give it in mm")
+    elif worst > _SLIP * (most := float(np.max(np.abs(tested)))):
+        problem = f"{worst:g} mm, where the readings reach to {most:g} mm"
         find("deformation", problem, "Give it in mm")
     if temperature.size == 0:
         find("temperature", "is empty", "give numbers in °C")
@@ -253,6 +261,7 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
     levels = np.unique(np.clip(np.round(records.temperature, 1), cold, warm))
     if len(levels) > _MOST_TEMPERATURES:
         levels = np.linspace(levels[0], levels[-1], 3)
+        levels = levels[1:2] if warm - cold < _SAME_TEMPERATURE else levels
     parts = [
         predict(models, grid, levels, side, interval=interval, allow_failed=True)
         for side in DIRECTIONS
