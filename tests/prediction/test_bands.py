@@ -148,6 +148,17 @@ def test_bad_grids_are_refused(rubbing, arguments):
     assert {f.file for f in caught.value.findings} <= {*signature(predict).parameters}
 
 
+def test_micrometres_are_refused_where_no_size_tells(rubbing):
+    """A spring has no radius, which a deformation could be larger than."""
+    case = rubbing.case
+    sizes = replace(case.gear.geometry, radius=np.nan)
+    spring = replace(
+        rubbing, case=replace(case, gear=replace(case.gear, geometry=sizes))
+    )
+    with pytest.raises(InputError, match="400 mm, where the readings reach to 0.54"):
+        predict(spring, [400.0])
+
+
 def test_a_failed_posterior_predicts_nothing(rubbing):
     failed = replace(rubbing, checks=(Check("made to fail", "failed", "on purpose"),))
     with pytest.raises(NotUsable, match="made to fail"):
