@@ -45,7 +45,7 @@ def test_priors_sum_to_one_and_groups_keep_their_share():
     assert prior["none"] == pytest.approx(0.5)
     assert prior["unknown"] == pytest.approx(0.1)
     rest = sum(v for n, v in prior.items() if n.endswith("+unknown"))
-    assert rest == pytest.approx(0.1)
+    assert rest == pytest.approx(0.15)
     pairs = sum(v for n, v in prior.items() if "+" in n) - rest
     assert pairs == pytest.approx(0.03)
     assert prior["a"] == pytest.approx(prior["b"])
@@ -59,7 +59,7 @@ def test_noise_has_its_odds_beside_whatever_goes_on_in_the_mean():
     for alone, beside in (("none", "n"), ("unknown", "n+unknown"), ("a", "a+n")):
         assert prior[beside] == pytest.approx(0.02 * prior[alone])
     # No remainder was looked for beside b: half of that prior is unused.
-    assert prior["a+unknown"] == pytest.approx(0.1 * prior["none"])
+    assert prior["a+unknown"] == pytest.approx(0.15 * prior["none"])
 
 
 def test_an_effect_that_does_not_carry_the_gap_is_only_in_the_way():

@@ -135,7 +135,7 @@ def fingerprint(library: str | None = None) -> dict[str, Any]:
     thresholds = {
         name: getattr(model_posterior, name)
         for name in dir(model_posterior)
-        if name.startswith("PRIOR_") or name in ("NAMED", "CARRIES")
+        if name.startswith("PRIOR_") or name in ("NAMED", "SURE", "CARRIES")
     }
     considered = choose_library(library).items()
     return {

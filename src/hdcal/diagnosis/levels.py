@@ -9,7 +9,7 @@ from collections.abc import Container, Mapping
 from hdcal.diagnosis.adequacy import leaves_most
 from hdcal.diagnosis.detection import Detection
 from hdcal.diagnosis.groups import LeadingGroup, identified
-from hdcal.diagnosis.model_posterior import CARRIES, NAMED
+from hdcal.diagnosis.model_posterior import CARRIES, NAMED, SURE
 from hdcal.diagnosis.verdict import VerdictWord
 from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
 from hdcal.evidence.remainder_evidence import closed_by
@@ -49,7 +49,7 @@ def verdict_word(
         return closed_by(evidence, posterior.top.split("+"), names) >= CARRIES
 
     minor = leaves_most(evidence, posterior.top, best)
-    alone = identified(posterior, library, best) >= NAMED
+    alone = identified(posterior, library, best) >= SURE
     # A rival that this loading can never exclude is not excluded by a name.
     if alone and not rival and not doubt and not minor and carry(sure):
         return "named"
