@@ -60,8 +60,8 @@ def read_case(
         theory: overrides the gear file's theory.
         material: stands for the material file that the gear names.
         encoding: of the CSV file; by default what it looks like.
-        sheet: of a workbook (.xlsx); by default the one with readings. With a *, as in
-            `Probe*`, it stands for several, each a specimen.
+        sheet: of a workbook (.xlsx); by default the one with readings. With an
+            asterisk, as in ``Probe*``, it stands for several, each a specimen.
         reading: of the deformation, `radial` or `diametral`, where the gear file is
             silent; by default it is taken for radial, and said to be so.
 

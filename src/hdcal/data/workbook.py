@@ -33,8 +33,8 @@ def read_sheet(
     Args:
         path: of the workbook.
         findings: of the file.
-        sheet: its name; by default the only one that holds a table of readings. With a
-            * it stands for every such sheet, each of which is a specimen.
+        sheet: its name; by default the only one that holds a table of readings. With an
+            asterisk it stands for every such sheet, each of which is a specimen.
 
     Returns:
         The text as UTF-8, the hash of the file's own bytes, and which sheet was taken
