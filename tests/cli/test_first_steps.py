@@ -2,6 +2,7 @@
 
 import io
 import json
+import sys
 import tomllib
 from pathlib import Path
 
@@ -52,6 +53,9 @@ def test_what_the_gear_file_leaves_open_is_asked_on_a_terminal(
     assumed = "the deformation is radial"
     assert assumed in here("check", log).stdout
     monkeypatch.setattr("sys.stdin", Terminal("diametral\n"))
+    # Where nobody sees the question it is not asked.
+    assert assumed in here("check", log).stdout
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     done = here("check", log)
     assert "radial or diametral" in done.stderr
     assert done.returncode == 0 and assumed not in done.stdout

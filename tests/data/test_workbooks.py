@@ -137,3 +137,12 @@ def test_sheets_of_other_columns_are_not_joined(folder):
     path = book(folder, **{"Probe 1": [*HEAD, *READINGS], "Probe 2": other})
     with pytest.raises(InputError, match="'Probe 1' and 'Probe 2' have other columns"):
         read(path, folder, sheet="Probe*")
+
+
+def test_only_a_sheet_of_commas_alone_gets_points(folder):
+    """Beside 0.5 a text of "1,234" may be a thousand: that is told, not decided."""
+    head = [("deformation_mm", "force_N")]
+    mixed = [(x, f"1,{234 + row}") for row, (x, _) in enumerate(READINGS)]
+    path = book(folder, **{"Probe 1": [*head, *READINGS], "Probe 2": [*head, *mixed]})
+    with pytest.raises(InputError, match="1,234"):
+        read(path, folder, sheet="Probe*")

@@ -98,7 +98,9 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
         return None
     read = partial(read_case, columns=columns, **how)
     case = console.wrong.attempt(read, data, gear)
-    asks = sys.stdin is not None and sys.stdin.isatty() and not console.json
+    streams = sys.stdin, sys.stderr
+    asks = all(each is not None and each.isatty() for each in streams)
+    asks = asks and not console.json
     if case is None or not asks or not leaves_reading_open(case.gear):
         return case
     kinds = click.Choice(["radial", "diametral"])

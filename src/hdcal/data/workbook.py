@@ -44,12 +44,16 @@ def read_sheet(
         InputError: it is no workbook, or it is not clear which sheet is meant.
     """
     tables = _sheets(path, findings)
-    named = [n for n in tables if sheet in (None, n) or fnmatchcase(n, sheet or "")]
+    several = sheet is not None and "*" in sheet
+    named = [
+        name
+        for name in tables
+        if sheet in (None, name) or (several and fnmatchcase(name, sheet or ""))
+    ]
     if not named:
         names = ", ".join(map(quoted, tables))
         words = f"has no `sheet` {quoted(sheet or '')}"
         findings.refuse(words, f"Name one of: {names}")
-    several = sheet is not None and "*" in sheet
     exact = sheet is not None and not several
     likely = named if exact else [name for name in named if _is_table(tables[name])]
     if not likely or (len(likely) > 1 and not several):
@@ -92,20 +96,24 @@ def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
             words = f"sheets {quoted(first)} and {quoted(name)} have other columns"
             findings.refuse(words, _WHICH)
         filled = [at for at in range(start.readings, len(rows)) if any(rows[at])]
-        joined += [[*_with_points(rows[at]), name] for at in filled]
+        rows = _with_points(rows)
+        joined += [[*rows[at], name] for at in filled]
         places += [(name, at + 1) for at in filled]
     findings.places = places
     return joined
 
 
-def _with_points(row: list[str]) -> list[str]:
-    """Return a row with decimal points, where a sheet's texts have commas.
+def _with_points(rows: Rows) -> Rows:
+    """Return a sheet with decimal points, where all of its numbers have commas.
 
     Numbers of other sheets have points, and one sign serves a whole table.
     """
-    if any("." in cell for cell in row if is_number(cell)):
-        return row
-    return [cell.replace(",", ".") if is_number(cell) else cell for cell in row]
+    if any("." in cell for row in rows for cell in row if is_number(cell)):
+        return rows
+    return [
+        [cell.replace(",", ".") if is_number(cell) else cell for cell in row]
+        for row in rows
+    ]
 
 
 def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
