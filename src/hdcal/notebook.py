@@ -10,10 +10,12 @@ from typing import Any
 # Class of a result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
+    "Case": "calibration.check.summary.case_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "InverseDesign": "design.summary.inverse_report",
     "Margin": "prediction.margin.document.margin_document",
     "Posterior": "calibration.summary.calibration_report",
+    "Residuals": "calibration.residuals_document.residuals_document",
     "Response": "motion.respond.summary.response_report",
     "Study": "design.study.summary.study_report",
     "Verdict": "diagnosis.summary.verdict_report",
@@ -22,10 +24,12 @@ TELLERS = {
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
     "Bands": "report.tables.own_columns",
+    "Case": "calibration.check.summary.reading_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "InverseDesign": "design.chart.candidate_rows",
     "Margin": "prediction.margin.chart.level_rows",
     "Posterior": "report.parameters.parameter_estimates",
+    "Residuals": "calibration.residuals_document.residual_columns",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
     "Verdict": "diagnosis.chart.hypothesis_columns",
@@ -34,14 +38,17 @@ TABLES = {
 # -> its chart.
 CHARTS = {
     "Bands": "prediction.bands.chart.bands_chart",
+    "Case": "calibration.check.chart.case_chart",
     "InverseDesign": "design.chart.candidate_chart",
-    "Margin": "prediction.margin.chart.margin_chart",
     "Posterior": "calibration.chart.posterior_chart",
+    "Residuals": "calibration.chart.residuals_chart",
     "Response": "motion.respond.chart.response_chart",
     "Study": "design.study.chart.study_chart",
     "Verdict": "diagnosis.chart.verdict_chart",
     "WaveGenerator": "design.chart.generator_chart",
 }
+# -> what draws it where no chart holds it.
+DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}
 
 
 class Shown:
@@ -83,6 +90,8 @@ class Shown:
             These Axes.
         """
         drawer = import_module("hdcal.report.chart_figure")
+        if (own := DRAWERS.get(type(self).__name__)) is not None:
+            return _room(own)(self, drawer.axes_or_new(ax))
         return drawer.draw_chart(self._ask(CHARTS), ax)
 
     @property
@@ -101,5 +110,10 @@ class Shown:
         name = next((name for name in known if name in table), None)
         if name is None:
             raise NotImplementedError(f"of a {known[0]} there is no such drawing")
-        room, _, asked = f"hdcal.{table[name]}".rpartition(".")
-        return getattr(import_module(room), asked)(self)
+        return _room(table[name])(self)
+
+
+def _room(address: str) -> Any:
+    """Return the function of this address."""
+    room, _, asked = f"hdcal.{address}".rpartition(".")
+    return getattr(import_module(room), asked)

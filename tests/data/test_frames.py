@@ -121,3 +121,20 @@ def test_steel_is_assumed_aloud():
     assert any("the gear is of steel" in note for note in silent.notes)
     told = hdcal.read_case(FRAME, {**sizes, "material": "17-4PH"})
     assert not any("the gear is of steel" in note for note in told.notes)
+
+
+def test_headers_of_several_levels_are_refused(folder):
+    stacked = pd.concat({"rig": FRAME}, axis=1)
+    with pytest.raises(InputError, match="columns of several levels"):
+        hdcal.read_case(stacked, folder / "gear.toml")
+
+
+def test_a_case_returns_to_the_table_it_was_read_from(folder):
+    """What `to_frame` gives is read as the same case again."""
+    case = hdcal.read_case(FRAME, folder / "gear.toml")
+    again = hdcal.read_case(case.to_frame(), folder / "gear.toml")
+    assert again.run_labels == case.run_labels
+    for name in ("deformation", "force", "time", "run", "sense", "force_sd"):
+        np.testing.assert_array_equal(
+            getattr(again.records, name), getattr(case.records, name)
+        )

@@ -52,7 +52,7 @@ def counted(force, limit: float) -> float:
 @pytest.mark.parametrize("law", slice_of(SIGMAS, ["Student's t"]))
 def test_tails_are_exact_however_far(law):
     case = case_of(SIGMAS[law])
-    posterior = calibrate(case, chains=2, warmup=300, draws=600)
+    posterior = calibrate(case, chains=2, warmup=500, draws=1000)
     (cause,), (pulled,) = causes_of(posterior), causes_of(mirrored(posterior))
     force = population_force(cause, AT, "readings")
     for limit in LIMITS[law]:

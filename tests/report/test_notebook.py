@@ -14,12 +14,16 @@ from verdicts import named
 import hdcal
 from hdcal.data.gear import read_gear
 from hdcal.data.resources import datasets_folder
+from hdcal.design.study.chart import study_chart
 from hdcal.diagnosis.summary import verdict_answer
+from hdcal.errors import InputError
+from hdcal.inference.residual_shapes import Structure
 from hdcal.notebook import TELLERS, Shown
+from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
 # What public functions return and is no result.
-NO_RESULTS = {"Case", "PolynomialFit", "Residuals"}
+NO_RESULTS = {"PolynomialFit"}
 
 
 def test_every_public_result_is_shown():
@@ -41,7 +45,9 @@ def results():
             "keeps 90 N",
         ),
         "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
-        "Posterior": (posterior, "Stiffness at the reference temperature"),
+        "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
+        "Posterior": (posterior, "per millimetre as read"),
+        "Residuals": (hdcal.residuals(posterior), "measured − fitted"),
         "Response": (
             hdcal.respond(still_posterior(), "step", points=21, draws=20),
             "The deformation reaches",
@@ -79,7 +85,8 @@ def test_a_result_is_a_line_a_table_and_a_drawing(name: str, results):
     assert len(frame) and not frame.columns.duplicated().any()
     axes = Figure().add_subplot()
     assert found.plot(axes) is axes
-    assert axes.get_xlabel() and axes.get_ylabel() and axes.has_data()
+    named = axes.get_ylabel() or any(axes.get_yticklabels())
+    assert axes.get_xlabel() and named and axes.has_data()
     tree = found.to_datatree()
     assert isinstance(tree, xr.DataTree)
     if name != "Posterior":
@@ -115,3 +122,70 @@ def test_pyplot_is_asked_where_no_axes_are_given(results):
 def test_a_failed_result_says_so_in_its_line(results):
     failed = replace(results["Verdict"][0], reasons=("the sampler diverged",))
     assert repr(failed) == "<Verdict: FAILED, do not use>"
+
+
+def test_a_case_says_what_was_guessed_of_it(results):
+    case = hdcal.read_case(results["Case"][0].to_frame())
+    assert case.notes
+    shown = case._repr_html_()
+    assert "a spring of which nothing is known" in shown
+
+
+def test_residuals_say_their_shapes(results):
+    left = results["Residuals"][0]
+    assert (left.structure, left.noise) == ((), ())
+    assert "No shape was found" in repr(left)
+    bend = Structure("curvature", 0.001, 2.0, "They bend.")
+    noise = Structure("scatter", 0.001, 2.0, "They grow.")
+    shaped = replace(left, structure=(bend,), noise=(noise,))
+    assert "They bend." in repr(shaped)
+    assert all(one.words in shaped._repr_html_() for one in (bend, noise))
+
+
+def test_a_verdict_stands_for_its_models(results):
+    held = {"none": (1.0, results["Posterior"][0])}
+    verdict = replace(results["Verdict"][0], posteriors=held)
+    pairs = list(held.values())
+    found = hdcal.predict(verdict, [0.2, 0.4]).to_frame()
+    listed = hdcal.predict(pairs, [0.2, 0.4]).to_frame()
+    assert found.equals(listed)
+    with pytest.raises(InputError, match="a quick verdict holds none"):
+        hdcal.margin(replace(verdict, posteriors={}), 0.4)
+
+
+def test_what_is_no_case_or_model_is_told_so(results):
+    case = results["Case"][0]
+    frame = case.to_frame()
+    for asked in (hdcal.calibrate, hdcal.diagnose, hdcal.fit, hdcal.calibrate_dynamic):
+        with pytest.raises(InputError, match=r"a DataFrame is none\. Read it first"):
+            asked(frame)
+    with pytest.raises(InputError, match="Case is no calibrated model"):
+        hdcal.margin(case, 0.4)
+    with pytest.raises(InputError, match=r"as \['hysteresis'\]"):
+        hdcal.calibrate(case, effects="hysteresis")
+
+
+def test_a_study_has_a_curve_for_each_of_what_else_varied(results):
+    gear = read_gear(GEAR)
+    study = hdcal.study(gear, {"radius_mm": [38, 40]}, materials=["steel", "PEEK"])
+    chart = study_chart(study)
+    lines = [one for one in chart.series if one.width]
+    assert [one.label.count("steel") for one in lines] == [1, 0]
+    assert all(list(one.x) == [38.0, 40.0] for one in lines)
+    with pytest.raises(InputError, match="no number"):
+        hdcal.study(gear, {"material": ["steel"]})
+    alone = hdcal.study(gear, {}, materials=["steel", "PEEK"])
+    assert study_chart(alone).x == "design"
+
+
+def test_a_margin_is_drawn_as_its_figure_draws_it(results):
+    posterior = results["Posterior"][0]
+    several = hdcal.margin(
+        posterior, 0.4, temperature=[20.0, 40.0], sensitivities=False
+    )
+    axes = Figure().add_subplot()
+    several.plot(axes)
+    assert axes.get_xlabel() == "temperature [°C]"
+    chart = margin_chart(several)
+    upper = next(one for one in chart.series if "upper" in one.label)
+    assert list(upper.y) == [level.upper_bound_N for level in several.levels]

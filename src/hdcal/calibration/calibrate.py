@@ -8,7 +8,7 @@ from difflib import get_close_matches
 import jax
 import numpy as np
 
-from hdcal.data.case import Case, Theory
+from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.errors import Finding, InputError
@@ -61,6 +61,9 @@ def choose_effects(
     Raises:
         InputError: a name is not in the library; the nearest one is suggested.
     """
+    if isinstance(names, str):
+        remedy = f"Give a list of names, as ['{names}']"
+        raise InputError([Finding("effects", f"'{names}' is one text", remedy)])
     check_names(names, registry, "effects")
     return tuple(registry[name] for name in dict.fromkeys(names))
 
@@ -165,9 +168,11 @@ def calibrate(
         progress: called with (iterations done, iterations in all).
 
     Raises:
-        InputError: an effect is unknown, has no prior, or lacks its covariates.
+        InputError: an effect is unknown, has no prior, or lacks its covariates; or
+            `case` is none.
     """
     began = time.perf_counter()
+    require_case(case)
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)

@@ -34,6 +34,12 @@ def calibration_charts(bands: Bands, left: Residuals) -> tuple[Chart, Chart]:
     )
 
 
+def residuals_chart(left: Residuals) -> Chart:
+    """Return the distance of readings from the fit over deformation."""
+    rest = list(_readings(left, left.residual, "measured − fitted"))
+    return Chart(AXIS, "measured − fitted [N]", rest)
+
+
 def _readings(left: Residuals, y: np.ndarray, words: str) -> Iterator[Series]:
     """Yield the readings of each direction as points."""
     kept = np.zeros(len(y), dtype=bool)

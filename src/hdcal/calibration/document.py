@@ -1,9 +1,10 @@
 """A calibration in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer, LocalStiffness
+from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.checks import INDEPENDENT, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
@@ -26,7 +27,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.provenance import data_rows, provenance_rows
-from hdcal.report.words import estimate, label, number, with_labels
+from hdcal.report.words import capital, estimate, label, number, with_labels
 
 ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
@@ -37,21 +38,17 @@ _IMPLAUSIBLE = (
     "gear file: what comes out is not what such a gear is believed to be."
 )
 _ALIKE = (
-    "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and "
-    "`hdcal diagnose` weighs both."
+    "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and a "
+    "diagnosis weighs both."
 )
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {
-    "curvature": "Unload as well as load, take finer steps at small deformation, or "
-    "re-seat the gear and repeat: each separates some causes of curvature.",
     "end": "Take more readings near the largest deformation, loading and unloading.",
-    "direction": "Diagnose: `hdcal diagnose` weighs what can part loading from "
-    "unloading, friction and hysteresis among it.",
-    "temperature": "Diagnose: `hdcal diagnose` weighs what a change of temperature "
-    "does.",
+    "direction": "Diagnose: that weighs what can part loading from unloading, "
+    "friction and hysteresis among it.",
+    "temperature": "Diagnose: that weighs what a change of temperature does.",
     "temperature x deformation": "Check the prior of alpha for this material.",
-    "time": "Diagnose: `hdcal diagnose` weighs what drifts. Repeat the first point at "
-    "the end.",
+    "time": "Diagnose: that weighs what drifts. Repeat the first point at the end.",
     "order": "Repeat the first point at the end: it tells drift from stiffness.",
     NEIGHBOURS: "Repeat the ramp in other mountings: their scatter tells what "
     "neighbours that err alike hide.",
@@ -65,11 +62,12 @@ _LACKING: Mapping[str, str] = {
 }
 
 
-def headline(found: Interval, bend: Sequence[LocalStiffness] = ()) -> str:
-    """Return the stiffness at the reference temperature in one sentence.
+def headline(found: Interval, case: Case, bend: Sequence[LocalStiffness] = ()) -> str:
+    """Return the stiffness in one sentence.
 
     Args:
         found: of a straight line.
+        case: whose it is; without temperatures it holds at that of the test.
         bend: its slope at several places, where the readings bend.
     """
     middle, span = estimate(found)
@@ -82,9 +80,11 @@ def headline(found: Interval, bend: Sequence[LocalStiffness] = ()) -> str:
     told = (
         f". That is a straight line; the readings bend, from {slopes}" if bend else ""
     )
+    was_read = "temperature" in case.records.known
+    warm = f" at {case.gear.reference_temperature:g} °C" * was_read
     return (
-        f"Stiffness at the reference temperature: {middle} N/mm, 95 % credible "
-        f"interval {span} N/mm, per millimetre as read{told}."
+        f"Stiffness{warm}: {middle} N/mm, 95 % credible interval {span} N/mm, per "
+        f"millimetre as read{told}."
     )
 
 
@@ -99,9 +99,24 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     warned = {check.name for check in posterior.checks if check.outcome == "warning"}
     steps = [_IMPLAUSIBLE] * (PLAUSIBLE in warned)
     steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
-    steps += [_REMEDY[shape.name] for shape in (*left.structure, *left.noise)]
+    remedies = {**_REMEDY, "curvature": _bend_remedy(known)}
+    steps += [remedies[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))
+
+
+def _bend_remedy(known: Collection[str]) -> str:
+    """Return what separates causes of curvature and was not done."""
+    steps = {
+        "unload as well as load": "unloading" not in known,
+        "take finer steps at small deformation": True,
+        "re-seat the gear and repeat": "run" not in known,
+    }
+    open_ones = [step for step, left in steps.items() if left]
+    *first, last = open_ones
+    told = f"{', '.join(first)} or {last}" if first else last
+    each = "each separates" if first else "this separates"
+    return f"{capital(told)}: {each} some causes of curvature."
 
 
 def calibration_document(
@@ -117,7 +132,7 @@ def calibration_document(
         f"({found.data.name}), theory “{found.gear.theory}”"
         f"{', with ' * bool(effects)}{effects}.",
         # Of a failed calibration the page shows it struck through.
-        headline=headline(found.stiffness_N_per_mm, found.bend),
+        headline=headline(found.stiffness_N_per_mm, posterior.case, found.bend),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[

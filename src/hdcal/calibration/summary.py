@@ -56,7 +56,8 @@ def calibration_answer(
     steps = tuple(next_steps(posterior, left))
     stiffness = credible_interval(posterior.draws["stiffness"])
     bend = tuple(_bend(posterior, left))
-    entries = posterior_entries(posterior, headline(stiffness, bend), steps)
+    first = headline(stiffness, posterior.case, bend)
+    entries = posterior_entries(posterior, first, steps)
     found = *left.structure, *left.noise
     entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(

@@ -8,6 +8,8 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
+from hdcal.errors import Finding, InputError
+from hdcal.notebook import Shown
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Gear:
 
 
 @dataclass(frozen=True, repr=False)
-class Case:
+class Case(Shown):
     """Records of one data file on one gear, with where they came from.
 
     Attributes:
@@ -98,3 +100,11 @@ class Case:
     def __repr__(self) -> str:
         rows = len(self.records.force)
         return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"
+
+
+def require_case(given: object) -> None:
+    """Raise InputError where something else was given for a case."""
+    if not isinstance(given, Case):
+        words = f"a {type(given).__name__} is none"
+        remedy = "Read it first, as in read_case(data, gear={'radius_mm': 40.0, …})"
+        raise InputError([Finding("case", words, remedy)])

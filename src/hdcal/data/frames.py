@@ -36,7 +36,8 @@ def frame_text(data: Any, findings: FileFindings) -> tuple[bytes, str, str]:
         findings: of the table.
 
     Raises:
-        InputError: arrays of several lengths, or of more than one dimension.
+        InputError: arrays of several lengths, or of more than one dimension; headers
+            of several levels.
     """
     if hasattr(data, "to_pandas"):
         data = data.to_pandas()
@@ -45,6 +46,9 @@ def frame_text(data: Any, findings: FileFindings) -> tuple[bytes, str, str]:
     except (ValueError, TypeError) as error:
         remedy = "Give arrays of one length and one dimension, by name"
         findings.refuse(f"is no table ({error})", remedy)
+    if frame.columns.nlevels > 1:
+        remedy = "Name each by one text, as in frame.columns.map('_'.join)"
+        findings.refuse("has columns of several levels", remedy)
     # Each number in full, so that it is read back as it is.
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.groups import JOINED
+from hdcal.diagnosis.model_posterior import SURE as NAME
 from hdcal.diagnosis.seen_words import what_is_seen
 from hdcal.diagnosis.verdict import Closure, NotTestable, Which
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
@@ -66,6 +67,8 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
             f"{capital(label(which.effect))} alone describes it, but is not named: "
             f"{lookalikes_counted(which)} such cases of blind checks had another cause."
         )
+    elif _SURE <= which.inclusion[which.effect] < NAME:
+        yield f"A name of its own takes {percent(NAME)}."
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdcal.calibration.calibrate import check_effect_priors
-from hdcal.data.case import Case
+from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
@@ -53,6 +53,7 @@ def diagnose(
     Raises:
         InputError: an effect, a prior or the data cannot be used, see `_check`.
     """
+    require_case(case)
     _check(case, library, seed)
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.

@@ -43,7 +43,10 @@ def verdict_word(
     if posterior.top == UNKNOWN:
         return "unknown"
     inclusion = posterior.inclusion
-    sure = {name for name, chance in inclusion.items() if chance >= NAMED}
+    sure, likely = (
+        {name for name, chance in inclusion.items() if chance >= least}
+        for least in (SURE, NAMED)
+    )
 
     def carry(names: Container[str]) -> bool:
         return closed_by(evidence, posterior.top.split("+"), names) >= CARRIES
@@ -56,5 +59,5 @@ def verdict_word(
     if group is None or group.probability < NAMED or minor:
         return "ambiguous"
     # Noise that leaves more than noise is none.
-    hollow = doubt and (not sure or best in evidence.on_noise)
-    return "group" if not hollow and carry({*group.members, *sure}) else "ambiguous"
+    hollow = doubt and (not likely or best in evidence.on_noise)
+    return "group" if not hollow and carry({*group.members, *likely}) else "ambiguous"

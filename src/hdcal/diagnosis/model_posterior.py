@@ -14,8 +14,8 @@ PRIOR_NONE, PRIOR_UNKNOWN, PRIOR_REMAINDER, PRIOR_PAIRS = 0.5, 0.1, 0.15, 0.03
 # Odds of each effect on the noise, whatever goes on in the mean.
 PRIOR_NOISE = 0.02
 NAMED = 0.9
-# An effect gets its own name from here on: of the thresholds that were tried on opened
-# blind checks the one at which at most 5 % of names are wrong, with 95 % confidence.
+# An effect gets its own name from here on. Chosen among five on opened blind checks;
+# what such names are worth, fresh ones say, see `naming`.
 SURE = 0.97
 # An effect is the cause where it closes this share of the gap; below it something
 # unknown is, with the effect beside it.

@@ -114,7 +114,7 @@ def _regions(regions: Sequence[Cell]) -> Iterator[Block]:
     yield Table(["off", "in", *numbers], rows, frozenset(numbers))
     hidden = len(regions) - _MOST_ROWS
     if hidden > 0:
-        yield Text(f"{hidden} more are in verdict.json.", soft=True)
+        yield Text(f"{hidden} more are in the verdict itself.", soft=True)
 
 
 def _region_row(cell: Cell) -> list[str]:
@@ -144,7 +144,7 @@ def which_section(found: VerdictAnswer) -> Section:
     strong = frozenset(i for i, name in enumerate(ranked) if name in together)
     table = Table(["hypothesis", *numbers], rows, frozenset(numbers), strong=strong)
     others = len(chances) - _MOST_ROWS
-    rest = f"{others} less probable ones are in verdict.json. " if others > 0 else ""
+    rest = f"{others} less probable ones are left out here. " if others > 0 else ""
     note = (
         f"Bold: the fewest that make up 90 %. {rest}An effect stands here alone; the "
         "answer's percentage counts all that hold it. Log evidence in nats: three are "

@@ -79,7 +79,7 @@ class Which:
     Attributes:
         verdict: none, named, group, ambiguous or unknown.
         effect: top effect by inclusion; None for none and unknown.
-        second_effect: another with inclusion of 90 % or more.
+        second_effect: another with inclusion of 97 % or more.
         set: effects of the smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; sum to 1.
         inclusion: of each effect over all hypotheses that hold it.

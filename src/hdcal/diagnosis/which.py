@@ -19,7 +19,7 @@ from hdcal.diagnosis.levels import verdict_word
 from hdcal.diagnosis.lookalikes import inseparable, untestable_lookalikes
 from hdcal.diagnosis.model_posterior import (
     CARRIES,
-    NAMED,
+    SURE,
     ModelPosterior,
     posterior_of,
 )
@@ -53,7 +53,7 @@ def identify_cause(
     )
     best = ranked[0] if ranked else ""
     unseen = untestable_lookalikes(evidence, best, library)
-    others = [n for n in ranked[1:] if posterior.inclusion[n] >= NAMED][:1]
+    others = [n for n in ranked[1:] if posterior.inclusion[n] >= SURE][:1]
     rival = bool(unseen) or any({best, *others} & {*pair} for pair in alike)
     word = verdict_word(evidence, found, library, best, group, rival=rival, doubt=doubt)
     mistaken = word == "named" and not all(map(naming().may_be_named, [best, *others]))

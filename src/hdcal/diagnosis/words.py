@@ -155,7 +155,7 @@ def _alike(which: Which) -> str:
     texts = [f"{label(a)} from {label(b)}" for a, b in pairs[:_MOST_PAIRS]]
     rest = len(pairs) - len(texts)
     pairs_word = "pair" if rest == 1 else "pairs"
-    more = f", nor {rest} other {pairs_word} (in verdict.json)" if rest else ""
+    more = f", nor {rest} other {pairs_word}" if rest else ""
     return f"This program can never tell {', '.join(texts)}{more}."
 
 

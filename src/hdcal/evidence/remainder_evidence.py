@@ -122,11 +122,10 @@ def _added(evidence: CaseEvidence, name: str) -> tuple[np.ndarray, np.ndarray] |
     if name in evidence.single.names:
         effect = evidence.piecewise[evidence.single.names.index(name)]
         at = int(np.argmax(evidence.weight_of_correlations))
-        piece, size, tolerance = evidence.single.likeliest(name, at)
+        piece, size, loose = evidence.single.likeliest(name, at)
         free = _FREE * size * effect.slopes[[piece]]
-        visible = remove_base(rows, size * effect.shapes[[piece]])
-        loose = tolerance * visible * rows.tolerance
-        return effect.offsets[piece], np.concatenate([free, loose])
+        shape = loose * remove_base(rows, effect.shapes[[piece]]) * rows.tolerance
+        return effect.offsets[piece], np.concatenate([free, shape])
     if name not in evidence.subspace_effects:
         return None
     design = design_of(evidence, [name])

@@ -83,19 +83,17 @@ class SingleEvidence:
             at: index of the correlation.
 
         Returns:
-            Its piece, from 0, the size of its amplitude and the tolerance of its shape,
-            which is relative to that size.
+            Its piece, from 0, the size of its amplitude, and of which amplitude its
+            shape's freedom is, however small the effect itself stands there.
         """
         index = self.names.index(name)
         parts = [part.of(index) for part in self.parts]
         part = max(parts, key=lambda p: p.log_evidence[at].max())
         cell, cells = int(np.argmax(part.log_evidence[at])), part.cells
-        tolerance = float(cells.tolerance[cell])
         size = abs(np.clip(part.mean[at, cell], cells.low[cell], cells.high[cell]))
-        # A shape is as loose as its cell lets it be, however small the amplitude in it.
-        size = cells.size[cell] if tolerance > 0.0 else size
+        loose = cells.tolerance[cell] * cells.size[cell]
         piece = int(cells.piece[cell] - self.starts[index])
-        return piece, float(size), tolerance
+        return piece, float(size), float(loose)
 
     def by_correlation(self, name: str) -> np.ndarray:
         """Return the log evidence of an effect, [correlation]."""

@@ -24,6 +24,7 @@ from hdcal.inference.residual_shapes import (
 )
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
+from hdcal.notebook import Shown
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
@@ -33,8 +34,8 @@ _DRAWS = 200
 SHAPED = "This takes the model's shape for right, but its residuals have one."
 
 
-@dataclass(frozen=True)
-class Residuals:
+@dataclass(frozen=True, repr=False)
+class Residuals(Shown):
     """Measured against fitted, row by row; the fit is the posterior mean reading.
 
     Attributes:

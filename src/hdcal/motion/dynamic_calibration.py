@@ -7,7 +7,7 @@ from functools import partial
 import jax
 import numpy as np
 
-from hdcal.data.case import Case, Theory
+from hdcal.data.case import Case, Theory, require_case
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
@@ -78,6 +78,7 @@ def calibrate_dynamic(
     Raises:
         InputError: the record or an effect is none that the model can be held against.
     """
+    require_case(case)
     check_settings(chains, warmup, draws, seed)
     loss_effects(effects or ())
     check_motion(case)

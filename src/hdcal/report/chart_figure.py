@@ -2,9 +2,12 @@
 
 from matplotlib.axes import Axes
 
+from hdcal.report.canvas import plain
 from hdcal.report.chart import Chart
 
 _INK = "#222222"
+# A legend of more lines hides what it explains.
+_MOST_NAMED, _LONGEST = 8, 40
 
 
 def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
@@ -14,25 +17,30 @@ def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
         chart: what to draw.
         axes: where; by default new ones of pyplot's.
     """
-    if axes is None:
-        from matplotlib import pyplot
-
-        axes = pyplot.subplots()[1]
+    axes = axes_or_new(axes)
     for high, low, strength in chart.bands:
         top, bottom = chart.series[high], chart.series[low]
         look = {"color": top.colour, "alpha": strength, "linewidth": 0.0}
-        label = top.label.rpartition(",")[0] or top.label
+        label = plain(top.label.rpartition(",")[0] or top.label, _LONGEST)
         axes.fill_between(top.x, bottom.y, top.y, label=label, **look)
     for series in chart.series:
-        colour = series.colour or _INK
+        colour, label = series.colour or _INK, plain(series.label, _LONGEST)
         if series.points:
-            axes.plot(
-                series.x, series.y, ".", color=colour, label=series.label, zorder=4
-            )
+            axes.plot(series.x, series.y, ".", color=colour, label=label, zorder=4)
         elif series.width:
             line = ":" if series.dashed else "-"
-            axes.plot(series.x, series.y, line, color=colour, label=series.label)
+            axes.plot(series.x, series.y, line, color=colour, label=label)
     axes.set_xlabel(chart.x)
     axes.set_ylabel(chart.y)
-    axes.legend(fontsize="small")
+    if len(axes.get_legend_handles_labels()[1]) <= _MOST_NAMED:
+        axes.legend(fontsize="small")
+    return axes
+
+
+def axes_or_new(axes: Axes | None) -> Axes:
+    """Return these axes, or new ones of pyplot's."""
+    if axes is None:
+        from matplotlib import pyplot
+
+        return pyplot.subplots()[1]
     return axes

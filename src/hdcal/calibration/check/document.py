@@ -97,7 +97,7 @@ def _lacking(found: CheckAnswer, each: bool) -> Iterator[tuple[str, str]]:
         needs = dict.fromkeys(need for lack in lacking.values() for need in lack)
         yield (
             "not testable",
-            f"{len(lacking)} effects, for want of {', '.join(needs)} (--effects: each)",
+            f"{len(lacking)} effects, for want of {', '.join(needs)}",
         )
 
 

@@ -16,6 +16,7 @@ from hdcal.calibration.check.document import (
     HEADLINE,
     OWN_SCATTER,
     STATED,
+    check_document,
 )
 from hdcal.data.case import Case, Gear
 from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
@@ -24,6 +25,7 @@ from hdcal.data.gear_text import gear_text
 from hdcal.data.loading import loading
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
+from hdcal.report.document import Document
 from hdcal.report.units import UNITS
 
 # Prior sds of log K within which 99.7 % of it lies.
@@ -60,6 +62,37 @@ def check_answer(case: Case) -> CheckAnswer:
         ),
         notes=(*doubt, *_scatter(case), *case.notes),
     )
+
+
+def case_document(case: Case) -> Document:
+    """Return the report of a check of a case that was read."""
+    return check_document(check_answer(case))
+
+
+def reading_columns(case: Case) -> dict[str, np.ndarray]:
+    """Return what was read, under the headers of a file of hdcal's own.
+
+    Args:
+        case: whose readings; columns that it lacks are left out.
+    """
+    records, known = case.records, case.records.known
+    columns = {
+        "deformation_mm": np.asarray(records.deformation),
+        "force_N": np.asarray(records.force),
+    }
+    others = {
+        "temperature_C": records.temperature,
+        "time_s": records.time,
+        "angle_rad": records.angle,
+        "force_sd_N": records.force_sd,
+    }
+    for header, values in others.items():
+        if header.rpartition("_")[0] in known:
+            columns[header] = np.asarray(values)
+    for name, labels in (("run", case.run_labels), ("specimen", case.specimen_labels)):
+        if name in known:
+            columns[name] = np.array(labels)[np.asarray(getattr(records, name))]
+    return columns
 
 
 def gear_file(case: Case) -> str:

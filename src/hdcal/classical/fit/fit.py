@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 from scipy.stats import f as f_law
 from scipy.stats import t as t_law
 
-from hdcal.data.case import Case
+from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
 from hdcal.report.answer import Real
@@ -133,12 +133,14 @@ def fit(
         For each degree the curve with intercept, then the one without.
 
     Raises:
-        InputError: a degree is out of range, or the rows are too few for it.
+        InputError: a degree is out of range, the rows are too few for it, or `case`
+            is none.
 
     Source:
         Draper and Smith, Applied Regression Analysis; Hurvich and Tsai (1989) for
         the criterion.
     """
+    require_case(case)
     first = (1,) if through_origin else (0, 1)
     wanted = [tuple(range(i, d + 1)) for d in dict.fromkeys(degrees) for i in first]
     records = case.records

@@ -19,7 +19,7 @@ from hdcal.design.checks import (
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import geometry_with
-from hdcal.errors import Finding, Findings
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.physics.profile import peak_stress
@@ -89,7 +89,13 @@ def study(
         InputError: holds everything that is wrong with the question.
     """
     draws = design_draws(source, seed=seed)
-    axes = {name: np.atleast_1d(np.asarray(v, float)) for name, v in vary.items()}
+    try:
+        axes = {name: np.atleast_1d(np.asarray(v, float)) for name, v in vary.items()}
+    except (TypeError, ValueError) as error:
+        remedy = "Give numbers by name; materials have an argument of their own"
+        raise InputError(
+            [Finding("vary", "what varies is no number", remedy)]
+        ) from error
     axes = _with_place(draws, axes, deformation, temperature)
     with Findings() as wrong:
         wrong += _findings(draws, axes, materials, interval)

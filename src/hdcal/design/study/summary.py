@@ -35,6 +35,13 @@ def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
 
         return {"study": study_figure(found)}
 
+    def charts():
+        from hdcal.design.study.chart import study_chart
+
+        # Two sizes make a map, and one picture holds every design.
+        mapped = len({*found.varied} - {"material"}) > 1
+        return {} if mapped else {"study": [study_chart(found)]}
+
     answer = study_answer(found)
     return Report(
         study_document(answer, command),
@@ -42,6 +49,7 @@ def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
         "study.json",
         figures,
         tables=lambda: {"study.csv": found.columns},
+        charts=charts,
     )
 
 

@@ -1,11 +1,11 @@
 """The causes that an answer averages over: models, each with its probability."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -36,7 +36,17 @@ _LARGEST_VERDICT = 64 << 20
 # Of probability that is left out, less than this is the rounding of a sum.
 _ROUNDING = 1e-6
 
-Models = Posterior | Sequence[tuple[float, Posterior]]
+
+class Averaged(Protocol):
+    """What holds calibrated models with their probabilities: a verdict."""
+
+    @property
+    def posteriors(self) -> Mapping[str, tuple[float, Posterior]]:
+        """Models by hypothesis, each with its probability."""
+        ...
+
+
+Models = Posterior | Averaged | Sequence[tuple[float, Posterior]]
 # What an uncertainty comes from.
 Driver = Literal["data", "prior", "given"]
 
@@ -103,15 +113,15 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
     """Return models as causes whose probabilities sum to 1.
 
     Args:
-        models: a posterior, or several with the probabilities of their models. One
-            that is a mixture counts as the models in it.
+        models: a posterior, several with the probabilities of their models, or a
+            verdict. One that is a mixture counts as the models in it.
         allow_failed: also calibrations that failed their checks.
 
     Raises:
         NotUsable: a calibration failed its checks.
         InputError: there are none, or they are not of the same data.
     """
-    given = [(1.0, models)] if isinstance(models, Posterior) else list(models)
+    given = _pairs(models)
     listed = [
         (weight * share, alone)
         for weight, model in given
@@ -130,6 +140,20 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
     return tuple(
         Cause(share / total, model, model.draws) for share, model in listed if share > 0
     )
+
+
+def _pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
+    if isinstance(models, Posterior):
+        return [(1.0, models)]
+    held = getattr(models, "posteriors", None)
+    if held is None and isinstance(models, Sequence):
+        return models
+    if not held:
+        quick = " and a quick verdict holds none" * (held is not None)
+        words = f"{type(models).__name__} is no calibrated model{quick}"
+        remedy = "Calibrate first, or diagnose without quick"
+        raise InputError([Finding("models", words, remedy)])
+    return list(held.values())
 
 
 def likeliest(causes: Sequence[Cause]) -> Cause:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hdcal.prediction.margin.result import Level, Margin
+from hdcal.prediction.margin.sentences import bound_name, member_word
 from hdcal.report.chart import COLOURS, Chart, Series
 
 
@@ -14,22 +15,27 @@ def level_rows(found: Margin) -> Sequence[Level]:
 
 
 def margin_chart(found: Margin) -> Chart:
-    """Return mean and bounds at each temperature, and the capacity."""
+    """Return mean and member with their bands, the bounds and the capacity."""
     levels = sorted(found.levels, key=lambda level: level.temperature_C)
     x = np.array([level.temperature_C for level in levels])
-    rows = {
-        "upper bound [N]": [level.upper_bound_N for level in levels],
-        "lower bound [N]": [level.lower_bound_N for level in levels],
-        "mean [N]": [level.force_N.median for level in levels],
+    series: list[Series] = []
+    for words, name in (
+        (f"one {member_word(found)}", "member_N"),
+        ("mean", "force_N"),
+    ):
+        for end, side in (("hi", "97.5 %"), ("lo", "2.5 %")):
+            y = np.array([getattr(getattr(level, name), end) for level in levels])
+            label = f"{words}, {side} [N]"
+            series.append(Series(label, x, y, COLOURS[0], width=0.0))
+    bounds = bound_name(found)
+    lines = {
+        "mean [N]": ([level.force_N.median for level in levels], COLOURS[0]),
+        f"{bounds} upper [N]": ([level.upper_bound_N for level in levels], ""),
+        f"{bounds} lower [N]": ([level.lower_bound_N for level in levels], ""),
     }
-    alone = len(x) == 1
-    series = [
-        Series(name, x, np.array(y), COLOURS[0], points=alone or name[0] == "m")
-        for name, y in rows.items()
-    ]
     if found.limit_force_N is not None:
-        limit = np.full(len(x), found.limit_force_N * found.loading_sense)
-        series.append(Series("capacity [N]", x, limit, COLOURS[1], points=alone))
-    return Chart(
-        "temperature [°C]", "force [N]", series, [] if alone else [(0, 1, 0.2)]
-    )
+        limit = [found.limit_force_N * found.loading_sense] * len(levels)
+        lines["capacity [N]"] = limit, COLOURS[1]
+    series += [Series(n, x, np.array(y), hue) for n, (y, hue) in lines.items()]
+    between = [(0, 1, 0.18), (2, 3, 0.4)]
+    return Chart("temperature [°C]", "force [N]", series, between)

@@ -57,6 +57,13 @@ def margin_figure(found: Margin, name: str) -> Figure:
     return figure
 
 
+def draw_margin(found: Margin, axes: Axes) -> Axes:
+    """Draw bounds and capacity: at one temperature, or over several."""
+    several = len(found.levels) > 1
+    (_draw_window if several else _draw_spans)(axes, found)
+    return axes
+
+
 def _draw_spans(axes: Axes, found: Margin) -> None:
     level = found.worst
     rows = [

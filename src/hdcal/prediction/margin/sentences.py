@@ -107,7 +107,7 @@ def next_steps(found: Margin) -> Iterator[str]:
 
 def answer(found: Margin) -> list[str]:
     """Return the answer in sentences."""
-    return [*_force(found), *_capacity(found), *_inverse(found), *_models(found)]
+    return [*_inverse(found), *_force(found), *_capacity(found), *_models(found)]
 
 
 def _if_bent_so(found: Margin) -> str:
@@ -264,7 +264,7 @@ def _inverse(found: Margin) -> Iterator[str]:
         least, most = most, least
     tested = "" if got.tested else " Part of this lies outside what was tested."
     yield (
-        f"The other way round: {middle} in the mean{span}. With "
+        f"{middle} in the mean{span}. With "
         f"{_percent(found.confidence)} confidence {share} of "
         f"{_many(found)} get at least to {at(least)}, and as surely {share} get at "
         f"most to {at(most)}.{tested}"

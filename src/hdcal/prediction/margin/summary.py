@@ -81,6 +81,11 @@ def margin_report(
 
         return margin_figures(found, posterior.case.gear.name)
 
+    def charts():
+        from hdcal.prediction.margin.chart import margin_chart
+
+        return {"margin": [margin_chart(found)]} if len(found.levels) > 1 else {}
+
     answer = margin_answer(found, posterior, seed=seed)
     document = whole_document(answer, posterior, command)
     document = spoken_of(document, posterior.theory)
@@ -90,4 +95,4 @@ def margin_report(
         others.append((FILE, page.encode("utf-8", "xmlcharrefreplace")))
     tables = {"budget.csv": budget_columns(found)} if found.budget else {}
     made = {"tables": lambda: tables, "others": lambda: others}
-    return Report(document, answer, "margin.json", figures, **made)
+    return Report(document, answer, "margin.json", figures, charts=charts, **made)
