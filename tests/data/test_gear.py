@@ -4,6 +4,7 @@ import pytest
 
 from hdcal.data.gear import read_gear
 from hdcal.data.priors import MODEL_UNITS, SCALE_UNITS, material_priors, rig_priors
+from hdcal.errors import InputError
 
 SIZES = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70.0\n"
 
@@ -82,3 +83,12 @@ def test_a_material_of_ones_own(read, tmp_path):
     gear = read('material = "mine.toml"\n')
     assert gear.geometry.poisson == 0.33
     assert gear.priors["E0"].numbers == pytest.approx((70e3, 1e3))
+
+
+def test_how_the_deformation_is_read_may_be_said_beside_a_silent_file():
+    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
+    assert read_gear(sizes, reading="diametral").reading == "diametral"
+    with pytest.raises(InputError, match="there is no 'round'"):
+        read_gear(sizes, reading="round")
+    with pytest.raises(InputError, match="the gear file says 'radial'"):
+        read_gear(sizes | {"deformation": "radial"}, reading="diametral")

@@ -146,3 +146,36 @@ def test_only_a_sheet_of_commas_alone_gets_points(folder):
     path = book(folder, **{"Probe 1": [*head, *READINGS], "Probe 2": [*head, *mixed]})
     with pytest.raises(InputError, match="1,234"):
         read(path, folder, sheet="Probe*")
+
+
+def test_a_sheet_of_few_readings_is_said_to_be_left_out(folder):
+    sheets = {"P 1": [*HEAD, *READINGS], "P 2": [*HEAD, *READINGS[:4]]}
+    case = read(book(folder, **sheets), folder, sheet="P*")
+    assert any("left out, as too few readings: 'P 2'" in note for note in case.notes)
+
+
+def test_labels_of_joined_sheets_keep_their_commas(folder):
+    head = [("deformation_mm", "force_N", "run")]
+    points = [(x, f, "1,2") for x, f in READINGS]
+    commas = [(*(str(v).replace(".", ",") for v in pair), "1,2") for pair in READINGS]
+    sheets = {"P 1": [*head, *points], "P 2": [*head, *commas]}
+    case = read(book(folder, **sheets), folder, sheet="P*")
+    assert case.run_labels == ("P 1/1,2", "P 2/1,2")
+
+
+def test_headers_again_begin_another_run_in_joined_sheets_too(folder):
+    twice = [*HEAD[:1], *READINGS, *HEAD[:1], *READINGS]
+    alone = [("deformation_mm", "force_N") if r == HEAD[0] else r for r in twice]
+    path = book(folder, **{"P 1": alone, "P 2": alone})
+    exact = read(path, folder, sheet="P 1")
+    assert len(exact.run_labels) == 2
+    joined = read(path, folder, sheet="P*")
+    assert len(joined.records.force) == 4 * len(READINGS)
+    assert len(joined.specimen_labels) == 2
+
+
+def test_a_sheet_that_names_specimens_itself_is_not_joined(folder):
+    rows = [("deformation_mm", "force_N", "specimen"), *((*r, "a") for r in READINGS)]
+    path = book(folder, **{"P 1": rows, "P 2": rows})
+    with pytest.raises(InputError, match="'P 1' names specimens itself"):
+        read(path, folder, sheet="P*")

@@ -17,7 +17,7 @@ from hdcal.cli.option_types import (
     read_named,
     read_quantity,
 )
-from hdcal.data.theory_names import Theory
+from hdcal.data.theory_names import READINGS, Theory
 from hdcal.errors import Finding
 
 if TYPE_CHECKING:
@@ -67,6 +67,11 @@ def reading_options(command: Callable) -> Callable:
             "several, each a specimen.",
         ),
         click.option(
+            "--reading",
+            type=click.Choice(READINGS),
+            help="Of the deformation, where the gear file is silent [default: radial].",
+        ),
+        click.option(
             "--encoding",
             metavar="NAME",
             help="Of the data file's text [default: what it looks like].",
@@ -83,7 +88,7 @@ def reading_options(command: Callable) -> Callable:
 
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
-    names = ("gear", "columns", "theory", "encoding", "sheet")
+    names = ("gear", "columns", "theory", "encoding", "sheet", "reading")
     return {name: settings.pop(name) for name in names}
 
 
@@ -92,21 +97,34 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
 
     On a terminal it asks for what the gear file leaves open.
     """
-    from hdcal.data.reading import leaves_reading_open, read_case
+    from hdcal.data.reading import read_case
 
     if columns is None:  # it could not be read, which is said already
         return None
-    read = partial(read_case, columns=columns, **how)
-    case = console.wrong.attempt(read, data, gear)
+    read = partial(read_case, columns=columns)
+    case = console.wrong.attempt(read, data, gear, **how)
+    reading = asked_reading(console, case)
+    if reading is None:
+        return case
+    how["reading"] = reading
+    return console.wrong.attempt(read, data, gear, **how)
+
+
+def asked_reading(console: Console, case: "Case | None") -> str | None:
+    """Return how the deformation is read, where nothing says so but who sits there.
+
+    None where it is known, or nobody can be asked.
+    """
+    from hdcal.data.reading import leaves_reading_open
+
     streams = sys.stdin, sys.stderr
     asks = all(each is not None and each.isatty() for each in streams)
     asks = asks and not console.json
     if case is None or not asks or not leaves_reading_open(case.gear):
-        return case
-    kinds = click.Choice(["radial", "diametral"])
+        return None
     words = "Deformation as read, radial or diametral"
-    told = click.prompt(words, default="radial", type=kinds, err=True)
-    return console.wrong.attempt(partial(read, reading=told), data, gear)
+    kinds = click.Choice(READINGS)
+    return click.prompt(words, default="radial", type=kinds, err=True)
 
 
 def json_option(command: Callable) -> Callable:

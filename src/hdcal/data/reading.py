@@ -208,14 +208,15 @@ def _gear_of(
     asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
     """Return the gear of a case, and what is to be told of how it was found."""
-    theory, material, _ = asked
+    theory, material, reading = asked
+    told = [f"the deformation is {reading}, as was asked"] if reading else []
     if gear is not None:
         found = read_gear(gear, *asked)
-        return found, tuple(_unsaid(found))
+        return found, (*told, *_unsaid(found))
     if beside is not None and (folder or os.path.exists(beside)):
         found = read_gear(beside, *asked)
-        return found, (*_unsaid(found), *([] if folder else [_BESIDE]))
-    if theory not in (None, SPRING) or material is not None:
+        return found, (*told, *_unsaid(found), *([] if folder else [_BESIDE]))
+    if theory not in (None, SPRING) or material is not None or reading is not None:
         words = "no gear file says the sizes that this needs"
         raise InputError([Finding("gear", words, "Name one, as `gear` FILE.toml")])
     return unsized(), (UNSIZED,)

@@ -14,3 +14,5 @@ THEORY_WORDS: dict[str, str] = {
     "article": "slope plotted in the article",
     "spring": "a stiffness without sizes",
 }
+# What a deformation may be as it is read.
+READINGS = "radial", "diametral"

@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from hdcal.data.columns import LABELS
 from hdcal.data.findings import FileFindings
 from hdcal.data.table_start import find_start, is_number
 from hdcal.errors import quoted
@@ -70,6 +71,8 @@ def read_sheet(
     note = f"sheet {names} is meant. If not, name the sheet" * (len(tables) > 1)
     if several:
         note = f"each sheet is a specimen: {names}"
+        left_out = ", ".join(quoted(name) for name in named if name not in likely)
+        note += f"; left out, as too few readings: {left_out}" * bool(left_out)
     return text.encode() + b"\n", digest, "" if exact else note
 
 
@@ -88,6 +91,9 @@ def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
             findings.refuse(f"sheet {quoted(name)} has no row of headers", _WHICH)
         lines = [at for at in (start.headers, start.units) if at is not None]
         above = [rows[at] for at in lines]
+        if "specimen" in above[0]:
+            words = f"sheet {quoted(name)} names specimens itself"
+            findings.refuse(words, "Name that sheet alone")
         if not joined:
             wanted = above
             joined = [[*above[0], "specimen"], *([*row, ""] for row in above[1:])]
@@ -96,22 +102,31 @@ def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
             words = f"sheets {quoted(first)} and {quoted(name)} have other columns"
             findings.refuse(words, _WHICH)
         filled = [at for at in range(start.readings, len(rows)) if any(rows[at])]
-        rows = _with_points(rows)
-        joined += [[*rows[at], name] for at in filled]
+        rows = _with_points(rows, above[0])
+        # Headers again begin another run, as they do in a sheet alone.
+        joined += [
+            [*row, "specimen" if row == above[0] else name]
+            for row in (rows[at] for at in filled)
+        ]
         places += [(name, at + 1) for at in filled]
     findings.places = places
     return joined
 
 
-def _with_points(rows: Rows) -> Rows:
+def _with_points(rows: Rows, headers: list[str]) -> Rows:
     """Return a sheet with decimal points, where all of its numbers have commas.
 
-    Numbers of other sheets have points, and one sign serves a whole table.
+    Numbers of other sheets have points, and one sign serves a whole table. Labels stay
+    as they are.
     """
+    labels = {at for at, header in enumerate(headers) if header in LABELS}
     if any("." in cell for row in rows for cell in row if is_number(cell)):
         return rows
     return [
-        [cell.replace(",", ".") if is_number(cell) else cell for cell in row]
+        [
+            cell.replace(",", ".") if is_number(cell) and at not in labels else cell
+            for at, cell in enumerate(row)
+        ]
         for row in rows
     ]
 

@@ -6,6 +6,7 @@ from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
+    asked_reading,
     force_option,
     json_option,
     reading_options,
@@ -65,6 +66,9 @@ def diagnose(console: Console, cases, out, force, **settings):
         reading, asked = take_reading(settings), None
         if reading["columns"] is not None:
             asked = wrong.attempt(read_cases, cases, **reading)
+            told = asked_reading(console, asked.found[0]) if asked else None
+            if told is not None:
+                asked = wrong.attempt(read_cases, cases, **reading | {"reading": told})
         if out is None and asked is not None:
             out = asked.folder
         console.reserve_folder(out, force)

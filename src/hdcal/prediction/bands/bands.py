@@ -236,8 +236,8 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
 def default_bands(models: Models, interval: float = 0.95) -> Bands:
     """Return the bands of a result folder: the tested range and a tenth beyond.
 
-    One block per tested temperature (three over the range if there are many) and
-    per direction that was tested.
+    One block per tested temperature (three over the range if there are many, one of
+    a room's) and per direction that was tested.
 
     Args:
         models: a posterior, or several with the probabilities of their models, over
@@ -259,9 +259,11 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
     cold, warm = np.min(records.temperature), np.max(records.temperature)
     # Rounded together, but never out of what was measured.
     levels = np.unique(np.clip(np.round(records.temperature, 1), cold, warm))
-    if len(levels) > _MOST_TEMPERATURES:
-        levels = np.linspace(levels[0], levels[-1], 3)
-        levels = levels[1:2] if warm - cold < _SAME_TEMPERATURE else levels
+    three = np.linspace(levels[0], levels[-1], 3)
+    if warm - cold < _SAME_TEMPERATURE:
+        levels = three[1:2]
+    elif len(levels) > _MOST_TEMPERATURES:
+        levels = three
     parts = [
         predict(models, grid, levels, side, interval=interval, allow_failed=True)
         for side in DIRECTIONS

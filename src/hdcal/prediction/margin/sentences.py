@@ -231,7 +231,7 @@ def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
             else f"at {sure} confidence it may be all of them."
         )
     )
-    if risk.probability > risk.at_confidence:
+    if risk.probability > min(risk.hi, risk.at_confidence):
         beyond = "the interval" if risk.probability > risk.hi else "that bound"
         yield (
             f"The probability lies above {beyond} of the share because what is least "
