@@ -29,6 +29,7 @@ PUBLIC = [
     "calibrate_dynamic",
     "diagnose",
     "fit",
+    "fleet",
     "force",
     "inverse_design",
     "margin",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hdcal.diagnosis.diagnose import diagnose
     from hdcal.diagnosis.verdict import Verdict
     from hdcal.errors import HdcalError, InputError, NotUsable
+    from hdcal.fleets.fleet import fleet
     from hdcal.inference.dynamic_posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
@@ -53,6 +54,7 @@ _HOMES = {
     "calibrate_dynamic": "motion.dynamic_calibration",
     "diagnose": "diagnosis.diagnose",
     "fit": "classical.fit.fit",
+    "fleet": "fleets.fleet",
     "force": "physics.chain",
     "inverse_design": "design.inverse_design",
     "margin": "prediction.margin.margin",

@@ -25,6 +25,7 @@ from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
+from hdcal.fleets.command import fleet
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
@@ -69,6 +70,7 @@ def hdcal() -> None:
 for _command in (
     calibrate,
     diagnose,
+    fleet,
     predict,
     margin,
     design,

@@ -12,6 +12,7 @@ TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "Case": "calibration.check.summary.case_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
+    "Fleet": "fleets.summary.fleet_report",
     "InverseDesign": "design.summary.inverse_report",
     "Margin": "prediction.margin.document.margin_document",
     "Posterior": "calibration.summary.calibration_report",
@@ -26,6 +27,7 @@ TABLES = {
     "Bands": "report.tables.own_columns",
     "Case": "calibration.check.summary.reading_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
+    "Fleet": "fleets.summary.gear_columns",
     "InverseDesign": "design.chart.candidate_rows",
     "Margin": "prediction.margin.chart.level_rows",
     "Posterior": "report.parameters.parameter_estimates",
@@ -39,6 +41,7 @@ TABLES = {
 CHARTS = {
     "Bands": "prediction.bands.chart.bands_chart",
     "Case": "calibration.check.chart.case_chart",
+    "Fleet": "fleets.chart.fleet_chart",
     "InverseDesign": "design.chart.candidate_chart",
     "Posterior": "calibration.chart.posterior_chart",
     "Residuals": "calibration.chart.residuals_chart",

@@ -6,6 +6,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 import xarray as xr
+from fleets import handmade
 from matplotlib.figure import Figure
 from moving import still_posterior
 from posteriors import single
@@ -40,6 +41,7 @@ def results():
     gear, posterior = read_gear(GEAR), single()
     return {
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
+        "Fleet": (handmade(), "D is 10 % softer"),
         "InverseDesign": (
             hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
             "keeps 90 N",

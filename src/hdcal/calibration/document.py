@@ -41,6 +41,10 @@ _ALIKE = (
     "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and a "
     "diagnosis weighs both."
 )
+_EACH = (
+    "Look at the gears one by one: the command `fleet` says which of them is off. What "
+    "is said here is of their mean."
+)
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {
     "end": "Take more readings near the largest deformation, loading and unloading.",
@@ -101,6 +105,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
     remedies = {**_REMEDY, "curvature": _bend_remedy(known)}
     steps += [remedies[shape.name] for shape in (*left.structure, *left.noise)]
+    steps += [_EACH] * ("specimens" in known)
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))
 

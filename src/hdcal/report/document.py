@@ -205,7 +205,7 @@ def notices(
 
 
 # "gear", where it is not the file of that name.
-_GEAR = re.compile(r"(?<![-`\[\w./])([Gg])ear(s?)(?![-`\]\w/]|\.\w| file)")
+_GEAR = re.compile(r"(?<![-`'\[\w./])([Gg])ear(s?)(?![-`\]\w/]|\.\w| file)")
 
 
 def spoken_of(document: Document, theory: str) -> Document:

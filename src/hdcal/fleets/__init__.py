@@ -1,0 +1,1 @@
+"""Many gears: which one is off, and how much do they scatter?"""

@@ -1,0 +1,63 @@
+"""The JSON answer of a fleet: what each number in it is."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
+from hdcal.report.parameters import Interval
+
+
+@dataclass(frozen=True)
+class PopulationAnswer:
+    """How gears, mountings and readings scatter; 95 % credible intervals.
+
+    Attributes:
+        stiffness_N_per_mm: of the centre of ordinary gears, per mm as read.
+        gear_sd_percent: between ordinary gears.
+        mounting_sd_N: of the zero from mounting to mounting.
+        reading_sd_N: of single readings.
+    """
+
+    stiffness_N_per_mm: Interval
+    gear_sd_percent: Interval
+    mounting_sd_N: Interval
+    reading_sd_N: Interval
+
+
+@dataclass(frozen=True)
+class FutureGear:
+    """A gear not yet measured; 95 % predictive interval."""
+
+    stiffness_N_per_mm: Interval
+
+
+@dataclass(frozen=True, kw_only=True)
+class FleetAnswer(Answer):
+    """What `hdcal fleet` answers; summary.json. Its gears are in gears.csv.
+
+    Attributes:
+        gears: how many there are.
+        rows: of all of them.
+        called_off: gears that are called off, the surest first.
+        false_calls: share of these that may be ordinary gears, as expected.
+        interval: probability that every interval holds.
+        population: what they come from.
+        next_gear: one more of them.
+        notes: from reading, and on what the answer rests.
+        seed: of the draws.
+        versions: of the packages that made them.
+        data_sha256: of the data file.
+    """
+
+    schema: Literal["hdcal.fleet/1"] = "hdcal.fleet/1"
+    gears: Count
+    rows: Count
+    called_off: tuple[Words, ...]
+    false_calls: float
+    interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
+    population: PopulationAnswer
+    next_gear: FutureGear
+    notes: Sentences
+    seed: Count
+    versions: Annotated[dict[str, str], Promise(required=["hdcal"])]
+    data_sha256: Digest

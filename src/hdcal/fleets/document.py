@@ -1,0 +1,163 @@
+"""A fleet in words: the only place of its sentences."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from hdcal.fleets.answer import FleetAnswer
+from hdcal.fleets.fleet import Fleet
+from hdcal.report.document import (
+    Document,
+    Facts,
+    Picture,
+    Section,
+    Sentences,
+    Table,
+    Tag,
+    Text,
+    notices,
+)
+from hdcal.report.words import estimate, number, percent
+
+# Gears in the table of a page; all of them are in gears.csv.
+MOST_LISTED = 30
+_MOST_NAMED = 3
+RESTS_ON = (
+    "Of each mounting a straight line is taken, with a zero of its own and noise that "
+    "is independent from reading to reading: what bends it, a loop or a drift, is not "
+    "modelled here. Diagnose a gear to see it."
+)
+ONE_MOUNTING = (
+    "Every gear was mounted once: how much mountings scatter is told by the zeros "
+    "alone, and what a mounting does to the slope counts as of the gear."
+)
+
+
+def headline(answer: FleetAnswer, columns: Mapping[str, np.ndarray]) -> str:
+    """Return how many gears are alike, and which ones are off, in one sentence."""
+    population, total = answer.population, answer.gears
+    middle, span = estimate(population.gear_sd_percent)
+    centre = estimate(population.stiffness_N_per_mm)[0]
+    alike = total - len(answer.called_off)
+    if alike == total:
+        return (
+            f"None of {total} gears is called off: they scatter by {middle} % (sd, "
+            f"{span} %) about {centre} N/mm."
+        )
+    told = "; ".join(_off(answer, columns))
+    return f"{alike} of {total} gears scatter by {middle} % (sd); {told}."
+
+
+def _off(answer: FleetAnswer, columns: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """Yield what is said of the gears that are called off, the surest first."""
+    centre = answer.population.stiffness_N_per_mm.median
+    place = {name: row for row, name in enumerate(columns["gear"].tolist())}
+    for name in answer.called_off[:_MOST_NAMED]:
+        row = place[name]
+        apart = columns["stiffness_N_per_mm"][row] / centre - 1.0
+        word = "softer" if apart < 0.0 else "stiffer"
+        sure = percent(columns["probability_off"][row])
+        yield f"{name} is {100.0 * abs(apart):.2g} % {word} (probability {sure})"
+    rest = len(answer.called_off) - _MOST_NAMED
+    if rest > 0:
+        yield f"{rest} more are off"
+
+
+def fleet_document(
+    found: Fleet, answer: FleetAnswer, columns: Mapping[str, np.ndarray], command: str
+) -> Document:
+    """Return the report; its picture is called gears."""
+    settings = found.settings
+    sampled = f"NUTS, {settings['chains']} chains of {settings['draws']} draws"
+    versions = ", ".join(f"{k} {v}" for k, v in answer.versions.items())
+    provenance = [
+        ("SHA-256 of the data", answer.data_sha256),
+        ("sampling", f"{sampled}, seed {settings['seed']}"),
+        ("versions", versions),
+    ]
+    return Document(
+        name=found.case.name,
+        kind="fleet",
+        subtitle=f"{answer.gears} gears, {answer.rows} readings",
+        headline=headline(answer, columns),
+        answers=list(_answers(answer)),
+        next_steps=[answer.next_step] if answer.next_step else [],
+        notices=notices(("To be aware of", answer.notes)),
+        sections=[
+            _gears(columns, answer),
+            _scatter(answer),
+            Section(
+                "Checks", [Sentences([c.words for c in found.checks])], False, True
+            ),
+        ],
+        provenance=provenance + ([("command", command)] if command else []),
+        failed=found.reasons,
+    )
+
+
+def _answers(answer: FleetAnswer) -> Iterator[str]:
+    middle, span = estimate(answer.population.stiffness_N_per_mm)
+    yield (
+        f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "
+        "N/mm, per millimetre as read."
+    )
+    middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
+    yield f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm."
+
+
+def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
+    far = np.argsort(-columns["probability_off"], kind="stable")[:MOST_LISTED]
+    numbers = ["rows", "N/mm", "95 % interval", "in sds", "noise [N]", "P(off)"]
+    rows = [_gear(columns, int(row)) for row in far]
+    table = Table(["gear", *numbers, ""], rows, frozenset(numbers))
+    shown = Picture(
+        "gears",
+        "Stiffness of every gear with its interval",
+        "Each gear's stiffness with its 95 % credible interval, from the softest to "
+        "the stiffest. The numbers are in gears.csv.",
+    )
+    rest = answer.gears - len(rows)
+    more = [Text(f"{rest} more are in gears.csv.", soft=True)] if rest > 0 else []
+    called = (
+        "In sds: how far a gear is from the centre, counted in the scatter of ordinary "
+        "gears. As many gears are called off as keep the expected share of ordinary "
+        f"ones among them below {percent(answer.false_calls)}."
+    )
+    blocks = [shown, table, *more, Text(called, soft=True)]
+    return Section("The gears, the oddest first", blocks, brief=True)
+
+
+def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
+    one = {name: column[row] for name, column in columns.items()}
+    low, high = one["stiffness_lo"], one["stiffness_hi"]
+    width = high - low
+    return [
+        str(one["gear"]),
+        str(one["rows"]),
+        number(one["stiffness_N_per_mm"], width),
+        f"{number(low, width)} … {number(high, width)}",
+        f"{one['distance_sd']:+.1f}",
+        f"{one['noise_sd_N']:.2g}",
+        percent(one["probability_off"]),
+        Tag("off", "caution") if one["called_off"] else "",
+    ]
+
+
+def _scatter(answer: FleetAnswer) -> Section:
+    population = answer.population
+    rows = [
+        ("between ordinary gears", population.gear_sd_percent, "%"),
+        ("zero, between mountings", population.mounting_sd_N, "N"),
+        ("single readings", population.reading_sd_N, "N"),
+    ]
+    told = [
+        (what, f"{estimate(one)[0]} {unit} ({estimate(one)[1]})")
+        for what, one, unit in rows
+    ]
+    return Section("What scatters, sd with 95 % interval", [Facts(told)], brief=True)
+
+
+def notes_of(found: Fleet) -> Sequence[str]:
+    """Return what the reader of a fleet must know."""
+    once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
+    return [*found.case.notes, RESTS_ON, *once]

@@ -1,0 +1,230 @@
+"""Many gears of one kind: each one, the population they come from, the next one."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray as xr
+
+from hdcal.data.case import Case, require_case
+from hdcal.data.prior import Prior
+from hdcal.errors import Finding, InputError
+from hdcal.fleets.mounting_sums import mounting_sums
+from hdcal.inference import laplace
+from hdcal.inference.checks import Check, sampling_checks
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.distributions import frozen
+from hdcal.inference.executables import bound_executables
+from hdcal.inference.population_problem import (
+    POPULATION_PRIORS,
+    PopulationProblem,
+    draw_gears,
+)
+from hdcal.inference.problem import problem_priors, unit_stiffness
+from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.notebook import Shown
+
+# Fewer gears say next to nothing of how much gears differ.
+FEWEST = 3
+# Share of the gears that are called off which may be ordinary ones, as expected.
+FALSE_CALLS = 0.05
+# Draws of the population for which every gear is drawn too.
+_GEAR_DRAWS = 400
+
+
+@dataclass(frozen=True, repr=False)
+class Fleet(Shown):
+    """What is known of gears that were measured alike.
+
+    Attributes:
+        case: their readings.
+        draws: of the population by site, shape (d,): stiffness [N/mm as read],
+            specimen_sd (relative), zero and run_offset_sd [N], sigma [N], noise_spread,
+            off_share and off_ratio.
+        stiffness: of each gear, of as many draws, shape (t, g) [N/mm as read].
+        noise_sd: of each gear, shape (g,) [N].
+        zero: of each gear in the mean of its mountings, shape (g,) [N].
+        distance: of each gear from the centre in ordinary gears' sds, shape (g,).
+        off: probability of each gear that it is no ordinary one, shape (g,).
+        called: which gears are called off.
+        next_stiffness: of a gear not yet measured, shape (d,) [N/mm as read].
+        unit: stiffness at K = 1 [N/mm as read].
+        rows: of each gear, shape (g,).
+        mountings: of each gear, shape (g,).
+        checks: of the sampler.
+        settings: of the run.
+    """
+
+    case: Case
+    draws: Mapping[str, np.ndarray]
+    stiffness: np.ndarray
+    noise_sd: np.ndarray
+    zero: np.ndarray
+    distance: np.ndarray
+    off: np.ndarray
+    called: np.ndarray
+    next_stiffness: np.ndarray
+    unit: float
+    rows: np.ndarray
+    mountings: np.ndarray
+    checks: tuple[Check, ...]
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Return why the result must not be used; empty where it may."""
+        return tuple(c.words for c in self.checks if c.outcome == "failed")
+
+
+def fleet(
+    case: Case,
+    *,
+    chains: int = 4,
+    warmup: int = 500,
+    draws: int = 500,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Fleet:
+    """Say of many gears how stiff each one is, and which ones are off.
+
+    A straight line for each mounting: stiffness of its gear, zero of its own, noise
+    that is independent from reading to reading. Gears scatter about the centre of their
+    population, most as ordinary ones, some farther.
+
+    Args:
+        case: from `read_case`, whose rows name their specimen.
+        chains: independent chains, two or more.
+        warmup: iterations of adaptation per chain.
+        draws: draws kept per chain.
+        seed: of all random numbers; the same seed gives the same answer.
+        progress: called with (iterations done, iterations in all).
+
+    Raises:
+        InputError: there are too few gears, or one says nothing of its stiffness.
+    """
+    began = time.perf_counter()
+    require_case(case)
+    check_settings(chains, warmup, draws, seed)
+    check_fleet(case)
+    bound_executables()
+    sums, gears = mounting_sums(case), len(case.specimen_labels)
+    unit, priors = _priors(case)
+    problem = PopulationProblem(priors, sums, jnp.zeros(gears))
+    of_draws, of_gears = jax.random.split(jax.random.key(seed))
+    size = {"chains": chains, "warmup": warmup, "draws": draws}
+    start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}
+    whitening = laplace.fit(problem, start)
+    found = sample(problem, whitening, of_draws, progress=progress, **size)
+    flat = {name: v.reshape(-1) for name, v in found.values.items()}
+    every = -(-len(flat["stiffness"]) // _GEAR_DRAWS)
+    chosen = {name: v[::every] for name, v in flat.items()}
+    drawn = draw_gears(problem, chosen, of_gears)
+    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off).mean(axis=0)
+    centre = chosen["stiffness"][:, None]
+    apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
+    rows = np.bincount(sums.gear, sums.rows)
+    zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
+    return Fleet(
+        case=case,
+        draws=flat,
+        stiffness=stiffness,
+        noise_sd=np.median(np.asarray(drawn.noise_sd), axis=0),
+        zero=np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
+        distance=np.median(apart, axis=0),
+        off=off,
+        called=called_off(off),
+        next_stiffness=_next_gear(flat, np.random.default_rng(seed)),
+        unit=unit,
+        rows=rows.astype(int),
+        mountings=np.bincount(sums.gear),
+        checks=_checks(found),
+        settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
+    )
+
+
+def called_off(off: np.ndarray) -> np.ndarray:
+    """Return which gears are called off, as many as keep false calls rare.
+
+    Of those called the expected share of ordinary ones is at most `FALSE_CALLS`.
+
+    Args:
+        off: probability of each gear that it is off.
+    """
+    order = np.argsort(-off, kind="stable")
+    wrong = np.cumsum(1.0 - off[order]) / np.arange(1, len(off) + 1)
+    kept = np.flatnonzero(wrong <= FALSE_CALLS)
+    called = np.zeros(len(off), dtype=bool)
+    called[order[: kept[-1] + 1 if len(kept) else 0]] = True
+    return called
+
+
+def _priors(case: Case) -> tuple[float, dict[str, Prior]]:
+    """Return the stiffness at K = 1 [N/mm as read], and the priors of all sites."""
+    gear = case.gear
+    own = problem_priors(case, (), {}, gear.theory)
+    laws = {name: frozen(own[name]) for name in ("K", "E0") if _is_free(own[name])}
+    modulus = _centre(own["E0"])
+    half = 0.5 if gear.reading == "diametral" else 1.0
+    unit = unit_stiffness(case, gear.theory) * modulus * half
+    log_sd = np.sqrt(sum((law.std() / law.mean()) ** 2 for law in laws.values()))
+    centre = unit * _centre(own["K"])
+    contact = centre * frozen(own["deformation_offset"]).std()
+    gauge = frozen(own["force_offset"])
+    return unit, {
+        "stiffness": Prior("lognormal", (centre, float(log_sd))),
+        "zero": Prior("normal", (gauge.mean(), float(np.hypot(gauge.std(), contact)))),
+        **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
+        **POPULATION_PRIORS,
+    }
+
+
+def _is_free(prior: Prior) -> bool:
+    return prior.family != "fixed"
+
+
+def _centre(prior: Prior) -> float:
+    return float(frozen(prior).median() if _is_free(prior) else prior.numbers[0])
+
+
+def check_fleet(case: Case) -> None:
+    """Refuse what no population can be told of.
+
+    Raises:
+        InputError: holds a finding for each gear.
+    """
+    records, gears = case.records, case.specimen_labels
+    if len(gears) < FEWEST:
+        words = f"{len(gears) or 1} gears: how much gears differ takes {FEWEST} or more"
+        remedy = "Say in a column `specimen` which gear a row is of, or calibrate"
+        raise InputError([Finding(case.name, words, remedy)])
+    index, x = np.asarray(records.specimen), np.asarray(records.deformation)
+    findings = [
+        Finding(
+            case.name,
+            f"gear '{label}' was read at one deformation only",
+            "Read it at two or more, or leave it out",
+        )
+        for one, label in enumerate(gears)
+        if np.ptp(x[index == one]) == 0.0
+    ]
+    if findings:
+        raise InputError(findings)
+
+
+def _next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
+    """Return the stiffness of one more gear, for each draw [N/mm as read]."""
+    size = len(draws["stiffness"])
+    off = rng.random(size) < draws["off_share"]
+    wide = np.sqrt(1.0 + off * draws["off_ratio"] ** 2)
+    apart = draws["specimen_sd"] * wide * rng.standard_normal(size)
+    return draws["stiffness"] * (1.0 + apart)
+
+
+def _checks(found: Draws) -> tuple[Check, ...]:
+    over = ("chain", "draw")
+    names = ("energy", "diverging", "n_steps")
+    stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
+    return sampling_checks(stats, mixing(found.values))

@@ -1,0 +1,96 @@
+"""A fleet as an answer, and all that its result folder holds."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.data.theory_names import SPRING
+from hdcal.data.versions import versions
+from hdcal.fleets.answer import FleetAnswer, FutureGear, PopulationAnswer
+from hdcal.fleets.document import fleet_document, headline, notes_of
+from hdcal.fleets.fleet import FALSE_CALLS, Fleet
+from hdcal.report.document import spoken_of
+from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.write import Report
+
+
+def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
+    """Return what is known of each gear, the columns of gears.csv."""
+    low, middle, high = np.quantile(found.stiffness, [0.025, 0.5, 0.975], axis=0)
+    columns = {
+        "gear": np.array(found.case.specimen_labels),
+        "rows": found.rows,
+        "runs": found.mountings,
+        "stiffness_N_per_mm": middle,
+        "stiffness_lo": low,
+        "stiffness_hi": high,
+    }
+    if found.case.gear.theory != SPRING:
+        ends = {"K": middle, "K_lo": low, "K_hi": high}
+        columns |= {name: end / found.unit for name, end in ends.items()}
+    failed = bool(found.reasons)
+    return columns | {
+        "zero_N": found.zero,
+        "noise_sd_N": found.noise_sd,
+        "distance_sd": found.distance,
+        "probability_off": found.off,
+        "called_off": found.called,
+        "status": np.full(len(middle), "failed" if failed else "ok"),
+    }
+
+
+def fleet_answer(found: Fleet) -> FleetAnswer:
+    """Return a fleet as an answer, ready for JSON."""
+    draws, columns = found.draws, gear_columns(found)
+    order = np.argsort(-found.off, kind="stable")
+    called = [found.case.specimen_labels[row] for row in order if found.called[row]]
+    answer = FleetAnswer(
+        status="failed" if found.reasons else "ok",
+        reasons=found.reasons,
+        headline="-",  # told of all the other numbers, below
+        next_step=f"Look at {called[0]} by itself: diagnose it." if called else None,
+        gears=len(found.off),
+        rows=int(found.rows.sum()),
+        called_off=tuple(called),
+        false_calls=FALSE_CALLS,
+        interval=INTERVAL,
+        population=PopulationAnswer(
+            stiffness_N_per_mm=credible_interval(draws["stiffness"]),
+            gear_sd_percent=credible_interval(100.0 * draws["specimen_sd"]),
+            mounting_sd_N=credible_interval(draws["run_offset_sd"]),
+            reading_sd_N=credible_interval(draws["sigma"]),
+        ),
+        next_gear=FutureGear(credible_interval(found.next_stiffness)),
+        notes=tuple(notes_of(found)),
+        seed=int(str(found.settings["seed"])),
+        versions=versions(),
+        data_sha256=found.case.data_sha256,
+    )
+    failed = f"This result failed its checks: {'; '.join(found.reasons)}."
+    said = failed if found.reasons else headline(answer, columns)
+    return replace(answer, headline=said)
+
+
+def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:
+    """Return all that `hdcal fleet` leaves behind."""
+
+    def figures():
+        from hdcal.fleets.figure import fleet_figure
+
+        return {"gears": fleet_figure(found)}
+
+    def charts():
+        from hdcal.fleets.chart import fleet_chart
+
+        return {} if found.reasons else {"gears": [fleet_chart(found)]}
+
+    answer, columns = fleet_answer(found), gear_columns(found)
+    document = fleet_document(found, answer, columns, command)
+    return Report(
+        spoken_of(document, found.case.gear.theory),
+        answer,
+        "summary.json",
+        figures,
+        tables=lambda: {"gears.csv": columns},
+        charts=charts,
+    )

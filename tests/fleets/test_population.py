@@ -1,0 +1,179 @@
+"""Gears that are integrated out leave the likelihood of the whole covariance matrix."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import optimize
+from scipy.stats import multivariate_normal
+
+from hdcal.inference.density import log_likelihood
+from hdcal.inference.population_problem import (
+    MountingSums,
+    PopulationProblem,
+    draw_gears,
+    gear_law,
+)
+
+# One-way layouts. Davies, Statistical Methods in Research and Production (1947): yields
+# of dyestuff from six batches; lme4 gives the sds 42.0 and 49.5 by REML. NIST StRD:
+# SiRstv, resistivity of silicon by five instruments, with certified sums of squares.
+DYESTUFF = [
+    (1545.0, 1440.0, 1440.0, 1520.0, 1580.0),
+    (1540.0, 1555.0, 1490.0, 1560.0, 1495.0),
+    (1595.0, 1550.0, 1605.0, 1510.0, 1560.0),
+    (1445.0, 1440.0, 1595.0, 1465.0, 1545.0),
+    (1595.0, 1630.0, 1515.0, 1635.0, 1625.0),
+    (1520.0, 1455.0, 1450.0, 1480.0, 1445.0),
+]
+SILICON = [
+    (196.3052, 196.1240, 196.1890, 196.2569, 196.3403),
+    (196.3042, 196.3825, 196.1669, 196.3257, 196.0422),
+    (196.1303, 196.2005, 196.2889, 196.0343, 196.1811),
+    (196.2795, 196.1748, 196.1494, 196.1485, 195.9885),
+    (196.2119, 196.1051, 196.1850, 196.0052, 196.2090),
+]
+# Certified sums of squares between and within, 4 and 20 degrees of freedom.
+BETWEEN, WITHIN = 5.11462616e-2, 2.16636560e-1
+
+
+def sums_of(mountings):
+    """Return the sums of (gear, x, y) for each mounting."""
+    rows = []
+    for gear, x, y in mountings:
+        about_x, about_y = x - x.mean(), y - y.mean()
+        products = about_x @ about_x, about_x @ about_y, about_y @ about_y
+        rows.append((gear, len(x), x.mean(), y.mean(), *products))
+    columns = np.array(rows).T
+    return MountingSums(columns[0].astype(int), *columns[1:])
+
+
+def problem_of(mountings, gears):
+    return PopulationProblem({}, sums_of(mountings), jnp.zeros(gears))
+
+
+VALUES = {
+    "stiffness": 200.0,
+    "specimen_sd": 0.03,
+    "zero": 0.4,
+    "run_offset_sd": 0.8,
+    "sigma": 0.5,
+    "noise_spread": 0.0,
+    "off_share": 0.07,
+    "off_ratio": 5.0,
+}
+
+
+def fleet(seed=0, gears=3):
+    rng = np.random.default_rng(seed)
+    found = []
+    for gear in range(gears):
+        for _ in range(1 + gear % 2):
+            x = rng.uniform(0.0, 0.5, 6 + gear)
+            stiffness = 200.0 * (1.0 + 0.03 * rng.standard_normal())
+            y = stiffness * x + rng.normal() + 0.5 * rng.standard_normal(len(x))
+            found.append((gear, x, y))
+    return found
+
+
+def dense(mountings, values):
+    """Return log p and the mean stiffness of one gear, for both kinds of gears."""
+    x = np.concatenate([x for _, x, _ in mountings])
+    y = np.concatenate([y for _, _, y in mountings])
+    run = np.repeat(np.arange(len(mountings)), [len(x) for _, x, _ in mountings])
+    noise = values["sigma"] ** 2 * np.eye(len(x))
+    noise += values["run_offset_sd"] ** 2 * (run[:, None] == run)
+    mean = values["stiffness"] * x + values["zero"]
+    found = []
+    for wide in (1.0, np.sqrt(1.0 + values["off_ratio"] ** 2)):
+        between = (values["specimen_sd"] * values["stiffness"] * wide) ** 2
+        whole = noise + between * np.outer(x, x)
+        gain = between * x @ np.linalg.solve(whole, y - mean)
+        law = multivariate_normal(mean, whole)
+        found.append((law.logpdf(y), values["stiffness"] + gain))
+    return np.array(found)
+
+
+def test_the_likelihood_is_that_of_all_rows_with_their_covariance():
+    mountings = fleet()
+    shares = np.log([1.0 - VALUES["off_share"], VALUES["off_share"]])
+    expected, means, chances = 0.0, [], []
+    for gear in range(3):
+        logs, mean = dense([m for m in mountings if m[0] == gear], VALUES).T
+        whole = np.logaddexp.reduce(logs + shares)
+        # The sums leave out what does not depend on the parameters.
+        rows = [len(x) for one, x, _ in mountings if one == gear]
+        expected += whole + 0.5 * sum(n * np.log(2.0 * np.pi) + np.log(n) for n in rows)
+        means.append(mean)
+        chances.append(np.exp(logs + shares - whole))
+    problem = problem_of(mountings, 3)
+    assert log_likelihood(problem, VALUES) == pytest.approx(expected, abs=1e-9)
+    law = gear_law(problem, VALUES)
+    np.testing.assert_allclose(law.mean[:, 0], means, rtol=1e-10)
+    np.testing.assert_allclose(np.exp(law.log_weight).sum(axis=1), chances, rtol=1e-8)
+
+
+def test_noise_that_differs_is_integrated():
+    """Seven nodes against a fine grid of the log-normal noise."""
+    mountings = fleet(seed=2, gears=1)
+    values = {**VALUES, "noise_spread": 0.3}
+    place = np.linspace(-6.0, 6.0, 401)
+    weight = np.exp(-0.5 * place**2) / np.exp(-0.5 * place**2).sum()
+    problem = problem_of(mountings, 1)
+    fine = [
+        log_likelihood(problem, {**VALUES, "sigma": 0.5 * np.exp(0.3 * z)})
+        for z in place
+    ]
+    expected = np.logaddexp.reduce(np.log(weight) + np.array(fine))
+    assert log_likelihood(problem, values) == pytest.approx(expected, abs=1e-3)
+
+
+def test_draws_of_gears_follow_their_law():
+    problem = problem_of(fleet(seed=4), 3)
+    many = {name: np.full(4000, value) for name, value in VALUES.items()}
+    drawn = draw_gears(problem, many, jax.random.key(1))
+    law = gear_law(problem, VALUES)
+    mean = np.sum(np.exp(law.log_weight) * law.mean, axis=(1, 2))
+    error = np.std(np.asarray(drawn.stiffness), axis=0) / np.sqrt(4000)
+    apart = (np.mean(np.asarray(drawn.stiffness), axis=0) - mean) / error
+    assert np.all(np.abs(apart) < 4.0)
+    off = np.exp(law.log_weight)[..., 1].sum(axis=1)
+    np.testing.assert_allclose(np.asarray(drawn.off)[0], off, rtol=1e-10)
+
+
+def reml(layout):
+    """Return both sds that maximise the likelihood with the centre integrated out."""
+    ones = [(g, np.ones(len(row)), np.array(row)) for g, row in enumerate(layout)]
+    centre, spread = np.mean(layout), np.std(layout)
+    problem = problem_of(ones, len(layout))
+    places = centre + spread * np.linspace(-5.0, 5.0, 401)
+    usual = {**VALUES, "zero": 0.0, "run_offset_sd": 0.0, "off_share": 0.0}
+
+    @jax.jit
+    def lost(logs):
+        between, within = jnp.exp(logs)
+
+        def at(place):
+            values = {"stiffness": place, "specimen_sd": between / place}
+            return log_likelihood(problem, {**usual, **values, "sigma": within})
+
+        return -jax.nn.logsumexp(jax.vmap(at)(places))
+
+    begin = np.log([spread / 2.0, spread])
+    options = {"xatol": 1e-7, "fatol": 1e-10}
+    found = optimize.minimize(lost, begin, method="Nelder-Mead", options=options)
+    return np.exp(found.x)
+
+
+def test_dyestuff_is_what_others_find():
+    np.testing.assert_allclose(reml(DYESTUFF), (42.00, 49.51), rtol=1e-3)
+
+
+def test_silicon_is_as_certified():
+    layout = np.array(SILICON)
+    means = layout.mean(axis=1, keepdims=True)
+    assert np.sum((layout - means) ** 2) == pytest.approx(WITHIN, rel=1e-8)
+    assert 5.0 * np.sum((means - means.mean()) ** 2) == pytest.approx(BETWEEN, rel=1e-8)
+    between = (BETWEEN / 4.0 - WITHIN / 20.0) / 5.0
+    expected = np.sqrt([between, WITHIN / 20.0])
+    np.testing.assert_allclose(reml(SILICON), expected, rtol=2e-3)

@@ -1,0 +1,41 @@
+"""A fleet made by hand: what is said of it hangs on no sampler."""
+
+from dataclasses import replace
+
+import numpy as np
+from rigs import make_gear
+
+from hdcal.data.reading import read_case
+from hdcal.fleets.fleet import Fleet
+from hdcal.inference.checks import Check
+
+
+def handmade() -> Fleet:
+    """Return four gears of which the last is called off."""
+    rng = np.random.default_rng(0)
+    x = np.tile(np.linspace(0.0, 0.5, 5), 4)
+    columns = {"deformation_mm": x, "force_N": 200.0 * x}
+    case = read_case(columns | {"specimen": np.repeat(list("ABCD"), 5)})
+    truth = np.array([199.0, 200.0, 201.0, 180.0])
+    draws = {
+        "stiffness": rng.normal(200.0, 0.5, 50),
+        "specimen_sd": rng.uniform(0.005, 0.01, 50),
+        "run_offset_sd": rng.uniform(0.5, 1.5, 50),
+        "sigma": rng.uniform(0.4, 0.6, 50),
+    }
+    return Fleet(
+        case=replace(case, gear=make_gear()),
+        draws=draws,
+        stiffness=truth + rng.normal(0.0, 0.3, (40, 4)),
+        noise_sd=np.full(4, 0.5),
+        zero=np.zeros(4),
+        distance=np.array([-0.7, 0.0, 0.7, -14.0]),
+        off=np.array([0.01, 0.01, 0.01, 0.999]),
+        called=np.array([False, False, False, True]),
+        next_stiffness=rng.normal(200.0, 2.0, 50),
+        unit=80.0,
+        rows=np.full(4, 5),
+        mountings=np.ones(4, int),
+        checks=(Check("chains agree (R-hat)", "passed", "the largest R-hat is 1.0"),),
+        settings={"seed": 0, "chains": 4, "warmup": 500, "draws": 500},
+    )
