@@ -179,3 +179,14 @@ def test_a_sheet_that_names_specimens_itself_is_not_joined(folder):
     path = book(folder, **{"P 1": rows, "P 2": rows})
     with pytest.raises(InputError, match="'P 1' names specimens itself"):
         read(path, folder, sheet="P*")
+
+
+def test_texts_with_commas_beside_numbers_are_decimal_where_they_can_be_no_other(
+    folder,
+):
+    """As test machines' exports hold them after somebody typed a value again."""
+    typed = [(f"{x:.4f}".replace(".", ","), f) for x, f in READINGS[:3]]
+    path = book(folder, **{"Probe 1": [*HEAD, *typed, *READINGS[3:]]})
+    for sheet in ("Probe 1", "Probe*", None):
+        case = read(path, folder, sheet=sheet)
+        np.testing.assert_allclose(case.records.deformation, np.array(READINGS)[:, 0])

@@ -31,6 +31,7 @@ def handmade() -> Fleet:
         zero=np.zeros(4),
         distance=np.array([-0.7, 0.0, 0.7, -14.0]),
         off=np.array([0.01, 0.01, 0.01, 0.999]),
+        chance=np.array([0.5, 1.0, 0.5, 1e-6]),
         called=np.array([False, False, False, True]),
         next_stiffness=rng.normal(200.0, 2.0, 50),
         unit=80.0,

@@ -10,7 +10,9 @@ _LEFT_OUT = """\
 # wall_thickness_mm = 0.68
 # radius_mm = 40.0             # to the neutral surface
 # length_mm = 70.0
-# material = "steel"           # or the name of another one, or a file"""
+# material = "steel"           # or the name of another one, or a file
+# and below [measurement], which way it is read:
+# deformation = "radial"       # or "diametral", which makes K twice as large"""
 
 
 def gear_text(

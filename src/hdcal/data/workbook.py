@@ -2,6 +2,7 @@
 
 import datetime
 import hashlib
+import re
 import zipfile
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
@@ -24,6 +25,8 @@ _WHICH = "Say which with `sheet`; with a *, as in 'Probe*', each is a specimen"
 # Rows with two numbers or more that make a sheet a table of readings.
 _READINGS = 5
 Rows = list[list[str]]
+# Which may be a whole number with signs for thousands.
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 def read_sheet(
@@ -63,7 +66,7 @@ def read_sheet(
         if likely:
             words = f"{len(likely)} sheets hold a table: {names}"
         findings.refuse(words, _WHICH)
-    found = {name: _same(tables[name]) for name in likely}
+    found = {name: _with_points(_same(tables[name])) for name in likely}
     rows = _specimens(found, findings) if several else found[likely[0]]
     text = "\n".join(map("\t".join, rows))
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
@@ -102,7 +105,6 @@ def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
             words = f"sheets {quoted(first)} and {quoted(name)} have other columns"
             findings.refuse(words, _WHICH)
         filled = [at for at in range(start.readings, len(rows)) if any(rows[at])]
-        rows = _with_points(rows, above[0])
         # Headers again begin another run, as they do in a sheet alone.
         joined += [
             [*row, "specimen" if row == above[0] else name]
@@ -113,14 +115,24 @@ def _specimens(sheets: dict[str, Rows], findings: FileFindings) -> Rows:
     return joined
 
 
-def _with_points(rows: Rows, headers: list[str]) -> Rows:
-    """Return a sheet with decimal points, where all of its numbers have commas.
+def _with_points(rows: Rows) -> Rows:
+    """Return a sheet with decimal points, where its commas can be nothing else.
 
-    Numbers of other sheets have points, and one sign serves a whole table. Labels stay
-    as they are.
+    Cells that hold numbers have points, texts beside them may have commas. They are no
+    thousands where one of them has no three digits behind it, or a zero before it, or
+    where there are no points at all. Labels stay as they are.
     """
+    start = find_start("\n".join(map("\t".join, rows[:_TOP])))
+    headers = [] if start is None or start.headers is None else rows[start.headers]
     labels = {at for at, header in enumerate(headers) if header in LABELS}
-    if any("." in cell for row in rows for cell in row if is_number(cell)):
+    numbers = [
+        cell
+        for row in rows
+        for at, cell in enumerate(row)
+        if is_number(cell) and at not in labels
+    ]
+    commas = [cell for cell in numbers if "," in cell]
+    if any("." in cell for cell in numbers) and all(map(_THOUSANDS.fullmatch, commas)):
         return rows
     return [
         [

@@ -32,6 +32,12 @@ ONE_MOUNTING = (
     "alone, and what a mounting does to the slope counts as of the gear."
 )
 
+FEW_GEARS = (
+    "So few gears say little of how much ordinary ones scatter: only a gear very far "
+    "out can be called off. Ten tell clearly more."
+)
+_FEW = 8
+
 
 def headline(answer: FleetAnswer, columns: Mapping[str, np.ndarray]) -> str:
     """Return how many gears are alike, and which ones are off, in one sentence."""
@@ -120,8 +126,8 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     more = [Text(f"{rest} more are in gears.csv.", soft=True)] if rest > 0 else []
     called = (
         "In sds: how far a gear is from the centre, counted in the scatter of ordinary "
-        "gears. As many gears are called off as keep the expected share of ordinary "
-        f"ones among them below {percent(answer.false_calls)}."
+        "gears. Called off are those so far out that in the mean at most "
+        f"{percent(answer.false_calls)} of the gears called are ordinary ones."
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
     return Section("The gears, the oddest first", blocks, brief=True)
@@ -160,4 +166,5 @@ def _scatter(answer: FleetAnswer) -> Section:
 def notes_of(found: Fleet) -> Sequence[str]:
     """Return what the reader of a fleet must know."""
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
-    return [*found.case.notes, RESTS_ON, *once]
+    few = [FEW_GEARS] if len(found.off) < _FEW else []
+    return [*found.case.notes, RESTS_ON, *few, *once]

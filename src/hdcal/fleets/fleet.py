@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import xarray as xr
+from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case, require_case
 from hdcal.data.prior import Prior
@@ -29,7 +30,7 @@ from hdcal.notebook import Shown
 
 # Fewer gears say next to nothing of how much gears differ.
 FEWEST = 3
-# Share of the gears that are called off which may be ordinary ones, as expected.
+# Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05
 # Draws of the population for which every gear is drawn too.
 _GEAR_DRAWS = 400
@@ -49,6 +50,7 @@ class Fleet(Shown):
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
         off: probability of each gear that it is no ordinary one, shape (g,).
+        chance: that an ordinary gear is as far from the centre, shape (g,).
         called: which gears are called off.
         next_stiffness: of a gear not yet measured, shape (d,) [N/mm as read].
         unit: stiffness at K = 1 [N/mm as read].
@@ -65,6 +67,7 @@ class Fleet(Shown):
     zero: np.ndarray
     distance: np.ndarray
     off: np.ndarray
+    chance: np.ndarray
     called: np.ndarray
     next_stiffness: np.ndarray
     unit: float
@@ -83,8 +86,8 @@ def fleet(
     case: Case,
     *,
     chains: int = 4,
-    warmup: int = 500,
-    draws: int = 500,
+    warmup: int = 1000,
+    draws: int = 1000,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Fleet:
@@ -122,7 +125,9 @@ def fleet(
     every = -(-len(flat["stiffness"]) // _GEAR_DRAWS)
     chosen = {name: v[::every] for name, v in flat.items()}
     drawn = draw_gears(problem, chosen, of_gears)
-    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off).mean(axis=0)
+    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
+    # About a centre and a scatter that the gear itself has no part in: where it is off.
+    chance = np.sum(off * np.asarray(drawn.chance), axis=0) / np.sum(off, axis=0)
     centre = chosen["stiffness"][:, None]
     apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
     rows = np.bincount(sums.gear, sums.rows)
@@ -134,8 +139,9 @@ def fleet(
         noise_sd=np.median(np.asarray(drawn.noise_sd), axis=0),
         zero=np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
         distance=np.median(apart, axis=0),
-        off=off,
-        called=called_off(off),
+        off=off.mean(axis=0),
+        chance=chance,
+        called=called_off(chance),
         next_stiffness=_next_gear(flat, np.random.default_rng(seed)),
         unit=unit,
         rows=rows.astype(int),
@@ -145,20 +151,19 @@ def fleet(
     )
 
 
-def called_off(off: np.ndarray) -> np.ndarray:
-    """Return which gears are called off, as many as keep false calls rare.
+def called_off(chance: np.ndarray) -> np.ndarray:
+    """Return which gears are called off: so far out that few of them are ordinary.
 
-    Of those called the expected share of ordinary ones is at most `FALSE_CALLS`.
+    In the mean at most `FALSE_CALLS` of those called are ordinary gears; where none is
+    off, in as many fleets any is called.
 
     Args:
-        off: probability of each gear that it is off.
+        chance: of each gear, that an ordinary one is as far out, shape (g,).
+
+    Source:
+        Benjamini and Hochberg, Journal of the Royal Statistical Society B 57 (1995).
     """
-    order = np.argsort(-off, kind="stable")
-    wrong = np.cumsum(1.0 - off[order]) / np.arange(1, len(off) + 1)
-    kept = np.flatnonzero(wrong <= FALSE_CALLS)
-    called = np.zeros(len(off), dtype=bool)
-    called[order[: kept[-1] + 1 if len(kept) else 0]] = True
-    return called
+    return false_discovery_control(chance) <= FALSE_CALLS
 
 
 def _priors(case: Case) -> tuple[float, dict[str, Prior]]:

@@ -34,6 +34,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "noise_sd_N": found.noise_sd,
         "distance_sd": found.distance,
         "probability_off": found.off,
+        "chance_ordinary": found.chance,
         "called_off": found.called,
         "status": np.full(len(middle), "failed" if failed else "ok"),
     }

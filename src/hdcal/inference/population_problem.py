@@ -96,11 +96,14 @@ class GearLaw(NamedTuple):
         log_weight: of noise and kind, normalised over both.
         mean: of the stiffness [N/mm].
         sd: of it [N/mm].
+        far: how far the readings are from the centre, in sds of an ordinary gear with
+            its noise; [gear, node].
     """
 
     log_weight: Float[Array, "g u k"]
     mean: Float[Array, "g u k"]
     sd: Float[Array, "g u k"]
+    far: Float[Array, "g u"]
 
 
 def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
@@ -136,7 +139,8 @@ def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
         + jnp.log(jnp.stack([1.0 - share, share]))
     )
     mean = centre + slope * between / shrunk
-    return GearLaw(log_joint, mean, jnp.sqrt(between / shrunk))
+    far = (slope / jnp.sqrt(precision * shrunk))[..., 0]
+    return GearLaw(log_joint, mean, jnp.sqrt(between / shrunk), far)
 
 
 @log_likelihood.register
@@ -165,11 +169,13 @@ class DrawnGears(NamedTuple):
         stiffness: [N/mm as read].
         noise_sd: [N].
         off: probability that it is no ordinary one.
+        chance: that an ordinary one is as far from the centre.
     """
 
     stiffness: Float[Array, "t g"]
     noise_sd: Float[Array, "t g"]
     off: Float[Array, "t g"]
+    chance: Float[Array, "t g"]
 
 
 @jax.jit
@@ -196,7 +202,9 @@ def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
         place = jnp.asarray(_PLACES)[case[:, 0] // 2]
         noise = draw["sigma"] * jnp.exp(draw["noise_spread"] * place)
         off = jnp.exp(jax.nn.logsumexp(law.log_weight[..., 1], axis=1))
-        return DrawnGears(stiffness, noise, off)
+        weight = jax.nn.softmax(law.log_weight[..., 1], axis=1)
+        chance = jnp.sum(weight * 2.0 * jax.scipy.stats.norm.sf(abs(law.far)), axis=1)
+        return DrawnGears(stiffness, noise, off, chance)
 
     keys = jax.random.split(key, len(values["stiffness"]))
     # One after the other: a hundred thousand gears side by side fill the memory.

@@ -98,10 +98,8 @@ def reading_columns(case: Case) -> dict[str, np.ndarray]:
 def gear_file(case: Case) -> str:
     """Return a gear file for readings that came without one."""
     gear = case.gear
-    measured = {
-        "deformation": gear.reading,
-        "reference_temperature_C": gear.reference_temperature,
-    }
+    # Nothing said whether they are radial or diametral: that stays open.
+    measured = {"reference_temperature_C": gear.reference_temperature}
     named = {"name": case.name, "theory": gear.theory}
     return gear_text(named, measured, case.columns)
 
