@@ -62,7 +62,7 @@ def test_the_soft_gear_is_named_and_no_other(found):
     population = answer.population
     between = population.gear_sd_percent
     assert between.lo < 100.0 * SPREAD < between.hi
-    assert between.hi < 4.0
+    assert between.median < 2.5  # of all ten it were 5
     centre = population.stiffness_N_per_mm
     assert centre.lo < np.median(stiffness) < centre.hi
     assert population.mounting_sd_N.lo < ZERO_SD < population.mounting_sd_N.hi
