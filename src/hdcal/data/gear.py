@@ -18,6 +18,7 @@ from hdcal.data.gear_schema import (
     check_schema,
     size_findings,
     tables_of,
+    with_reading,
 )
 from hdcal.data.prior import Prior
 from hdcal.data.prior_entry import read_prior
@@ -37,7 +38,7 @@ from hdcal.data.priors import (
 )
 from hdcal.data.records import Geometry
 from hdcal.data.rig_facts import filtered, rig_fact_priors
-from hdcal.data.theory_names import READINGS, SPRING, Theory
+from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
@@ -91,7 +92,7 @@ def read_gear(
         path = Path(source)
         toml = read_toml(path, str(path))
     with Findings() as wrong:
-        toml = wrong.attempt(_with_reading, toml, reading) or toml
+        toml = wrong.attempt(with_reading, toml, reading) or toml
         model = wrong.attempt(check_schema, toml)
         wrong += size_findings(toml, theory)
         if theory is not None and theory not in get_args(Theory):
@@ -103,26 +104,6 @@ def read_gear(
         wrong += _of_another_theory(toml, theory)
     assert model is not None and facts is not None and given is not None
     return _assemble(model, theory, facts, given, path, toml)
-
-
-def _with_reading(toml: TomlFile, reading: str | None) -> TomlFile:
-    """Return a gear file that says how the deformation is read, where it is silent.
-
-    Raises:
-        InputError: there is no such reading, or the file says another one.
-    """
-    measurement = toml.table.get("measurement", {})
-    if reading is None or not isinstance(measurement, dict):
-        return toml
-    said = measurement.get("deformation", reading)
-    if reading not in READINGS:
-        remedy = f"It is {' or '.join(READINGS)}"
-        raise InputError([Finding("reading", f"there is no '{reading}'", remedy)])
-    if said != reading:
-        words = f"'{reading}' was asked for, and the gear file says '{said}'"
-        raise InputError([Finding("reading", words, "Correct the one that is wrong")])
-    told = {"measurement": {**measurement, "deformation": reading}}
-    return replace(toml, table={**toml.table, **told})
 
 
 def _assemble(

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -16,7 +17,7 @@ from hdcal.data.certificates import (
 )
 from hdcal.data.plausible import NAMES, RANGES, implausible, range_of
 from hdcal.data.rig_facts import RigTable
-from hdcal.data.theory_names import SPRING, Theory
+from hdcal.data.theory_names import READINGS, SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.typed_json import within
 from hdcal.errors import Finding, Findings, InputError
@@ -218,3 +219,23 @@ def size_faults(size: Mapping[str, float]) -> list[tuple[str, str, str]]:
         remedy = "Measure the load height from the closed base"
         faults.append(("load_height", words, remedy))
     return faults
+
+
+def with_reading(toml: TomlFile, reading: str | None) -> TomlFile:
+    """Return a gear file that says how the deformation is read, where it is silent.
+
+    Raises:
+        InputError: there is no such reading, or the file says another one.
+    """
+    measurement = toml.table.get("measurement", {})
+    if reading is None or not isinstance(measurement, dict):
+        return toml
+    said = measurement.get("deformation", reading)
+    if reading not in READINGS:
+        remedy = f"It is {' or '.join(READINGS)}"
+        raise InputError([Finding("reading", f"there is no '{reading}'", remedy)])
+    if said != reading:
+        words = f"'{reading}' was asked for, and the gear file says '{said}'"
+        raise InputError([Finding("reading", words, "Correct the one that is wrong")])
+    told = {"measurement": {**measurement, "deformation": reading}}
+    return replace(toml, table={**toml.table, **told})

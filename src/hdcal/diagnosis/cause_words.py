@@ -68,7 +68,8 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
             f"{lookalikes_counted(which)} such cases of blind checks had another cause."
         )
     elif _SURE <= which.inclusion[which.effect] < NAME:
-        yield f"A name of its own takes {percent(NAME)}."
+        name = capital(label(which.effect))
+        yield f"{name} is not named: a name takes {percent(NAME)}."
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."

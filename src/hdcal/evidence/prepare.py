@@ -94,7 +94,7 @@ def prepare(
     # Computed readings have no noise, and a noise of zero has no density.
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
     noise_sd = float(noise_sd or max(pilot_noise(records), least))
-    scale = _stiffness_prior(case, own)
+    scale = stiffness_prior(case, own)
     base, columns, mean = _linearise(records, reading, own, scale, noise_sd, stiffness)
     relative = np.sqrt(1.0 + (np.asarray(records.force_sd) / noise_sd) ** 2)
     rows = LinearRows(
@@ -131,18 +131,19 @@ def log_moments(prior: Prior) -> tuple[float, float]:
     """Return mean and sd of the logarithm of a positive parameter."""
     if prior.family == "lognormal":
         return float(np.log(prior.numbers[0])), float(prior.numbers[1])
-    mean, sd = _moments(prior)
+    mean, sd = moments(prior)
     return float(np.log(mean)), sd / mean
 
 
-def _moments(prior: Prior) -> tuple[float, float]:
+def moments(prior: Prior) -> tuple[float, float]:
+    """Return mean and sd of a parameter."""
     if prior.family == "fixed":
         return float(prior.numbers[0]), 1e-9
     law = frozen(prior)
     return float(law.mean()), float(law.std())
 
 
-def _stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
+def stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
     """Return mean and sd of the log stiffness, and both formulas with K = 1 [N/mm]."""
     k_mean, k_sd = log_moments(priors["K"])
     e_mean, e_sd = log_moments(priors["E0"])
@@ -152,7 +153,7 @@ def _stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
         for theory in (case.gear.theory, "ring")
     )
     # The stiffness as read has the gains in it.
-    gains = [_moments(priors[name])[1] for name in GAINS if name in priors]
+    gains = [moments(priors[name])[1] for name in GAINS if name in priors]
     sd = float(reduce(np.hypot, [k_sd, e_sd, *gains]))
     return k_mean + float(np.log(nominal)), sd, nominal, ring
 
@@ -165,9 +166,9 @@ def _linearise(
     The stiffness is expanded about its least-squares value, where effects act; its
     own prior is on the logarithm.
     """
-    alpha, _ = _moments(priors["alpha"])
-    zero, _ = _moments(priors["deformation_offset"])
-    offset, _ = _moments(priors["force_offset"])
+    alpha, _ = moments(priors["alpha"])
+    zero, _ = moments(priors["deformation_offset"])
+    offset, _ = moments(priors["force_offset"])
     shape = (records.deformation - zero) * reading.radial_per_read
     rise = np.asarray(records.temperature) - reading.reference_temperature
     shape = shape * (1.0 - alpha * rise)
@@ -186,15 +187,15 @@ def _linearise(
 
 def _columns(records: Records, reading: Reading, priors, base: Base, log_sd: float):
     """Return what one prior sd of each base parameter adds [N], shape (n, 4)."""
-    alpha, alpha_sd = _moments(priors["alpha"])
-    zero, zero_sd = _moments(priors["deformation_offset"])
+    alpha, alpha_sd = moments(priors["alpha"])
+    zero, zero_sd = moments(priors["deformation_offset"])
     rise = np.asarray(records.temperature) - reading.reference_temperature
     radial = (np.asarray(records.deformation) - zero) * reading.radial_per_read
     soft = 1.0 - alpha * rise
     return np.stack(
         [
             log_sd * base.stiffness * radial * soft,
-            np.full(len(rise), _moments(priors["force_offset"])[1]),
+            np.full(len(rise), moments(priors["force_offset"])[1]),
             -alpha_sd * base.stiffness * rise * radial,
             -zero_sd * base.stiffness * reading.radial_per_read * soft,
         ],

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from hdcal.fleets.answer import FleetAnswer
+from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
 from hdcal.report.document import (
     Document,
@@ -39,32 +39,46 @@ FEW_GEARS = (
 _FEW = 8
 
 
-def headline(answer: FleetAnswer, columns: Mapping[str, np.ndarray]) -> str:
-    """Return how many gears are alike, and which ones are off, in one sentence."""
-    population, total = answer.population, answer.gears
+def headline(
+    population: PopulationAnswer,
+    called: Sequence[str],
+    columns: Mapping[str, np.ndarray],
+) -> str:
+    """Return how many gears are alike, and which ones are off, in one sentence.
+
+    Args:
+        population: of the gears.
+        called: off, the surest first.
+        columns: of gears.csv.
+    """
+    total = len(columns["gear"])
     middle, span = estimate(population.gear_sd_percent)
     centre = estimate(population.stiffness_N_per_mm)[0]
-    alike = total - len(answer.called_off)
+    alike = total - len(called)
     if alike == total:
         return (
             f"None of {total} gears is called off: they scatter by {middle} % (sd, "
             f"{span} %) about {centre} N/mm."
         )
-    told = "; ".join(_off(answer, columns))
+    told = "; ".join(_off(population, called, columns))
     return f"{alike} of {total} gears scatter by {middle} % (sd); {told}."
 
 
-def _off(answer: FleetAnswer, columns: Mapping[str, np.ndarray]) -> Iterator[str]:
+def _off(
+    population: PopulationAnswer,
+    called: Sequence[str],
+    columns: Mapping[str, np.ndarray],
+) -> Iterator[str]:
     """Yield what is said of the gears that are called off, the surest first."""
-    centre = answer.population.stiffness_N_per_mm.median
+    centre = population.stiffness_N_per_mm.median
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
-    for name in answer.called_off[:_MOST_NAMED]:
+    for name in called[:_MOST_NAMED]:
         row = place[name]
         apart = columns["stiffness_N_per_mm"][row] / centre - 1.0
         word = "softer" if apart < 0.0 else "stiffer"
         sure = percent(columns["probability_off"][row])
         yield f"{name} is {100.0 * abs(apart):.2g} % {word} (probability {sure})"
-    rest = len(answer.called_off) - _MOST_NAMED
+    rest = len(called) - _MOST_NAMED
     if rest > 0:
         yield f"{rest} more are off"
 
@@ -85,7 +99,7 @@ def fleet_document(
         name=found.case.name,
         kind="fleet",
         subtitle=f"{answer.gears} gears, {answer.rows} readings",
-        headline=headline(answer, columns),
+        headline=answer.headline,
         answers=list(_answers(answer)),
         next_steps=[answer.next_step] if answer.next_step else [],
         notices=notices(("To be aware of", answer.notes)),

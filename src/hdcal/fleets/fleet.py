@@ -13,18 +13,18 @@ from scipy.stats import false_discovery_control
 from hdcal.data.case import Case, require_case
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
+from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.mounting_sums import mounting_sums
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
 from hdcal.inference.diagnostics import mixing
-from hdcal.inference.distributions import frozen
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.population_problem import (
     POPULATION_PRIORS,
     PopulationProblem,
     draw_gears,
 )
-from hdcal.inference.problem import problem_priors, unit_stiffness
+from hdcal.inference.problem import problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.notebook import Shown
 
@@ -146,7 +146,7 @@ def fleet(
         unit=unit,
         rows=rows.astype(int),
         mountings=np.bincount(sums.gear),
-        checks=_checks(found),
+        checks=_checks(found, priors),
         settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
     )
 
@@ -168,30 +168,19 @@ def called_off(chance: np.ndarray) -> np.ndarray:
 
 def _priors(case: Case) -> tuple[float, dict[str, Prior]]:
     """Return the stiffness at K = 1 [N/mm as read], and the priors of all sites."""
-    gear = case.gear
-    own = problem_priors(case, (), {}, gear.theory)
-    laws = {name: frozen(own[name]) for name in ("K", "E0") if _is_free(own[name])}
-    modulus = _centre(own["E0"])
-    half = 0.5 if gear.reading == "diametral" else 1.0
-    unit = unit_stiffness(case, gear.theory) * modulus * half
-    log_sd = np.sqrt(sum((law.std() / law.mean()) ** 2 for law in laws.values()))
-    centre = unit * _centre(own["K"])
-    contact = centre * frozen(own["deformation_offset"]).std()
-    gauge = frozen(own["force_offset"])
-    return unit, {
-        "stiffness": Prior("lognormal", (centre, float(log_sd))),
-        "zero": Prior("normal", (gauge.mean(), float(np.hypot(gauge.std(), contact)))),
+    own = problem_priors(case, (), {}, case.gear.theory)
+    half = 0.5 if case.gear.reading == "diametral" else 1.0
+    log_mean, log_sd, nominal, _ = stiffness_prior(case, own)
+    centre = half * float(np.exp(log_mean))
+    zero, gauge_sd = moments(own["force_offset"])
+    place, contact_sd = moments(own["deformation_offset"])
+    zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
+    return half * nominal, {
+        "stiffness": Prior("lognormal", (centre, log_sd)),
+        "zero": Prior("normal", (zero - centre * place, zero_sd)),
         **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
         **POPULATION_PRIORS,
     }
-
-
-def _is_free(prior: Prior) -> bool:
-    return prior.family != "fixed"
-
-
-def _centre(prior: Prior) -> float:
-    return float(frozen(prior).median() if _is_free(prior) else prior.numbers[0])
 
 
 def check_fleet(case: Case) -> None:
@@ -228,8 +217,9 @@ def _next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.
     return draws["stiffness"] * (1.0 + apart)
 
 
-def _checks(found: Draws) -> tuple[Check, ...]:
+def _checks(found: Draws, priors: Mapping[str, Prior]) -> tuple[Check, ...]:
     over = ("chain", "draw")
     names = ("energy", "diverging", "n_steps")
     stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
-    return sampling_checks(stats, mixing(found.values))
+    free = {n: v for n, v in found.values.items() if priors[n].family != "fixed"}
+    return sampling_checks(stats, mixing(free))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.evidence.prepare import moments
 from hdcal.inference.population_problem import MountingSums
 
 
@@ -12,7 +13,7 @@ def mounting_sums(case: Case) -> MountingSums:
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
     pairs, of_row = np.unique(labels, axis=1, return_inverse=True)
     warm = np.asarray(records.temperature) - gear.reference_temperature
-    loss = float(np.asarray(gear.priors["alpha"].numbers[0]))
+    loss, _ = moments(gear.priors["alpha"])
     x = np.asarray(records.deformation) * (1.0 - loss * warm)
     y = np.asarray(records.force)
     rows = np.bincount(of_row).astype(float)

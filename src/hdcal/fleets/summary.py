@@ -1,7 +1,5 @@
 """A fleet as an answer, and all that its result folder holds."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from hdcal.data.theory_names import SPRING
@@ -45,31 +43,31 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
     draws, columns = found.draws, gear_columns(found)
     order = np.argsort(-found.off, kind="stable")
     called = [found.case.specimen_labels[row] for row in order if found.called[row]]
-    answer = FleetAnswer(
+    population = PopulationAnswer(
+        stiffness_N_per_mm=credible_interval(draws["stiffness"]),
+        gear_sd_percent=credible_interval(100.0 * draws["specimen_sd"]),
+        mounting_sd_N=credible_interval(draws["run_offset_sd"]),
+        reading_sd_N=credible_interval(draws["sigma"]),
+    )
+    failed = f"This result failed its checks: {'; '.join(found.reasons)}."
+    said = failed if found.reasons else headline(population, called, columns)
+    return FleetAnswer(
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
-        headline="-",  # told of all the other numbers, below
+        headline=said,
         next_step=f"Look at {called[0]} by itself: diagnose it." if called else None,
         gears=len(found.off),
         rows=int(found.rows.sum()),
         called_off=tuple(called),
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
-        population=PopulationAnswer(
-            stiffness_N_per_mm=credible_interval(draws["stiffness"]),
-            gear_sd_percent=credible_interval(100.0 * draws["specimen_sd"]),
-            mounting_sd_N=credible_interval(draws["run_offset_sd"]),
-            reading_sd_N=credible_interval(draws["sigma"]),
-        ),
+        population=population,
         next_gear=FutureGear(credible_interval(found.next_stiffness)),
         notes=tuple(notes_of(found)),
         seed=int(str(found.settings["seed"])),
         versions=versions(),
         data_sha256=found.case.data_sha256,
     )
-    failed = f"This result failed its checks: {'; '.join(found.reasons)}."
-    said = failed if found.reasons else headline(answer, columns)
-    return replace(answer, headline=said)
 
 
 def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:

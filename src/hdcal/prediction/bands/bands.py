@@ -14,7 +14,7 @@ from hdcal.data.plausible import implausible
 from hdcal.data.records import Records
 from hdcal.errors import Finding, InputError
 from hdcal.notebook import Shown
-from hdcal.prediction.engine.causes import Cause, Models, causes_of, likeliest
+from hdcal.prediction.engine.causes import Cause, causes_of, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
     SENSE,
@@ -27,6 +27,7 @@ from hdcal.prediction.engine.conditions import (
 )
 from hdcal.prediction.engine.forces import grid_records
 from hdcal.prediction.engine.mixture import draw_quantiles
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.readings import readings
 from hdcal.prediction.engine.untested import with_untested
 

@@ -1,11 +1,11 @@
 """The causes that an answer averages over: models, each with its probability."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from hdcal.inference.mixed_posterior import models_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import POSITIVE, Values
+from hdcal.prediction.engine.models import Models, model_pairs
 from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
@@ -35,18 +36,6 @@ SCHEMAS = ("hdcal.verdict/2", "hdcal.verdict/1")
 _LARGEST_VERDICT = 64 << 20
 # Of probability that is left out, less than this is the rounding of a sum.
 _ROUNDING = 1e-6
-
-
-class Averaged(Protocol):
-    """What holds calibrated models with their probabilities: a verdict."""
-
-    @property
-    def posteriors(self) -> Mapping[str, tuple[float, Posterior]]:
-        """Models by hypothesis, each with its probability."""
-        ...
-
-
-Models = Posterior | Averaged | Sequence[tuple[float, Posterior]]
 # What an uncertainty comes from.
 Driver = Literal["data", "prior", "given"]
 
@@ -121,7 +110,7 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
         NotUsable: a calibration failed its checks.
         InputError: there are none, or they are not of the same data.
     """
-    given = _pairs(models)
+    given = model_pairs(models)
     listed = [
         (weight * share, alone)
         for weight, model in given
@@ -140,20 +129,6 @@ def causes_of(models: Models, *, allow_failed: bool = False) -> tuple[Cause, ...
     return tuple(
         Cause(share / total, model, model.draws) for share, model in listed if share > 0
     )
-
-
-def _pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
-    if isinstance(models, Posterior):
-        return [(1.0, models)]
-    held = getattr(models, "posteriors", None)
-    if held is None and isinstance(models, Sequence):
-        return models
-    if not held:
-        quick = " and a quick verdict holds none" * (held is not None)
-        words = f"{type(models).__name__} is no calibrated model{quick}"
-        remedy = "Calibrate first, or diagnose without quick"
-        raise InputError([Finding("models", words, remedy)])
-    return list(held.values())
 
 
 def likeliest(causes: Sequence[Cause]) -> Cause:

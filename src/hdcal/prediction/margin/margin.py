@@ -7,7 +7,6 @@ import numpy as np
 
 from hdcal.prediction.engine.causes import (
     Cause,
-    Models,
     causes_of,
     chances_of,
     likeliest,
@@ -25,6 +24,7 @@ from hdcal.prediction.engine.loading_sense import (
     loading_sense,
     sense_of,
 )
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.population import Population, widest
 from hdcal.prediction.engine.population_force import PopulationForce, population_force
 from hdcal.prediction.engine.reading_grid import ReadingGrid, reading_grid
