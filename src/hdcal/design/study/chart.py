@@ -28,7 +28,7 @@ def study_chart(found: Study) -> Chart:
         between.append((len(curves), len(curves) + 1, 0.2))
         for end in ("hi", "lo"):
             y = columns[f"force_{end}_N"][rows]
-            label = f"{found.interval:.0%} interval{named}, {end} [N]"
+            label = f"{100.0 * found.interval:g} % interval{named}, {end} [N]"
             curves.append(Series(label, x[rows], y, colour, width=0.0))
         middle = columns["force_median_N"][rows]
         curves.append(Series(f"median{named} [N]", x[rows], middle, colour))
