@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from hdcal.diagnosis.next_run import _candidates
+from hdcal.diagnosis.next_run import _candidates, _differing
 
 EVIDENCE: Any = SimpleNamespace(
     single=SimpleNamespace(names=("coulomb_friction", "hysteresis")),
@@ -26,7 +26,19 @@ def test_what_stands_beside_noise_or_a_remainder_takes_part():
         unknown=0.1,
         coulomb_friction_and_hysteresis=0.1,
     )
-    assert found == pytest.approx({"coulomb_friction": 0.75, "hysteresis": 0.25})
+    both = "coulomb_friction+hysteresis"
+    single = {"coulomb_friction": 0.6, "hysteresis": 0.2}
+    whole = {name: share / 0.9 for name, share in {**single, both: 0.1}.items()}
+    assert found == pytest.approx(whole)
+
+
+def test_what_all_have_in_common_is_not_what_a_run_tells():
+    assert _differing("hysteresis+relaxation", "coulomb_friction+relaxation") == (
+        "hysteresis",
+        "coulomb_friction",
+    )
+    assert _differing("hysteresis+relaxation", "relaxation") == ("hysteresis", "none")
+    assert _differing("none", "relaxation") == ("none", "relaxation")
 
 
 def test_noise_alone_is_no_gap():

@@ -168,7 +168,7 @@ def test_readings_whose_neighbours_err_alike_are_said_to_tell_less():
 
 
 def test_the_unknown_is_called_so():
-    assert "Nothing in the library explains it" in text("unknown")
+    assert "Nothing in the library explains all of it" in text("unknown")
 
 
 def said(verdict, **parts) -> str:
@@ -319,4 +319,4 @@ def test_a_pair_that_nothing_describes_better_is_told_beside_unknown():
     for without in (weighed, {}):
         words = said(KINDS["unknown"](), which={"log_evidence": without})
         assert "effects act at once" not in words
-        assert "Nothing in the library explains it" in words
+        assert "Nothing in the library explains all of it" in words

@@ -9,6 +9,7 @@ from hdcal.diagnosis.seen_words import what_is_seen
 from hdcal.diagnosis.verdict import Closure, NotTestable, Which
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.physics.groups import GROUPS
+from hdcal.physics.registry import EFFECTS
 from hdcal.report.words import (
     capital,
     estimate,
@@ -43,6 +44,7 @@ def named(found: VerdictAnswer) -> Iterator[str]:
         middle = with_unit(middle, size.unit)
         name = label(size.parameter.rpartition(".")[2])
         yield f"Most likely cause: {cause}; its {name} is {middle} ({span})."
+    yield from _twins(which)
     yield from _beside(which, label(which.effect))
     yield from _shrinks(found, "it" if not which.second_effect else "them")
 
@@ -74,6 +76,7 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."
     yield from _looks_the_same(which)
+    yield from _twins(which)
     yield from _beside(which, label(which.effect))
     both = " and ".join(map(label, which.named))
     yield from _shrinks(found, both)
@@ -90,6 +93,14 @@ def _looks_the_same(which: Which) -> Iterator[str]:
     if which.lookalikes:
         told = ", ".join(map(with_needs, which.lookalikes))
         yield f"This loading would not tell it from {told}."
+
+
+def _twins(which: Which) -> Iterator[str]:
+    """Say what obeys the same equation as a cause that is told."""
+    for name in which.named:
+        twin = EFFECTS[name].twin if name in EFFECTS else ""
+        if twin:
+            yield f"{capital(twin)}, gives the same readings as {label(name)}."
 
 
 def with_needs(untestable: NotTestable) -> str:
@@ -121,7 +132,7 @@ def unknown(found: VerdictAnswer) -> Iterator[str]:
     if not others or not known(chance) or chance >= _SURE:
         yield (
             f"{'No single effect' if together else 'Nothing'} in the library explains "
-            f"it: most likely the cause lies outside ({percent(chance)})."
+            f"all of it: most likely the cause lies outside ({percent(chance)})."
         )
     else:
         best = max(others, key=lambda name: or_zero(chances[name]))

@@ -5,6 +5,7 @@ of the hypothesis and its Gaussian predictive. "Unknown" predicts nothing and is
 left out.
 """
 
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import jax
@@ -14,7 +15,12 @@ from hdcal.diagnosis.candidate_runs import ROWS, CandidateRun, candidate_runs
 from hdcal.diagnosis.model_posterior import ModelPosterior
 from hdcal.diagnosis.verdict import NextRun
 from hdcal.evidence.case_evidence import NONE, UNKNOWN, CaseEvidence
-from hdcal.evidence.design_matrix import DesignMatrix, fit_design, join_designs
+from hdcal.evidence.design_matrix import (
+    DesignFit,
+    DesignMatrix,
+    fit_design,
+    join_designs,
+)
 from hdcal.evidence.effect_curves import effect_curves
 from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.parameter_grid import make_grid
@@ -24,12 +30,36 @@ from hdcal.physics.effect import Effect
 
 # Hypotheses that take part, draws of each, and the least that is worth a run.
 _MOST, _DRAWS, _LEAST_NATS, _LEAST_SHARE = 6, 256, 0.02, 0.01
-_NOTHING = join_designs([], ROWS)
 _TOO_FEW = (
     "fewer than two hypotheses about the mean force are left to tell apart; a cause "
     "outside the library predicts nothing"
 )
 _TELLS_LITTLE = "no run that a rig of this kind can do would tell more"
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """Effects on the mean that may act together, fitted to the readings.
+
+    Attributes:
+        name: effects joined with +, or none.
+        fit: of base and effects.
+        runs: what the effects add in each run, the columns as those of the fit.
+    """
+
+    name: str
+    fit: DesignFit
+    runs: list[DesignMatrix]
+
+    def predict(
+        self, run: int, base: np.ndarray, noise_sd: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and covariance of a run's readings [N]."""
+        new = self.runs[run]
+        columns = np.column_stack([base, new.columns.T])
+        noise = noise_sd**2 * np.eye(ROWS)
+        covariance = columns @ self.fit.covariance @ columns.T + noise
+        return new.offset + columns @ self.fit.mean, covariance
 
 
 def rank_runs(
@@ -47,19 +77,18 @@ def rank_runs(
     if len(share) < 2:
         return (), _TOO_FEW
     prepared = evidence.prepared
-    names = list(share)
     runs = candidate_runs(prepared.records, prepared.reading.reference_temperature)
-    tables = {name: _designs(evidence, name, runs, library) for name in names}
+    tried = [_fitted(evidence, name, runs, library) for name in share]
     weight = np.array(list(share.values()))
     # The same random numbers for every run: they are compared with each other.
     drawn = rng.normal(size=(_DRAWS, ROWS))
     ranked = []
     for index, run in enumerate(runs):
         base = prepared.base_columns(run.records)
-        predicted = [_predict(evidence, n, base, tables[n][index]) for n in names]
+        predicted = [each.predict(index, base, prepared.noise_sd) for each in tried]
         nats, apart = _information(predicted, weight, drawn)
-        pair = max(apart, key=lambda p: apart[p])
-        separates = tuple(names[i] for i in pair)
+        one, two = max(apart, key=lambda p: apart[p])
+        separates = _differing(tried[one].name, tried[two].name)
         worth = round(nats / run.effort, 2)
         ranked.append((worth, NextRun(run.words, separates, nats, run.cost)))
     ranked.sort(key=lambda item: -item[0])
@@ -68,17 +97,18 @@ def rank_runs(
 
 
 def _candidates(evidence: CaseEvidence, posterior: ModelPosterior) -> dict[str, float]:
-    """Return the likeliest effects, and none, with their shares.
+    """Return the likeliest effects and pairs, and none, with their shares.
 
     What stands beside an effect on the noise, or a remainder, tells a run nothing.
     """
-    allowed = NONE, *evidence.single.names, *evidence.subspace_effects
+    allowed = {NONE, *evidence.single.names, *evidence.subspace_effects}
     share = dict.fromkeys(allowed, 0.0)
     for name, chance in posterior.probabilities.items():
         alone = {*name.split("+")} - {*evidence.on_noise} or {NONE}
-        mean = "+".join(alone - {UNKNOWN})
-        if mean in share:
-            share[mean] += chance
+        mean = alone - {UNKNOWN}
+        if mean and mean <= allowed:
+            joined = "+".join(sorted(mean))
+            share[joined] = share.get(joined, 0.0) + chance
     best = sorted(share, key=lambda name: -share[name])[:_MOST]
     best = [n for n in best if share[n] >= _LEAST_SHARE]
     if len(best) > 2 and NONE in best:
@@ -88,18 +118,38 @@ def _candidates(evidence: CaseEvidence, posterior: ModelPosterior) -> dict[str, 
     return {n: share[n] / total for n in best} if total > 0.0 else {}
 
 
-def _designs(
+def _differing(one: str, two: str) -> tuple[str, ...]:
+    """Return the effects of either hypothesis that are not in both."""
+    first, second = one.split("+"), two.split("+")
+    left = [n for n in first if n not in second] or [NONE]
+    return (*left, *([n for n in second if n not in first] or [NONE]))
+
+
+def _fitted(
     evidence: CaseEvidence,
     name: str,
     runs: list[CandidateRun],
     library: dict[str, type[Effect]],
-) -> list[DesignMatrix]:
-    """Return the design of an effect on the rows of each run, history included."""
-    if name == NONE:
-        return [_NOTHING] * len(runs)
-    own = design_of(evidence, [name])
-    design = _piece_on_run if name in evidence.single.names else _subspace_on_run
-    return [design(evidence, library[name], own, run) for run in runs]
+) -> _Hypothesis:
+    """Return a hypothesis and what it adds to each run, history included."""
+    prepared = evidence.prepared
+    parts = [] if name == NONE else name.split("+")
+    own = [design_of(evidence, [part]) for part in parts]
+    joined = join_designs(own, len(prepared.rows.reading))
+    fit = fit_design(prepared.rows, joined, prepared.noise_sd, 0.0)
+    spread = np.sqrt(np.diag(fit.covariance))
+    at = prepared.rows.base.shape[1]
+    designs: list[list[DesignMatrix]] = [[] for _ in runs]
+    for part, design in zip(parts, own, strict=True):
+        for index, run in enumerate(runs):
+            if part in evidence.single.names:
+                size = float(fit.mean[at]), float(spread[at])
+                new = _piece_on_run(prepared, library[part], design, size, run)
+            else:
+                new = _subspace_on_run(evidence, library[part], design, run)
+            designs[index].append(new)
+        at += len(design.columns)
+    return _Hypothesis(name, fit, [join_designs(each, ROWS) for each in designs])
 
 
 def _curves_on_run(
@@ -114,12 +164,14 @@ def _curves_on_run(
 
 
 def _piece_on_run(
-    evidence: CaseEvidence, effect, own: DesignMatrix, run: CandidateRun
+    prepared: PreparedCase,
+    effect,
+    own: DesignMatrix,
+    size: tuple[float, float],
+    run: CandidateRun,
 ) -> DesignMatrix:
-    """Return an effect about its fitted amplitude as linear."""
-    prepared = evidence.prepared
-    fit = fit_design(prepared.rows, own, prepared.noise_sd, 0.0)
-    centre, spread = fit.mean[-1], np.sqrt(fit.covariance[-1, -1])
+    """Return an effect about its fitted amplitude, of mean and sd, as linear."""
+    centre, spread = size
     grid = make_grid(effect, prepared.priors)
     low, high = centre - spread, centre + spread
     if grid.one_sided:
@@ -129,7 +181,7 @@ def _piece_on_run(
     table = _curves_on_run(prepared, effect, values, run)
     slope = (table[1] - table[0]) / (high - low)
     offset = table[0] - slope * low
-    return DesignMatrix(offset, slope[None], own.mean, own.sd, own.values)
+    return replace(own, offset=offset, columns=slope[None])
 
 
 def _subspace_on_run(
@@ -139,26 +191,14 @@ def _subspace_on_run(
     prepared = evidence.prepared
     grid = make_grid(effect, prepared.priors, kind="subspace")
     if len(grid.amplitudes) != len(own.columns):
-        # Members of a new run or gear are new: their scatter adds to the noise.
-        return _NOTHING
-    shape, _ = evidence.subspaces.likeliest(effect.name)
-    shapes = shown_shapes(grid, prepared)
-    values = grid.one_amplitude_each({n: v[[shape]] for n, v in shapes.items()})
-    table = _curves_on_run(prepared, effect, values, run)
-    return DesignMatrix(np.zeros(ROWS), table, own.mean, own.sd, {})
-
-
-def _predict(evidence: CaseEvidence, name: str, base: np.ndarray, new: DesignMatrix):
-    """Return mean and covariance of a run's readings [N] under one hypothesis."""
-    prepared = evidence.prepared
-    own = design_of(evidence, [] if name == NONE else [name])
-    if len(new.columns) != len(own.columns):
-        own = design_of(evidence, [])
-    fit = fit_design(prepared.rows, own, prepared.noise_sd, 0.0)
-    columns = np.column_stack([base, new.columns.T])
-    mean = new.offset + columns @ fit.mean
-    noise = prepared.noise_sd**2 * np.eye(ROWS)
-    return mean, columns @ fit.covariance @ columns.T + noise
+        # Members of a new run or gear are new: nothing is known of them.
+        table = np.zeros((len(own.columns), ROWS))
+    else:
+        shape, _ = evidence.subspaces.likeliest(effect.name)
+        shapes = shown_shapes(grid, prepared)
+        values = grid.one_amplitude_each({n: v[[shape]] for n, v in shapes.items()})
+        table = _curves_on_run(prepared, effect, values, run)
+    return replace(own, offset=np.zeros(ROWS), columns=table)
 
 
 def _information(predicted, share, normal) -> tuple[float, dict]:

@@ -50,8 +50,8 @@ def seen_section(found: VerdictAnswer) -> Section:
     note = (
         "Size: from the lowest to the highest place of what slope and zero cannot take "
         "up. Intervals hold all together; p counts all that was looked for. The "
-        "clearest comes first, the others are what it leaves. It matters from a "
-        "thousandth of the largest force on."
+        "clearest comes first; each was found in what larger ones leave. It matters "
+        "from a thousandth of the largest force on."
     )
     table = Table(["seen", *numbers, "matters"], rows, frozenset(numbers))
     return Section(heading, [table, Text(note, soft=True)], brief=True)

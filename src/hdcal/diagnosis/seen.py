@@ -1,8 +1,9 @@
 """What is seen, whatever its cause: plain contrasts of the readings, one by one.
 
 The clearest contrast is taken first and joins the base model; the others are then
-tested on what it leaves, each at a family-wise error of 1 %. Its size is its swing from
-the lowest to the highest place.
+tested on what it leaves, each at a family-wise error of 1 %. What a large one hid may
+be clearer than it. The size of a contrast is its swing from the lowest to the highest
+place.
 """
 
 from dataclasses import replace
@@ -59,7 +60,8 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     found = find_structure(data, sd, noise)
     scale = float(np.max(np.abs(prepared.records.force)))
     quantile = float(stats.norm.isf((1.0 - _LEVEL) / (2.0 * max(len(tried), 1))))
-    return tuple(_seen(tried[each.name], each, scale, quantile) for each in found)
+    clearest = sorted(found, key=lambda each: each.p_value)
+    return tuple(_seen(tried[each.name], each, scale, quantile) for each in clearest)
 
 
 def _turned(records: Records, sign: float) -> Records:

@@ -78,7 +78,8 @@ class Which:
 
     Attributes:
         verdict: none, named, group, ambiguous or unknown.
-        effect: top effect by inclusion; None for none and unknown.
+        effect: top effect by inclusion, under `group` of that group; None for none
+            and unknown.
         second_effect: another with inclusion of 97 % or more.
         set: effects of the smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; sum to 1.

@@ -1,6 +1,6 @@
 """Which effect causes the gap: posterior over hypotheses, and how firm it is."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import starmap
 
@@ -11,6 +11,7 @@ from hdcal.diagnosis.adequacy import leaves_more_than_noise
 from hdcal.diagnosis.amplitude import amplitude_of
 from hdcal.diagnosis.detection import Detection
 from hdcal.diagnosis.groups import (
+    LeadingGroup,
     group_probabilities,
     leading_group,
     ranked_effects,
@@ -59,7 +60,11 @@ def identify_cause(
     mistaken = word == "named" and not all(map(naming().may_be_named, [best, *others]))
     word = "group" if mistaken else word
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
-    effect = best if suspected else None
+    leader = _leader(word, ranked, group)
+    if leader != best:
+        others = [n for n in ranked if n != leader and posterior.inclusion[n] >= SURE]
+        unseen = untestable_lookalikes(evidence, leader, library)
+    effect = leader if suspected else None
     counted = naming().called.get(effect or "")
     return Which(
         verdict=word,
@@ -87,6 +92,13 @@ def identify_cause(
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,
     )
+
+
+def _leader(word: str, ranked: Sequence[str], group: LeadingGroup | None) -> str:
+    """Return the effect that leads: of the group, where that is what is said."""
+    if word == "group" and group is not None:
+        return next(name for name in ranked if name in group.members)
+    return ranked[0] if ranked else ""
 
 
 def _certificate(word: str, library: Mapping) -> Certificate | None:

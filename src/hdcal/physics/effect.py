@@ -94,6 +94,7 @@ class Effect(eqx.Module):
         acts_at_once: whether it is a force or play of the gear itself that depends on
             deformation, speed and temperature of the moment only; `hdcal respond`
             takes such effects along and leaves others out.
+        twin: what obeys the same equation and is no effect of the library.
     """
 
     name: AbstractClassVar[str]
@@ -104,6 +105,7 @@ class Effect(eqx.Module):
     mixture: ClassVar[bool] = False
     period: ClassVar[str] = ""
     acts_at_once: ClassVar[bool] = False
+    twin: ClassVar[str] = ""
 
     @abstractmethod
     def apply(self, signal: Any, rows: Rows) -> Any:

@@ -34,7 +34,8 @@ GROUPS = {
     "loop": Group(
         "loading and unloading differ",
         "calibrate on loading alone or on both in equal number, grease and free the "
-        "guides, and widen margins by half the loop",
+        "guides, widen margins by half the loop, and see that the zero is after the "
+        "test what it was before: a part that has yielded is another one",
         "small inner loops, and a second loading of the same specimen",
     ),
     "rate or time": Group(

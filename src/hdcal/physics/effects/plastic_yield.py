@@ -15,7 +15,7 @@ class PlasticYield(Effect):
 
     Beyond ω_y the stiffness is (1 − s) k, on the way back it is k again: what is left
     at no force is the permanent set. The set belongs to the specimen and outlives the
-    run.
+    run. A spring in series with dry friction is the same within one mounting.
 
     Source: L. Prandtl, ZAMM 8 (1928); parallel elastic branch after G. Masing (1926).
     """
@@ -25,6 +25,7 @@ class PlasticYield(Effect):
     groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
+    twin: ClassVar[str] = "a joint that sticks before it slips, until it is taken apart"
 
     softening: Float[Array, ""] | float = parameter(
         "1", "share of the stiffness lost beyond yield", typical=0.2, null=0.0
