@@ -148,7 +148,7 @@ def test_hypotheses_left_out_of_the_bands_are_told_only_with_bands():
 
     def notes(left: LeftOut | None, *failed: str) -> str:
         fits = Refits({}, left, dict.fromkeys(failed))
-        return " ".join(module._notes(found, fits, 1))
+        return " ".join(module._notes(found, fits, 1, 1))
 
     assert notes(None) == ""
     assert notes(LeftOut(0.004, "a")) == ""

@@ -52,11 +52,15 @@ class Refit:
 
 @dataclass(frozen=True)
 class DiagnosedData:
-    """Which data they were; `averaged_rows` in each mean that was diagnosed."""
+    """Which data they were.
+
+    `averaged_rows` are in each mean that was diagnosed, one mean of `row_step`.
+    """
 
     name: str
     rows: Annotated[int, Promise(minimum=1)]
     averaged_rows: Annotated[int, Promise(minimum=1)]
+    row_step: Annotated[int, Promise(minimum=1)]
     rows_diagnosed: Annotated[int, Promise(minimum=1)]
     sha256: Digest
     notes: tuple[str, ...]

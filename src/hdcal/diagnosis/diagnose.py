@@ -58,10 +58,10 @@ def diagnose(
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.
     weighed = weigh(case, library, rng.spawn(1)[0])
-    averaged, library = weighed.case, weighed.library
+    diagnosed, library = weighed.case, weighed.library
     evidence, posterior = weighed.evidence, weighed.posterior
-    found = detect_gap(evidence, posterior, averaged, rng)
-    which = identify_cause(evidence, found, averaged, library, rng)
+    found = detect_gap(evidence, posterior, diagnosed, rng)
+    which = identify_cause(evidence, found, diagnosed, library, rng)
     closed = _closure(evidence, which, found, rng)
     fits = refit(case, posterior, library, seed, progress, quick=quick)
     runs, no_run = rank_runs(evidence, posterior, library, rng)
@@ -76,11 +76,12 @@ def diagnose(
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),
-        notes=tuple(_notes(evidence, fits, weighed.averaged_rows)),
+        notes=tuple(_notes(evidence, fits, weighed.averaged_rows, weighed.row_step)),
         reasons=failure_reasons(fits),
         averaged_rows=weighed.averaged_rows,
+        row_step=weighed.row_step,
         no_run=no_run,
-        seen=what_is_seen(evidence, averaged),
+        seen=what_is_seen(evidence, diagnosed),
         seed=seed,
         quick=quick,
     )
@@ -117,7 +118,7 @@ def _closure(
     return closure(evidence, which.named, members, found.basis, found.correlation, rng)
 
 
-def _notes(evidence: CaseEvidence, fits: Refits, group: int) -> list[str]:
+def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[str]:
     notes = [
         f"{name} is accounted for by the gear file's force_resolution_N"
         for name in evidence.accounted
@@ -137,5 +138,11 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int) -> list[str]:
         notes.append(
             f"means of {group} neighbouring rows were diagnosed, not single rows; the "
             "noise of single rows was not looked at"
+        )
+    if step > 1:
+        notes.append(
+            f"one {'row' if group == 1 else 'mean'} of {step} was diagnosed: "
+            "neighbours err so much alike that those between say little more; the noise "
+            "of single rows was not looked at"
         )
     return notes

@@ -86,7 +86,7 @@ class Where:
         shares: of the gap's variance by covariate; empty when no gap is detected.
         residual_N: reading minus calibrated base model, shape (n,).
         gap_N: smooth part of it (posterior mean), shape (n,).
-        records: the rows that were looked at: the case's own, or means of neighbours.
+        records: the rows that were looked at: of the case, or means of neighbours.
     """
 
     p_value: float

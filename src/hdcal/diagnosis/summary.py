@@ -58,6 +58,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
             name=case.name,
             rows=len(case.records.force),
             averaged_rows=verdict.averaged_rows,
+            row_step=verdict.row_step,
             rows_diagnosed=len(where.records.force),
             sha256=case.data_sha256,
             notes=case.notes,

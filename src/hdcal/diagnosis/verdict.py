@@ -209,6 +209,7 @@ class Verdict(Shown):
         notes: remarks, such as rows thinned.
         reasons: why the result must not be used; empty when it may.
         averaged_rows: rows in each mean that was diagnosed; 1 is single rows.
+        row_step: one of so many rows, or means, was diagnosed.
         no_run: why `next_test` is empty.
         seen: what readings show, the clearest first.
         seed: of the simulations and the sampler.
@@ -228,6 +229,7 @@ class Verdict(Shown):
     notes: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
     averaged_rows: int = 1
+    row_step: int = 1
     no_run: str = ""
     seen: tuple[Seen, ...] = ()
     seed: int = 0

@@ -2,7 +2,7 @@
 
 Rows between which nothing can change are one observation. Where neighbours err alike as
 far as the hypotheses can take it, they are such rows: a logger read faster than the rig
-moves, and their means say as much. Slow physics is then no longer taken for noise.
+moves, and some of them say as much. Slow physics is then no longer taken for noise.
 """
 
 from collections.abc import Mapping
@@ -16,17 +16,17 @@ from hdcal.diagnosis.model_posterior import ModelPosterior, log_priors, posterio
 from hdcal.evidence.bursts import with_bursts
 from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
 from hdcal.evidence.compute_evidence import compute_evidence
+from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
 from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
 from hdcal.evidence.remainder_evidence import with_remainders
-from hdcal.evidence.row_means import MOST_ROWS, average_rows
 from hdcal.evidence.unseen_effects import with_unseen
 from hdcal.physics.effect import Effect
 
 # Changes of the stiffness, and of the log of the noise, that move no evidence much.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
-# Neighbours are averaged while the largest correlation is more probable than not, this
-# many at a time, and no fewer rows than this are left.
-_AT_A_TIME, _FEWEST = 3, 100
+# One row of so many is kept while the largest correlation is more probable than not,
+# again and again, as long as no fewer rows than this are left.
+_OF, _FEWEST = 3, 100
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,9 @@ class Weighed:
     """What was weighed.
 
     Attributes:
-        case: the case, or means of its neighbouring rows.
+        case: the case, means of its neighbouring rows, or some of its rows.
         averaged_rows: rows in each mean; 1 is single rows.
+        row_step: one of so many of these was weighed.
         library: effects that these rows can show.
         evidence: of every hypothesis.
         posterior: over them.
@@ -43,6 +44,7 @@ class Weighed:
 
     case: Case
     averaged_rows: int
+    row_step: int
     library: dict[str, type[Effect]]
     evidence: CaseEvidence
     posterior: ModelPosterior
@@ -51,30 +53,31 @@ class Weighed:
 def weigh(
     case: Case, library: Mapping[str, type[Effect]], rng: np.random.Generator
 ) -> Weighed:
-    """Weigh all hypotheses, on means of rows where single ones say no more.
+    """Weigh all hypotheses, on as few rows as say what all of them do.
 
     Args:
         case: data and gear.
         library: effects to consider, by name.
         rng: of the draws of shares.
     """
-    rows = len(case.records.force)
-    most = min(rows, MOST_ROWS)
+    averaged, group = average_rows(case, MOST_ROWS)
+    step = 1
     while True:
-        averaged, group = average_rows(case, most)
-        # Means say nothing of the noise of single rows.
-        shown = {n: e for n, e in library.items() if group == 1 or e.stage != "noise"}
-        evidence = _final_evidence(averaged, shown)
+        thinned = thin_rows(averaged, step)
+        # Means, and rows of what wanders, say nothing of the noise of single rows.
+        single = group == 1 and step == 1
+        shown = {n: e for n, e in library.items() if single or e.stage != "noise"}
+        evidence = _final_evidence(thinned, shown)
         at_the_end = posterior_of(evidence).correlation[-1] > 0.5
-        most = -(-rows // (_AT_A_TIME * group))
-        if not at_the_end or most < _FEWEST:
+        if not at_the_end or len(averaged.records.force) < _OF * step * _FEWEST:
             break
+        step *= _OF
     evidence = with_remainders(evidence, rng)
     names = list(evidence.table)
     prior = dict(zip(names, log_priors(names, evidence.on_noise), strict=True))
     evidence = with_bursts(evidence, shown, prior)
     evidence = with_unseen(evidence, posterior_of(evidence).inclusion)
-    return Weighed(averaged, group, shown, evidence, posterior_of(evidence))
+    return Weighed(thinned, group, step, shown, evidence, posterior_of(evidence))
 
 
 def _final_evidence(case: Case, library: dict[str, type[Effect]]) -> CaseEvidence:

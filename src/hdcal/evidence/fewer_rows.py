@@ -1,0 +1,70 @@
+"""Long records: fewer rows that say nearly as much."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.records import Records
+from hdcal.evidence.row_features import half_cycles, take_rows
+
+# Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
+MOST_ROWS = 10_000
+_AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
+
+
+def average_rows(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
+    """Average neighbouring rows of a half cycle until few enough are left.
+
+    Args:
+        case: with rows in the order they were taken.
+        most: about as many rows may be left.
+
+    Returns:
+        The case, and how many rows went into each mean; 1 leaves it as it is.
+    """
+    group = int(np.ceil(len(case.records.force) / most))
+    if group == 1:
+        return case, 1
+    records = _run_after_run(case)
+    new = _every(records, group)
+    member = np.cumsum(new) - 1
+    count = np.bincount(member)
+    means = {
+        name: np.bincount(member, np.asarray(getattr(records, name))) / count
+        for name in _AVERAGED
+    }
+    known = np.bincount(member, np.asarray(records.force_sd) ** 2) / count
+    short = take_rows(records, np.flatnonzero(new))
+    short = replace(short, **means, force_sd=np.sqrt(known / count))
+    return replace(case, records=short), group
+
+
+def thin_rows(case: Case, step: int) -> Case:
+    """Keep one row of so many in each half cycle, the first one among them.
+
+    What is left of an AR(1) series is one, of the coefficient's power: means of it are
+    none, so that where neighbours err much alike rows are left out, not averaged.
+
+    Args:
+        case: with rows in the order they were taken.
+        step: 1 leaves it as it is.
+    """
+    if step == 1:
+        return case
+    records = _run_after_run(case)
+    kept = np.flatnonzero(_every(records, step))
+    return replace(case, records=take_rows(records, kept))
+
+
+def _run_after_run(case: Case) -> Records:
+    order = np.argsort(np.asarray(case.records.run), kind="stable")
+    return take_rows(case.records, order)
+
+
+def _every(records: Records, step: int) -> np.ndarray:
+    """Tell which rows are the first of so many in their half cycle, shape (n,)."""
+    half = half_cycles(records)
+    begins = np.diff(half, prepend=half[0] - 1) != 0
+    place = np.arange(len(half)) - np.flatnonzero(begins)[half - half[0]]
+    return place % step == 0
