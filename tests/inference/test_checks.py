@@ -146,6 +146,21 @@ def test_an_effect_far_from_its_prior_is_no_wrong_unit():
     assert "Is it a wrong unit" in both.words
 
 
+def test_much_noise_alone_is_what_the_model_lacks_rather_than_a_unit():
+    prior = {
+        "sigma": Prior("lognormal", (0.1, 0.5)),
+        "K": Prior("normal", (0.0, 1.0)),
+    }
+    own, ordinary = np.exp(0.01 * GOOD), GOOD
+    much = conflict_check({"sigma": own, "K": ordinary}, prior)
+    assert much.outcome == "warning" and "that the model lacks" in much.words
+    assert "unit" not in much.words
+    little = conflict_check({"sigma": 0.001 * own, "K": ordinary}, prior)
+    assert "Is it a wrong unit" in little.words
+    both = conflict_check({"sigma": own, "K": ordinary + 4.0}, prior)
+    assert "Is it a wrong unit" in both.words
+
+
 def test_what_a_lognormal_prior_lost_counts_in_logarithms():
     """Far above its prior a parameter is as wide as that in N, but well known."""
     draws, prior = 15.0 * np.exp(0.1 * GOOD), Prior("lognormal", (5.0, 0.3))

@@ -225,6 +225,10 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
+def _was_let_grow(case: Case) -> bool:
+    return case.gear.priors["sigma"].source == _PART_SOURCE
+
+
 def _shipped(
     case: Case, chosen: Sequence[type[Effect]], names: Sequence[str]
 ) -> dict[str, Prior]:
@@ -256,7 +260,7 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
                 len(case.records.force),
                 why_independent(case, problem.effects, **form),
             ),
-            growth_check(found.values),
+            growth_check(found.values, unasked=_was_let_grow(case)),
         ],
     )
 

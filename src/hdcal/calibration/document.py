@@ -6,7 +6,7 @@ from functools import partial
 from hdcal.calibration.answer import CalibrationAnswer, LocalStiffness
 from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
-from hdcal.inference.checks import INDEPENDENT, PLAUSIBLE
+from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
 from hdcal.inference.residuals import Residuals
@@ -40,6 +40,10 @@ _IMPLAUSIBLE = (
 _ALIKE = (
     "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and a "
     "diagnosis weighs both."
+)
+_NOISE = (
+    "Diagnose: there is more noise than such rigs have, and a diagnosis weighs what "
+    "else it may be."
 )
 _EACH = (
     "Look at the gears one by one: the command `fleet` says which of them is off. What "
@@ -105,6 +109,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
     remedies = {**_REMEDY, "curvature": _bend_remedy(known)}
     steps += [remedies[shape.name] for shape in (*left.structure, *left.noise)]
+    steps += [_NOISE] * (NOISY in warned and not left.structure)
     steps += [_EACH] * ("specimens" in known)
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))

@@ -142,7 +142,7 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[
     if step > 1:
         notes.append(
             f"one {'row' if group == 1 else 'mean'} of {step} was diagnosed: "
-            "neighbours err so much alike that those between say little more; the noise "
-            "of single rows was not looked at"
+            "neighbours err so much alike that those between say little more; the "
+            "noise of single rows was not looked at"
         )
     return notes

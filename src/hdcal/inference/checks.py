@@ -20,6 +20,7 @@ from hdcal.inference.serial_correlation import CORRELATION, worth
 INDEPENDENT = "neighbouring readings err independently"
 # Name of the check that data are what was believed of gears.
 PLAUSIBLE = "prior and data agree"
+NOISY = "the noise is what such rigs have"
 MIN_BFMI = 0.3
 MAX_SATURATED = 0.01
 # Largest rounding step, in noise sds, for Sheppard's correction: error 4e-4 relative.
@@ -153,11 +154,12 @@ def correlation_check(
     )
 
 
-def growth_check(draws: Mapping[str, np.ndarray]) -> Check:
+def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> Check:
     """Say that the noise was let grow with the force.
 
     Args:
         draws: by parameter.
+        unasked: because the readings showed it.
     """
     name = "readings scatter alike at any force"
     share = draws.get("heteroscedastic_noise.share")
@@ -166,7 +168,9 @@ def growth_check(draws: Mapping[str, np.ndarray]) -> Check:
     words = (
         f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
     )
-    return Check(name, "note", f"{words}; every interval allows for it")
+    words += "; every interval allows for it"
+    words += ". The option --constant-noise keeps it of one size" * unasked
+    return Check(name, "note", words)
 
 
 def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
@@ -203,12 +207,20 @@ def conflict_check(
         return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
     each = [f"{name} = {about}" for name, about in far.items()]
     words = f"far outside what was expected before the data: {listed(each)}"
+    if [*far] == ["sigma"] and _above(draws["sigma"], priors["sigma"]):
+        # A wrong unit shows in the stiffness too.
+        remedy = "A loop, a bend or a drift that the model lacks counts as noise here"
+        return Check(NOISY, "warning", f"{words}. {remedy}")
     # A wrong unit shows in more than in parameters of effects.
     if all("." in name for name in far):
         remedy = "Where the rig explains it, give it a prior of its own"
         return Check("prior and effects agree", "warning", f"{words}. {remedy}")
     remedy = "Is it a wrong unit, reading (radial or diametral) or size of the gear?"
     return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
+
+
+def _above(values: np.ndarray, prior: Prior) -> bool:
+    return float(np.median(values)) > frozen(prior).median()
 
 
 def _peaks_at_zero(prior: Prior) -> bool:

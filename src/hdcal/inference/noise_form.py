@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 from scipy import stats
 
@@ -11,6 +12,7 @@ from hdcal.data.records import Records
 from hdcal.inference.member_counts import member_counts
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.physics.effect import Effect
+from hdcal.physics.history import stop_cells
 
 # Up to this many rows the noise that a fit leaves is a rough number, and the exact
 # rounding likelihood is cheap.
@@ -32,6 +34,9 @@ _LEAST_ROWS = 12
 _LEAST_GROWTH = 1.1
 # Correlation of neighbours that is taken off residuals, at most.
 _MOST_ALIKE = 0.95
+# Shares of the range after which the cells of a loop slip.
+_REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
+_loop_cells = jax.jit(stop_cells)
 # Probability that noise of one size is let grow: one parameter more, near nothing.
 _FALSE_ALARM = 0.05
 
@@ -43,10 +48,12 @@ class Pilot:
     Attributes:
         residual: of each row [N].
         noise_sd: of the noise [N].
+        free: degrees of freedom that it has.
     """
 
     residual: np.ndarray
     noise_sd: float
+    free: int
 
 
 def pilot_noise(records: Records) -> float:
@@ -54,17 +61,24 @@ def pilot_noise(records: Records) -> float:
     return pilot_fit(records).noise_sd
 
 
-def pilot_fit(records: Records) -> Pilot:
+def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
     """Fit records by generous least squares.
 
     Generous, because too small a noise only chooses the exact rounding likelihood,
     which is never wrong. A cubic in deformation with a slope for each specimen, a step
     for the direction and temperature terms, within runs.
+
+    Args:
+        records: the rows.
+        with_loop: also fit a loop of any shape, as of joints that stick and slip.
     """
     scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
     own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
     shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
+    if with_loop:
+        reaches = _REACHES * np.ptp(scaled)
+        shapes += [*np.asarray(_loop_cells(scaled, records.run, reaches))]
     table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
     count = np.bincount(records.run)
     means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
@@ -73,14 +87,15 @@ def pilot_fit(records: Records) -> Pilot:
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
     free = max(len(force) - len(count) - int(rank), 1)
-    return Pilot(residual, float(np.sqrt(residual @ residual / free)))
+    return Pilot(residual, float(np.sqrt(residual @ residual / free)), free)
 
 
 def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     """Return whether readings clearly scatter more the farther the gear is deformed.
 
     Not by so little that it matters to nobody. Not asked where every row's sd is
-    stated, nor below the steps of the reading.
+    stated, nor below the steps of the reading. What a loop leaves at its turns is no
+    noise.
 
     Args:
         case: records and gear.
@@ -90,9 +105,20 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     coarse = case.gear.force_resolution > pilot.noise_sd
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
+    if "unloading" in records.known:
+        looped = pilot_fit(records, with_loop=True)
+        pilot = looped if _is_better(looped, pilot) else pilot
     square = _added(pilot.residual, previous_rows(records)) ** 2
     clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
     return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
+
+
+def _is_better(larger: Pilot, smaller: Pilot) -> bool:
+    """Return whether what a larger model adds is seen, by the F test."""
+    one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
+    more = smaller.free - larger.free
+    ratio = (one - two) / max(more, 1) * larger.free / max(two, 1e-300)
+    return more > 0 and stats.f.sf(ratio, more, larger.free) < _FALSE_ALARM
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
