@@ -6,6 +6,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import openpyxl
 import pytest
 from commands import Hdcal
 
@@ -119,6 +120,27 @@ def test_a_case_is_begun(here: Hdcal, log: Path):
     assert again.returncode == 2 and "holds gear.toml already" in again.stderr
 
 
+def test_sheets_of_a_workbook_become_a_text_that_is_read_without_it(
+    here: Hdcal, tmp_path: Path
+):
+    book = openpyxl.Workbook()
+    for name in ("A", "B"):
+        sheet = book.create_sheet(name)
+        for row in (("Protocol",), (), ("Weg", "Kraft"), ("mm", "N")):
+            sheet.append(row)
+        for row in range(8):
+            sheet.append((0.05 * row, 5.0 * row))
+    book.save(tmp_path / "book.xlsx")
+    folder = tmp_path / "rig"
+    given = (*BEGUN, "--data", tmp_path / "book.xlsx")
+    assert here("init", folder, *given).returncode == 2
+    assert here("init", folder, *given, "--sheet", "*").returncode == 0
+    case = library.read_case(folder)
+    assert case.specimen_labels == ("A", "B") and len(case.records.force) == 16
+    whole = library.read_case(tmp_path / "book.xlsx", sheet="*")
+    assert "row 4 taken for the units of the columns" in " ".join(whole.notes)
+
+
 def test_a_material_of_ones_own_is_found_from_the_new_folder(here: Hdcal, tmp_path):
     text = (priors_folder() / "steel.toml").read_text("utf-8")
     (tmp_path / "my.toml").write_text(text)
@@ -142,6 +164,9 @@ def test_readings_may_lie_in_the_folder_already(here: Hdcal, log: Path):
         ([*SIZES, "--deformation", "radiall"], "Did you mean 'radial'?"),
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
         ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),
+        (["--wall", "0,68", *BEGUN[2:]], "'0,68' is no number: write 0.68"),
+        ([*BEGUN, "--sheet", "A"], "--sheet: is of a workbook"),
+        ([*BEGUN, "--sheet", "A", "--sheet", "B"], "--sheet: is given 2 times"),
     ],
 )
 def test_nothing_is_begun_with_what_is_wrong(here: Hdcal, tmp_path, given, words):

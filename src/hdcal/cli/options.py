@@ -18,7 +18,7 @@ from hdcal.cli.option_types import (
     read_quantity,
 )
 from hdcal.data.theory_names import READINGS, Theory
-from hdcal.errors import Finding
+from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
@@ -38,6 +38,25 @@ def repeated_option(
     return click.option(
         *names, metavar=metavar, multiple=True, callback=read_all(read), help=help
     )
+
+
+def sheet_option(command: Callable) -> Callable:
+    """Add the option that says which sheet of a workbook is meant."""
+    return repeated_option(
+        "--sheet",
+        metavar="NAME",
+        read=_one,
+        help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
+        "several, each a specimen.",
+    )(command)
+
+
+def _one(texts: Sequence[str], option: str) -> str | None:
+    if len(texts) > 1:
+        words = f"is given {len(texts)} times"
+        remedy = "Name one; several that are called alike are 'Probe*'"
+        raise InputError([Finding(option, words, remedy)])
+    return texts[0] if texts else None
 
 
 def case_options(command: Callable) -> Callable:
@@ -60,12 +79,7 @@ def reading_options(command: Callable) -> Callable:
             read=read_columns,
             help="Read a quantity from a header of your own: force=Load[kgf].",
         ),
-        click.option(
-            "--sheet",
-            metavar="NAME",
-            help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
-            "several, each a specimen.",
-        ),
+        sheet_option,
         click.option(
             "--reading",
             type=click.Choice(READINGS),

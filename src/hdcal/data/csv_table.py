@@ -147,7 +147,10 @@ def split_table(
         for index in np.flatnonzero(filled & ~fits)
     )
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
-    kept, notes = list(compress(lines, fits)), [*_notes(begin, above, headers, spaced)]
+    kept, notes = (
+        list(compress(lines, fits)),
+        [*_notes(begin, above, headers, findings, spaced=spaced)],
+    )
     runs, many = _runs(blocks, fits)
     if labelled or any(map(_is_run, headers)):
         many = 0
@@ -237,7 +240,12 @@ def _other_units(
 
 
 def _notes(
-    begin: TableStart, above: int, headers: tuple[str, ...], spaced: bool
+    begin: TableStart,
+    above: int,
+    headers: tuple[str, ...],
+    findings: FileFindings,
+    *,
+    spaced: bool,
 ) -> Iterator[str]:
     if spaced:
         yield "the columns are separated by blanks"
@@ -246,7 +254,8 @@ def _notes(
         names = ", ".join(map(quoted, headers))
         yield f"{lines} above the table taken for titles. Its columns: {names}"
     if begin.units is not None:
-        yield f"row {begin.units + 1} taken for the units of the columns"
+        row = findings.row_of_file(begin.units + 1)
+        yield f"row {row} taken for the units of the columns"
 
 
 def _headers(

@@ -24,6 +24,10 @@ class FileFindings(Findings):
         self.file = file
         self.places: Sequence[tuple[str, int]] = ()
 
+    def row_of_file(self, row: int) -> int:
+        """Return where a row of the text stands in the file, or in its sheet."""
+        return self.places[row - 1][1] if self.places else row
+
     def add(
         self,
         problem: str,

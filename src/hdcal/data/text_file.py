@@ -66,6 +66,17 @@ def read_text(
     return utf8, hashlib.sha256(raw).hexdigest(), note
 
 
+def text_of(path: Path, sheet: str | None = None) -> bytes:
+    """Return the bytes of a text file as they are, of any other the text in it.
+
+    Args:
+        path: of a file that `read_text` reads.
+        sheet: of a workbook, as in `read_text`.
+    """
+    found = _of_program(path, FileFindings(str(path)), None, sheet)
+    return path.read_bytes() if found is None else found[0]
+
+
 def _of_program(
     path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
 ) -> tuple[bytes, str, str] | None:

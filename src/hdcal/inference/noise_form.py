@@ -118,7 +118,7 @@ def _is_better(larger: Pilot, smaller: Pilot) -> bool:
     one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
     more = smaller.free - larger.free
     ratio = (one - two) / max(more, 1) * larger.free / max(two, 1e-300)
-    return more > 0 and stats.f.sf(ratio, more, larger.free) < _FALSE_ALARM
+    return more > 0 and float(stats.f.sf(ratio, more, larger.free)) < _FALSE_ALARM
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:

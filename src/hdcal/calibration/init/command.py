@@ -10,8 +10,8 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import json_option
-from hdcal.errors import Finding, InputError
+from hdcal.cli.options import json_option, sheet_option
+from hdcal.errors import Finding, InputError, quoted
 
 # Parameter -> its key in the gear file, its option, what is asked, the usual answer.
 _ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
@@ -35,11 +35,27 @@ _ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
 _TEXTS = ("material", "reading")
 
 
+class _Number(click.ParamType):
+    """A number with a decimal point; of a comma it says what to write."""
+
+    name = "number"
+
+    def convert(self, value, param, ctx):
+        try:
+            return float(value)
+        except ValueError:
+            point = str(value).replace(",", ".")
+            hint = f": write {point}" if point != value else ""
+            self.fail(f"{quoted(str(value))} is no number{hint}", param, ctx)
+
+
+_KIND = {name: click.STRING if name in _TEXTS else _Number() for name in _ASKED}
+
+
 def _asked(command):
     for name, (_, option, words, default) in reversed(_ASKED.items()):
         usual = "" if default is None else f" [default: {default}]"
-        kind = str if name in _TEXTS else float
-        add = click.option(option, name, type=kind, help=f"{words}{usual}.")
+        add = click.option(option, name, type=_KIND[name], help=f"{words}{usual}.")
         command = add(command)
     return command
 
@@ -48,14 +64,16 @@ def _asked(command):
 @click.argument("folder", metavar="FOLDER")
 @_asked
 @click.option("--data", metavar="FILE", help="Readings to copy there, as data.csv.")
+@sheet_option
 @json_option
 @click.pass_obj
-def init(console: Console, folder, data, **given):
+def init(console: Console, folder, data, sheet, **given):
     """Write FOLDER with a gear file, from options or from answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
     from hdcal.data.gear_text import gear_text
     from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
+    from hdcal.data.text_file import text_of
 
     tables = {"name": Path(folder).resolve().name, **stated}
     if str(tables["material"]).endswith(".toml"):
@@ -63,19 +81,23 @@ def init(console: Console, folder, data, **given):
         tables["material"] = os.path.abspath(str(tables["material"]))
     case = None
     with console.wrong:
+        if data is None and sheet is not None:
+            raise InputError(
+                [Finding("--sheet", "is of a workbook", "Name its --data")]
+            )
         if data is None:
             console.wrong.attempt(read_gear, tables)
         elif Path(data).is_dir():
             raise InputError([Finding("data", "is a folder", "Name a file")])
         else:
-            case = console.wrong.attempt(read_case, data, tables)
+            case = console.wrong.attempt(read_case, data, tables, sheet=sheet)
     measured = {
         key: tables.pop(key) for key in ("deformation", "reference_temperature_C")
     }
     columns = {} if case is None else case.columns
     files = {GEAR_NAME: gear_text(tables, measured, columns).encode()}
     if data is not None:
-        files[DATA_NAME] = Path(data).read_bytes()
+        files[DATA_NAME] = text_of(Path(data), sheet)
     _write(Path(folder), files)
     next_step = f"hdcal calibrate {folder} --out result"
     if data is None:
@@ -107,8 +129,7 @@ def _answers(given: dict) -> Iterator[tuple[str, str | float]]:
             assert default is not None
             yield key, default
         else:
-            kind = str if name in _TEXTS else float
-            yield key, click.prompt(words, default=default, type=kind, err=True)
+            yield key, click.prompt(words, default=default, type=_KIND[name], err=True)
 
 
 def _write(folder: Path, files: dict[str, bytes]) -> None:
