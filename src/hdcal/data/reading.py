@@ -24,7 +24,7 @@ _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 # What is told where no gear file was named, and none lies beside the data.
 UNSIZED = (
     f"{ASSUMED}the part is a spring of which nothing is known but these readings: its "
-    "stiffness is asked, no K. For a gear, state its sizes in a gear file, named or as "
+    "stiffness is asked, no K. K needs sizes, stated in a gear file, named or as "
     f"{GEAR_NAME} beside the data"
 )
 MOST_ROWS = 8  # listed in one note

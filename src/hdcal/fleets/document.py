@@ -19,8 +19,9 @@ from hdcal.report.document import (
 )
 from hdcal.report.words import estimate, number, percent
 
-# Gears in the table of a page; all of them are in gears.csv.
-MOST_LISTED = 30
+# Gears in the table of a page, and of those that are shown at once; all of them are in
+# gears.csv.
+MOST_LISTED, _AT_ONCE = 10_000, 25
 _MOST_NAMED = 3
 RESTS_ON = (
     "Of each mounting a straight line is taken, with a zero of its own and noise that "
@@ -129,15 +130,16 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     far = np.argsort(-columns["probability_off"], kind="stable")[:MOST_LISTED]
     numbers = ["rows", "N/mm", "95 % interval", "in sds", "noise [N]", "P(off)"]
     rows = [_gear(columns, int(row)) for row in far]
-    table = Table(["gear", *numbers, ""], rows, frozenset(numbers))
+    titles = ["gear", *numbers, ""]
+    table = Table(titles, rows, frozenset(numbers), page=_AT_ONCE)
     shown = Picture(
         "gears",
         "Stiffness of every gear with its interval",
         "Each gear's stiffness with its 95 % credible interval, from the softest to "
         "the stiffest. The numbers are in gears.csv.",
     )
-    rest = answer.gears - len(rows)
-    more = [Text(f"{rest} more are in gears.csv.", soft=True)] if rest > 0 else []
+    more = [Text("All of them are in gears.csv.", soft=True)]
+    more *= answer.gears > _AT_ONCE
     called = (
         "In sds: how far a gear is from the centre, counted in the scatter of ordinary "
         "gears. Called off are those so far out that in the mean at most "

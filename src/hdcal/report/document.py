@@ -68,6 +68,8 @@ class Table:
         names: titles of the columns whose texts may not break.
         spare: titles of the columns that a terminal leaves out.
         strong: indices of the rows that stand out.
+        page: rows that are shown at once; a browser turns to the others, and sorts and
+            searches all of them. 0 shows every row everywhere.
     """
 
     kind: ClassVar[str] = "table"
@@ -78,6 +80,12 @@ class Table:
     names: frozenset[str] = frozenset()
     spare: frozenset[str] = frozenset()
     strong: frozenset[int] = frozenset()
+    page: int = 0
+
+    @property
+    def first_page(self) -> Sequence[Sequence[Cell]]:
+        """Return the rows that are shown where no page can be turned."""
+        return self.rows[: self.page or None]
 
 
 @dataclass(frozen=True)

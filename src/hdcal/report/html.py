@@ -10,7 +10,7 @@ from typing import NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from hdcal.report.chart import Chart, charts_json
-from hdcal.report.document import Document
+from hdcal.report.document import Document, Table
 from hdcal.report.plain import printable
 
 
@@ -52,6 +52,9 @@ def html_page(
     if touched:
         style += _part("uplot.css")
         script = _part("uplot.js") + _part("touch.js")
+    blocks = (block for section in document.sections for block in section.blocks)
+    if any(isinstance(block, Table) and block.page for block in blocks):
+        script += _part("turn.js")
     return _template(template).render(
         document=document,
         images=drawings,

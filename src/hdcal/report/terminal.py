@@ -92,7 +92,7 @@ def _table(table: Table) -> RichTable:
         made.add_column(
             RichText(title), justify="right" if right else "left", no_wrap=whole
         )
-    for index, row in enumerate(table.rows):
+    for index, row in enumerate(table.first_page):
         style = "bold" if index in table.strong else ""
         made.add_row(*(_cell(row[i]) for i in shown), style=style)
     return made
