@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from hdcal.data.theory_names import Theory
-from hdcal.report.answer import Answer, Count, Digest, EffectName, Promise
+from hdcal.report.answer import Answer, Count, Digest, EffectName, Promise, Real
 
 # Smallest and largest value.
 Ends = tuple[float, float]
@@ -76,6 +76,21 @@ class EffectsInReach:
     not_testable: dict[str, tuple[str, ...]]
 
 
+@dataclass(frozen=True)
+class SpecimenRead:
+    """One of several specimens.
+
+    Attributes:
+        stiffness_N_per_mm: of parallel straight lines through its runs, as read; None
+            where its deformation does not change. `hdcal fleet` infers it.
+    """
+
+    name: str
+    rows: Count
+    runs: Count
+    stiffness_N_per_mm: Real
+
+
 @dataclass(frozen=True, kw_only=True)
 class CheckAnswer(Answer):
     """What `hdcal check` answers."""
@@ -85,5 +100,6 @@ class CheckAnswer(Answer):
     gear: CheckedGear
     certificates: tuple[StatedError, ...]
     data: CheckedData
+    specimens: tuple[SpecimenRead, ...] = ()
     effects: EffectsInReach
     notes: tuple[str, ...]

@@ -8,11 +8,17 @@ from hdcal.calibration.check.answer import CheckAnswer, Ends
 from hdcal.data.measurements import ASSUMED
 from hdcal.data.records import Records
 from hdcal.report.braille import scatter_lines
-from hdcal.report.document import Document, Facts, Section, Sentences
+from hdcal.report.document import Document, Facts, Section, Sentences, Table, Text
+from hdcal.report.words import number
 
 HEADLINE = "The input is in order."
 DOUBTFUL = "The input can be read, but the stiffness it shows is not plausible."
 _MOST_LISTED = 8
+EACH = (
+    "Look at the specimens one by one: the command `fleet` says which of them is off."
+)
+# Specimens that are listed in a terminal.
+_AT_ONCE = 20
 _GAIN = (
     "the data cannot tell it from the stiffness, so it widens stiffness, K and the "
     "load on a gear, not the next reading of this rig"
@@ -47,6 +53,8 @@ def check_document(
         lacking: whether each effect that cannot be tested is listed.
     """
     sections = [Section("Data and gear", [Facts(list(_facts(found, lacking)))], True)]
+    if found.specimens:
+        sections.append(_specimens(found))
     if drawn is not None:
         sections.append(Section("The readings", [Sentences(_picture(drawn))], True))
     return Document(
@@ -54,8 +62,23 @@ def check_document(
         kind="check",
         subtitle="what was read",
         headline=found.headline,
+        next_steps=[found.next_step] if found.next_step else [],
         sections=sections,
     )
+
+
+def _specimens(found: CheckAnswer) -> Section:
+    span = np.ptp([one.stiffness_N_per_mm for one in found.specimens])
+    titles = ["specimen", "rows", "runs", "N/mm"]
+    rows = [
+        [one.name, str(one.rows), str(one.runs), number(one.stiffness_N_per_mm, span)]
+        for one in found.specimens
+    ]
+    table = Table(titles, rows, frozenset(titles[1:]), page=_AT_ONCE)
+    rest = len(rows) - _AT_ONCE
+    words = "N/mm: of parallel straight lines through the runs, as read; a first look."
+    words += f" {rest} more are not listed." * (rest > 0)
+    return Section("The specimens", [table, Text(words, soft=True)], brief=True)
 
 
 def _facts(found: CheckAnswer, lacking: bool) -> Iterator[tuple[str, str]]:

@@ -9,10 +9,12 @@ from hdcal.calibration.check.answer import (
     EffectsInReach,
     Ends,
     RowsByMovement,
+    SpecimenRead,
     StatedError,
 )
 from hdcal.calibration.check.document import (
     DOUBTFUL,
+    EACH,
     HEADLINE,
     OWN_SCATTER,
     STATED,
@@ -44,7 +46,7 @@ def check_answer(case: Case) -> CheckAnswer:
         status="ok",
         reasons=(),
         headline=DOUBTFUL if doubt else HEADLINE,
-        next_step=None,
+        next_step=EACH if "specimens" in records.known and not doubt else None,
         case=case.name,
         gear=CheckedGear(
             name=gear.name,
@@ -56,6 +58,7 @@ def check_answer(case: Case) -> CheckAnswer:
         ),
         certificates=_certificates(gear),
         data=_data(case),
+        specimens=_specimens(case),
         effects=EffectsInReach(
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
@@ -161,6 +164,24 @@ def _data(case: Case) -> CheckedData:
         known=tuple(sorted(records.known)),
         sha256=case.data_sha256,
     )
+
+
+def _specimens(case: Case) -> tuple[SpecimenRead, ...]:
+    """Return what was read of each specimen, where there are several."""
+    names, records = case.specimen_labels, case.records
+    if len(names) < 2:
+        return ()
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    x, y = (
+        values - (np.bincount(run, values) / np.bincount(run))[run]
+        for values in (np.asarray(records.deformation), np.asarray(records.force))
+    )
+    rows, xx, xy = (np.bincount(specimen, w) for w in (np.ones(len(x)), x * x, x * y))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = np.where(xx > 0.0, xy / xx, np.nan)
+    runs = np.bincount(np.unique(np.stack([specimen, run]), axis=1)[0])
+    columns = (names, rows.astype(int).tolist(), runs.tolist(), slopes.tolist())
+    return tuple(SpecimenRead(*each) for each in zip(*columns, strict=True))
 
 
 def _ends(values) -> Ends:
