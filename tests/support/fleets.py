@@ -7,6 +7,7 @@ from rigs import make_gear
 
 from hdcal.data.reading import read_case
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.misfit import Misfit
 from hdcal.inference.checks import Check
 
 
@@ -37,6 +38,7 @@ def handmade() -> Fleet:
         unit=80.0,
         rows=np.full(4, 5),
         mountings=np.ones(4, int),
+        misfit=Misfit(0.0, 0.0, 0.0),
         checks=(Check("chains agree (R-hat)", "passed", "the largest R-hat is 1.0"),),
         settings={"seed": 0, "chains": 4, "warmup": 500, "draws": 500},
     )

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from hdcal.fleets.misfit import Misfit
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
 from hdcal.report.parameters import Interval
 
@@ -43,6 +44,7 @@ class FleetAnswer(Answer):
         interval: probability that every interval holds.
         population: what they come from.
         next_gear: one more of them.
+        misfit: what the readings have beside straight lines.
         notes: from reading, and on what the answer rests.
         seed: of the draws.
         versions: of the packages that made them.
@@ -57,6 +59,7 @@ class FleetAnswer(Answer):
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
     population: PopulationAnswer
     next_gear: FutureGear
+    misfit: Misfit
     notes: Sentences
     seed: Count
     versions: Annotated[dict[str, str], Promise(required=["hdcal"])]

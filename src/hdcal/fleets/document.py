@@ -6,6 +6,7 @@ import numpy as np
 
 from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.misfit import misfit_words
 from hdcal.report.document import (
     Document,
     Facts,
@@ -183,4 +184,5 @@ def notes_of(found: Fleet) -> Sequence[str]:
     """Return what the reader of a fleet must know."""
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
     few = [FEW_GEARS] if len(found.off) < _FEW else []
-    return [*found.case.notes, RESTS_ON, *few, *once]
+    beside = misfit_words(found.misfit)
+    return [*beside, *found.case.notes, RESTS_ON, *few, *once]

@@ -14,6 +14,7 @@ from hdcal.data.case import Case, require_case
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
 from hdcal.evidence.prepare import moments, stiffness_prior
+from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.mounting_sums import mounting_sums
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
@@ -56,6 +57,7 @@ class Fleet(Shown):
         unit: stiffness at K = 1 [N/mm as read].
         rows: of each gear, shape (g,).
         mountings: of each gear, shape (g,).
+        misfit: what the readings have beside straight lines.
         checks: of the sampler.
         settings: of the run.
     """
@@ -73,6 +75,7 @@ class Fleet(Shown):
     unit: float
     rows: np.ndarray
     mountings: np.ndarray
+    misfit: Misfit
     checks: tuple[Check, ...]
     settings: Mapping[str, object] = field(default_factory=dict)
 
@@ -131,12 +134,13 @@ def fleet(
     centre = chosen["stiffness"][:, None]
     apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
     rows = np.bincount(sums.gear, sums.rows)
+    noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
     zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
     return Fleet(
         case=case,
         draws=flat,
         stiffness=stiffness,
-        noise_sd=np.median(np.asarray(drawn.noise_sd), axis=0),
+        noise_sd=noise_sd,
         zero=np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
         distance=np.median(apart, axis=0),
         off=off.mean(axis=0),
@@ -146,6 +150,7 @@ def fleet(
         unit=unit,
         rows=rows.astype(int),
         mountings=np.bincount(sums.gear),
+        misfit=misfit(case, np.median(stiffness, axis=0), noise_sd),
         checks=_checks(found, priors),
         settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
     )

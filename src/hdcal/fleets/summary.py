@@ -62,6 +62,7 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
         population=population,
+        misfit=found.misfit,
         next_gear=FutureGear(credible_interval(found.next_stiffness)),
         notes=tuple(notes_of(found)),
         seed=int(str(found.settings["seed"])),
