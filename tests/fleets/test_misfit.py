@@ -40,6 +40,7 @@ def test_a_loop_has_its_width():
     loop = np.where(np.arange(len(PATH)) < len(UP), 0.4, -0.4)
     one = found(loop)
     assert one.loop_N == pytest.approx(0.8, abs=0.05) and one.bend_N == 0.0
+    assert one.correlation == 0.0
     assert "0.8 N higher while the deformation increases" in " ".join(misfit_words(one))
 
 
