@@ -70,14 +70,16 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
 
     Args:
         records: the rows.
-        with_loop: also fit a loop of any shape, as of joints that stick and slip.
+        with_loop: also fit a loop of any shape, as of joints that stick and slip, and
+            one that opens with the load.
     """
     scaled = np.asarray(records.deformation) / np.max(np.abs(records.deformation))
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
     own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
     shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
     if with_loop:
-        reaches = _REACHES * np.ptp(scaled)
+        size, reaches = np.abs(scaled), _REACHES * np.ptp(scaled)
+        shapes += [records.sense * size, records.sense * size**2]
         shapes += [*np.asarray(_loop_cells(scaled, records.run, reaches))]
     table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
     count = np.bincount(records.run)
