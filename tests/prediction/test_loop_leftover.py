@@ -36,8 +36,15 @@ def looped(*, told: bool = True) -> Posterior:
     case = make_case(replace(records, force=force, known=frozenset(known)))
     # One in ten such loops leaves what passes for noise that grows; so few draws do not
     # always settle how much.
-    size = {"warmup": 400, "draws": 400, "chains": 2, "seed": 1}
-    return hdcal.calibrate(case, with_gap=True, adapt_noise=False, **size)
+    return hdcal.calibrate(
+        case,
+        with_gap=True,
+        adapt_noise=False,
+        warmup=400,
+        draws=400,
+        chains=2,
+        seed=1,
+    )
 
 
 def bands(posterior, direction):
