@@ -14,6 +14,7 @@ import hdcal
 from hdcal.errors import InputError
 from hdcal.fleets.answer import FleetAnswer
 from hdcal.fleets.fleet import FALSE_CALLS, called_off
+from hdcal.fleets.next_gear import next_gear, stiffness_bounds
 from hdcal.fleets.summary import fleet_answer, fleet_report, gear_columns
 from hdcal.inference.checks import Check
 
@@ -50,6 +51,22 @@ def measured(seed=3, gears=10, off=0.85, runs=2, rows=30, spread=SPREAD):
 def found():
     frame, stiffness = measured()
     return hdcal.fleet(hdcal.read_case(frame, gear=NAMED)), stiffness
+
+
+def test_bounds_are_those_of_gears_drawn_one_by_one(found):
+    fleet, _ = found
+    rng, draws, many = np.random.default_rng(0), fleet.draws, 20_000
+    rows = rng.choice(len(draws["sigma"]), 200, replace=False)
+    few = {name: values[rows] for name, values in draws.items()}
+    low, high = stiffness_bounds(few, 0.9)
+    ends = []
+    for row in range(len(rows)):
+        one = {name: np.full(many, values[row]) for name, values in few.items()}
+        ends.append(np.quantile(next_gear(one, rng), [0.1, 0.9]))
+    assert low == pytest.approx(np.quantile([e[0] for e in ends], 0.05), rel=1e-3)
+    assert high == pytest.approx(np.quantile([e[1] for e in ends], 0.95), rel=1e-3)
+    wider = stiffness_bounds(few, 0.99)
+    assert wider[0] < low < high < wider[1]
 
 
 def test_the_soft_gear_is_named_and_no_other(found):

@@ -23,6 +23,8 @@ def handmade() -> Fleet:
         "specimen_sd": rng.uniform(0.005, 0.01, 50),
         "run_offset_sd": rng.uniform(0.5, 1.5, 50),
         "sigma": rng.uniform(0.4, 0.6, 50),
+        "off_share": rng.uniform(0.0, 0.1, 50),
+        "off_ratio": rng.uniform(4.0, 8.0, 50),
     }
     return Fleet(
         case=replace(case, gear=make_gear()),

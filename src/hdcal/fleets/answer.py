@@ -26,10 +26,24 @@ class PopulationAnswer:
 
 
 @dataclass(frozen=True)
+class GearBounds:
+    """What a share `content` of gears to come is stiffer than, and softer than.
+
+    One-sided each, with the stated confidence.
+    """
+
+    content: float
+    confidence: float
+    stiffer_than_N_per_mm: float
+    softer_than_N_per_mm: float
+
+
+@dataclass(frozen=True)
 class FutureGear:
-    """A gear not yet measured; 95 % predictive interval."""
+    """A gear not yet measured; 95 % predictive interval, and bounds for many."""
 
     stiffness_N_per_mm: Interval
+    bounds: tuple[GearBounds, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -125,6 +125,16 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     )
     middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
     yield f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm."
+    one = answer.next_gear.stiffness_N_per_mm
+    width = one.hi - one.lo
+    ends = [
+        f"{percent(each.content)} are stiffer than "
+        f"{number(each.stiffer_than_N_per_mm, width)} N/mm and as many softer than "
+        f"{number(each.softer_than_N_per_mm, width)} N/mm"
+        for each in answer.next_gear.bounds
+    ]
+    sure = percent(answer.next_gear.bounds[0].confidence)
+    yield f"Of gears to come, each with {sure} confidence: {'; '.join(ends)}."
 
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:

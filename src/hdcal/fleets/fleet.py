@@ -16,6 +16,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.mounting_sums import mounting_sums
+from hdcal.fleets.next_gear import next_gear
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
 from hdcal.inference.diagnostics import mixing
@@ -146,7 +147,7 @@ def fleet(
         off=off.mean(axis=0),
         chance=chance,
         called=called_off(chance),
-        next_stiffness=_next_gear(flat, np.random.default_rng(seed)),
+        next_stiffness=next_gear(flat, np.random.default_rng(seed)),
         unit=unit,
         rows=rows.astype(int),
         mountings=np.bincount(sums.gear),
@@ -211,15 +212,6 @@ def check_fleet(case: Case) -> None:
     ]
     if findings:
         raise InputError(findings)
-
-
-def _next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
-    """Return the stiffness of one more gear, for each draw [N/mm as read]."""
-    size = len(draws["stiffness"])
-    off = rng.random(size) < draws["off_share"]
-    wide = np.sqrt(1.0 + off * draws["off_ratio"] ** 2)
-    apart = draws["specimen_sd"] * wide * rng.standard_normal(size)
-    return draws["stiffness"] * (1.0 + apart)
 
 
 def _checks(found: Draws, priors: Mapping[str, Prior]) -> tuple[Check, ...]:

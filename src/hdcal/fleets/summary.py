@@ -4,12 +4,16 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
-from hdcal.fleets.answer import FleetAnswer, FutureGear, PopulationAnswer
+from hdcal.fleets.answer import FleetAnswer, FutureGear, GearBounds, PopulationAnswer
 from hdcal.fleets.document import fleet_document, headline, notes_of
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
+from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.report.document import spoken_of
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.write import Report
+
+# Shares of gears to come for which bounds are told.
+CONTENTS = (0.9, 0.99)
 
 
 def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
@@ -63,7 +67,13 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         interval=INTERVAL,
         population=population,
         misfit=found.misfit,
-        next_gear=FutureGear(credible_interval(found.next_stiffness)),
+        next_gear=FutureGear(
+            credible_interval(found.next_stiffness),
+            tuple(
+                GearBounds(content, CONFIDENCE, *stiffness_bounds(found.draws, content))
+                for content in CONTENTS
+            ),
+        ),
         notes=tuple(notes_of(found)),
         seed=int(str(found.settings["seed"])),
         versions=versions(),
