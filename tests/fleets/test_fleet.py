@@ -53,20 +53,22 @@ def found():
     return hdcal.fleet(hdcal.read_case(frame, gear=NAMED)), stiffness
 
 
-def test_bounds_are_those_of_gears_drawn_one_by_one(found):
+def test_bounds_keep_their_share_of_gears_and_their_confidence(found):
     fleet, _ = found
-    rng, draws, many = np.random.default_rng(0), fleet.draws, 20_000
-    rows = rng.choice(len(draws["sigma"]), 200, replace=False)
-    few = {name: values[rows] for name, values in draws.items()}
-    low, high = stiffness_bounds(few, 0.9)
+    rng, many, content = np.random.default_rng(0), 100_000, 0.9
+    rows = rng.choice(len(fleet.draws["sigma"]), 50, replace=False)
+    few = {name: values[rows] for name, values in fleet.draws.items()}
     ends = []
     for row in range(len(rows)):
-        one = {name: np.full(many, values[row]) for name, values in few.items()}
-        ends.append(np.quantile(next_gear(one, rng), [0.1, 0.9]))
-    assert low == pytest.approx(np.quantile([e[0] for e in ends], 0.05), rel=1e-3)
-    assert high == pytest.approx(np.quantile([e[1] for e in ends], 0.95), rel=1e-3)
-    wider = stiffness_bounds(few, 0.99)
-    assert wider[0] < low < high < wider[1]
+        one = {name: values[[row]] for name, values in few.items()}
+        low, high = stiffness_bounds(one, content)
+        drawn = next_gear({n: np.full(many, v[0]) for n, v in one.items()}, rng)
+        assert np.mean(drawn > low) == pytest.approx(content, abs=5e-3)
+        assert np.mean(drawn < high) == pytest.approx(content, abs=5e-3)
+        ends.append((low, high))
+    lows, highs = np.transpose(ends)
+    sure = np.quantile(lows, 0.05), np.quantile(highs, 0.95)
+    assert stiffness_bounds(few, content) == pytest.approx(sure)
 
 
 def test_the_soft_gear_is_named_and_no_other(found):
