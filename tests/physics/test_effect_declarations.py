@@ -74,3 +74,12 @@ def test_the_documentation_has_a_page(name):
     row = f"| [{name}]({name}.md) | {EFFECTS[name].stage} | {fields} | {needs} |"
     assert row in index
     assert f"\n{name}\n" in index
+
+
+def test_the_page_says_of_each_group_what_answers_say():
+    page = (DOCS / "index.md").read_text("utf-8")
+    for name, group in GROUPS.items():
+        own = [n for n, effect in EFFECTS.items() if name in effect.groups]
+        links = ", ".join(f"[{n}]({n}.md)" for n in own)
+        told = " | ".join((name, group.meaning, links, group.remedy, group.run))
+        assert f"| {told} |" in page
