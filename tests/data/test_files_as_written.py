@@ -257,6 +257,15 @@ FILES = {
         ("lines above the table", "the headers stand 2 times", "3 lines between"),
         also={"run": [0, 0, 0, 1, 1, 1]},
     ),
+    "LabVIEW, with the numbers of each channel above the headers": Written(
+        "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+        "X_Dimension\tTime\tTime\t\nX0\t0\t0\t\nDelta_X\t0.5\t0.5\t\n"
+        "***End_of_Header***\t\t\t\nX_Value\tWeg (mm)\tKraft (N)\tComment\n"
+        + "".join(
+            f"{k}\t{row}\t\n" for k, row in enumerate(lines("\t").strip().split("\n"))
+        ),
+        ("lines above the table", "'X_Value'"),
+    ),
     "blocks that name their runs themselves": Written(
         "deformation_mm,force_N,run\n"
         + "".join(

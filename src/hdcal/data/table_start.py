@@ -15,6 +15,8 @@ from hdcal.data.units import COLUMN_UNITS, known_unit
 _TITLES, _READINGS = 200, 5
 _SEPARATORS = "\t;,"
 _MARK = re.compile(r"\s*[#%*/]+\s*")
+# LabVIEW's headers hold rows of numbers too, of each channel, and end with this.
+_HEADER_ENDS = "***End_of_Header***"
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
@@ -52,6 +54,8 @@ def find_start(text: str) -> TableStart | None:
             # One of them may be spoiled: it is told of later.
             block = filled[place : place + _READINGS]
             readings = sum(is_reading(cells[i], width) for i in block)
+            if any(lines[index].startswith(_HEADER_ENDS) for index in block):
+                continue
             named = any(_names(cells[index]) for index in above[-2:])
             if readings < len(block) - 1 and not named:
                 continue
