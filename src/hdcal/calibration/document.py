@@ -38,8 +38,8 @@ _IMPLAUSIBLE = (
     "gear file: what comes out is not what such a gear is believed to be."
 )
 _ALIKE = (
-    "Diagnose: errors of neighbours that are so alike may be a loop or a bend, and a "
-    "diagnosis weighs both."
+    "Diagnose: errors of neighbours that are so alike may be a loop or a bend, which "
+    "can shift the stiffness beyond its interval. A diagnosis weighs both."
 )
 _NOISE = (
     "Diagnose: there is more noise than such rigs have, and a diagnosis weighs what "
