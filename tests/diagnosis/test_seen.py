@@ -175,3 +175,20 @@ def test_a_place_that_is_read_twice_was_not_held():
     found = seen(make_case(make_records(x, force, time=time, known=known, **moved)))
     assert "on unloading than on loading" in found[0].statement
     assert not any("is held" in one.statement for one in found)
+
+
+def test_a_loop_that_changes_over_gradually_has_its_whole_width_and_is_told_once():
+    """Joints that stick over a fortieth of the range, in rows as dense as a log's."""
+    up = np.linspace(0.0, 0.45, 67)
+    path = np.concatenate([up, up[-2::-1], up[1:], up[-2::-1]])
+    stuck, loop = 0.0, []
+    for step in np.diff(path, prepend=0.0):
+        stuck = np.clip(stuck + 200.0 * step, -2.4, 2.4)
+        loop.append(stuck)
+    force = 108.0 * path + loop + np.random.default_rng(3).normal(0.0, 0.3, len(path))
+    motion = derive_motion(path, np.zeros(len(path), int))
+    moved = {name: getattr(motion, name) for name in ("direction", "sense", "rate")}
+    case = make_case(make_records(path, force, known=motion.features, **moved))
+    told = [one for one in seen(case) if one.covariate == "direction"]
+    (one,) = told
+    assert one.size_N.lo < 4.8 < one.size_N.hi and one.size_N.hi < 6.0
