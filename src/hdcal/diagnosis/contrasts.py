@@ -9,10 +9,12 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
-from hdcal.physics.history import load_cycle
+from hdcal.physics.history import load_cycle, stop_cells
 
 # Ends of the curve, as shares of the largest deformation.
 _TOE, _HEAD = 0.25, 0.75
+# Shares of the range over which a gradual loop changes over.
+_REACHES = np.array([0.03, 0.1, 0.3])
 # More runs or gears than these are not told one by one.
 _MOST_MEMBERS = 24
 
@@ -36,6 +38,11 @@ class Contrast:
     words: str
     beside: np.ndarray | None = None
     share: float = 1.0
+
+    @property
+    def told_once(self) -> str:
+        """What it has in common with others of which only the clearest is told."""
+        return self.words if self.covariate == "direction" else ""
 
     @property
     def swing(self) -> float:
@@ -62,7 +69,7 @@ def contrasts(
     deformation = np.asarray(records.deformation)
     x = deformation / np.max(np.abs(deformation))
     yield from _along_the_stroke(x, both=both)
-    yield from _over_direction(np.asarray(records.sense, float), x, both=both)
+    yield from _over_direction(records, x, both=both)
     yield from _over_time(records, x)
     yield from _over_temperature(records, x, own=own)
     yield from _of_members(records, case, x)
@@ -97,9 +104,13 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
 
 
 def _over_direction(
-    sense: np.ndarray, x: np.ndarray, *, both: bool
+    records: Records, x: np.ndarray, *, both: bool
 ) -> Iterator[Contrast]:
-    """Yield loops of even width, and what makes them wider or narrower."""
+    """Yield loops of even width, and what makes them wider or narrower.
+
+    The force may change over at once at a turn, or gradually.
+    """
+    sense = np.asarray(records.sense, float)
     down, up = ("unloading", "loading")
     while_down, while_up = f"on {down}", f"on {up}"
     if both:
@@ -109,6 +120,9 @@ def _over_direction(
     ways = ("lower", "higher")
     words = f"the force lies {{size}} {{way}} {while_down} than {while_up}"
     yield Contrast("direction", sense, ways, words)
+    if "unloading" in records.known:
+        for cell in np.asarray(_loop_cells(padded_records(records), np.ptp(x))):
+            yield Contrast("direction", cell[: len(x)], ways, words)
     words = (
         f"the larger the deformation, the {{way}} {down} lies against {up}, "
         "by {size} over the range"
@@ -158,6 +172,11 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "the slope {way} from cycle to cycle, which moves the force by {size} in all",
         beside=x,
     )
+
+
+@jax.jit
+def _loop_cells(records: Records, span):
+    return stop_cells(records.deformation, records.run, span * _REACHES)
 
 
 @jax.jit
