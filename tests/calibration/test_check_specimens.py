@@ -3,17 +3,19 @@
 import numpy as np
 import pytest
 
+from hdcal.calibration.check.document import check_document
 from hdcal.calibration.check.summary import check_answer
 from hdcal.data.reading import read_case
+from hdcal.report.document import Table
 
 X = np.linspace(0.0, 0.5, 6)
 SLOPES = {"A": 100.0, "B": 120.0, "C": 90.0}
 
 
-def case_of(*names: str):
-    """Return two runs of each, of which the second has another zero."""
+def case_of(*names: str, held: str = ""):
+    """Return two runs of each, of which the second has another zero; one is held."""
     rows = [
-        (n, f"{n}{r}", x, SLOPES[n] * x + 3.0 * r)
+        (n, f"{n}{r}", 0.3 if n == held else x, SLOPES[n] * x + 3.0 * r)
         for n in names
         for r in (0, 1)
         for x in X
@@ -35,6 +37,18 @@ def test_each_specimen_has_its_rows_runs_and_slope():
     )
     assert {(s.rows, s.runs) for s in answer.specimens} == {(12, 2)}
     assert "`fleet`" in (answer.next_step or "")
+
+
+def test_one_that_was_not_moved_has_no_slope_and_takes_no_digits_from_the_others():
+    answer = check_answer(case_of("A", "B", held="B"))
+    one, other = (s.stiffness_N_per_mm for s in answer.specimens)
+    assert one == pytest.approx(100.0) and np.isnan(other)
+    (section,) = [
+        one for one in check_document(answer).sections if one.heading == "The specimens"
+    ]
+    table = section.blocks[0]
+    assert isinstance(table, Table)
+    assert [row[-1] for row in table.rows] == ["100", "–"]
 
 
 def test_two_are_shown_but_no_fleet():

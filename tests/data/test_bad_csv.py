@@ -220,3 +220,11 @@ def test_no_gear_says_what_to_do(folder):
     assert "`gear`" in findings[1].remedy
     # A folder is a case of two files.
     assert "does not exist" in findings_of(folder)[1].problem
+
+
+def test_a_first_reading_that_is_torn_is_no_title_of_a_table_without_headers(folder):
+    rows = "".join(f"{x / 100},{2 * x},{20 + x % 2}.5\n" for x in range(1, 12))
+    (folder / "data.csv").write_text("0.005,1.0,20.5,start\n" + rows)
+    columns = {"deformation": "1[mm]", "force": "2[N]"}
+    found = findings_of(folder, columns=columns)
+    check(found, [(1, None, "4 cells")])

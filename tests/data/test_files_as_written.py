@@ -266,6 +266,18 @@ FILES = {
         ),
         ("lines above the table", "'X_Value'"),
     ),
+    "LabVIEW, the first reading with a comment and no cell for one below it": Written(
+        "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+        "Y_Unit_Label\tMillimeter\tkN\t\nX0\t0\t0\t\n"
+        "***End_of_Header***\t\t\t\nX_Value\tWeg (um)\tKraft\tComment\n"
+        + "".join(
+            f"{k}\t{1000 * x:.6f}\t{y / 1000:.9f}"
+            + "\tstart\n" * (k == 0)
+            + "\n" * (k > 0)
+            for k, (x, y) in enumerate(zip(DEFORMATION, FORCE, strict=True))
+        ),
+        ("lines above the table", "'X_Value'"),
+    ),
     "blocks that name their runs themselves": Written(
         "deformation_mm,force_N,run\n"
         + "".join(

@@ -177,15 +177,19 @@ def test_a_place_that_is_read_twice_was_not_held():
     assert not any("is held" in one.statement for one in found)
 
 
-def test_a_loop_that_changes_over_gradually_has_its_whole_width_and_is_told_once():
+@pytest.mark.parametrize("stroke", [0.0045, 0.45, 45.0])
+def test_a_loop_that_changes_over_gradually_has_its_whole_width_and_is_told_once(
+    stroke,
+):
     """Joints that stick over a fortieth of the range, in rows as dense as a log's."""
-    up = np.linspace(0.0, 0.45, 67)
+    up = np.linspace(0.0, stroke, 67)
     path = np.concatenate([up, up[-2::-1], up[1:], up[-2::-1]])
     stuck, loop = 0.0, []
     for step in np.diff(path, prepend=0.0):
-        stuck = np.clip(stuck + 200.0 * step, -2.4, 2.4)
+        stuck = np.clip(stuck + 90.0 * step / stroke, -2.4, 2.4)
         loop.append(stuck)
-    force = 108.0 * path + loop + np.random.default_rng(3).normal(0.0, 0.3, len(path))
+    force = 50.0 * path / stroke + loop
+    force += np.random.default_rng(3).normal(0.0, 0.3, len(path))
     motion = derive_motion(path, np.zeros(len(path), int))
     moved = {name: getattr(motion, name) for name in ("direction", "sense", "rate")}
     case = make_case(make_records(path, force, known=motion.features, **moved))

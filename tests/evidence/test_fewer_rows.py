@@ -1,24 +1,38 @@
 """Long records are shortened so that what is left can still be weighed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import cycles, make_case
 
-from hdcal.evidence.fewer_rows import average_rows, thin_rows
-from hdcal.evidence.row_features import half_cycles
+from hdcal.evidence.fewer_rows import average_rows, rows_of_half_cycle, thin_rows
+from hdcal.evidence.row_features import half_cycles, take_rows
 
 CASE = make_case(cycles(144))
+OF_THREE_RUNS = make_case(replace(CASE.records, run=np.arange(144) // 48))
 
 
 @pytest.mark.parametrize("step", [2, 3, 7])
-def test_one_row_of_so_many_of_each_half_cycle_is_kept(step):
-    half = half_cycles(CASE.records)
-    kept = [
-        row for each in np.unique(half) for row in np.flatnonzero(half == each)[::step]
-    ]
-    thinned = thin_rows(CASE, step).records
+def test_as_many_rows_lie_between_any_two_of_a_run_that_are_left(step):
+    run = np.asarray(OF_THREE_RUNS.records.run)
+    kept = [k for each in np.unique(run) for k in np.flatnonzero(run == each)[::step]]
+    thinned = thin_rows(OF_THREE_RUNS, step).records
     np.testing.assert_array_equal(thinned.force, CASE.records.force[kept])
     np.testing.assert_array_equal(thinned.sense, CASE.records.sense[kept])
+
+
+def test_rows_of_runs_that_alternate_are_thinned_run_by_run():
+    one_by_one = np.argsort(np.arange(144) % 48, kind="stable")
+    mixed = make_case(take_rows(OF_THREE_RUNS.records, one_by_one))
+    thinned, plain = (thin_rows(case, 5).records for case in (mixed, OF_THREE_RUNS))
+    np.testing.assert_array_equal(thinned.force, plain.force)
+
+
+def test_half_cycles_have_their_rows():
+    half = half_cycles(CASE.records)
+    rows = [np.count_nonzero(half == each) for each in np.unique(half)]
+    assert rows_of_half_cycle(CASE) == np.median(rows)
 
 
 def test_means_are_those_of_the_rows_from_one_kept_row_to_the_next():

@@ -290,8 +290,9 @@ def test_noise_in_proportion_to_the_force_is_let_grow():
     mine = replace(case.gear, priors={**case.gear.priors, "sigma": own})
     kept = calibrate(replace(case, gear=mine), **SHORT)
     assert kept.case.gear.priors["sigma"] == own != found.case.gear.priors["sigma"]
-    (told,) = [c.words for c in found.checks if "of the force" in c.words]
-    assert growth_check(found.draws).words in told and "--constant-noise" in told
+    for unasked in (found, kept):
+        (told,) = [c.words for c in unasked.checks if "of the force" in c.words]
+        assert growth_check(unasked.draws).words in told and "--constant-noise" in told
     assert not calibrate(case, adapt_noise=False, **SHORT).effects
     share = {"heteroscedastic_noise.share": Prior("fixed", (0.0,))}
     decided = replace(case.gear, effect_priors=share)

@@ -176,14 +176,17 @@ def calibrate(
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
-    theory, shipped = theory or case.gear.theory, _shipped(case, chosen, effects)
+    # Readings showed that noise grows, and nobody asked for it.
+    shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in effects
+    shipped = effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
+    theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
     model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
     problem = build_problem(case, shipped, chosen, **model)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
-    own = _specifics(case, problem, found)
+    own = _specifics(case, problem, found, shown=shown)
     parts = assemble(case, priors, problem, found, own, of_prior)
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
     settings |= {LOOP: True} | run_settings(found, began)
@@ -225,19 +228,9 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
     return replace(case, gear=replace(gear, priors={**gear.priors, "sigma": believed}))
 
 
-def _was_let_grow(case: Case) -> bool:
-    return case.gear.priors["sigma"].source == _PART_SOURCE
-
-
-def _shipped(
-    case: Case, chosen: Sequence[type[Effect]], names: Sequence[str]
-) -> dict[str, Prior]:
-    """Return the priors of effects; wide where readings showed that noise grows."""
-    shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in names
-    return effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
-
-
-def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
+def _specifics(
+    case: Case, problem: Problem, found: Draws, *, shown: bool = False
+) -> Specifics:
     """Return what the model of the force adds to what every calibration has."""
     centre = {
         name: np.median(values, axis=(0, 1)) for name, values in found.values.items()
@@ -260,7 +253,7 @@ def _specifics(case: Case, problem: Problem, found: Draws) -> Specifics:
                 len(case.records.force),
                 why_independent(case, problem.effects, **form),
             ),
-            growth_check(found.values, unasked=_was_let_grow(case)),
+            growth_check(found.values, unasked=shown),
         ],
     )
 

@@ -15,6 +15,7 @@ from hdcal.data.blanks import tabbed
 from hdcal.data.blocks import Blocks, block_notes, find_blocks, with_runs
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import guess_header
+from hdcal.data.labview import with_whole_lines
 from hdcal.data.line_cells import filled_cells, misfit
 from hdcal.data.table_start import (
     TableStart,
@@ -129,7 +130,7 @@ def split_table(
     if not utf8.strip():
         remedy = "Write a header row and at least 5 rows of readings"
         findings.refuse("the file is empty", remedy)
-    begin, utf8, spaced = _begin(utf8)
+    begin, utf8, spaced = _begin(with_whole_lines(utf8))
     lines = utf8.split(b"\n")
     begin, separator, headers = _columns(begin, lines, findings, numbered=numbered)
     top = begin.readings if begin.headers is None else begin.headers
@@ -182,8 +183,12 @@ def _columns(
         if not numbered:
             words = "the first row holds numbers where the headers should be"
             findings.refuse(words, _HEADLESS, top + 1)
-        begin = TableStart(None, None, top)
+        begin = TableStart(None, None, top, begin.torn)
         headers = tuple(str(number + 1) for number in range(len(headers)))
+    if begin.torn is not None:
+        cells = len(split_line(lines[begin.torn].decode(), separator))
+        words = misfit(cells, len(headers), separator)
+        findings.add_rows([(begin.torn + 1, *words)])
     if begin.units is not None:
         units = split_line(lines[begin.units].decode(), separator)
         findings.add_rows(_other_units(headers, units, begin.units + 1))

@@ -26,6 +26,8 @@ from hdcal.report.words import (
 _SURE = 0.9
 # Members of a group below this are not listed.
 _WORTH_SAYING = 0.01
+# Chances of one effect or another make more than this only where both may act.
+_ONE = 1.05
 
 
 def named(found: VerdictAnswer) -> Iterator[str]:
@@ -59,6 +61,9 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     likely = [n for n in which.group_members if which.inclusion[n] >= _WORTH_SAYING]
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
+    # Chances that each one acts: together they are more than one where two may.
+    more = ", of which more than one may act"
+    causes += more * (sum(which.inclusion[name] for name in likely) > _ONE)
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
     others = [n for n in which.named if n not in which.group_members]
     if others:

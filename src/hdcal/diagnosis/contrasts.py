@@ -9,7 +9,8 @@ import numpy as np
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
-from hdcal.physics.history import load_cycle, stop_cells
+from hdcal.inference.loop_cells import loop_cells
+from hdcal.physics.history import load_cycle
 
 # Ends of the curve, as shares of the largest deformation.
 _TOE, _HEAD = 0.25, 0.75
@@ -121,8 +122,8 @@ def _over_direction(
     words = f"the force lies {{size}} {{way}} {while_down} than {while_up}"
     yield Contrast("direction", sense, ways, words)
     if "unloading" in records.known:
-        for cell in np.asarray(_loop_cells(padded_records(records), np.ptp(x))):
-            yield Contrast("direction", cell[: len(x)], ways, words)
+        for cell in loop_cells(records, _REACHES):
+            yield Contrast("direction", cell, ways, words)
     words = (
         f"the larger the deformation, the {{way}} {down} lies against {up}, "
         "by {size} over the range"
@@ -172,11 +173,6 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "the slope {way} from cycle to cycle, which moves the force by {size} in all",
         beside=x,
     )
-
-
-@jax.jit
-def _loop_cells(records: Records, span):
-    return stop_cells(records.deformation, records.run, span * _REACHES)
 
 
 @jax.jit

@@ -136,13 +136,13 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[
         )
     if group > 1:
         notes.append(
-            f"means of {group} neighbouring rows were diagnosed, not single rows; the "
-            "noise of single rows was not looked at"
+            f"means of {group} neighbouring rows were diagnosed, not single rows"
         )
     if step > 1:
         notes.append(
-            f"one {'row' if group == 1 else 'mean'} of {step} was diagnosed: "
-            "neighbours err so much alike that those between say little more; the "
-            "noise of single rows was not looked at"
+            f"of every {step} {'rows' if group == 1 else 'means'} one was diagnosed: "
+            "neighbours err so much alike that those between say little more"
         )
+    if group > 1 or step > 1:
+        notes.append("the noise of single rows was not looked at")
     return notes

@@ -96,7 +96,7 @@ def _next_runs(found: VerdictAnswer) -> Section:
     rows = [
         [
             run.run,
-            ", ".join(map(hypothesis, run.separates)),
+            " from ".join(map(hypothesis, run.separates)),
             number(run.information_nats, 1.0),
             run.cost,
         ]
@@ -104,8 +104,8 @@ def _next_runs(found: VerdictAnswer) -> Section:
     ]
     columns = ["run", "tells apart", "information [nat]", "cost"]
     note = (
-        "“Something outside the library” predicts nothing and is left out of this "
-        "ranking."
+        "0.7 nat is what an answer of yes or no tells. “Something outside the library” "
+        "predicts nothing and is left out of this ranking."
     )
     table = Table(columns, rows, frozenset({"information [nat]"}))
     return Section(heading, [table, Text(note, soft=True)], brief=True)

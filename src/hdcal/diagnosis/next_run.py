@@ -102,7 +102,7 @@ def _candidates(evidence: CaseEvidence, posterior: ModelPosterior) -> dict[str, 
     What stands beside an effect on the noise, or a remainder, tells a run nothing.
     """
     allowed = {NONE, *evidence.single.names, *evidence.subspace_effects}
-    share = dict.fromkeys(allowed, 0.0)
+    share = dict.fromkeys(sorted(allowed), 0.0)
     for name, chance in posterior.probabilities.items():
         alone = {*name.split("+")} - {*evidence.on_noise} or {NONE}
         mean = alone - {UNKNOWN}
@@ -118,11 +118,12 @@ def _candidates(evidence: CaseEvidence, posterior: ModelPosterior) -> dict[str, 
     return {n: share[n] / total for n in best} if total > 0.0 else {}
 
 
-def _differing(one: str, two: str) -> tuple[str, ...]:
-    """Return the effects of either hypothesis that are not in both."""
+def _differing(one: str, two: str) -> tuple[str, str]:
+    """Return hypotheses without what they share, unless one lies in the other."""
     first, second = one.split("+"), two.split("+")
-    left = [n for n in first if n not in second] or [NONE]
-    return (*left, *([n for n in second if n not in first] or [NONE]))
+    left = [n for n in first if n not in second]
+    right = [n for n in second if n not in first]
+    return ("+".join(left), "+".join(right)) if left and right else (one, two)
 
 
 def _fitted(
@@ -173,6 +174,8 @@ def _piece_on_run(
     """Return an effect about its fitted amplitude, of mean and sd, as linear."""
     centre, spread = size
     grid = make_grid(effect, prepared.priors)
+    # Of an amplitude that the readings leave open a slope is one about its centre.
+    spread = min(spread, abs(centre)) or spread
     low, high = centre - spread, centre + spread
     if grid.one_sided:
         low, high = max(low, 0.02 * abs(high)), max(high, 1e-9)

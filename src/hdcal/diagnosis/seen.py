@@ -61,7 +61,9 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     scale = float(np.max(np.abs(prepared.records.force)))
     quantile = float(stats.norm.isf((1.0 - _LEVEL) / (2.0 * max(len(tried), 1))))
     # A loop is told once, by the shape that shows it best.
-    once = {tried[each.name].told_once or each.name: each for each in reversed(found)}
+    once: dict[str, Structure] = {}
+    for each in found:
+        once.setdefault(tried[each.name].told_once or each.name, each)
     clearest = sorted(once.values(), key=lambda each: each.p_value)
     return tuple(_seen(tried[each.name], each, scale, quantile) for each in clearest)
 

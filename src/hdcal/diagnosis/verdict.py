@@ -179,13 +179,14 @@ class NextRun:
 
     Attributes:
         run: what to do, in words.
-        separates: effects whose ranking it would settle, most of all first.
+        separates: the two hypotheses that it would tell apart best, effects joined
+            with +.
         information_nats: expected information about which effect it is.
         cost: in words, such as "one ramp".
     """
 
     run: Words
-    separates: tuple[EffectName, ...]
+    separates: tuple[Words, ...]
     information_nats: Real
     cost: str
 

@@ -16,7 +16,12 @@ from hdcal.diagnosis.model_posterior import ModelPosterior, log_priors, posterio
 from hdcal.evidence.bursts import with_bursts
 from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
 from hdcal.evidence.compute_evidence import compute_evidence
-from hdcal.evidence.fewer_rows import MOST_ROWS, average_rows, thin_rows
+from hdcal.evidence.fewer_rows import (
+    MOST_ROWS,
+    average_rows,
+    rows_of_half_cycle,
+    thin_rows,
+)
 from hdcal.evidence.hypothesis_design import stiffness_and_noise_beside
 from hdcal.evidence.remainder_evidence import with_remainders
 from hdcal.evidence.unseen_effects import with_unseen
@@ -25,8 +30,9 @@ from hdcal.physics.effect import Effect
 # Changes of the stiffness, and of the log of the noise, that move no evidence much.
 _SAME_STIFFNESS, _SAME_NOISE = 0.03, 0.3
 # One row of so many is kept while the largest correlation is more probable than not,
-# again and again, as long as no fewer rows than this are left.
-_OF, _FEWEST = 3, 100
+# again and again, as long as no fewer rows than this are left, in all and of a half
+# cycle, which shows neither a bend nor a loop by fewer.
+_OF, _FEWEST, _FEWEST_OF_HALF = 3, 100, 5
 
 
 @dataclass(frozen=True)
@@ -36,7 +42,7 @@ class Weighed:
     Attributes:
         case: the case, means of its neighbouring rows, or some of its rows.
         averaged_rows: rows in each mean; 1 is single rows.
-        row_step: one of so many of these was weighed.
+        row_step: one of so many rows, or means, of a run was weighed.
         library: effects that these rows can show.
         evidence: of every hypothesis.
         posterior: over them.
@@ -61,7 +67,7 @@ def weigh(
         rng: of the draws of shares.
     """
     averaged, group = average_rows(case, MOST_ROWS)
-    step = 1
+    step, most = 1, _largest_step(averaged)
     while True:
         thinned = thin_rows(averaged, step)
         # Means, and rows of what wanders, say nothing of the noise of single rows.
@@ -69,7 +75,7 @@ def weigh(
         shown = {n: e for n, e in library.items() if single or e.stage != "noise"}
         evidence = _final_evidence(thinned, shown)
         at_the_end = posterior_of(evidence).correlation[-1] > 0.5
-        if not at_the_end or len(averaged.records.force) < _OF * step * _FEWEST:
+        if not at_the_end or _OF * step > most:
             break
         step *= _OF
     evidence = with_remainders(evidence, rng)
@@ -78,6 +84,12 @@ def weigh(
     evidence = with_bursts(evidence, shown, prior)
     evidence = with_unseen(evidence, posterior_of(evidence).inclusion)
     return Weighed(thinned, group, step, shown, evidence, posterior_of(evidence))
+
+
+def _largest_step(case: Case) -> float:
+    """Return how many rows apart those may lie that are left."""
+    rows = len(case.records.force)
+    return min(rows / _FEWEST, rows_of_half_cycle(case) / _FEWEST_OF_HALF)
 
 
 def _final_evidence(case: Case, library: dict[str, type[Effect]]) -> CaseEvidence:

@@ -87,7 +87,7 @@ def identify_cause(
         lookalikes=unseen if suspected else (),
         lookalike_cases=counted.said if counted else 0,
         lookalike_rate=counted.rate if counted else None,
-        describes_best=mistaken and not others,
+        describes_best=mistaken and not others and leader == best,
         certificate=_certificate(word, library),
         sensitivity=sensitivity(evidence, effect) if effect else {},
         stability=_stability(evidence, effect, rng) if effect else None,

@@ -13,7 +13,7 @@ MOST_ROWS = 10_000
 _AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
 
 
-def average_rows(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
+def average_rows(case: Case, most: int) -> tuple[Case, int]:
     """Average neighbouring rows of a half cycle until few enough are left.
 
     Args:
@@ -27,7 +27,8 @@ def average_rows(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
     if group == 1:
         return case, 1
     records = _run_after_run(case)
-    new = _every(records, group)
+    half = half_cycles(records)
+    new = _place(half) % group == 0
     member = np.cumsum(new) - 1
     count = np.bincount(member)
     means = {
@@ -41,10 +42,11 @@ def average_rows(case: Case, most: int = MOST_ROWS) -> tuple[Case, int]:
 
 
 def thin_rows(case: Case, step: int) -> Case:
-    """Keep one row of so many in each half cycle, the first one among them.
+    """Keep one row of so many in each run, the first one among them.
 
     What is left of an AR(1) series is one, of the coefficient's power: means of it are
     none, so that where neighbours err much alike rows are left out, not averaged.
+    Turns are not looked at: as many rows lie between any two that are left.
 
     Args:
         case: with rows in the order they were taken.
@@ -53,8 +55,13 @@ def thin_rows(case: Case, step: int) -> Case:
     if step == 1:
         return case
     records = _run_after_run(case)
-    kept = np.flatnonzero(_every(records, step))
+    kept = np.flatnonzero(_place(np.asarray(records.run)) % step == 0)
     return replace(case, records=take_rows(records, kept))
+
+
+def rows_of_half_cycle(case: Case) -> float:
+    """Return how many rows a half cycle has, in the median over all."""
+    return float(np.median(np.bincount(half_cycles(_run_after_run(case)))))
 
 
 def _run_after_run(case: Case) -> Records:
@@ -62,9 +69,8 @@ def _run_after_run(case: Case) -> Records:
     return take_rows(case.records, order)
 
 
-def _every(records: Records, step: int) -> np.ndarray:
-    """Tell which rows are the first of so many in their half cycle, shape (n,)."""
-    half = half_cycles(records)
-    begins = np.diff(half, prepend=half[0] - 1) != 0
-    place = np.arange(len(half)) - np.flatnonzero(begins)[half - half[0]]
-    return place % step == 0
+def _place(label: np.ndarray) -> np.ndarray:
+    """Return how many rows before each one have its label, which adjoin."""
+    rows = np.arange(len(label))
+    begins = np.diff(label, prepend=label[0] - 1) != 0
+    return rows - np.maximum.accumulate(np.where(begins, rows, 0))

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.loading import loading_side
+from hdcal.data.records import Records
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.report.answer import Real
 
@@ -13,7 +15,9 @@ from hdcal.report.answer import Real
 _CLEAR = 4.0
 # What is smaller is not worth saying: in noise sds, and as a correlation.
 _SMALL, _LITTLE = 0.2, 0.2
-# Length of a shape, of sizes about one, that rounding alone gives.
+# Correlation that is believed at most.
+_MOST_ALIKE = 0.99
+# Size of a shape, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
 
 
@@ -46,50 +50,64 @@ def misfit(case: Case, stiffness: np.ndarray, noise_sd: np.ndarray) -> Misfit:
         noise_sd: of each gear, shape (g,) [N].
     """
     records = case.records
-    gear = np.asarray(records.specimen)
-    labels = np.stack([gear, np.asarray(records.run)])
-    mounting = np.unique(labels, axis=1, return_inverse=True)[1]
-    x, y = np.asarray(records.deformation), np.asarray(records.force)
-    sd, rows = noise_sd[gear], np.bincount(mounting)
-
-    def within(values: np.ndarray) -> np.ndarray:
-        return values - (np.bincount(mounting, values) / rows)[mounting]
-
-    error = within(y - stiffness[gear] * x) / sd
-    line = within(x)
-    # A gear's slope is fitted: it takes up what goes along with the deformation.
-    squares = np.bincount(gear, line**2)
-
-    def beside_lines(values: np.ndarray) -> np.ndarray:
-        values = within(values)
-        return values - (np.bincount(gear, values * line) / squares)[gear] * line
-
-    error = beside_lines(error)
-    ways, curve = beside_lines(np.asarray(records.sense)), beside_lines(x * np.abs(x))
-    loop, bend = _size(ways / sd, error), _size(curve / sd, error)
-    # What the two explain is no correlation.
-    error = error - (loop * ways + bend * curve) / sd
-    loop, bend = 2.0 * loop, float(np.ptp(curve)) * bend
-    return Misfit(_correlation(error, previous_rows(records)), loop, bend)
+    gear, sd = np.asarray(records.specimen), noise_sd[records.specimen]
+    # Of gears that are pulled, what is said is said of the size of their force.
+    side = float(loading_side(np.asarray(records.deformation)) or 1)
+    x, y = side * np.asarray(records.deformation), side * np.asarray(records.force)
+    ways = _beside_lines(records, side * np.asarray(records.sense))
+    scaled = x / np.max(np.abs(x))
+    curve = _beside_lines(records, scaled * np.abs(scaled))
+    error = _beside_lines(records, y - stiffness[gear] * x) / sd
+    sizes, clear, left = _fitted(np.stack([ways, curve], axis=1), error, sd)
+    correlation = _correlation(left, previous_rows(records))
+    scatter = Misfit(correlation, 0.0, 0.0).widening
+    seen = np.abs(clear) > np.maximum(_CLEAR * scatter, _SMALL * np.sqrt(len(error)))
+    loop, bend = np.where(seen, sizes, 0.0)
+    return Misfit(correlation, 2.0 * float(loop), _swing(curve, gear) * float(bend))
 
 
-def _size(shape: np.ndarray, error: np.ndarray) -> float:
-    """Return the coefficient of a shape in errors of sd one; 0 where it is not seen."""
-    length = float(np.sqrt(shape @ shape))
-    if length < _NOTHING:
-        return 0.0
-    clear = float(shape @ error) / length
-    small = _SMALL * np.sqrt(len(error))
-    return clear / length if abs(clear) > max(_CLEAR, small) else 0.0
+def _beside_lines(records: Records, values: np.ndarray) -> np.ndarray:
+    """Return what a straight line for each gear, with zeros for its runs, leaves."""
+    run, gear = np.asarray(records.run), np.asarray(records.specimen)
+    line, left = _within(run, np.asarray(records.deformation)), _within(run, values)
+    slope = np.bincount(gear, left * line) / np.bincount(gear, line**2)
+    return left - slope[gear] * line
+
+
+def _within(run: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return values - (np.bincount(run, values) / np.bincount(run))[run]
+
+
+def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):
+    """Fit shapes to errors in sds: sizes [N], those in standard errors, what is left.
+
+    A shape that is none, or no other than those before it, has the size 0.
+    """
+    upper = np.linalg.qr(shapes, mode="r")
+    own = np.abs(np.diag(upper)) > _NOTHING * np.sqrt(len(error))
+    sizes, clear = np.zeros((2, shapes.shape[1]))
+    shapes = shapes / sd[:, None]
+    if own.any():
+        some = shapes[:, own]
+        covariance = np.linalg.inv(some.T @ some)
+        sizes[own] = covariance @ (some.T @ error)
+        clear[own] = sizes[own] / np.sqrt(np.diag(covariance))
+    return sizes, clear, error - shapes @ sizes
+
+
+def _swing(curve: np.ndarray, gear: np.ndarray) -> float:
+    """Return from where to where a curve goes, in the median over all gears."""
+    each = [float(np.ptp(curve[gear == one])) for one in np.unique(gear)]
+    return float(np.median(each))
 
 
 def _correlation(error: np.ndarray, before: np.ndarray) -> float:
-    follows = before >= 0
+    follows, square = before >= 0, float(error @ error)
     pairs = int(follows.sum())
-    if not pairs:
+    if not pairs or square < _NOTHING:
         return 0.0
     tied = float(error[follows] @ error[before[follows]]) / pairs
-    tied /= float(error @ error) / len(error)
+    tied = min(tied * len(error) / square, _MOST_ALIKE)
     return tied if tied > max(_LITTLE, _CLEAR / np.sqrt(pairs)) else 0.0
 
 

@@ -169,7 +169,8 @@ def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> C
         f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
     )
     words += "; every interval allows for it"
-    words += ". The option --constant-noise keeps it of one size" * unasked
+    remedy = "--constant-noise, or adapt_noise=False, keeps it of one size"
+    words += f". {remedy}" * unasked
     return Check(name, "note", words)
 
 

@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 from scipy import stats
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
+from hdcal.inference.loop_cells import loop_cells
 from hdcal.inference.member_counts import member_counts
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
 from hdcal.physics.effect import Effect
-from hdcal.physics.history import stop_cells
 
 # Up to this many rows the noise that a fit leaves is a rough number, and the exact
 # rounding likelihood is cheap.
@@ -32,11 +31,12 @@ _BESIDE_A_GAP = 49
 _LEAST_ROWS = 12
 # Noise sds over a range that differ by less are one: of very many rows any would show.
 _LEAST_GROWTH = 1.1
+# Degrees of freedom that the noise beside a loop has at least: with fewer all is loop.
+_FEWEST_FREE = 4
 # Correlation of neighbours that is taken off residuals, at most.
 _MOST_ALIKE = 0.95
 # Shares of the range after which the cells of a loop slip.
 _REACHES = np.array([0.03, 0.06, 0.12, 0.25, 0.5])
-_loop_cells = jax.jit(stop_cells)
 # Probability that noise of one size is let grow: one parameter more, near nothing.
 _FALSE_ALARM = 0.05
 
@@ -78,9 +78,9 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
     own = [scaled * (records.specimen == i) for i in np.unique(records.specimen)[:50]]
     shapes = [scaled**2, scaled**3, records.sense, rise, rise * scaled]
     if with_loop:
-        size, reaches = np.abs(scaled), _REACHES * np.ptp(scaled)
+        size = np.abs(scaled)
         shapes += [records.sense * size, records.sense * size**2]
-        shapes += [*np.asarray(_loop_cells(scaled, records.run, reaches))]
+        shapes += [*loop_cells(records, _REACHES)]
     table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
     count = np.bincount(records.run)
     means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
@@ -117,10 +117,12 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
 
 def _is_better(larger: Pilot, smaller: Pilot) -> bool:
     """Return whether what a larger model adds is seen, by the F test."""
-    one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
     more = smaller.free - larger.free
-    ratio = (one - two) / max(more, 1) * larger.free / max(two, 1e-300)
-    return more > 0 and float(stats.f.sf(ratio, more, larger.free)) < _FALSE_ALARM
+    if more <= 0 or larger.free < _FEWEST_FREE:
+        return False
+    one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
+    ratio = (one - two) / more * larger.free / max(two, 1e-300)
+    return float(stats.f.sf(ratio, more, larger.free)) < _FALSE_ALARM
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:

@@ -81,7 +81,7 @@ class SpecimenRead:
     """One of several specimens.
 
     Attributes:
-        stiffness_N_per_mm: of parallel straight lines through its runs, as read; None
+        stiffness_N_per_mm: of parallel straight lines through its runs, as read; NaN
             where its deformation does not change. `hdcal fleet` infers it.
     """
 

@@ -9,7 +9,7 @@ from hdcal.data.measurements import ASSUMED
 from hdcal.data.records import Records
 from hdcal.report.braille import scatter_lines
 from hdcal.report.document import Document, Facts, Section, Sentences, Table, Text
-from hdcal.report.words import number
+from hdcal.report.words import known, number
 
 HEADLINE = "The input is in order."
 DOUBTFUL = "The input can be read, but the stiffness it shows is not plausible."
@@ -68,7 +68,8 @@ def check_document(
 
 
 def _specimens(found: CheckAnswer) -> Section:
-    span = np.ptp([one.stiffness_N_per_mm for one in found.specimens])
+    slopes = [one.stiffness_N_per_mm for one in found.specimens]
+    span = float(np.ptp([slope for slope in slopes if known(slope)] or [0.0]))
     titles = ["specimen", "rows", "runs", "N/mm"]
     rows = [
         [one.name, str(one.rows), str(one.runs), number(one.stiffness_N_per_mm, span)]

@@ -172,15 +172,18 @@ def _specimens(case: Case) -> tuple[SpecimenRead, ...]:
     if len(names) < 2:
         return ()
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    read = np.asarray(records.deformation)
+    # Each run counts from its first reading: of none that moves nothing is left over.
+    first = np.unique(run, return_index=True)[1]
     x, y = (
         values - (np.bincount(run, values) / np.bincount(run))[run]
-        for values in (np.asarray(records.deformation), np.asarray(records.force))
+        for values in (read - read[first][run], np.asarray(records.force))
     )
-    rows, xx, xy = (np.bincount(specimen, w) for w in (np.ones(len(x)), x * x, x * y))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slopes = np.where(xx > 0.0, xy / xx, np.nan)
-    runs = np.bincount(np.unique(np.stack([specimen, run]), axis=1)[0])
-    columns = (names, rows.astype(int).tolist(), runs.tolist(), slopes.tolist())
+    xx, xy = (np.bincount(specimen, w) for w in (x * x, x * y))
+    slopes = np.full(len(names), np.nan)
+    np.divide(xy, xx, out=slopes, where=xx > 0.0)
+    runs = np.bincount(specimen[first])
+    columns = (names, np.bincount(specimen).tolist(), runs.tolist(), slopes.tolist())
     return tuple(SpecimenRead(*each) for each in zip(*columns, strict=True))
 
 
