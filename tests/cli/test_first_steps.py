@@ -141,6 +141,25 @@ def test_sheets_of_a_workbook_become_a_text_that_is_read_without_it(
     assert "row 4 taken for the units of the columns" in " ".join(whole.notes)
 
 
+def test_columns_that_nobody_would_guess_are_named(here: Hdcal, tmp_path: Path):
+    rows = "".join(f"{0.05 * k:.2f},{5 * k}\n" for k in range(8))
+    (tmp_path / "log.csv").write_text("a,b\n" + rows)
+    given = (*BEGUN, "--data", tmp_path / "log.csv")
+    told = here("init", tmp_path / "rig", *given)
+    assert told.returncode == 2 and "--column 'force=HEADER[UNIT]'" in told.stderr
+    named = ("--column", "deformation=a[mm]", "--column", "force=b[N]")
+    assert here("init", tmp_path / "rig", *given, *named).returncode == 0
+    assert library.read_case(tmp_path / "rig").records.force[-1] == 35.0
+
+
+def test_a_sheet_that_is_named_twice_is_told_once(here: Hdcal, log: Path):
+    for told in (
+        here("check", log, "--sheet", "A", "--sheet", "B"),
+        here("init", "rig", *BEGUN, "--data", log, "--sheet", "A", "--sheet", "B"),
+    ):
+        assert told.returncode == 2 and told.stderr.count("--sheet") == 1
+
+
 def test_a_material_of_ones_own_is_found_from_the_new_folder(here: Hdcal, tmp_path):
     text = (priors_folder() / "steel.toml").read_text("utf-8")
     (tmp_path / "my.toml").write_text(text)
@@ -161,10 +180,21 @@ def test_readings_may_lie_in_the_folder_already(here: Hdcal, log: Path):
     [
         (SIZES, "--deformation: is not stated"),
         (["--wall", "50", *BEGUN[2:]], "not thinner than the radius"),
-        ([*SIZES, "--deformation", "radiall"], "Did you mean 'radial'?"),
+        ([*SIZES, "--deformation", "radiall"], "'radial', 'diametral'"),
         ([*BEGUN, "--data", "nowhere.csv"], "nowhere.csv: does not exist"),
         ([*BEGUN, "--material", "chese"], "unknown material 'chese'"),
         (["--wall", "0,68", *BEGUN[2:]], "'0,68' is no number: write 0.68"),
+        (["--wall", "1,000", *BEGUN[2:]], "'1,000' is no number: write it like 20.5"),
+        (
+            ["--wall", "1,234.5", *BEGUN[2:]],
+            "'1,234.5' is no number: write it like 20.5",
+        ),
+        (
+            ["--wall", "abc,def", *BEGUN[2:]],
+            "'abc,def' is no number: write it like 20.5",
+        ),
+        (["--wall", "inf", *BEGUN[2:]], "'inf' is no number: write it like 20.5"),
+        ([*BEGUN, "--data", "nowhere.csv", "--column", "force"], "--column: "),
         ([*BEGUN, "--sheet", "A"], "--sheet: is of a workbook"),
         ([*BEGUN, "--sheet", "A", "--sheet", "B"], "--sheet: is given 2 times"),
     ],

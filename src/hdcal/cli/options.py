@@ -51,6 +51,17 @@ def sheet_option(command: Callable) -> Callable:
     )(command)
 
 
+def column_option(command: Callable) -> Callable:
+    """Add the option that says which column is which quantity."""
+    return repeated_option(
+        "--column",
+        "columns",
+        metavar="QUANTITY=HEADER",
+        read=read_columns,
+        help="Read a quantity from a header of your own: force=Load[kgf].",
+    )(command)
+
+
 def _one(texts: Sequence[str], option: str) -> str | None:
     if len(texts) > 1:
         words = f"is given {len(texts)} times"
@@ -72,13 +83,7 @@ def reading_options(command: Callable) -> Callable:
             type=click.Choice(get_args(Theory)),
             help="Stiffness formula that K multiplies; overrides the gear file.",
         ),
-        repeated_option(
-            "--column",
-            "columns",
-            metavar="QUANTITY=HEADER",
-            read=read_columns,
-            help="Read a quantity from a header of your own: force=Load[kgf].",
-        ),
+        column_option,
         sheet_option,
         click.option(
             "--reading",
@@ -113,7 +118,7 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
     """
     from hdcal.data.reading import read_case
 
-    if columns is None:  # it could not be read, which is said already
+    if columns is None or is_refused(console, "--sheet"):  # which is said already
         return None
     read = partial(read_case, columns=columns)
     case = console.wrong.attempt(read, data, gear, **how)
@@ -122,6 +127,11 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
         return case
     how["reading"] = reading
     return console.wrong.attempt(read, data, gear, **how)
+
+
+def is_refused(console: Console, option: str) -> bool:
+    """Tell whether what an option says could not be read."""
+    return any(finding.file == option for finding in console.wrong)
 
 
 def asked_reading(console: Console, case: "Case | None") -> str | None:

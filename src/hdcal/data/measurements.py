@@ -148,7 +148,7 @@ def _assumed(
             unit = f" in {column.unit}" if column.unit else ""
             yield (
                 f"{ASSUMED}{quoted(column.header)} is the {quantity}{unit}. If not, "
-                f"name the column, as in {quantity} = 'HEADER[UNIT]'"
+                f"name the column: --column '{quantity}=HEADER[UNIT]'"
             )
 
 

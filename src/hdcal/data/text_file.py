@@ -62,7 +62,7 @@ def read_text(
     utf8, guessed = _as_utf8(raw, findings, encoding)
     if b"\r" in utf8:
         utf8 = utf8.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    note = f"the text is {guessed}. If not, name its encoding" if guessed else ""
+    note = f"the text is {guessed}. If not, name it: --encoding NAME" if guessed else ""
     return utf8, hashlib.sha256(raw).hexdigest(), note
 
 

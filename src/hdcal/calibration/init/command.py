@@ -1,6 +1,8 @@
 """`hdcal init`: ask for what a gear file needs, and write a case folder."""
 
+import math
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -10,7 +12,13 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import json_option, sheet_option
+from hdcal.cli.options import (
+    column_option,
+    is_refused,
+    json_option,
+    sheet_option,
+)
+from hdcal.data.theory_names import READINGS
 from hdcal.errors import Finding, InputError, quoted
 
 # Parameter -> its key in the gear file, its option, what is asked, the usual answer.
@@ -32,7 +40,8 @@ _ASKED: dict[str, tuple[str, str, str, str | float | None]] = {
         20.0,
     ),
 }
-_TEXTS = ("material", "reading")
+# A comma that can only be a decimal one; in 1,000 it may be none.
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?(0,\d+|[1-9]\d*,(\d{1,2}|\d{4,}))\s*")
 
 
 class _Number(click.ParamType):
@@ -42,14 +51,20 @@ class _Number(click.ParamType):
 
     def convert(self, value, param, ctx):
         try:
-            return float(value)
+            number = float(value)
         except ValueError:
-            point = str(value).replace(",", ".")
-            hint = f": write {point}" if point != value else ""
-            self.fail(f"{quoted(str(value))} is no number{hint}", param, ctx)
+            number = math.nan
+        if math.isfinite(number):
+            return number
+        point = _DECIMAL_COMMA.fullmatch(str(value)) is not None
+        right = value.strip().replace(",", ".") if point else "it like 20.5"
+        self.fail(f"{quoted(str(value))} is no number: write {right}", param, ctx)
 
 
-_KIND = {name: click.STRING if name in _TEXTS else _Number() for name in _ASKED}
+_KIND = dict.fromkeys(_ASKED, _Number()) | {
+    "material": click.STRING,
+    "reading": click.Choice(READINGS),
+}
 
 
 def _asked(command):
@@ -64,10 +79,11 @@ def _asked(command):
 @click.argument("folder", metavar="FOLDER")
 @_asked
 @click.option("--data", metavar="FILE", help="Readings to copy there, as data.csv.")
+@column_option
 @sheet_option
 @json_option
 @click.pass_obj
-def init(console: Console, folder, data, sheet, **given):
+def init(console: Console, folder, data, columns, sheet, **given):
     """Write FOLDER with a gear file, from options or from answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
@@ -89,8 +105,9 @@ def init(console: Console, folder, data, sheet, **given):
             console.wrong.attempt(read_gear, tables)
         elif Path(data).is_dir():
             raise InputError([Finding("data", "is a folder", "Name a file")])
-        else:
-            case = console.wrong.attempt(read_case, data, tables, sheet=sheet)
+        elif not (columns is None or is_refused(console, "--sheet")):
+            how = {"columns": columns, "sheet": sheet}
+            case = console.wrong.attempt(read_case, data, tables, **how)
     measured = {
         key: tables.pop(key) for key in ("deformation", "reference_temperature_C")
     }
