@@ -42,12 +42,17 @@ ACT = """
   on.click(); on.click();
   found.last = names(); found.told = bar.querySelector("span").textContent;
   found.after = [back.disabled, on.disabled];
-  const [, stiffness] = page.querySelectorAll("th");
+  const [, stiffness] = page.querySelectorAll("th button");
   stiffness.click(); found.softest = names();
   stiffness.click(); found.stiffest = names();
   wanted.value = "OFF"; wanted.dispatchEvent(new Event("input")); found.off = names();
   wanted.value = "nowhere"; wanted.dispatchEvent(new Event("input"));
   found.none = [names().length, bar.querySelector("span").textContent];
+  wanted.value = ""; wanted.dispatchEvent(new Event("input"));
+  const rows = () => page.querySelectorAll("tbody tr").length;
+  const frame = page.defaultView;
+  frame.dispatchEvent(new frame.Event("beforeprint")); found.printed = rows();
+  frame.dispatchEvent(new frame.Event("afterprint")); found.again = rows();
   return found;
 """
 
@@ -69,6 +74,7 @@ def test_a_browser_turns_sorts_and_searches(page: Path, tmp_path: Path):
     assert found["stiffest"] == numbered[:PAGE]
     assert found["off"] == ["G07"]
     assert found["none"] == [0, "none"]
+    assert (found["printed"], found["again"]) == (SIZE, PAGE)
 
 
 def test_it_fits_everywhere_and_nothing_is_complained_of(page: Path, tmp_path: Path):
@@ -80,7 +86,7 @@ def test_it_fits_everywhere_and_nothing_is_complained_of(page: Path, tmp_path: P
 def test_what_has_no_number_comes_last(page: Path, tmp_path: Path):
     last = """
       const bar = page.querySelector(".turn"), on = bar.querySelectorAll("button")[1];
-      page.querySelectorAll("th")[1].click(); on.click(); on.click();
+      page.querySelectorAll("th button")[1].click(); on.click(); on.click();
       const rows = page.querySelectorAll("tbody tr");
       return {last: rows[rows.length - 1].cells[0].textContent};
     """

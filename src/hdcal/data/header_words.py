@@ -26,7 +26,10 @@ WORDS: dict[str, tuple[str, ...]] = {
     "time": ("time", "zeit", "prüfzeit", "temps", "durée", "时间"),
     "angle": ("angle", "winkel", "drehwinkel", "角度"),
     "run": ("run", "lauf", "messung", "essai"),
-    "specimen": ("specimen", "gear", "serial", "probe", "prüfling", "éprouvette"),
+    "specimen": (
+        *("specimen", "gear", "serial", "seriennummer", "probe", "prüfling"),
+        "éprouvette",
+    ),
 }
 # What says that a column is something else about the quantity.
 _OTHERWISE = {
@@ -35,6 +38,8 @@ _OTHERWISE = {
     *("sd", "std", "deviation", "offset", "tare", "limit", "grenze"),
     *("diameter", "durchmesser", "diamètre", "corrected", "korrigiert", "corrigé"),
 }
+# What says no more than that a column holds labels.
+_LABELS = {"no", "nr", "number", "nummer", "id", "numéro"}
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]\s*")
 _BEHIND = re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)(?P<unit>\S+)\s*")
 _LONGEST = 80
@@ -90,4 +95,6 @@ def _quantity(name: str) -> Guess | None:
     ]
     if len(found) != 1:
         return None
-    return Guess(found[0], "", len(words) == 1)
+    (quantity,) = found
+    of_labels = _LABELS if quantity in ("run", "specimen") else set()
+    return Guess(quantity, "", len([w for w in words if w not in of_labels]) == 1)

@@ -124,17 +124,21 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
         "N/mm, per millimetre as read."
     )
     middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
-    yield f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm."
+    told = f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm"
+    also = "; that it may be an odd one is in it" * bool(answer.called_off)
+    yield f"{told}{also}."
     one = answer.next_gear.stiffness_N_per_mm
     width = one.hi - one.lo
     ends = [
-        f"{percent(each.content)} are stiffer than "
-        f"{number(each.stiffer_than_N_per_mm, width)} N/mm and as many softer than "
+        f"at least {percent(each.content)} are stiffer than "
+        f"{number(each.stiffer_than_N_per_mm, width)} N/mm, and at least "
+        f"{percent(each.content)} softer than "
         f"{number(each.softer_than_N_per_mm, width)} N/mm"
         for each in answer.next_gear.bounds
     ]
     sure = percent(answer.next_gear.bounds[0].confidence)
-    yield f"Of gears to come, each with {sure} confidence: {'; '.join(ends)}."
+    told = "; ".join(ends)
+    yield f"Of gears to come, each bound by itself with {sure} confidence: {told}."
 
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
@@ -149,7 +153,8 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
         "Each gear's stiffness with its 95 % credible interval, from the softest to "
         "the stiffest. The numbers are in gears.csv.",
     )
-    more = [Text("All of them are in gears.csv.", soft=True)]
+    listed = f"The oddest {MOST_LISTED} are listed. " * (answer.gears > MOST_LISTED)
+    more = [Text(f"{listed}All of them are in gears.csv.", soft=True)]
     more *= answer.gears > _AT_ONCE
     called = (
         "In sds: how far a gear is from the centre, counted in the scatter of ordinary "

@@ -197,8 +197,9 @@ def check_fleet(case: Case) -> None:
     """
     records, gears = case.records, case.specimen_labels
     if len(gears) < FEWEST:
-        words = f"{len(gears) or 1} gears: how much gears differ takes {FEWEST} or more"
-        remedy = "Say in a column `specimen` which gear a row is of, or calibrate"
+        many = f"{len(gears)} gears" if len(gears) > 1 else "1 gear"
+        words = f"{many}: how much gears differ takes {FEWEST} or more"
+        remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
         raise InputError([Finding(case.name, words, remedy)])
     index, run = np.asarray(records.specimen), np.asarray(records.run)
     x = np.asarray(records.deformation)

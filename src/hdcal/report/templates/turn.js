@@ -1,5 +1,5 @@
-// Lets tables be sorted by a click on a title, searched, and turned page by page.
-// Without this their first page stays.
+// Lets tables be sorted by their titles, searched, and turned page by page. On paper
+// stands all that was found; without this script the first page.
 "use strict";
 function turn(table) {
   const size = Number(table.dataset.page);
@@ -23,8 +23,8 @@ function turn(table) {
   });
   bar.append(wanted, told, back, on);
 
-  function show() {
-    const last = Math.min(first + size, found.length);
+  function show(most = size) {
+    const last = Math.min(first + most, found.length);
     table.tBodies[0].replaceChildren(...found.slice(first, last));
     told.textContent = found.length ? `${first + 1} to ${last} of ${found.length}` : "none";
     back.disabled = first === 0;
@@ -49,22 +49,26 @@ function turn(table) {
 
   function sort(title) {
     const at = title.cellIndex, isNumber = title.classList.contains("number");
-    const falls = title.ariaSort === "ascending";
-    for (const each of titles) each.ariaSort = null;
-    title.ariaSort = falls ? "descending" : "ascending";
+    const falls = title.getAttribute("aria-sort") === "ascending";
+    for (const each of titles) each.removeAttribute("aria-sort");
+    title.setAttribute("aria-sort", falls ? "descending" : "ascending");
     const keys = new Map(rows.map(row => [row, key(row, at, isNumber)]));
     const missing = row => Number.isNaN(keys.get(row));
-    order = rows.toSorted((one, two) => missing(one) - missing(two) || (falls ? -1 : 1) * (
+    order = [...rows].sort((one, two) => missing(one) - missing(two) || (falls ? -1 : 1) * (
       isNumber ? keys.get(one) - keys.get(two)
         : keys.get(one).localeCompare(keys.get(two), undefined, {numeric: true})));
     search();
   }
 
   for (const title of titles) {
-    title.tabIndex = 0;
-    title.addEventListener("click", () => sort(title));
-    title.addEventListener("keydown", event => { if (event.key === "Enter") sort(title); });
+    if (!title.textContent.trim()) continue;
+    const button = document.createElement("button");
+    button.append(...title.childNodes);
+    button.addEventListener("click", () => sort(title));
+    title.append(button);
   }
+  addEventListener("beforeprint", () => { first = 0; show(found.length); });
+  addEventListener("afterprint", () => show());
   wanted.addEventListener("input", search);
   for (const body of [...table.tBodies].slice(1)) body.remove();
   if (rows.length > size) room.before(bar);
