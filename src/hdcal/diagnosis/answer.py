@@ -19,6 +19,7 @@ from hdcal.report.answer import (
     Sentences,
     Words,
 )
+from hdcal.report.parameters import Interval
 from hdcal.report.posterior_answer import CalibratedGear
 
 
@@ -113,6 +114,7 @@ class VerdictAnswer(Answer):
     budget: Budget | None
     refits: tuple[Refit, ...]
     left_out: LeftOut | None = None
+    stiffness_N_per_mm: Interval | None = None
     library: tuple[EffectName, ...]
     notes: tuple[str, ...]
     seed: Count

@@ -62,7 +62,7 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)
     # Chances that each one acts: together they are more than one where two may.
-    more = ", of which more than one may act"
+    more = "; what acts together counts for each"
     causes += more * (sum(which.inclusion[name] for name in likely) > _ONE)
     yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
     others = [n for n in which.named if n not in which.group_members]

@@ -9,6 +9,7 @@ from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict
+from hdcal.diagnosis.where import interval
 from hdcal.diagnosis.words import answer, headline, limits, next_step
 from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN
 from hdcal.inference.mixed_posterior import mixed_posterior
@@ -16,6 +17,7 @@ from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.document import spoken_of
+from hdcal.report.parameters import Interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
 
@@ -48,6 +50,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
             for name, file in member_files(verdict).items()
         ),
         left_out=verdict.left_out,
+        stiffness_N_per_mm=_stiffness(verdict),
         library=verdict.library,
         notes=verdict.notes,
         seed=verdict.seed,
@@ -72,6 +75,13 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         answer=tuple(answer(found)),
         limits=tuple(limits(found)),
     )
+
+
+def _stiffness(verdict: Verdict) -> Interval | None:
+    """Return the stiffness as read, hypotheses weighed by their probabilities."""
+    if verdict.reasons or not verdict.posteriors:
+        return None
+    return interval(mixed_posterior(verdict.posteriors).draws["stiffness"])
 
 
 def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]:

@@ -17,6 +17,7 @@ from hdcal.diagnosis.seen_words import p_words, what_is_seen
 from hdcal.diagnosis.verdict import Which
 from hdcal.inference.serial_correlation import worth
 from hdcal.report.words import (
+    estimate,
     known,
     label,
     newton,
@@ -72,7 +73,12 @@ def _sentences(found: VerdictAnswer) -> list[str]:
         "group": group_of_causes,
         "ambiguous": ambiguous,
     }
-    return list(say.get(found.which.verdict, unknown)(found))
+    said = list(say.get(found.which.verdict, unknown)(found))
+    if found.stiffness_N_per_mm is not None:
+        middle, span = estimate(found.stiffness_N_per_mm)
+        over = "" if found.which.verdict == "none" else ", whatever of this it is"
+        said.append(f"The stiffness{over}: {middle} N/mm ({span}), per mm as read.")
+    return said
 
 
 def count_words(found: Mapping[str, VerdictAnswer]) -> str:
