@@ -105,7 +105,8 @@ def _twins(which: Which) -> Iterator[str]:
     for name in which.named:
         twin = EFFECTS[name].twin if name in EFFECTS else ""
         if twin:
-            yield f"{capital(twin)}, gives the same readings as {label(name)}."
+            within = "gives the same readings within a mounting as"
+            yield f"{capital(twin)} {within} {label(name)}."
 
 
 def with_needs(untestable: NotTestable) -> str:

@@ -25,7 +25,7 @@ class PlasticYield(Effect):
     groups: ClassVar[tuple[str, ...]] = ("loop",)
     needs: ClassVar[frozenset[str]] = frozenset({"unloading"})
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
-    twin: ClassVar[str] = "a joint that sticks before it slips, until it is taken apart"
+    twin: ClassVar[str] = "a joint that sticks before it slips"
 
     softening: Float[Array, ""] | float = parameter(
         "1", "share of the stiffness lost beyond yield", typical=0.2, null=0.0

@@ -224,3 +224,12 @@ def _upwards(uncertainty: float) -> str:
 def _digits(value: float, uncertainty: float) -> str:
     """Return a number to the second digit of an uncertainty."""
     return number(value, 10.0 * uncertainty)
+
+
+def more_is_asked(capacity: float, share: float, confidence: float) -> str:
+    """Return why a force that conforms needs a larger capacity than its limit."""
+    asked = f"{100.0 * share:.6g} % of them do with {100.0 * confidence:.6g} %"
+    return (
+        f" This asks whether one reading keeps the limit; that {asked} confidence, as "
+        f"the answer above asks, takes {newtons(capacity)}."
+    )

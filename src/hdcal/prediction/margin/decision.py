@@ -16,6 +16,7 @@ from hdcal.prediction.margin.budget_words import (
     GEAR,
     component_label,
     decision_words,
+    more_is_asked,
     rule_words,
 )
 from hdcal.prediction.margin.request import Criteria
@@ -83,6 +84,9 @@ def decision(
             for share, sd in each
         )
     wrong = risk.probability
+    words = decision_words(estimate, most_force, guard, statement, wrong, overall)
+    if statement == "conforms" and worst.capacity_N > limit:
+        words += more_is_asked(worst.capacity_N, criteria.required, criteria.confidence)
     return Decision(
         rule=rule,
         limit_N=limit,
@@ -93,7 +97,7 @@ def decision(
         false_accept_risk=wrong,
         global_false_accept_risk=overall,
         rule_words=rule_words(rule, limit, guard, most_force),
-        words=decision_words(estimate, most_force, guard, statement, wrong, overall),
+        words=words,
     )
 
 
