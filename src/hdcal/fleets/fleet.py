@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 from scipy.stats import false_discovery_control
@@ -21,6 +20,7 @@ from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.executables import bound_executables
+from hdcal.inference.gear_sums import gear_sums
 from hdcal.inference.population_problem import (
     POPULATION_PRIORS,
     PopulationProblem,
@@ -119,7 +119,7 @@ def fleet(
     bound_executables()
     sums, gears = mounting_sums(case), len(case.specimen_labels)
     unit, priors = _priors(case)
-    problem = PopulationProblem(priors, sums, jnp.zeros(gears))
+    problem = PopulationProblem(priors, gear_sums(sums, gears))
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}

@@ -4,7 +4,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.evidence.prepare import moments
-from hdcal.inference.population_problem import MountingSums
+from hdcal.inference.gear_sums import MountingSums
 
 
 def mounting_sums(case: Case) -> MountingSums:

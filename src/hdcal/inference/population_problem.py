@@ -2,29 +2,30 @@
 
 A mounting's readings are y = s x + z + e, with s of its gear, z = zero + N(0,
 mounting_sd²) its own, and e ~ N(0, σ²) with a σ of its gear. About a gear's σ and its
-kind (ordinary or off) all is Gaussian in s, so that the mounting's readings say no more
-than seven sums. σ is integrated by Gauss and Hermite's rule, the kind by its two cases.
+kind (ordinary or off) all is Gaussian in s: readings say no more than sums. σ is
+integrated by Gauss and Hermite's rule, the kind by its two cases.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import numpyro
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.inference.density import log_likelihood
+from hdcal.inference.gear_sums import GearSums
 from hdcal.inference.model import model, sample_site
 from hdcal.inference.sampled_problem import Sampled
 
-# Nodes of the noise of a gear about that of all: places in sds, and weights.
-_NODES = 7
+# Nodes of the noise of a gear about where it likely is: places in sds, and weights.
+_NODES = 4
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(_NODES)
+_NEWTON = 4
 _LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
 
 # Sites that a population adds to those of a gear.
@@ -52,41 +53,17 @@ POPULATION_PRIORS: Mapping[str, Prior] = {
 }
 
 
-class MountingSums(eqx.Module):
-    """What the readings of each mounting say, one entry each.
-
-    Attributes:
-        gear: index of its gear.
-        rows: number of readings [-].
-        x: mean deformation as read, at the modulus of its temperature [mm].
-        y: mean force [N].
-        xx: squares about the mean, summed [mm²].
-        xy: products likewise [N mm].
-        yy: squares likewise [N²].
-    """
-
-    gear: Int[Array, " m"]
-    rows: Float[Array, " m"]
-    x: Float[Array, " m"]
-    y: Float[Array, " m"]
-    xx: Float[Array, " m"]
-    xy: Float[Array, " m"]
-    yy: Float[Array, " m"]
-
-
 class PopulationProblem(Sampled):
     """Gears of one kind, measured alike.
 
     Attributes:
         priors: by site: stiffness [N/mm as read], specimen_sd, zero [N],
             run_offset_sd [N], sigma [N] and those of `POPULATION_PRIORS`.
-        sums: of every mounting.
-        gears: an entry for each; its values mean nothing.
+        sums: of every gear.
     """
 
     priors: dict[str, Prior]
-    sums: MountingSums
-    gears: Float[Array, " g"]
+    sums: GearSums
 
 
 class GearLaw(NamedTuple):
@@ -96,6 +73,7 @@ class GearLaw(NamedTuple):
         log_weight: of noise and kind, normalised over both.
         mean: of the stiffness [N/mm].
         sd: of it [N/mm].
+        noise_sd: [N]; [gear, node].
         far: how far the readings are from the centre, in sds of an ordinary gear with
             its noise; [gear, node].
     """
@@ -103,31 +81,36 @@ class GearLaw(NamedTuple):
     log_weight: Float[Array, "g u k"]
     mean: Float[Array, "g u k"]
     sd: Float[Array, "g u k"]
+    noise_sd: Float[Array, "g u"]
     far: Float[Array, "g u"]
 
 
 def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
     """Return log p(readings of a gear, noise, kind), and its stiffness given these."""
-    sums, size = problem.sums, len(problem.gears)
-    centre = values["stiffness"]
-    sigma = values["sigma"] * jnp.exp(values["noise_spread"] * _PLACES)
-    variance = jnp.broadcast_to(sigma[None] ** 2, (len(sums.rows), _NODES))
-    of_mean = values["run_offset_sd"] ** 2 + variance / sums.rows[:, None]
-    # Sums about a gear of the population's centre.
-    rest_y = (sums.y - centre * sums.x - values["zero"])[:, None]
-    rest_xy = (sums.xy - centre * sums.xx)[:, None]
-    rest_yy = (sums.yy - 2.0 * centre * sums.xy + centre**2 * sums.xx)[:, None]
-    x, xx = sums.x[:, None], sums.xx[:, None]
-    parts = jnp.stack(
-        [
-            xx / variance + x**2 / of_mean,
-            rest_xy / variance + x * rest_y / of_mean,
-            rest_yy / variance + rest_y**2 / of_mean,
-            (sums.rows[:, None] - 1.0) * jnp.log(variance) + jnp.log(of_mean),
-        ]
+    sums = jax.tree.map(lambda column: column[..., None], problem.sums)
+    centre, zero = values["stiffness"], values["zero"]
+    sigma, log_weight = _noise_nodes(problem.sums, values)
+    noise = sigma[:, None] ** 2
+    of_mean = values["run_offset_sd"] ** 2 + noise / sums.rows
+    # Sums about a gear of the population's centre, whose zeros are in the middle.
+    rest_xy = sums.xy - centre * sums.xx - zero * sums.x
+    rest_yy = (
+        sums.yy
+        - 2.0 * (centre * sums.xy + zero * sums.y)
+        + centre * (centre * sums.xx + 2.0 * zero * sums.x)
+        + zero**2 * sums.mountings
     )
-    whole = jax.vmap(lambda part: jax.ops.segment_sum(part, sums.gear, size))(parts)
-    precision, slope, square, volume = whole[..., None]
+    own_xy = sums.own_xy - centre * sums.own_xx
+    own_yy = sums.own_yy - centre * (sums.own_xy + own_xy)
+    log_noise = (sums.rows - 1.0) * jnp.log(noise) + jnp.log(of_mean)
+
+    def whole(part):
+        return jnp.sum(part, axis=1)[..., None]
+
+    precision = whole(sums.own_xx / noise + sums.xx / of_mean)
+    slope = whole(own_xy / noise + rest_xy / of_mean)
+    square = whole(own_yy / noise + rest_yy / of_mean)
+    volume = whole(sums.mountings * log_noise)
     ordinary = values["specimen_sd"] * centre
     kinds = jnp.stack([jnp.ones(()), jnp.sqrt(1.0 + values["off_ratio"] ** 2)])
     between = (ordinary * kinds) ** 2
@@ -135,12 +118,34 @@ def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
     shrunk = 1.0 + between * precision
     log_joint = (
         -0.5 * (square + volume + jnp.log(shrunk) - slope**2 * between / shrunk)
-        + _LOG_WEIGHTS[:, None]
+        + log_weight[..., None]
         + jnp.log(jnp.stack([1.0 - share, share]))
     )
     mean = centre + slope * between / shrunk
     far = (slope / jnp.sqrt(precision * shrunk))[..., 0]
-    return GearLaw(log_joint, mean, jnp.sqrt(between / shrunk), far)
+    return GearLaw(log_joint, mean, jnp.sqrt(between / shrunk), sigma, far)
+
+
+def _noise_nodes(sums: GearSums, values: Mapping):
+    """Return noise sds of a gear [N] and the logs of their weights, both [gear, node].
+
+    A gear's own line leaves ν degrees of freedom of the noise sd s, which say
+    -ν (log σ + ½ s²/σ²) of log σ. Nodes lie about the mode of that and the law of all,
+    and as far apart as it is wide: those of the law of all would miss what many
+    readings say.
+    """
+    spread, pull = values["noise_spread"], sums.noise_free * values["noise_spread"]
+    own = sums.log_noise_sd - jnp.log(values["sigma"])
+    # In sds of the law of all, about its centre.
+    mode = 2.0 * pull * own / (1.0 + 2.0 * pull * spread)
+    for _ in range(_NEWTON):
+        square = pull * jnp.exp(2.0 * (own - spread * mode))
+        mode += (square - pull - mode) / (1.0 + 2.0 * spread * square)
+    square = pull * jnp.exp(2.0 * (own - spread * mode))
+    width = 1.0 / jnp.sqrt(1.0 + 2.0 * spread * square)
+    place = mode[:, None] + width[:, None] * _PLACES
+    log_weight = _LOG_WEIGHTS + 0.5 * (_PLACES**2 - place**2) + jnp.log(width)[:, None]
+    return values["sigma"] * jnp.exp(spread * place), log_weight
 
 
 @log_likelihood.register
@@ -192,15 +197,14 @@ def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
         draw, key = drawn
         law = gear_law(problem, draw)
         which, where = jax.random.split(key)
-        flat = law.log_weight.reshape(len(problem.gears), -1)
+        flat = law.log_weight.reshape(len(law.far), -1)
         case = jax.random.categorical(which, flat)[:, None]
         mean, sd = (
             jnp.take_along_axis(part.reshape(flat.shape), case, axis=1)[:, 0]
             for part in (law.mean, law.sd)
         )
         stiffness = mean + sd * jax.random.normal(where, mean.shape)
-        place = jnp.asarray(_PLACES)[case[:, 0] // 2]
-        noise = draw["sigma"] * jnp.exp(draw["noise_spread"] * place)
+        noise = jnp.take_along_axis(law.noise_sd, case // 2, axis=1)[:, 0]
         off = jnp.exp(jax.nn.logsumexp(law.log_weight[..., 1], axis=1))
         weight = jax.nn.softmax(law.log_weight[..., 1], axis=1)
         chance = jnp.sum(weight * 2.0 * jax.scipy.stats.norm.sf(abs(law.far)), axis=1)

@@ -1,0 +1,105 @@
+"""What readings say of gears: sums, whatever the number of rows."""
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float, Int
+
+from hdcal.data.records import Array
+
+# Share of squares that rounding alone leaves.
+_NOTHING = 1e-12
+
+
+class MountingSums(eqx.Module):
+    """What the readings of each mounting say, one entry each.
+
+    Attributes:
+        gear: index of its gear.
+        rows: number of readings [-].
+        x: mean deformation as read, at the modulus of its temperature [mm].
+        y: mean force [N].
+        xx: squares about the mean, summed [mm²].
+        xy: products likewise [N mm].
+        yy: squares likewise [N²].
+    """
+
+    gear: Int[Array, " m"]
+    rows: Float[Array, " m"]
+    x: Float[Array, " m"]
+    y: Float[Array, " m"]
+    xx: Float[Array, " m"]
+    xy: Float[Array, " m"]
+    yy: Float[Array, " m"]
+
+
+class GearSums(eqx.Module):
+    """What the readings of each gear say: its mountings of equally many rows together.
+
+    Whatever the law of their zeros, these have one and the same.
+
+    Attributes:
+        mountings: how many have so many rows; 0 where a gear has no more kinds.
+        rows: readings in each of them.
+        x: their mean deformations, summed [mm].
+        y: mean forces likewise [N].
+        xx: squares of the means likewise [mm²].
+        xy: products likewise [N mm].
+        yy: squares likewise [N²].
+        own_xx: squares about each mounting's mean, summed [mm²].
+        own_xy: products likewise [N mm].
+        own_yy: squares likewise [N²].
+        noise_free: degrees of freedom that a gear's own line leaves; [gear].
+        log_noise_sd: log of the noise sd beside it [N]; 0 where nothing tells it.
+    """
+
+    mountings: Float[Array, "g s"]
+    rows: Float[Array, "g s"]
+    x: Float[Array, "g s"]
+    y: Float[Array, "g s"]
+    xx: Float[Array, "g s"]
+    xy: Float[Array, "g s"]
+    yy: Float[Array, "g s"]
+    own_xx: Float[Array, "g s"]
+    own_xy: Float[Array, "g s"]
+    own_yy: Float[Array, "g s"]
+    noise_free: Float[Array, " g"]
+    log_noise_sd: Float[Array, " g"]
+
+
+def gear_sums(each: MountingSums, gears: int) -> GearSums:
+    """Return the sums of gears from those of their mountings.
+
+    Args:
+        each: mounting.
+        gears: how many there are.
+    """
+    kinds, kind = np.unique([each.gear, each.rows], axis=1, return_inverse=True)
+    gear = kinds[0].astype(int)
+    # Kinds are in the order of their gears: place within its own.
+    slot = np.arange(len(gear)) - np.searchsorted(gear, gear)
+    shape = gears, int(slot.max(initial=0)) + 1
+
+    def summed(values) -> np.ndarray:
+        table = np.zeros(shape)
+        table[gear, slot] = np.bincount(kind.ravel(), values, len(gear))
+        return table
+
+    rows = np.ones(shape)
+    rows[gear, slot] = kinds[1]
+    x, y = each.x, each.y
+    means = (np.ones_like(x), x, y, x * x, x * y, y * y)
+    count, *of_means = map(summed, means)
+    own = [summed(values) for values in (each.xx, each.xy, each.yy)]
+    return GearSums(count, rows, *of_means, *own, *_noise(count, rows, own))
+
+
+def _noise(count: np.ndarray, rows: np.ndarray, own) -> tuple[np.ndarray, np.ndarray]:
+    """Return degrees of freedom and log sd beside each gear's own line."""
+    xx, xy, yy = (values.sum(axis=1) for values in own)
+    free = np.sum(count * (rows - 1.0), axis=1) - 1.0
+    square = yy - xy**2 / np.where(xx > 0.0, xx, 1.0)
+    # What rounding leaves of an exact line is no noise.
+    told = (free > 0.0) & (square > _NOTHING * yy)
+    free = np.where(told, free, 0.0)
+    ratio = np.where(told, square, 1.0) / np.where(told, free, 1.0)
+    return free, 0.5 * np.log(ratio)
