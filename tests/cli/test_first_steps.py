@@ -150,6 +150,9 @@ def test_columns_that_nobody_would_guess_are_named(here: Hdcal, tmp_path: Path):
     named = ("--column", "deformation=a[mm]", "--column", "force=b[N]")
     assert here("init", tmp_path / "rig", *given, *named).returncode == 0
     assert library.read_case(tmp_path / "rig").records.force[-1] == 35.0
+    assert here("init", tmp_path / "later", *BEGUN, *named).returncode == 0
+    (tmp_path / "later" / "data.csv").write_text("a,b\n" + rows)
+    assert library.read_case(tmp_path / "later").records.force[-1] == 35.0
 
 
 def test_a_sheet_that_is_named_twice_is_told_once(here: Hdcal, log: Path):

@@ -163,6 +163,18 @@ def test_bad_mapping(folder, columns, expected):
     check(findings_of(folder, columns=columns), expected)
 
 
+@pytest.mark.parametrize("header", ["Messung Nr", "Probe Nr", "Run number"])
+def test_a_number_for_each_reading_is_no_label(folder, header):
+    rows = "".join(f"{k},{0.05 * k:.2f},{5 * k}\n" for k in range(1, 12))
+    (folder / "data.csv").write_text(f"{header},Weg [mm],Kraft [N]\n{rows}")
+    case = read_case(folder / "data.csv")
+    assert len(case.run_labels) == len(case.specimen_labels) == 1
+    assert any(header in note and "not used" in note for note in case.notes)
+    (folder / "data.csv").write_text(f"{header},Weg [mm],Kraft [N]\n{rows}{rows}")
+    case = read_case(folder / "data.csv")
+    assert 11 in (len(case.run_labels), len(case.specimen_labels))
+
+
 def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
     content = "here,there\n" + "".join(f"{i},{i}\n" for i in range(6))
     (folder / "data.csv").write_text(content)
@@ -222,9 +234,22 @@ def test_no_gear_says_what_to_do(folder):
     assert "does not exist" in findings_of(folder)[1].problem
 
 
-def test_a_first_reading_that_is_torn_is_no_title_of_a_table_without_headers(folder):
+@pytest.mark.parametrize("torn", ["0.005,1.0,20.5,start", "0.005,1.0", "0.005"])
+@pytest.mark.parametrize(
+    "above", ["", "Test of today\ndeformation_mm,force_N,temperature_C\n"]
+)
+def test_a_first_reading_that_is_torn_is_no_title(folder, torn, above):
     rows = "".join(f"{x / 100},{2 * x},{20 + x % 2}.5\n" for x in range(1, 12))
-    (folder / "data.csv").write_text("0.005,1.0,20.5,start\n" + rows)
-    columns = {"deformation": "1[mm]", "force": "2[N]"}
+    (folder / "data.csv").write_text(f"{above}{torn}\n{rows}")
+    columns = {} if above else {"deformation": "1[mm]", "force": "2[N]"}
     found = findings_of(folder, columns=columns)
-    check(found, [(1, None, "4 cells")])
+    check(found, [(above.count("\n") + 1, None, f"{torn.count(',') + 1} cell")])
+
+
+def test_labview_channels_whose_headers_name_another_unit_are_told(folder):
+    rows = "".join(f"{k}\t{0.05 * k:.2f}\t{5 * k}\n" for k in range(12))
+    top = "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"
+    units = "Y_Unit_Label\tmm\tkN\t\n***End_of_Header***\t\t\t\n"
+    headers = "X_Value\tWeg\tKraft [N]\tComment\n"
+    (folder / "data.csv").write_text(top + units + headers + rows)
+    check(findings_of(folder), [(5, None, "'Kraft [N]' names N, and the row of units")])

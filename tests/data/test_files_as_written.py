@@ -278,6 +278,15 @@ FILES = {
         ),
         ("lines above the table", "'X_Value'"),
     ),
+    "LabVIEW with commas, its units beside those of the headers": Written(
+        "LabVIEW Measurement,\n***End_of_Header***,\n,\nChannels,2,,\n"
+        "Y_Unit_Label,um,N,\n***End_of_Header***,,,\nX_Value,Weg,Kraft in N,Comment\n"
+        + "".join(
+            f"{k},{1000 * x:.6f},{y:.6f},\n"
+            for k, (x, y) in enumerate(zip(DEFORMATION, FORCE, strict=True))
+        ),
+        ("lines above the table", "'X_Value'"),
+    ),
     "blocks that name their runs themselves": Written(
         "deformation_mm,force_N,run\n"
         + "".join(

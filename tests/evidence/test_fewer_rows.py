@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rigs import cycles, make_case
+from rigs import cycles, make_case, make_records
 
+from hdcal.data.loading import derive_motion
 from hdcal.evidence.fewer_rows import average_rows, rows_of_half_cycle, thin_rows
 from hdcal.evidence.row_features import half_cycles, take_rows
 
@@ -29,10 +30,28 @@ def test_rows_of_runs_that_alternate_are_thinned_run_by_run():
     np.testing.assert_array_equal(thinned.force, plain.force)
 
 
-def test_half_cycles_have_their_rows():
-    half = half_cycles(CASE.records)
-    rows = [np.count_nonzero(half == each) for each in np.unique(half)]
-    assert rows_of_half_cycle(CASE) == np.median(rows)
+def ramps(*rows: int) -> np.ndarray:
+    """Return a path over one range, up and down in turn, in so many rows each."""
+    ends = [(0.0, 0.5), (0.5, 0.0)]
+    return np.concatenate(
+        [np.linspace(*ends[k % 2], n + 1)[1:] for k, n in enumerate(rows)]
+    )
+
+
+@pytest.mark.parametrize(
+    ("path", "rows"),
+    [
+        (ramps(*[10] * 24, 400, 400), 400),
+        (ramps(*[300] * 6, *[12] * 4), 300),
+        # Much is read where nothing is moved: that shows no loop.
+        (np.concatenate([ramps(*[40] * 10), np.linspace(0.0, 0.01, 8000)[1:]]), 40),
+    ],
+)
+def test_most_rows_lie_in_half_cycles_as_long_as(path, rows):
+    motion = derive_motion(path, np.zeros(len(path), int))
+    moved = {name: getattr(motion, name) for name in ("direction", "sense", "rate")}
+    records = make_records(path, 100.0 * path, known=motion.features, **moved)
+    assert rows_of_half_cycle(make_case(records)) == pytest.approx(rows, abs=2)
 
 
 def test_means_are_those_of_the_rows_from_one_kept_row_to_the_next():

@@ -56,6 +56,14 @@ def test_a_loop_in_rows_that_lie_closer_on_one_side_is_no_bend(noise):
     assert one.loop_N == pytest.approx(0.8, abs=0.05) and one.bend_N == 0.0
 
 
+@pytest.mark.parametrize("jitter", [0.0, 3e-9, 1e-4])
+def test_a_loop_that_three_readings_show_is_told_though_a_bend_looks_the_same(jitter):
+    path = np.array([0.1, 0.5, 0.3]) + np.zeros((GEARS, 2, 1))
+    path = path + jitter * np.random.default_rng(0).normal(size=path.shape)
+    one = found(np.array([0.4, 0.4, -0.4]), path=path)
+    assert one.loop_N == pytest.approx(0.8, abs=0.3) and one.bend_N == 0.0
+
+
 def test_a_loop_of_gears_that_are_pulled_has_its_sign():
     assert found(-0.4 * WAYS, path=-PATH).loop_N == pytest.approx(0.8, abs=0.05)
 

@@ -197,6 +197,11 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
         if quantity in REQUIRED:
             findings.add(words, remedy, table.header_row, column.header)
         return None
+    if quantity in LABELS:
+        labels = table.texts([column.position])[column.position]
+        if len({*labels}) == len(labels):
+            # A number for each reading is no label of a run or a gear.
+            return None
     return column
 
 

@@ -23,9 +23,8 @@ from hdcal.data.table_start import (
     header_cells,
     is_number,
     split_line,
-    unit_in,
 )
-from hdcal.data.units import known_unit
+from hdcal.data.unit_row import other_units, with_unit
 from hdcal.errors import quoted
 
 # The nearest double, not a fast approximation of it: the same file must give the
@@ -130,7 +129,7 @@ def split_table(
     if not utf8.strip():
         remedy = "Write a header row and at least 5 rows of readings"
         findings.refuse("the file is empty", remedy)
-    begin, utf8, spaced = _begin(with_whole_lines(utf8))
+    begin, utf8, spaced = _begin(with_whole_lines(utf8, findings))
     lines = utf8.split(b"\n")
     begin, separator, headers = _columns(begin, lines, findings, numbered=numbered)
     top = begin.readings if begin.headers is None else begin.headers
@@ -191,8 +190,8 @@ def _columns(
         findings.add_rows([(begin.torn + 1, *words)])
     if begin.units is not None:
         units = split_line(lines[begin.units].decode(), separator)
-        findings.add_rows(_other_units(headers, units, begin.units + 1))
-        headers = tuple(map(_with_unit, headers, units))
+        findings.add_rows(other_units(headers, units, begin.units + 1))
+        headers = tuple(map(with_unit, headers, units))
     return begin, separator, headers
 
 
@@ -223,25 +222,6 @@ def _begin(utf8: bytes) -> tuple[TableStart, bytes, bool]:
     first = len(utf8) - len(utf8.lstrip(b"\n"))
     start = find_start(head) or TableStart(first, None, first + 1)
     return start, utf8, text is not None
-
-
-def _with_unit(header: str, unit: str) -> str:
-    guess = guess_header(header)
-    named = guess is not None and bool(guess.unit)
-    return f"{header} [{unit_in(unit)}]" if unit and not named else header
-
-
-def _other_units(
-    headers: Iterable[str], units: Iterable[str], row: int
-) -> Iterator[tuple[int, str, str]]:
-    """Yield what is wrong where a header and the row of units name two units."""
-    for header, unit in zip(headers, units, strict=False):
-        guess = guess_header(header)
-        if guess is None or not guess.unit or not unit:
-            continue
-        if known_unit(guess.quantity, unit_in(unit)) != guess.unit:
-            words = f"{quoted(header)} names {guess.unit}, and the row of units {unit}"
-            yield row, words, "Leave one of them out"
 
 
 def _notes(

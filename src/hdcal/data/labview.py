@@ -2,12 +2,15 @@
 
 from collections.abc import Iterator
 
-from hdcal.data.table_start import split_line, unit_in
+from hdcal.data.findings import FileFindings
+from hdcal.data.table_start import is_number, split_line, unit_in
+from hdcal.data.unit_row import other_units, with_unit
 
 _BEGINS, _LAST, _UNITS = b"LabVIEW Measurement", "Comment", "Y_Unit_Label"
+_SEPARATORS = "\t,;"
 
 
-def with_whole_lines(utf8: bytes) -> bytes:
+def with_whole_lines(utf8: bytes, findings: FileFindings) -> bytes:
     """Return a file of LabVIEW's with as many cells in its readings as in its headers.
 
     Above its headers each block states the units of its channels, which join them.
@@ -15,23 +18,29 @@ def with_whole_lines(utf8: bytes) -> bytes:
 
     Args:
         utf8: lines ended by a newline.
+        findings: of the file; gets one where headers name other units.
     """
     if not utf8.startswith(_BEGINS):
         return utf8
-    return "\n".join(_lines(utf8.decode().split("\n"))).encode()
+    return "\n".join(_lines(utf8.decode().split("\n"), findings)).encode()
 
 
-def _lines(lines: list[str]) -> Iterator[str]:
-    separator, width, units = "\t", 0, [""]
-    for line in lines:
+def _lines(lines: list[str], findings: FileFindings) -> Iterator[str]:
+    separator, width, units, row_of_units = "\t", 0, [], 0
+    for row, line in enumerate(lines, 1):
         bare = line.rstrip()
+        headers = _headers(bare)
         if bare.startswith(_UNITS):
-            units = split_line(bare, bare[len(_UNITS) :][:1] or separator)
-        elif bare.endswith(_LAST) and bare[: -len(_LAST)][-1:] in (",", "\t"):
-            separator = bare[: -len(_LAST)][-1]
-            headers = split_line(bare, separator)
-            width = len(headers)
-            line = separator.join(_with_units(headers, units))
+            mark = bare[len(_UNITS) :][:1] or separator
+            units, row_of_units = split_line(line, mark)[1:], row
+        elif headers:
+            separator, width = bare[: -len(_LAST)][-1], len(headers)
+            own = [*headers, *[""] * (len(split_line(line, separator)) - width)]
+            labels = ["", *map(unit_in, units)] if _of_channels(headers) else []
+            findings.add_rows(other_units(headers, labels, row_of_units))
+            labels += [""] * (len(own) - len(labels))
+            line = separator.join(map(with_unit, own, labels))
+            units = []
         elif not bare:
             width = 0
         elif width and len(split_line(line, separator)) == width - 1:
@@ -39,12 +48,15 @@ def _lines(lines: list[str]) -> Iterator[str]:
         yield line
 
 
-def _with_units(headers: list[str], units: list[str]) -> list[str]:
-    """Return headers with units, which are those of all but the first and the last."""
-    if len(units) != len(headers) - 1:
-        return headers
-    known = ["", *map(unit_in, units[1:]), ""]
-    return [
-        f"{header} [{unit}]" if unit and unit not in header else header
-        for header, unit in zip(headers, known, strict=True)
-    ]
+def _headers(bare: str) -> list[str]:
+    """Return the cells of a line of headers; none of any other line."""
+    separator = bare[: -len(_LAST)][-1:] if bare.endswith(_LAST) else ""
+    if not separator or separator not in _SEPARATORS:
+        return []
+    cells = split_line(bare, separator)
+    return [] if any(map(is_number, cells)) else cells
+
+
+def _of_channels(headers: list[str]) -> bool:
+    """Tell whether all between the first and the last are channels."""
+    return headers.count("X_Value") == 1 and headers[0] == "X_Value"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.columns import Columns
+from hdcal.data.columns import LABELS, Columns
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
@@ -190,10 +190,12 @@ def _left_out(columns: Columns) -> Iterator[str]:
     for header in extra:
         guess = guess_header(header)
         if guess is not None and not guess.unit and guess.quantity not in columns.used:
-            example = f"{guess.quantity} = '{header}[UNIT]'"
+            label = guess.quantity in LABELS
+            why = "differs in every row" if label else "names no unit"
+            example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (
                 f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
-                f"used, as it names no unit. Name the column to use it, as in {example}"
+                f"used, as it {why}. Name the column to use it: {example}"
             )
     if extra:
         yield f"columns not used: {', '.join(map(quoted, extra))}"

@@ -27,8 +27,8 @@ class TableStart(NamedTuple):
         headers: line of the headers; None where the readings have none.
         units: line of their units; None without one.
         readings: first line of the readings.
-        torn: line of numbers right above readings without headers, which has more
-            cells than they have, or fewer; None without one.
+        torn: line of numbers right above the readings, which has more cells than they
+            have, or fewer; None without one.
     """
 
     headers: int | None
@@ -88,7 +88,7 @@ def is_number(cell: str) -> bool:
 
 def is_reading(cells: list[str], width: int) -> bool:
     """Tell whether cells are as many as those of a reading, two of them numbers."""
-    return len(cells) == width and _are_numbers(cells)
+    return len(cells) == width and sum(map(is_number, cells)) >= 2
 
 
 def unit_in(cell: str) -> str:
@@ -116,16 +116,14 @@ def _start(
         second = above[0] + 1
         units = second if _are_units(cells, above[1:2]) else None
         return TableStart(above[0], units, second + (units is not None))
+    torn = None
+    if every and every[-1] not in above and is_number(cells[every[-1]][0]):
+        *every, torn = every
     if not above or above[-1] != every[-1]:
-        torn = every[-1] if every and _are_numbers(cells[every[-1]]) else None
         return TableStart(None, None, first, torn)
     if _are_units(cells, above[-1:]) and len(above) > 1:
-        return TableStart(above[-2], above[-1], first)
-    return TableStart(above[-1], None, first)
-
-
-def _are_numbers(cells: list[str]) -> bool:
-    return sum(map(is_number, cells)) >= 2
+        return TableStart(above[-2], above[-1], first, torn)
+    return TableStart(above[-1], None, first, torn)
 
 
 def _names(cells: list[str]) -> bool:

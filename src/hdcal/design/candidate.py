@@ -13,8 +13,8 @@ from hdcal.design.force_limit import LimitedGear
 from hdcal.design.nearest_point import CLOSE, nearest_kept
 from hdcal.prediction.engine.sizes import SIZES
 
-# Draws about a quantile that tell its slope.
-_ABOUT = 101
+# Draws on either side of a quantile that tell its slope.
+_BESIDE = 50
 
 
 @dataclass(frozen=True)
@@ -159,8 +159,8 @@ def _elasticities(target: LimitedGear, place):
     # The slope of a quantile is the mean slope of the draws about it, of which one
     # alone is a rough number: Hong, Operations Research 57 (2009).
     order = jnp.argsort(target.forces(place))
-    begin = max(min(target.rank - _ABOUT // 2, len(order) - _ABOUT), 0)
-    about = order[begin : begin + _ABOUT]
+    half = min(_BESIDE, target.rank, len(order) - 1 - target.rank)
+    about = order[target.rank - half : target.rank + half + 1]
     mean = jax.value_and_grad(lambda place: target.forces(place)[about].mean())
     force, slopes = mean(place)
     return {name: slope * place[name] / force for name, slope in slopes.items()}

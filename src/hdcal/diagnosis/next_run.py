@@ -174,8 +174,6 @@ def _piece_on_run(
     """Return an effect about its fitted amplitude, of mean and sd, as linear."""
     centre, spread = size
     grid = make_grid(effect, prepared.priors)
-    # Of an amplitude that the readings leave open a slope is one about its centre.
-    spread = min(spread, abs(centre)) or spread
     low, high = centre - spread, centre + spread
     if grid.one_sided:
         low, high = max(low, 0.02 * abs(high)), max(high, 1e-9)

@@ -10,6 +10,8 @@ from hdcal.evidence.row_features import half_cycles, take_rows
 
 # Rows up to which every one is kept: kernels and tolerances of 10⁴ rows take 1 GB.
 MOST_ROWS = 10_000
+# Share of the longest travel of a half cycle from which on one shows a loop.
+_FAR = 0.5
 _AVERAGED = ("deformation", "temperature", "time", "angle", "rate", "force")
 
 
@@ -59,9 +61,19 @@ def thin_rows(case: Case, step: int) -> Case:
     return replace(case, records=take_rows(records, kept))
 
 
-def rows_of_half_cycle(case: Case) -> float:
-    """Return how many rows a half cycle has, in the median over all."""
-    return float(np.median(np.bincount(half_cycles(_run_after_run(case)))))
+def rows_of_half_cycle(case: Case) -> int:
+    """Return how many rows the half cycle has in which the median row lies.
+
+    Of those that go at least half as far as the farthest: others show no loop.
+    """
+    records = _run_after_run(case)
+    half, deformation = half_cycles(records), np.asarray(records.deformation)
+    begin = np.flatnonzero(np.diff(half, prepend=half[0] - 1))
+    ends = [np.ufunc.reduceat(f, deformation, begin) for f in (np.minimum, np.maximum)]
+    travel = ends[1] - ends[0]
+    rows = np.sort(np.bincount(half - half[0])[travel >= _FAR * travel.max()])
+    total = np.cumsum(rows)
+    return int(rows[np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _run_after_run(case: Case) -> Records:

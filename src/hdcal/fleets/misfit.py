@@ -17,6 +17,8 @@ _CLEAR = 4.0
 _SMALL, _LITTLE = 0.2, 0.2
 # Correlation that is believed at most.
 _MOST_ALIKE = 0.99
+# Share of a shape that is not in those before it, from which on it is one of its own.
+_OTHER = 0.05
 # Size of a shape, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
 
@@ -83,8 +85,10 @@ def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):
 
     A shape that is none, or no other than those before it, has the size 0.
     """
+    length = np.linalg.norm(shapes, axis=0)
     upper = np.linalg.qr(shapes, mode="r")
-    own = np.abs(np.diag(upper)) > _NOTHING * np.sqrt(len(error))
+    own = np.abs(np.diag(upper)) > _OTHER * length
+    own &= length > _NOTHING * np.sqrt(len(error))
     sizes, clear = np.zeros((2, shapes.shape[1]))
     shapes = shapes / sd[:, None]
     if own.any():

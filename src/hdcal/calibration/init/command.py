@@ -111,7 +111,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
     measured = {
         key: tables.pop(key) for key in ("deformation", "reference_temperature_C")
     }
-    columns = {} if case is None else case.columns
+    columns = columns or {} if case is None else case.columns
     files = {GEAR_NAME: gear_text(tables, measured, columns).encode()}
     if data is not None:
         files[DATA_NAME] = text_of(Path(data), sheet)
