@@ -75,11 +75,16 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
             f"{lookalikes_counted(which)} such cases of blind checks had another cause."
         )
     elif _SURE <= which.inclusion[which.effect] < NAME:
-        name = capital(label(which.effect))
-        yield f"{name} is not named: a name takes {percent(NAME)}."
+        yield (
+            f"{capital(label(which.effect))} is not named: its "
+            f"{100.0 * which.inclusion[which.effect]:.1f} % are short of the "
+            f"{percent(NAME)} that a name takes."
+        )
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."
+    for name in others:
+        yield f"Against {label(name)}: {GROUPS[EFFECTS[name].group].remedy}."
     yield from _looks_the_same(which)
     yield from _twins(which)
     yield from _beside(which, label(which.effect))
@@ -120,12 +125,25 @@ def ambiguous(found: VerdictAnswer) -> Iterator[str]:
     yield what_is_seen(found)
     chances = {name: or_zero(_chance(which, name)) for name in which.set}
     ranked = sorted(chances, key=lambda name: -chances[name])
-    causes = ", ".join(_with_chance(which, name) for name in ranked)
     several = sum(chances.values()) > 1.0 + 1e-6
     twice = "; what acts together counts for each" if several else ""
-    yield f"The cause cannot be told with this data; it may be {causes}{twice}."
+    if which.second_effect:
+        chance = which.probabilities.get("+".join(sorted(which.named)))
+        both = " and ".join(map(label, which.named))
+        ranked = [name for name in ranked if name not in which.named]
+        yield (
+            "The cause cannot be told for sure with this data; most likely are "
+            f"{both} together ({percent(chance)})."
+        )
+        lead, what, twice = "Or it may be", both, ""
+    else:
+        lead = "The cause cannot be told with this data; it may be"
+        what = label(which.effect or which.set[0])
+    causes = ", ".join(_with_chance(which, name) for name in ranked)
+    if ranked:
+        yield f"{lead} {causes}{twice}."
     yield from _looks_the_same(which)
-    yield from _shrinks(found, label(which.effect or which.set[0]))
+    yield from _shrinks(found, what)
 
 
 def unknown(found: VerdictAnswer) -> Iterator[str]:

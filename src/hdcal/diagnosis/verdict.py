@@ -80,7 +80,8 @@ class Which:
         verdict: none, named, group, ambiguous or unknown.
         effect: top effect by inclusion, under `group` of that group; None for none
             and unknown.
-        second_effect: another with inclusion of 97 % or more.
+        second_effect: another with inclusion of 97 % or more; where nothing is named
+            also that of a pair with 50 % or more.
         set: effects of the smallest set of hypotheses with 90 %, most probable first.
         probabilities: of all hypotheses; sum to 1.
         inclusion: of each effect over all hypotheses that hold it.

@@ -37,6 +37,9 @@ from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 
+# Probability from which on what acts beside an effect is told, where neither is named.
+_LIKELY = 0.5
+
 
 def identify_cause(
     evidence: CaseEvidence,
@@ -62,8 +65,9 @@ def identify_cause(
     suspected = word in ("named", "group", "ambiguous") and bool(ranked)
     leader = _leader(word, ranked, group)
     if leader != best:
-        others = [n for n in ranked if n != leader and posterior.inclusion[n] >= SURE]
         unseen = untestable_lookalikes(evidence, leader, library)
+    if word != "named":
+        others = _beside(posterior, leader, ranked)
     effect = leader if suspected else None
     counted = naming().called.get(effect or "")
     return Which(
@@ -99,6 +103,16 @@ def _leader(word: str, ranked: Sequence[str], group: LeadingGroup | None) -> str
     if word == "group" and group is not None:
         return next(name for name in ranked if name in group.members)
     return ranked[0] if ranked else ""
+
+
+def _beside(posterior: ModelPosterior, leader: str, ranked: Sequence[str]) -> list[str]:
+    """Return what acts beside an effect: surely, or in the likeliest pair."""
+    rest = [name for name in ranked if name != leader]
+    sure = [name for name in rest if posterior.inclusion[name] >= SURE]
+    pair = posterior.top.split("+")
+    if sure or leader not in pair or posterior.probabilities[posterior.top] < _LIKELY:
+        return sure
+    return [name for name in rest if name in pair]
 
 
 def _certificate(word: str, library: Mapping) -> Certificate | None:

@@ -116,7 +116,7 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
 
 
 def find_structure(
-    data: Whitened, sd: np.ndarray, noise: Correlated | None = None
+    data: Whitened, sd: np.ndarray, noise: Correlated | None = None, *, looks: int = 1
 ) -> tuple[Structure, ...]:
     """Find the shapes that residuals have beyond what the model can absorb.
 
@@ -126,10 +126,11 @@ def find_structure(
         data: residuals, sensitivities and shapes.
         sd: noise sd of each row [N].
         noise: how neighbours may err alike; None where they do not in the model.
+        looks: how often the same shapes are looked for.
 
     Returns:
         The shapes found, each at a family-wise error of `FALSE_ALARM`, Bonferroni
-        over the shapes still tried.
+        over the shapes still tried, in all looks.
     """
     shapes, absorbed = dict(data.shapes), data.absorbed
     found: list[Structure] = []
@@ -139,7 +140,7 @@ def find_structure(
         if not tests:
             break
         p, part, error, left, name = min(tests, key=lambda test: test[0])
-        p = min(1.0, p * len(tests))
+        p = min(1.0, p * len(tests) * looks)
         if p > FALSE_ALARM:
             break
         rms = float(abs(part) * np.sqrt(np.mean((left[: len(sd)] * sd) ** 2)))
