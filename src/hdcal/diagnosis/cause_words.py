@@ -46,6 +46,8 @@ def named(found: VerdictAnswer) -> Iterator[str]:
         middle = with_unit(middle, size.unit)
         name = label(size.parameter.rpartition(".")[2])
         yield f"Most likely cause: {cause}; its {name} is {middle} ({span})."
+    if which.named == ("run_offset",):
+        yield "A calibration gives each mounting a zero of its own already."
     yield from _twins(which)
     yield from _beside(which, label(which.effect))
     yield from _shrinks(found, "it" if not which.second_effect else "them")
@@ -84,7 +86,10 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
         yield f"Against {what}: {group.remedy}."
     for name in others:
-        yield f"Against {label(name)}: {GROUPS[EFFECTS[name].group].remedy}."
+        groups = EFFECTS[name].groups if name in EFFECTS else ()
+        remedies = [GROUPS[one].remedy for one in groups if GROUPS[one] not in own]
+        if remedies:
+            yield f"Against {label(name)}: {'; '.join(remedies)}."
     yield from _looks_the_same(which)
     yield from _twins(which)
     yield from _beside(which, label(which.effect))

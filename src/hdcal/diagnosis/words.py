@@ -76,8 +76,9 @@ def _sentences(found: VerdictAnswer) -> list[str]:
     said = list(say.get(found.which.verdict, unknown)(found))
     if found.stiffness_N_per_mm is not None:
         middle, span = estimate(found.stiffness_N_per_mm)
-        over = "" if found.which.verdict == "none" else ", whatever of this it is"
-        said.append(f"The stiffness{over}: {middle} N/mm ({span}), per mm as read.")
+        over = "" if found.which.verdict == "none" else ", causes weighed as told"
+        sure = f"{percent(found.interval)}: {span}"
+        said.append(f"The stiffness{over}: {middle} N/mm ({sure}), per mm as read.")
     return said
 
 

@@ -90,8 +90,8 @@ def fleet(
     case: Case,
     *,
     chains: int = 4,
-    warmup: int = 1000,
-    draws: int = 1000,
+    warmup: int = 500,
+    draws: int = 500,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Fleet:
