@@ -146,9 +146,10 @@ def _assumed(
             )
         if column.guessed:
             unit = f" in {column.unit}" if column.unit else ""
+            form = "HEADER" if quantity in LABELS else "HEADER[UNIT]"
             yield (
                 f"{ASSUMED}{quoted(column.header)} is the {quantity}{unit}. If not, "
-                f"name the column: --column '{quantity}=HEADER[UNIT]'"
+                f"name the column: --column '{quantity}={form}'"
             )
 
 
