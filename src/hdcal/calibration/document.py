@@ -33,6 +33,8 @@ ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
     "combination of its own inputs reproduces; its K = 0.13 is no property of the gear."
 )
+# The shape that loading and unloading leave which differ.
+LOOPED = "direction"
 _IMPLAUSIBLE = (
     "First look at the units of the columns, and at sizes and [measurement] of the "
     "gear file: what comes out is not what such a gear is believed to be."
@@ -52,7 +54,7 @@ _EACH = (
 # Shape of the residuals -> what to do about it.
 _REMEDY: Mapping[str, str] = {
     "end": "Take more readings near the largest deformation, loading and unloading.",
-    "direction": "Diagnose: that weighs what can part loading from unloading, "
+    LOOPED: "Diagnose: that weighs what can part loading from unloading, "
     "friction and hysteresis among it.",
     "temperature": "Diagnose: that weighs what a change of temperature does.",
     "temperature x deformation": "Check the prior of alpha for this material.",
@@ -70,13 +72,20 @@ _LACKING: Mapping[str, str] = {
 }
 
 
-def headline(found: Interval, case: Case, bend: Sequence[LocalStiffness] = ()) -> str:
+def headline(
+    found: Interval,
+    case: Case,
+    bend: Sequence[LocalStiffness] = (),
+    *,
+    looped: bool = False,
+) -> str:
     """Return the stiffness in one sentence.
 
     Args:
         found: of a straight line.
         case: whose it is; without temperatures it holds at that of the test.
         bend: its slope at several places, where the readings bend.
+        looped: whether readings on loading and on unloading differ from it.
     """
     middle, span = estimate(found)
     # Three digits of each slope.
@@ -88,6 +97,8 @@ def headline(found: Interval, case: Case, bend: Sequence[LocalStiffness] = ()) -
     told = (
         f". That is a straight line; the readings bend, from {slopes}" if bend else ""
     )
+    if looped and not bend:
+        told = ". Loading and unloading differ from that line: it may lie outside"
     was_read = "temperature" in case.records.known
     warm = f" at {case.gear.reference_temperature:g} °C" * was_read
     return (
@@ -142,7 +153,12 @@ def calibration_document(
         f"({found.data.name}), theory “{found.gear.theory}”"
         f"{', with ' * bool(effects)}{effects}.",
         # Of a failed calibration the page shows it struck through.
-        headline=headline(found.stiffness_N_per_mm, posterior.case, found.bend),
+        headline=headline(
+            found.stiffness_N_per_mm,
+            posterior.case,
+            found.bend,
+            looped=LOOPED in {shape.name for shape in found.residuals},
+        ),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
         notices=[

@@ -12,6 +12,7 @@ from hdcal.calibration.answer import (
 )
 from hdcal.calibration.document import (
     ARTICLE_NOTE,
+    LOOPED,
     calibration_document,
     headline,
     next_steps,
@@ -56,9 +57,10 @@ def calibration_answer(
     steps = tuple(next_steps(posterior, left))
     stiffness = credible_interval(posterior.draws["stiffness"])
     bend = tuple(_bend(posterior, left))
-    first = headline(stiffness, posterior.case, bend)
-    entries = posterior_entries(posterior, first, steps)
     found = *left.structure, *left.noise
+    looped = LOOPED in {shape.name for shape in found}
+    first = headline(stiffness, posterior.case, bend, looped=looped)
+    entries = posterior_entries(posterior, first, steps)
     entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(
         **entries,
