@@ -91,7 +91,7 @@ def fleet(
     *,
     chains: int = 4,
     warmup: int = 500,
-    draws: int = 500,
+    draws: int = 800,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Fleet:
