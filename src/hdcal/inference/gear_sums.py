@@ -87,10 +87,23 @@ def gear_sums(each: MountingSums, gears: int) -> GearSums:
     rows = np.ones(shape)
     rows[gear, slot] = kinds[1]
     x, y = each.x, each.y
-    means = (np.ones_like(x), x, y, x * x, x * y, y * y)
-    count, *of_means = map(summed, means)
+    count = summed(np.ones_like(x))
     own = [summed(values) for values in (each.xx, each.xy, each.yy)]
-    return GearSums(count, rows, *of_means, *own, *_noise(count, rows, own))
+    free, log_sd = _noise(count, rows, own)
+    return GearSums(
+        mountings=count,
+        rows=rows,
+        x=summed(x),
+        y=summed(y),
+        xx=summed(x * x),
+        xy=summed(x * y),
+        yy=summed(y * y),
+        own_xx=own[0],
+        own_xy=own[1],
+        own_yy=own[2],
+        noise_free=free,
+        log_noise_sd=log_sd,
+    )
 
 
 def _noise(count: np.ndarray, rows: np.ndarray, own) -> tuple[np.ndarray, np.ndarray]:
