@@ -80,3 +80,23 @@ def test_the_noise_of_means_is_called_so():
     assert "standard deviation of a mean of 3 readings" in page(
         replace(named(), averaged_rows=3)
     )
+
+
+def test_the_likeliest_pair_is_told_as_a_pair():
+    verdict = KINDS["ambiguous"]()
+    chances = {
+        "progressive_stiffening+seating_slack": 0.7,
+        "outliers+progressive_stiffening+seating_slack": 0.1,
+        "unknown": 0.2,
+    }
+    which = replace(
+        verdict.which,
+        second_effect="seating_slack",
+        set=("progressive_stiffening", "seating_slack", "unknown"),
+        probabilities=chances,
+        inclusion={"progressive_stiffening": 0.8, "seating_slack": 0.8},
+    )
+    told = " ".join(verdict_answer(replace(verdict, which=which)).answer)
+    assert "progressive stiffening and seating slack together (80 %)." in told
+    assert "Or it may be something outside the library (20 %)." in told
+    assert "Adding progressive stiffening and seating slack removes" in told

@@ -133,7 +133,9 @@ def ambiguous(found: VerdictAnswer) -> Iterator[str]:
     several = sum(chances.values()) > 1.0 + 1e-6
     twice = "; what acts together counts for each" if several else ""
     if which.second_effect:
-        chance = which.probabilities.get("+".join(sorted(which.named)))
+        pair = {*which.named}
+        with_both = [n for n in which.probabilities if pair <= {*n.split("+")}]
+        chance = sum(or_zero(which.probabilities[name]) for name in with_both)
         both = " and ".join(map(label, which.named))
         ranked = [name for name in ranked if name not in which.named]
         yield (
