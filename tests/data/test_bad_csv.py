@@ -170,9 +170,18 @@ def test_a_number_for_each_reading_is_no_label(folder, header):
     case = read_case(folder / "data.csv")
     assert len(case.run_labels) == len(case.specimen_labels) == 1
     assert any(header in note and "not used" in note for note in case.notes)
-    (folder / "data.csv").write_text(f"{header},Weg [mm],Kraft [N]\n{rows}{rows}")
+    twice = "".join(2 * f"{row}\n" for row in rows.split())
+    (folder / "data.csv").write_text(f"{header},Weg [mm],Kraft [N]\n{twice}")
     case = read_case(folder / "data.csv")
     assert 11 in (len(case.run_labels), len(case.specimen_labels))
+
+
+def test_a_counter_that_begins_again_with_each_ramp_is_no_run(folder):
+    rows = "".join(f"{k},{0.05 * k:.2f},{5 * k}\n" for k in range(1, 9))
+    (folder / "data.csv").write_text(f"Messung,Weg [mm],Kraft [N]\n{3 * rows}")
+    case = read_case(folder / "data.csv")
+    assert len(case.run_labels) == 1
+    assert any("'Messung', which may be the run, is not" in n for n in case.notes)
 
 
 def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from itertools import pairwise
 
 import numpy as np
 
@@ -199,8 +200,9 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
         return None
     if quantity in LABELS:
         labels = table.texts([column.position])[column.position]
-        if len({*labels}) == len(labels):
-            # A number for each reading is no label of a run or a gear.
+        # A number for each reading is no label of a run or a gear, and a run lasts.
+        counted = quantity == "run" and all(a != b for a, b in pairwise(labels))
+        if counted or len({*labels}) == len(labels):
             return None
     return column
 

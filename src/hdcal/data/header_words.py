@@ -25,10 +25,7 @@ WORDS: dict[str, tuple[str, ...]] = {
     "temperature": ("temperature", "temp", "temperatur", "température", "温度"),
     "time": ("time", "zeit", "prüfzeit", "temps", "durée", "时间"),
     "angle": ("angle", "winkel", "drehwinkel", "角度"),
-    "run": (
-        *("run", "mounting", "repeat", "lauf", "messung", "versuch", "einspannung"),
-        *("wiederholung", "essai"),
-    ),
+    "run": ("run", "lauf", "messung", "essai"),
     "specimen": (
         *("specimen", "gear", "serial", "seriennummer", "probe", "prüfling"),
         "éprouvette",

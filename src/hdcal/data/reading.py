@@ -191,7 +191,9 @@ def _left_out(columns: Columns) -> Iterator[str]:
         guess = guess_header(header)
         if guess is not None and not guess.unit and guess.quantity not in columns.used:
             label = guess.quantity in LABELS
-            why = "differs in every row" if label else "names no unit"
+            why = "names no unit"
+            if label:
+                why = "differs from row to row, or another may be meant"
             example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (
                 f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "

@@ -70,7 +70,8 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     others = [n for n in which.named if n not in which.group_members]
     if others:
         told = " and ".join(_with_chance(which, name) for name in others)
-        yield f"Together with it acts {told}."
+        sure = all(which.inclusion[n] >= _SURE for n in others)
+        yield f"Together with it {'' if sure else 'most likely '}acts {told}."
     if which.describes_best:
         yield (
             f"{capital(label(which.effect))} alone describes it, but is not named: "
