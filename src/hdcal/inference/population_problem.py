@@ -25,8 +25,10 @@ from hdcal.inference.sampled_problem import Sampled
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
 _NODES = 4
 _PLACES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(_NODES)
-_NEWTON = 8
 _LOG_WEIGHTS = np.log(_WEIGHTS / _WEIGHTS.sum())
+
+# Newton's steps to where it likely is.
+_NEWTON = 8
 
 # Sites that a population adds to those of a gear.
 POPULATION_PRIORS: Mapping[str, Prior] = {
