@@ -179,3 +179,21 @@ def test_one_in_thirty_is_found_and_none_is_called_falsely():
         wrong += found.called.any()
     assert right >= 0.9 * fleets - 2.0 * np.sqrt(0.09 * fleets)
     assert wrong <= 0.05 * fleets + 2.0 * np.sqrt(0.05 * fleets)
+
+
+def test_a_few_readings_that_the_display_shows_on_a_line_scatter_by_its_steps():
+    rng = np.random.default_rng(3)
+    gears, x = 40, np.array([0.1, 0.2, 0.3, 0.4, 0.5])
+    stiffness = MEAN * (1.0 + 0.03 * rng.standard_normal(gears))
+    force = stiffness[:, None] * x + rng.normal(0.0, 0.1, (gears, len(x)))
+    rows = {"deformation_mm": np.tile(x, gears), "force_N": np.round(force.ravel())}
+    frame = pd.DataFrame({"gear": np.repeat(np.arange(gears), len(x)), **rows})
+    straight = np.all(np.diff(np.round(force), 2) == 0.0, axis=1)
+    assert straight.sum() >= 5
+    found = hdcal.fleet(hdcal.read_case(frame, gear=NAMED))
+    assert not found.reasons
+    low, high = np.quantile(found.stiffness, [0.025, 0.975], axis=0)
+    assert np.mean((low < stiffness) & (stiffness < high)) > 0.8
+    sigma = np.quantile(found.draws["sigma"], [0.025, 0.975])
+    # Noise and rounding: 0.31 N.
+    assert sigma[0] < 0.31 < sigma[1]

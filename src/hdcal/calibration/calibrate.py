@@ -11,6 +11,7 @@ import numpy as np
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
+from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
@@ -169,10 +170,11 @@ def calibrate(
 
     Raises:
         InputError: an effect is unknown, has no prior, or lacks its covariates; or
-            `case` is none.
+            `case` is none, or nothing tells its noise.
     """
     began = time.perf_counter()
     require_case(case)
+    require_scatter(case)
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)

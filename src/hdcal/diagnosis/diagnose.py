@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
+from hdcal.data.scatter import require_scatter
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
 from hdcal.diagnosis.next_run import rank_runs
@@ -55,6 +56,7 @@ def diagnose(
     """
     require_case(case)
     _check(case, library, seed)
+    require_scatter(case)
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.
     weighed = weigh(case, library, rng.spawn(1)[0])

@@ -93,6 +93,7 @@ def prepare(
     own = problem_priors(case, (), {}, case.gear.theory)
     # Computed readings have no noise, and a noise of zero has no density.
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
+    least = max(least, case.gear.force_resolution / np.sqrt(12.0))
     noise_sd = float(noise_sd or max(pilot_noise(records), least))
     scale = stiffness_prior(case, own)
     base, columns, mean = _linearise(records, reading, own, scale, noise_sd, stiffness)

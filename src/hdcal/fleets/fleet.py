@@ -11,6 +11,7 @@ from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case, require_case
 from hdcal.data.prior import Prior
+from hdcal.data.scatter import reading_step, require_scatter
 from hdcal.errors import Finding, InputError
 from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.misfit import Misfit, misfit
@@ -110,16 +111,18 @@ def fleet(
         progress: called with (iterations done, iterations in all).
 
     Raises:
-        InputError: there are too few gears, or one says nothing of its stiffness.
+        InputError: there are too few gears, one says nothing of its stiffness, or none
+            scatters about its line.
     """
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
     check_fleet(case)
+    require_scatter(case)
     bound_executables()
     sums, gears = mounting_sums(case), len(case.specimen_labels)
     unit, priors = _priors(case)
-    problem = PopulationProblem(priors, gear_sums(sums, gears))
+    problem = PopulationProblem(priors, gear_sums(sums, gears, reading_step(case)))
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}

@@ -66,12 +66,14 @@ class GearSums(eqx.Module):
     log_noise_sd: Float[Array, " g"]
 
 
-def gear_sums(each: MountingSums, gears: int) -> GearSums:
+def gear_sums(each: MountingSums, gears: int, step: float = 0.0) -> GearSums:
     """Return the sums of gears from those of their mountings.
 
     Args:
         each: mounting.
         gears: how many there are.
+        step: of the force display [N]: a few readings that it shows on a line by
+            chance scatter nevertheless, by its rounding.
     """
     kinds, kind = np.unique([each.gear, each.rows], axis=1, return_inverse=True)
     gear = kinds[0].astype(int)
@@ -89,7 +91,7 @@ def gear_sums(each: MountingSums, gears: int) -> GearSums:
     x, y = each.x, each.y
     count = summed(np.ones_like(x))
     own = [summed(values) for values in (each.xx, each.xy, each.yy)]
-    free, log_sd = _noise(count, rows, own)
+    free, log_sd = _noise(count, rows, own, step)
     return GearSums(
         mountings=count,
         rows=rows,
@@ -106,12 +108,18 @@ def gear_sums(each: MountingSums, gears: int) -> GearSums:
     )
 
 
-def _noise(count: np.ndarray, rows: np.ndarray, own) -> tuple[np.ndarray, np.ndarray]:
-    """Return degrees of freedom and log sd beside each gear's own line."""
+def _noise(count: np.ndarray, rows: np.ndarray, own, step: float):
+    """Return degrees of freedom and log sd beside each gear's own line.
+
+    An exact line gets the squares that the display's rounding leaves in the mean.
+    """
     xx, xy, yy = (values.sum(axis=1) for values in own)
     free = np.sum(count * (rows - 1.0), axis=1) - 1.0
     square = yy - xy**2 / np.where(xx > 0.0, xx, 1.0)
-    # What rounding leaves of an exact line is no noise.
+    exact = (free > 0.0) & (square <= _NOTHING * yy)
+    added = np.where(exact, free * step**2 / 12.0, 0.0)
+    own[2][:, 0] += added
+    square += added
     told = (free > 0.0) & (square > _NOTHING * yy)
     free = np.where(told, free, 0.0)
     ratio = np.where(told, square, 1.0) / np.where(told, free, 1.0)

@@ -1,0 +1,60 @@
+"""Whether readings scatter at all, and the least that they can."""
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.records import Records
+from hdcal.errors import Finding, InputError
+
+# Shares of the range of forces that are no more than rounding of what was computed.
+_NOTHING = 1e-8
+
+
+def require_scatter(case: Case) -> None:
+    """Refuse readings that say nothing of their noise, where nothing else does.
+
+    Raises:
+        InputError: they lie on straight lines to the last digit, and neither the step
+            of the display nor an sd of any row is stated.
+    """
+    records = case.records
+    if case.gear.force_resolution > 0.0 or np.any(np.asarray(records.force_sd) > 0.0):
+        return
+    force = np.asarray(records.force)
+    if np.max(np.abs(_beside_lines(records))) > _NOTHING * np.max(np.abs(force)):
+        return
+    words = (
+        "the forces lie on a straight line to the last digit, so that nothing tells "
+        "how far readings scatter"
+    )
+    remedy = (
+        "Say the step of the display as force_resolution_N under [measurement] of the "
+        "gear file; to readings that were computed, add noise"
+    )
+    raise InputError([Finding(case.name, words, remedy)])
+
+
+def reading_step(case: Case) -> float:
+    """Return the step of the force display, or else the least between two forces [N].
+
+    Zero where all forces are the same.
+    """
+    if case.gear.force_resolution > 0.0:
+        return case.gear.force_resolution
+    force = np.asarray(case.records.force)
+    steps = np.diff(np.unique(force))
+    steps = steps[steps > _NOTHING * np.max(np.abs(force))]
+    return float(np.min(steps, initial=np.inf)) if len(steps) else 0.0
+
+
+def _beside_lines(records: Records) -> np.ndarray:
+    """Return what a line of each specimen, with a zero of each run, leaves [N]."""
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+
+    def within_runs(values) -> np.ndarray:
+        return values - (np.bincount(run, values) / np.bincount(run))[run]
+
+    x, y = map(within_runs, map(np.asarray, (records.deformation, records.force)))
+    squares = np.bincount(specimen, x * x)
+    slope = np.bincount(specimen, x * y) / np.where(squares > 0.0, squares, 1.0)
+    return y - slope[specimen] * x

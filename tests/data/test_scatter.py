@@ -1,0 +1,51 @@
+"""Readings that lie on a line to the last digit: nothing tells their noise."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdcal import InputError, calibrate, diagnose, fleet, read_case
+from hdcal.data.scatter import reading_step
+
+_LINE = np.arange(1, 11) / 10.0
+
+
+def _case(force, x=_LINE, step=None, **labels):
+    table = pd.DataFrame({"deformation_mm": x, "force_N": force, **labels})
+    stated = {"measurement": {"force_resolution_N": step}} if step else {}
+    return read_case(table, gear={"gear": {"name": "s", "theory": "spring"}, **stated})
+
+
+@pytest.mark.parametrize("ask", [calibrate, diagnose])
+@pytest.mark.parametrize("line", [lambda x: 100 * x + 2, lambda x: 100 / 3 * x - 7.1])
+def test_an_exact_line_is_refused(ask, line):
+    with pytest.raises(InputError, match="on a straight line to the last digit"):
+        ask(_case(line(_LINE)))
+
+
+def test_a_fleet_of_exact_lines_is_refused():
+    x = np.tile(_LINE, 4)
+    gear = np.repeat([1, 2, 3, 4], len(_LINE))
+    with pytest.raises(InputError, match="on a straight line to the last digit"):
+        fleet(_case(x * (100 + gear), x, specimen=gear))
+
+
+def test_noise_of_the_last_digit_is_none_to_refuse():
+    force = 100 * _LINE + 2 + 1e-4 * np.resize([1, -1, -1], 10)
+    assert "on a straight" not in str(calibrate(_case(force), draws=200).reasons)
+
+
+def test_a_display_that_shows_a_line_is_answered_by_its_step():
+    case = _case(np.round(100 * _LINE + 2), step=1.0)
+    found = calibrate(case, draws=400)
+    assert not found.reasons
+    low, high = np.quantile(found.draws["K"], [0.025, 0.975])
+    # 0.29 N over these strokes: sd 0.32 N/mm were it the only one.
+    assert low < 100 < high
+    assert 0.5 < high - low < 4
+    assert diagnose(case, quick=True).which.named == ()
+
+
+def test_the_step_is_the_stated_one_or_the_least_between_forces():
+    assert reading_step(_case(np.round(103 * _LINE), step=0.5)) == 0.5
+    assert reading_step(_case([5, 8, 11, 13, 17, 19, 29, 31, 40, 51.0])) == 2.0
