@@ -1,5 +1,7 @@
 """A bad table is refused with every finding at its row and column."""
 
+import numpy as np
+import pandas as pd
 import pytest
 
 from hdcal.data.reading import read_case
@@ -184,6 +186,42 @@ def test_a_counter_that_begins_again_with_each_ramp_is_no_run(folder):
     assert any("'Messung', which may be the run, is not" in n for n in case.notes)
 
 
+def test_a_counter_beside_repeated_headers_is_no_run_either(folder):
+    rows = "".join(f"{k},{0.05 * k:.2f},{5 * k}\n" for k in range(1, 9))
+    (folder / "data.csv").write_text(3 * f"Messung,Weg [mm],Kraft [N]\n{rows}")
+    assert read_case(folder / "data.csv").run_labels == ("1", "2", "3")
+
+
+def _labelled(folder, *columns):
+    """Write readings whose columns of labels have a header and 12 cells each."""
+    table = pd.DataFrame({"Weg [mm]": np.tile([0.1, 0.2, 0.3], 4)})
+    table["Kraft [N]"] = 50 * table["Weg [mm]"] + np.arange(12) % 5
+    for header, *cells in columns:
+        table[header] = np.repeat(cells, 12 // len(cells))
+    table.to_csv(folder / "data.csv", index=False)
+    return folder / "data.csv"
+
+
+def test_two_columns_that_may_both_name_the_gear_are_asked_about(folder):
+    data = _labelled(folder, ("Prüfling", 1, 2), ("Seriennummer", *"wxyz"))
+    expected = [(1, "Seriennummer", "the specimen may be 'Prüfling' or 'Seriennummer'")]
+    check(findings_of(folder), expected)
+    assert read_case(data, columns={"specimen": "4"}).specimen_labels == (*"wxyz",)
+
+
+def test_two_columns_that_may_both_name_the_run_are_asked_about(folder):
+    _labelled(folder, ("Versuch", 1, 2), ("Wiederholung", 1, 2, 1, 2))
+    (found,) = findings_of(folder)
+    assert found.problem == "the run may be 'Versuch' or 'Wiederholung'"
+    assert found.remedy == "Say which, by its number: `columns` 'run=3'"
+
+
+def test_columns_of_labels_that_say_the_same_or_nothing_are_not_asked_about(folder):
+    gears = ("Prüfling", 1, 2), ("Seriennummer", "s7", "s9"), ("Probe", "ring")
+    case = read_case(_labelled(folder, *gears))
+    assert case.specimen_labels == ("1", "2")
+
+
 def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
     content = "here,there\n" + "".join(f"{i},{i}\n" for i in range(6))
     (folder / "data.csv").write_text(content)
@@ -253,6 +291,17 @@ def test_a_first_reading_that_is_torn_is_no_title(folder, torn, above):
     columns = {} if above else {"deformation": "1[mm]", "force": "2[N]"}
     found = findings_of(folder, columns=columns)
     check(found, [(above.count("\n") + 1, None, f"{torn.count(',') + 1} cell")])
+
+
+@pytest.mark.parametrize("above", ["", "Test of today\ndeformation_mm,force_N\n"])
+def test_every_torn_reading_at_the_top_is_told(folder, above):
+    rows = "".join(f"{x / 100},{2 * x}\n" for x in range(1, 12))
+    (folder / "data.csv").write_text(f"{above}0.001\n0.005,1.0,start\n0.007\n{rows}")
+    columns = {} if above else {"deformation": "1[mm]", "force": "2[N]"}
+    found = findings_of(folder, columns=columns)
+    first = above.count("\n") + 1
+    check(found, [(first + k, None, f"has {n}") for k, n in enumerate((1, 3, 1))])
+    assert all("or remove the line" in finding.remedy for finding in found)
 
 
 def test_labview_channels_whose_headers_name_another_unit_are_told(folder):

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from itertools import pairwise
 
 import numpy as np
 
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import guess_header
+from hdcal.data.label_columns import label_columns
 from hdcal.data.units import COLUMN_UNITS, known_unit
 from hdcal.errors import quoted
 
@@ -170,6 +170,8 @@ def _named(
 
 def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column | None:
     """Return the column whose header means a quantity, in other words than ours."""
+    if quantity in LABELS:
+        return _labels(quantity, table, findings)
     found = [
         (Column(quantity, header, position, guess.unit, guessed=True), guess.whole)
         for position, header in enumerate(table.headers)
@@ -179,17 +181,11 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
     whole = [column for column, alone in found if alone]
     likely = whole or [column for column, _ in found]
     if len(likely) > 1 and quantity in REQUIRED:
-        names = " or ".join(quoted(column.header) for column in likely)
-        words = f"the {quantity} may be {names}"
-        remedy = (
-            f"Say which, as in `columns` '{quantity}={likely[0].position + 1}', the "
-            "number of the column"
-        )
-        findings.add(words, remedy, table.header_row, likely[1].header)
+        _ask_which(quantity, [column.position for column in likely], table, findings)
     if len(likely) != 1:
         return None
     (column,) = likely
-    if not column.unit and quantity not in LABELS:
+    if not column.unit:
         words = f"may be the {quantity}, but names no unit"
         units = ", ".join(COLUMN_UNITS[quantity])
         remedy = (
@@ -198,13 +194,24 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
         if quantity in REQUIRED:
             findings.add(words, remedy, table.header_row, column.header)
         return None
-    if quantity in LABELS:
-        labels = table.texts([column.position])[column.position]
-        # A number for each reading is no label of a run or a gear, and a run lasts.
-        counted = quantity == "run" and all(a != b for a, b in pairwise(labels))
-        if counted or len({*labels}) == len(labels):
-            return None
     return column
+
+
+def _labels(quantity: str, table: CsvTable, findings: FileFindings) -> Column | None:
+    found = label_columns(table, quantity)
+    if len(found) > 1:
+        _ask_which(quantity, found, table, findings)
+    alone = [Column(quantity, table.headers[at], at, guessed=True) for at in found]
+    return alone[0] if len(alone) == 1 else None
+
+
+def _ask_which(
+    quantity: str, places: Sequence[int], table: CsvTable, findings: FileFindings
+) -> None:
+    words = " or ".join(quoted(table.headers[place]) for place in places)
+    words = f"the {quantity} may be {words}"
+    remedy = f"Say which, by its number: `columns` '{quantity}={places[0] + 1}'"
+    findings.add(words, remedy, table.header_row, table.headers[places[1]])
 
 
 def _split(header: str) -> tuple[str, str]:

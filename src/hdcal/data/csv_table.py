@@ -4,7 +4,7 @@ import csv
 import io
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import compress
 from typing import Any
 
@@ -14,7 +14,7 @@ import pandas as pd
 from hdcal.data.blanks import tabbed
 from hdcal.data.blocks import Blocks, block_notes, find_blocks, with_runs
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import guess_header
+from hdcal.data.label_columns import label_columns
 from hdcal.data.labview import with_whole_lines
 from hdcal.data.line_cells import filled_cells, misfit
 from hdcal.data.table_start import (
@@ -147,26 +147,17 @@ def split_table(
         for index in np.flatnonzero(filled & ~fits)
     )
     used = int(np.flatnonzero(filled)[-1]) + 1 if filled.any() else 0
-    kept, notes = (
-        list(compress(lines, fits)),
-        [*_notes(begin, above, headers, findings, spaced=spaced)],
-    )
-    runs, many = _runs(blocks, fits)
-    if labelled or any(map(_is_run, headers)):
-        many = 0
-    notes += block_notes(blocks, many)
-    if many > 1:
-        headers, kept = (*headers, "run"), with_runs(kept, runs, separator)
-    return CsvTable(
+    table = CsvTable(
         headers=headers,
         header_row=top + 1,
         rows=rows[fits],
         separator=separator,
-        body=b"\n".join([*kept, b""]),
+        body=b"\n".join([*compress(lines, fits), b""]),
         filled=int(filled.sum()),
         skipped=int((~filled & ~blocks.extra)[:used].sum()),
-        notes=tuple(notes),
+        notes=(*_notes(begin, above, headers, findings, spaced=spaced),),
     )
+    return _with_runs(table, blocks, fits, labelled=labelled)
 
 
 def _columns(
@@ -184,10 +175,10 @@ def _columns(
             findings.refuse(words, _HEADLESS, top + 1)
         begin = TableStart(None, None, top, begin.torn)
         headers = tuple(str(number + 1) for number in range(len(headers)))
-    if begin.torn is not None:
-        cells = len(split_line(lines[begin.torn].decode(), separator))
-        words = misfit(cells, len(headers), separator)
-        findings.add_rows([(begin.torn + 1, *words)])
+    for row in begin.torn:
+        cells = len(split_line(lines[row].decode(), separator))
+        words, remedy = misfit(cells, len(headers), separator)
+        findings.add_rows([(row + 1, words, f"{remedy}, or remove the line")])
     if begin.units is not None:
         units = split_line(lines[begin.units].decode(), separator)
         findings.add_rows(other_units(headers, units, begin.units + 1))
@@ -205,9 +196,20 @@ def _runs(blocks: Blocks, fits: np.ndarray) -> tuple[np.ndarray, int]:
     return runs, int(runs.max(initial=1))
 
 
-def _is_run(header: str) -> bool:
-    guess = guess_header(header)
-    return guess is not None and guess.quantity == "run"
+def _with_runs(
+    table: CsvTable, blocks: Blocks, fits: np.ndarray, *, labelled: bool
+) -> CsvTable:
+    """Return a table whose blocks are runs, unless one of its columns names these."""
+    runs, many = _runs(blocks, fits)
+    own = any(header.lower() == "run" for header in table.headers)
+    if many > 1 and (labelled or own or label_columns(table, "run")):
+        many = 0
+    table = replace(table, notes=(*table.notes, *block_notes(blocks, many)))
+    if many < 2:
+        return table
+    lines = with_runs(table.body.split(b"\n")[:-1], runs, table.separator)
+    headers = (*table.headers, "run")
+    return replace(table, headers=headers, body=b"\n".join([*lines, b""]))
 
 
 def _begin(utf8: bytes) -> tuple[TableStart, bytes, bool]:

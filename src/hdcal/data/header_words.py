@@ -25,7 +25,10 @@ WORDS: dict[str, tuple[str, ...]] = {
     "temperature": ("temperature", "temp", "temperatur", "température", "温度"),
     "time": ("time", "zeit", "prüfzeit", "temps", "durée", "时间"),
     "angle": ("angle", "winkel", "drehwinkel", "角度"),
-    "run": ("run", "lauf", "messung", "essai"),
+    "run": (
+        *("run", "mounting", "repeat", "lauf", "messung", "versuch", "einspannung"),
+        *("wiederholung", "essai"),
+    ),
     "specimen": (
         *("specimen", "gear", "serial", "seriennummer", "probe", "prüfling"),
         "éprouvette",

@@ -27,14 +27,14 @@ class TableStart(NamedTuple):
         headers: line of the headers; None where the readings have none.
         units: line of their units; None without one.
         readings: first line of the readings.
-        torn: line of numbers right above the readings, which has more cells than they
-            have, or fewer; None without one.
+        torn: lines of numbers right above the readings, which have more cells than
+            these, or fewer.
     """
 
     headers: int | None
     units: int | None
     readings: int
-    torn: int | None = None
+    torn: tuple[int, ...] = ()
 
 
 def find_start(text: str) -> TableStart | None:
@@ -116,9 +116,9 @@ def _start(
         second = above[0] + 1
         units = second if _are_units(cells, above[1:2]) else None
         return TableStart(above[0], units, second + (units is not None))
-    torn = None
-    if every and every[-1] not in above and is_number(cells[every[-1]][0]):
-        *every, torn = every
+    torn: tuple[int, ...] = ()
+    while every and every[-1] not in above and is_number(cells[every[-1]][0]):
+        every, torn = every[:-1], (every[-1], *torn)
     if not above or above[-1] != every[-1]:
         return TableStart(None, None, first, torn)
     if _are_units(cells, above[-1:]) and len(above) > 1:
