@@ -1,7 +1,7 @@
 """The JSON answer of a calibration: what each number in it is."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal, get_args
 
 from hdcal.data.theory_names import SPRING, Theory
@@ -50,6 +50,11 @@ class CalibrationAnswer(PosteriorAnswer):
         effects: in the model.
         with_gap: whether the model has a leftover discrepancy.
         bend: where the residuals of a straight line bend, its slope at both ends.
+        beside_a_loop: stiffness as read, 95 % interval [N/mm], of a model with a loop
+            of any shape beside the straight line, where loading and unloading differ
+            and the calibrated model has no more than the line; flat priors.
+        specimens: of several, by label, the stiffness of each as read, 95 % credible
+            interval [N/mm].
     """
 
     schema: Literal["hdcal.calibration/1"] = "hdcal.calibration/1"
@@ -64,3 +69,5 @@ class CalibrationAnswer(PosteriorAnswer):
     effects: tuple[str, ...]
     with_gap: bool
     bend: tuple[LocalStiffness, ...] = ()
+    beside_a_loop: Interval | None = None
+    specimens: Mapping[str, Interval] = field(default_factory=dict)

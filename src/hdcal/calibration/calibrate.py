@@ -174,7 +174,6 @@ def calibrate(
     """
     began = time.perf_counter()
     require_case(case)
-    require_scatter(case)
     check_settings(chains, warmup, draws, seed)
     bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
@@ -185,6 +184,7 @@ def calibrate(
     priors = problem_priors(case, chosen, shipped, theory)
     model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
     problem = build_problem(case, shipped, chosen, **model)
+    require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = jax.random.split(jax.random.key(seed))
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)

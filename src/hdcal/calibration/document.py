@@ -33,6 +33,8 @@ ARTICLE_NOTE = (
     "K under `article` is a ratio to that article's slope of 1625.19 N/mm, which no "
     "combination of its own inputs reproduces; its K = 0.13 is no property of the gear."
 )
+# Gears that a page shows at once.
+_AT_ONCE = 10
 # The shape that loading and unloading leave which differ.
 LOOPED = "direction"
 _IMPLAUSIBLE = (
@@ -78,6 +80,7 @@ def headline(
     bend: Sequence[LocalStiffness] = (),
     *,
     looped: bool = False,
+    beside_a_loop: Interval | None = None,
 ) -> str:
     """Return the stiffness in one sentence.
 
@@ -86,6 +89,7 @@ def headline(
         case: whose it is; without temperatures it holds at that of the test.
         bend: its slope at several places, where the readings bend.
         looped: whether readings on loading and on unloading differ from it.
+        beside_a_loop: stiffness of a model with a loop of any shape.
     """
     middle, span = estimate(found)
     # Three digits of each slope.
@@ -98,13 +102,21 @@ def headline(
         f". That is a straight line; the readings bend, from {slopes}" if bend else ""
     )
     if looped and not bend:
-        told = ". Loading and unloading differ from that line: it may lie outside"
+        told = ". Loading and unloading differ from that line: "
+        told += _beside(beside_a_loop) if beside_a_loop else "it may lie outside"
     was_read = "temperature" in case.records.known
     warm = f" at {case.gear.reference_temperature:g} °C" * was_read
+    many = len(case.specimen_labels)
+    whose = f"Mean stiffness of the {many} gears tested" if many > 1 else "Stiffness"
     return (
-        f"Stiffness{warm}: {middle} N/mm, 95 % credible interval {span} N/mm, per "
+        f"{whose}{warm}: {middle} N/mm, 95 % credible interval {span} N/mm, per "
         f"millimetre as read{told}."
     )
+
+
+def _beside(found: Interval) -> str:
+    middle, span = estimate(found)
+    return f"beside a loop of any shape it is {middle} ({span}) N/mm"
 
 
 def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
@@ -117,11 +129,11 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     known = posterior.case.records.known
     warned = {check.name for check in posterior.checks if check.outcome == "warning"}
     steps = [_IMPLAUSIBLE] * (PLAUSIBLE in warned)
+    steps += [_EACH] * ("specimens" in known)
     steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
     remedies = {**_REMEDY, "curvature": _bend_remedy(known)}
     steps += [remedies[shape.name] for shape in (*left.structure, *left.noise)]
     steps += [_NOISE] * (NOISY in warned and not left.structure)
-    steps += [_EACH] * ("specimens" in known)
     steps += [words for name, words in _LACKING.items() if name not in known]
     return list(dict.fromkeys(steps))
 
@@ -158,6 +170,7 @@ def calibration_document(
             posterior.case,
             found.bend,
             looped=LOOPED in {shape.name for shape in found.residuals},
+            beside_a_loop=found.beside_a_loop,
         ),
         answers=list(_answers(found)),
         next_steps=found.next_steps,
@@ -166,6 +179,7 @@ def calibration_document(
             *notices(("Remarks", said(found.flat_directions)), tone="neutral"),
         ],
         sections=[
+            *_specimens(found),
             _bands(found),
             parameter_section(measured(found.parameters, found.gear.theory)),
             *_theories(found),
@@ -199,6 +213,15 @@ def _answers(found: CalibrationAnswer) -> Iterator[str]:
         ]
         if names:
             yield f"{words}: {', '.join(names)}."
+
+
+def _specimens(found: CalibrationAnswer) -> Iterator[Section]:
+    if not found.specimens:
+        return
+    rows = [[name, *estimate(own)] for name, own in found.specimens.items()]
+    titles = ["gear", "N/mm", "95 % interval"]
+    table = Table(titles, rows, frozenset(titles[1:]), page=_AT_ONCE)
+    yield Section("The gears", [table], brief=len(rows) <= _AT_ONCE)
 
 
 def _bands(found: CalibrationAnswer) -> Section:

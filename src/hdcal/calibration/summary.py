@@ -17,13 +17,15 @@ from hdcal.calibration.document import (
     headline,
     next_steps,
 )
+from hdcal.calibration.loop_stiffness import loop_stiffness
+from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.document import spoken_of
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report
@@ -59,7 +61,10 @@ def calibration_answer(
     bend = tuple(_bend(posterior, left))
     found = *left.structure, *left.noise
     looped = LOOPED in {shape.name for shape in found}
-    first = headline(stiffness, posterior.case, bend, looped=looped)
+    plain = not posterior.effects and not posterior.settings["with_gap"]
+    beside = _beside_a_loop(posterior.case) if looped and plain and not bend else None
+    loop = {"looped": looped, "beside_a_loop": beside}
+    first = headline(stiffness, posterior.case, bend, **loop)
     entries = posterior_entries(posterior, first, steps)
     entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(
@@ -74,7 +79,27 @@ def calibration_answer(
         effects=tuple(effect.name for effect in posterior.effects),
         with_gap=bool(posterior.settings["with_gap"]),
         bend=bend,
+        beside_a_loop=beside,
+        specimens=dict(_specimens(posterior)),
     )
+
+
+def _specimens(posterior: Posterior) -> Iterator[tuple[str, Interval]]:
+    """Yield each of several specimens with its stiffness."""
+    own = posterior.draws.get("specimen_deviation")
+    if own is not None:
+        each = posterior.draws["stiffness"][:, None] * (1.0 + own)
+        yield from zip(
+            posterior.case.specimen_labels,
+            map(credible_interval, each.T),
+            strict=True,
+        )
+
+
+def _beside_a_loop(case: Case) -> Interval | None:
+    tail = (1.0 - INTERVAL) / 2.0
+    found = loop_stiffness(case, np.array([0.5, tail, 1.0 - tail]))
+    return None if found is None else Interval(*map(float, found))
 
 
 def _bend(posterior: Posterior, left: Residuals) -> Iterator[LocalStiffness]:
