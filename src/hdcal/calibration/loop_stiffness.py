@@ -105,4 +105,4 @@ def _quantile(level: float, weight, mean, scale, free: int) -> float:
         return float(np.average(below, weights=weight)) - level
 
     ends = mean.min() - 50.0 * scale.max(), mean.max() + 50.0 * scale.max()
-    return float(optimize.brentq(excess, *ends))
+    return optimize.root_scalar(excess, bracket=ends).root
