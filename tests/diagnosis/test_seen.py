@@ -222,3 +222,17 @@ def test_a_loop_beside_zeros_of_mountings_has_its_width(seed):
     records = make_records(path, force + 0.25 * noise, run=run, known=known, **moved)
     told = [one for one in seen(make_case(records)) if one.covariate == "direction"]
     assert 1.5 < told[0].size_N.median < 2.1
+
+
+def test_zeros_that_all_differ_are_told_as_one():
+    records = simulated(cycles(48), seed=3).records
+    run = np.repeat([0, 1, 2], 16)
+    zeros = np.array([4.0, -6.0, 2.0])
+    force = np.asarray(records.force) + zeros[run]
+    case = make_case(replace(records, force=force, run=run))
+    case = replace(case, run_labels=("A", "{size}", "C"))
+    told = [each for each in seen(case) if each.covariate == "run"]
+    (only,) = told
+    assert "run {size} the lowest, run A the highest" in only.statement
+    assert only.size_N.lo < 10.0 < only.size_N.hi
+    assert only.material

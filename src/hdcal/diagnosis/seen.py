@@ -65,7 +65,48 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     for each in found:
         once.setdefault(tried[each.name].told_once or each.name, each)
     clearest = sorted(once.values(), key=lambda each: each.p_value)
-    return tuple(_seen(tried[each.name], each, scale, quantile) for each in clearest)
+    told = [_seen(tried[each.name], each, scale, quantile) for each in clearest]
+    if sum(each.covariate == "run" for each in told) < 2:
+        return tuple(told)
+    beside = [e.name for e in found if tried[e.name].covariate != "run"]
+    spread = _zeros_differ(data, beside, turned.run, case, sd)
+    return _as_one(told, *spread)
+
+
+def _zeros_differ(
+    data: Whitened, beside: list[str], run, case: Case, sd: np.ndarray
+) -> tuple[float, str]:
+    """Return by how much the zeros of runs differ [N], and the words for it.
+
+    Of several contrasts each one speaks of what the others leave, which is hard to say.
+    """
+    others = np.asarray(run)[:, None] == np.unique(run)[1:]
+    below = np.zeros((len(data.residual) - len(sd), others.shape[1]))
+    table = [data.absorbed, *(data.shapes[name][0][:, None] for name in beside)]
+    table.append(np.concatenate([others / sd[:, None], below]))
+    table = np.concatenate(table, axis=1)
+    found = np.linalg.lstsq(table, data.residual, rcond=None)[0]
+    zeros = np.append(0.0, found[-others.shape[1] :])
+    lowest, highest = (case.run_labels[k] for k in (zeros.argmin(), zeros.argmax()))
+    size = float(np.ptp(zeros))
+    words = f"the zeros of the runs differ by up to {newton(size)}, run {lowest} the "
+    return size, f"{words}lowest, run {highest} the highest"
+
+
+def _as_one(told: list[Seen], size: float, words: str) -> tuple[Seen, ...]:
+    """Return what is seen with all that is seen of the zeros of runs as one."""
+    place = next(i for i, each in enumerate(told) if each.covariate == "run")
+    zeros = [each for each in told if each.covariate == "run"]
+    others = [each for each in told if each.covariate != "run"]
+    # A difference of two runs, of which each contrast says one against the mean.
+    half = np.sqrt(2.0) * max(each.size_N.hi - each.size_N.median for each in zeros)
+    whole = replace(
+        zeros[0],
+        statement=words,
+        size_N=Interval(size, float(max(size - half, 0.0)), float(size + half)),
+        material=any(each.material for each in zeros),
+    )
+    return (*others[:place], whole, *others[place:])
 
 
 def _found(
