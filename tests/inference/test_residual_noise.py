@@ -8,7 +8,7 @@ from scipy import stats
 
 import hdcal
 from hdcal.calibration.summary import calibration_answer
-from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER, noise_faults
+from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER, WILD, noise_faults
 from hdcal.inference.residual_shapes import FALSE_ALARM, Whitened
 from hdcal.inference.residuals import residuals
 
@@ -22,12 +22,13 @@ def correlated(rho: float, rng, rows: int = ROWS, run=None) -> np.ndarray:
     return autoregression(rng.normal(size=rows), run, rho)
 
 
-def faults(error: np.ndarray, *, run=None, rounded: bool = False) -> list[str]:
+def faults(error, *, run=None, rounded=False, mixed=False) -> list[str]:
     """Return what is said of errors beside which a line was absorbed."""
     records = make_records(X, **({} if run is None else {"run": run}))
     absorbed = np.column_stack([np.ones(len(error)), X])
     data = Whitened(error, absorbed, {})
-    found = noise_faults(data, records, np.ones(len(error)), rounded=rounded)
+    form = {"rounded": rounded, "mixed": mixed}
+    found = noise_faults(data, records, np.ones(len(error)), **form)
     return [fault.name for fault in found]
 
 
@@ -127,3 +128,33 @@ def test_every_answer_says_so():
     assert any("Neighbouring readings err alike" in said for said in answer.warnings)
     assert NEIGHBOURS in [shape.name for shape in answer.residuals]
     assert any("other mountings" in step for step in answer.next_steps)
+
+
+def test_a_slip_of_writing_is_named_by_its_reading():
+    rng = np.random.default_rng(8)
+    for rho in (0.0, 0.8):
+        error = correlated(rho, rng)
+        error[ROWS // 3] += 60.0
+        assert WILD in faults(error)
+        assert WILD not in faults(error, mixed=True)
+        error[ROWS // 3] -= 60.0
+        assert WILD not in faults(error)
+
+
+def test_noise_with_long_tails_is_seldom_a_slip():
+    rng = np.random.default_rng(9)
+    many = [WILD in faults(rng.standard_t(5, size=ROWS)) for _ in range(200)]
+    assert np.mean(many) <= 0.03
+
+
+def test_a_slip_is_the_first_thing_to_look_at():
+    x = np.tile(np.linspace(0.05, 0.5, 30), 2)
+    force = 200.0 * x + 0.3 * np.random.default_rng(2).normal(size=60)
+    force[17] /= 10.0
+    case = hdcal.read_case({"deformation_mm": x, "force_N": force})
+    found = calibration_answer(hdcal.calibrate(case, warmup=300, draws=500))
+    assert found.next_steps[0].startswith("Look at that reading first")
+    (told,) = [words for words in found.warnings if "as far as readings" in words]
+    assert told.startswith(f"Reading 18, {force[17]:.4g} N at {x[17]:.4g} mm, lies ")
+    off = float(told.partition("lies ")[2].partition(" N off")[0])
+    assert off == pytest.approx(9.0 * force[17], rel=0.1)

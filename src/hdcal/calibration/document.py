@@ -8,7 +8,7 @@ from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER
+from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER, WILD
 from hdcal.inference.residuals import Residuals
 from hdcal.report.document import (
     Document,
@@ -65,6 +65,8 @@ _REMEDY: Mapping[str, str] = {
     NEIGHBOURS: "Repeat the ramp in other mountings: their scatter tells what "
     "neighbours that err alike hide.",
     SCATTER: "Calibrate with the effect heteroscedastic_noise.",
+    WILD: "Look at that reading first: if it is a slip, mend it or leave its row out; "
+    "where such readings happen, calibrate with the effect outliers.",
 }
 # Covariate that was not measured -> what to do about it.
 _LACKING: Mapping[str, str] = {
@@ -129,6 +131,7 @@ def next_steps(posterior: Posterior, left: Residuals) -> list[str]:
     known = posterior.case.records.known
     warned = {check.name for check in posterior.checks if check.outcome == "warning"}
     steps = [_IMPLAUSIBLE] * (PLAUSIBLE in warned)
+    steps += [_REMEDY[s.name] for s in left.noise if s.name == WILD]
     steps += [_EACH] * ("specimens" in known)
     steps += [_ALIKE] * (INDEPENDENT in warned and "unloading" in known)
     remedies = {**_REMEDY, "curvature": _bend_remedy(known)}

@@ -20,7 +20,12 @@ from hdcal.inference.serial_correlation import previous_rows, whiten
 
 # Fewer rows say nothing of their noise.
 _LEAST_ROWS = 12
-NEIGHBOURS, SCATTER = "neighbours", "scatter"
+NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
+# A normal sd over the median of absolute errors, and what that median is worth: as much
+# as the sd of so large a share of the errors.
+_NORMAL, _WORTH = 1.4826, 0.37
+# Errors that lie nearer are those of noise with long tails, of which a slip is none.
+_WILD = 12.0
 # Name, p value, size [N], words.
 _Test = tuple[str, float, float, str]
 
@@ -49,6 +54,7 @@ def noise_faults(
     sd: np.ndarray,
     *,
     rounded: bool,
+    mixed: bool = False,
     correlation: float = 0.0,
 ) -> tuple[Structure, ...]:
     """Find out in which ways residuals are not the noise that the model has.
@@ -59,6 +65,7 @@ def noise_faults(
         sd: noise sd of each row [N].
         rounded: whether steps of the reading are wider than its noise; neighbours
             are then alike without any correlation.
+        mixed: whether the model expects wild readings.
         correlation: of neighbouring readings in the model [-].
 
     Returns:
@@ -70,6 +77,9 @@ def noise_faults(
     # Squares of correlated errors come in waves, which pass for growth.
     rest = _left(_independent(data, before, correlation))
     tests = [_scatter(rest, records, sd)]
+    if not rounded and not mixed:
+        new = np.sqrt(1.0 - correlation**2 * (before >= 0))
+        tests.append(_wild(rest, records, new * sd))
     if not rounded and np.any(before >= 0):
         tests.append(_neighbours(rest, before, sd, correlation))
     return tuple(
@@ -130,6 +140,35 @@ def _neighbours(rest: _Left, before, sd: np.ndarray, correlation: float) -> _Tes
         f"intervals of stiffness and mean force are some {times:.1f} times too narrow."
     )
     return NEIGHBOURS, p, alike * rms, words
+
+
+def _wild(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
+    """Test whether a reading lies farther off than noise ever does, as slips do.
+
+    Against the median of all, which a few wild ones do not move.
+
+    Args:
+        rest: what is left of the rows.
+        records: the rows.
+        sd: of what each row errs beside the one before [N].
+    """
+    size = len(sd)
+    kept = 1.0 - np.sum(rest.basis[:size] ** 2, axis=1)
+    far = np.abs(rest.error[:size]) / np.sqrt(np.maximum(kept, 1e-6))
+    scale = _NORMAL * float(np.median(far))
+    times = far / max(scale, 1e-300)
+    chance = 2.0 * size * stats.t.sf(times, _WORTH * rest.free)
+    chance = np.where(times < _WILD, 1.0, chance)
+    row, many = int(np.argmax(far)), int(np.sum(chance <= FALSE_ALARM))
+    others = f", and {many - 1} more lie far off" * (many > 1)
+    off = float(far[row] * sd[row])
+    force, place = (float(v[row]) for v in (records.force, records.deformation))
+    words = (
+        f"Reading {row + 1}, {force:.4g} N at {place:.4g} mm, lies {off:.3g} N off, "
+        f"{times[row]:.0f} times as far as readings scatter{others}: all that is said "
+        "here may be off."
+    )
+    return WILD, min(1.0, float(chance[row])), off, words
 
 
 def _scatter(rest: _Left, records: Records, sd: np.ndarray) -> _Test:

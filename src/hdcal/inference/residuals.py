@@ -93,6 +93,7 @@ def residuals(posterior: Posterior) -> Residuals:
             records,
             near.sd,
             rounded=coarse,
+            mixed=any(effect.mixture for effect in posterior.effects),
             correlation=float(correlation_of(centre)),
         ),
     )
