@@ -10,6 +10,7 @@ from hdcal.data.records import Records
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import frozen
+from hdcal.inference.hypotheses import ORIGIN
 from hdcal.inference.linearisation import Linearisation, linearise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.posterior import Posterior
@@ -32,6 +33,9 @@ _DRAWS = 200
 
 # How a warning begins that a shape is left in the residuals.
 SHAPED = "This takes the model's shape for right, but its residuals have one."
+_DIAGNOSE = "Diagnose", "Diagnose, or calibrate with a gap"
+UNNAMED = "No cause named makes it"
+_DIAGNOSED = UNNAMED, f"{UNNAMED}: calibrate with a gap"
 
 
 @dataclass(frozen=True, repr=False)
@@ -157,8 +161,8 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     """
     left = residuals(posterior)
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    plain = posterior.problem.discrepancy is None
-    remedy = "Diagnose, or calibrate with a gap" if plain else "Diagnose"
+    remedies = _DIAGNOSED if ORIGIN in posterior.settings else _DIAGNOSE
+    remedy = remedies[posterior.problem.discrepancy is None]
     return (
         *(
             f"{SHAPED} {shape.words.rstrip('.')}. {remedy}."

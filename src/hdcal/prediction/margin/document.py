@@ -15,6 +15,7 @@ from hdcal.prediction.margin.sentences import (
     input_label,
     larger_bound,
     measurand,
+    member_word,
     next_steps,
 )
 from hdcal.prediction.margin.temperatures import shown_levels
@@ -57,7 +58,8 @@ def margin_document(found: Margin) -> Document:
     if found.decision is not None:
         rule = Text(found.decision.rule_words, soft=True)
         blocks = [Text(found.decision.words), rule]
-        sections.append(Section("Decision", blocks, brief=True))
+        title = f"Decision on one future {member_word(found)}"
+        sections.append(Section(title, blocks, brief=True))
     return Document(
         name="Margin",
         kind="margin",

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from hdcal.inference.residuals import SHAPED
+from hdcal.inference.residuals import SHAPED, UNNAMED
 from hdcal.prediction.margin.number_words import (
     NEARLY_ALL,
     RAREST,
@@ -88,7 +88,13 @@ def headline(found: Margin) -> str:
 def next_steps(found: Margin) -> Iterator[str]:
     """Yield what to do about what the model lacks, a small capacity, or no test."""
     level, limit = found.worst, found.limit_force_N
-    if any(words.startswith(SHAPED) for words in found.remarks):
+    shaped = [words for words in found.remarks if words.startswith(SHAPED)]
+    if any(UNNAMED in words for words in shaped):
+        yield (
+            "Calibrate with a gap before you rely on this: the residuals have a shape "
+            "that no cause named makes, and these bounds leave it out."
+        )
+    elif shaped:
         yield (
             "Diagnose before you rely on this, or calibrate with a gap: the residuals "
             "have a shape that these bounds leave out."
