@@ -173,7 +173,7 @@ def averaging_words(causes: Sequence[Cause]) -> list[str]:
             f"{hypothesis(name)} ({percent(share)})"
             for name, share in chances_of(causes).items()
         )
-        told.append(f"The cause is not settled; this averages over {listed}.")
+        told.append(f"This averages over the causes that are left: {listed}.")
     return told + left_out_words(causes)
 
 

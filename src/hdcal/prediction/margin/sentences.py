@@ -290,7 +290,7 @@ def _models(found: Margin) -> Iterator[str]:
         sizes_needed(of, found.loading_sense)[1] for of in (found.worst, likeliest)
     )
     yield (
-        "The cause of the gap is not settled, so the bounds average over the causes by "
-        f"probability. Upper bound with each alone: {each}. The average is "
+        "The bounds average over the causes that are left, by their probability. Upper "
+        f"bound with each alone: {each}. The average is "
         f"{newtons(bound)}, {bound - alone:+.2g} N from the likeliest alone."
     )
