@@ -222,6 +222,26 @@ def test_columns_of_labels_that_say_the_same_or_nothing_are_not_asked_about(fold
     assert case.specimen_labels == ("1", "2")
 
 
+def test_one_of_several_specimens_is_read_alone(folder):
+    data = _labelled(folder, ("Prüfling", "a/1", "b"), ("Messung", 1, 2, 3, 4))
+    whole, case = read_case(data), read_case(data, specimen="b")
+    assert case.name == "data-b" and read_case(data, specimen="a/1").name == "data-a_1"
+    assert case.specimen_labels == ("b",) and case.run_labels == ("3", "4")
+    assert np.array_equal(case.records.force, whole.records.force[6:])
+    assert np.array_equal(case.records.run, [0, 0, 0, 1, 1, 1])
+    assert not {"specimen", "specimens"} & case.records.known
+
+
+def test_a_specimen_that_is_not_there_is_told_with_those_that_are(folder):
+    data = _labelled(folder, ("Prüfling", *"abcd"))
+    for label, words in (("x", "no specimen is called 'x'"), ("a", "has 3 rows")):
+        with pytest.raises(InputError, match=words) as refused:
+            read_case(data, specimen=label)
+        assert ("There are 'a', 'b', 'c', 'd'" in str(refused.value)) == (label == "x")
+    with pytest.raises(InputError, match="specimen=HEADER"):
+        read_case(_labelled(folder), specimen="a")
+
+
 def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
     content = "here,there\n" + "".join(f"{i},{i}\n" for i in range(6))
     (folder / "data.csv").write_text(content)
@@ -230,13 +250,25 @@ def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
 
 
 def test_many_bad_cells_are_counted_after_twenty(folder):
-    (folder / "data.csv").write_text(H + "0,0\n" + "1,x\n" * 1000 + "1\n" * 30)
+    cells = "".join(f"1,x{k}\n" for k in range(1000))
+    (folder / "data.csv").write_text(H + "0,0\n" + cells + "1\n0\n\n" * 30)
     findings = findings_of(folder)
-    assert sum(f.problem.startswith("'x'") for f in findings) == 20
+    assert sum(f.problem.startswith("'x") for f in findings) == 20
     assert [f.problem for f in findings if f.row is None] == [
-        "and 10 more rows like these",
+        "and 20 more rows like these",
         "and 980 more cells that are no numbers",
     ]
+
+
+def test_many_rows_that_lack_the_same_are_told_as_one(folder):
+    (folder / "data.csv").write_text(H + "0,0\n" + "1,x\n" * 1000 + "1\n" * 30)
+    check(
+        findings_of(folder),
+        [
+            (1003, None, "has 2; the same in all rows down to 1032"),
+            (3, "force_N", "'x' is not a number; the same in all rows down to 1002"),
+        ],
+    )
 
 
 def test_blank_lines_do_not_shift_the_row_numbers(folder):

@@ -264,7 +264,24 @@ FILES = {
         + "".join(
             f"{k}\t{row}\t\n" for k, row in enumerate(lines("\t").strip().split("\n"))
         ),
+        ("lines above the table", "'X_Value (Time) [s]' is the time in s"),
+        also={"time": [0, 1, 2, 3, 4, 5]},
+    ),
+    "LabVIEW without a first column, whatever its dimension": Written(
+        "LabVIEW Measurement\t\nX_Columns\tNo\t\n***End_of_Header***\t\n\t\n"
+        "Channels\t2\t\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n"
+        "X_Value\tWeg (mm)\tKraft (N)\tComment\n"
+        + "".join(f"\t{row}\t\n" for row in lines("\t").strip().split("\n")),
         ("lines above the table", "'X_Value'"),
+    ),
+    "labels in the first row of what they name, as merged cells are": Written(
+        "Prüfling,Weg [mm],Kraft [N]\n"
+        + "".join(
+            f"{'AB'[k // 3] * (k % 3 == 0)},{row}\n"
+            for k, row in enumerate(lines().strip().split("\n"))
+        ),
+        ("'Prüfling' is the specimen", "'Prüfling' stands in the first row of each"),
+        also={"specimen": [0, 0, 0, 1, 1, 1]},
     ),
     "LabVIEW, the first reading with a comment and no cell for one below it": Written(
         "LabVIEW Measurement\t\n***End_of_Header***\t\n\t\nChannels\t2\t\t\n"

@@ -164,7 +164,10 @@ def mixture(**shares: float):
 def test_causes_that_can_be_followed_are_and_the_rest_is_said():
     shares = {"none": 0.4, "contact_onset": 0.3, NOISE: 0.2, "unknown": 0.1}
     words = Tracker(mixture(**shares)).describe()
-    assert "averages over the causes that are left: no gap (40 %), contact onset (30 %)" in words
+    assert (
+        "averages over the causes that are left: no gap (40 %), contact onset (30 %)"
+        in words
+    )
     assert "something outside the library (10 %)" in words
     assert "outliers cannot be followed row by row: 20 % of the probability" in words
     # Forgetting goes with a line only.

@@ -86,6 +86,11 @@ def reading_options(command: Callable) -> Callable:
         column_option,
         sheet_option,
         click.option(
+            "--specimen",
+            metavar="LABEL",
+            help="Of several in the data, the one whose rows are read.",
+        ),
+        click.option(
             "--reading",
             type=click.Choice(READINGS),
             help="Of the deformation, where the gear file is silent [default: radial].",
@@ -107,7 +112,7 @@ def reading_options(command: Callable) -> Callable:
 
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
-    names = ("gear", "columns", "theory", "encoding", "sheet", "reading")
+    names = "gear", "columns", "theory", "encoding", "sheet", "reading", "specimen"
     return {name: settings.pop(name) for name in names}
 
 

@@ -2,6 +2,7 @@
 
 import math
 import re
+from itertools import accumulate
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from hdcal.data.columns import LABELS, Column
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.formula_cells import with_formula
+from hdcal.errors import quoted
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Whole numbers, their thousands behind points.
@@ -18,7 +20,7 @@ _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 
 def read_cells(
     table: CsvTable, columns: dict[str, Column], findings: FileFindings
-) -> dict[str, np.ndarray]:
+) -> tuple[dict[str, np.ndarray], list[str]]:
     """Read the used columns.
 
     Args:
@@ -28,7 +30,7 @@ def read_cells(
 
     Returns:
         Floats in the file's units (NaN where a cell is wrong) or label strings, by
-        quantity, each of shape (n,).
+        quantity, each of shape (n,); and what was guessed of them.
     """
     labels = [c for c in columns.values() if c.quantity in LABELS]
     numeric = [c for c in columns.values() if c.quantity not in LABELS]
@@ -36,9 +38,13 @@ def read_cells(
     values = {c.quantity: numbers[c.position] for c in numeric if c.position in numbers}
     # cell by cell, only where something odd stands in the column
     odd = [c for c in numeric if c.position not in numbers]
-    texts = table.texts(c.position for c in (*labels, *odd))
+    texts, notes = table.texts(c.position for c in (*labels, *odd)), []
     for column in labels:
         cells = [with_formula(cell) for cell in texts[column.position]]
+        if _stand_once(cells):
+            words = "stands in the first row of each: the rows below it are taken for"
+            notes.append(f"the label of {quoted(column.header)} {words} the same")
+            cells = [*accumulate(cells, lambda above, own: own or above)]
         words = f"the {column.quantity} label is empty"
         empty = [
             (int(row), words, "Name it")
@@ -65,7 +71,15 @@ def read_cells(
                 (int(table.rows[i]), *_thousand(cells[i])) for i in _thousands(cells)
             )
             findings.add_rows(wrong, column.header, "cells that may be thousands")
-    return values
+    return values, notes
+
+
+def _stand_once(labels: list[str]) -> bool:
+    """Tell whether labels stand in the first row of what they name, as merged cells do.
+
+    Where most rows name theirs, an empty one was forgotten.
+    """
+    return bool(labels) and bool(labels[0]) and 2 * labels.count("") > len(labels)
 
 
 def _read_numbers(
@@ -132,7 +146,9 @@ def read_number(cell: str, comma: bool) -> float:
             raise CellError(words, remedy)
         point = cell if "." in cell else cell.replace(",", ".")
     if not _NUMBER.fullmatch(point):
-        remedy = "Write a plain number, without a sign for thousands"
+        remedy = "Write the reading, or leave out the row if there is none"
+        if any(map(str.isdigit, cell)):
+            remedy = "Write a plain number with a point, and no sign for thousands"
         raise CellError(f"'{cell}' is not a number", remedy)
     number = float(point)
     if math.isinf(number):

@@ -8,6 +8,21 @@ from hdcal.errors import Finding, Findings, InputError, quoted
 LISTED = 20  # findings of one kind that are spelled out before "and N more"
 
 
+# Row, problem and remedy.
+_Found = tuple[int, str, str]
+
+
+def _blocks(found: Sequence[_Found]) -> list[list[_Found]]:
+    """Return findings with those of the row above that say the same beside them."""
+    blocks: list[list[_Found]] = []
+    for one in found:
+        if blocks and blocks[-1][-1][0] == one[0] - 1 and blocks[-1][-1][1:] == one[1:]:
+            blocks[-1].append(one)
+        else:
+            blocks.append([one])
+    return blocks
+
+
 class FileFindings(Findings):
     """Findings about one file, so that a user sees all of them at once.
 
@@ -50,18 +65,23 @@ class FileFindings(Findings):
     ) -> None:
         """Add findings of one kind: the first 20, then how many more there are.
 
+        Where there are more, rows below each other that lack the same are told as one.
+
         Args:
             found: row, problem and remedy of each.
             column: header.
             kind: what they are, in the plural.
         """
-        count = 0
-        for count, (row, problem, remedy) in enumerate(found, 1):
-            if count <= LISTED:
-                self.add(problem, remedy, row, column)
-        if count > LISTED:
-            words = f"and {count - LISTED} more {kind}"
-            self.add(words, "Mend all of them", None, column)
+        every = [*found]
+        blocks = _blocks(every) if len(every) > LISTED else [[one] for one in every]
+        for block in blocks[:LISTED]:
+            row, problem, remedy = block[0]
+            if len(block) > 1:
+                last = self.row_of_file(block[-1][0])
+                problem = f"{problem}; the same in all rows down to {last}"
+            self.add(problem, remedy, row, column)
+        if more := sum(map(len, blocks[LISTED:])):
+            self.add(f"and {more} more {kind}", "Mend all of them", None, column)
 
     def refuse(self, problem: str, remedy: str, row: int | None = None) -> NoReturn:
         """Add one finding, after which nothing more can be read.

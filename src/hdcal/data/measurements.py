@@ -1,7 +1,7 @@
 """From a CSV file to checked columns, runs and gears."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ from hdcal.errors import quoted
 
 # How a note begins that says what was guessed.
 ASSUMED = "ASSUMED: "
+# Labels that one finding names.
+_LISTED = 20
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,37 @@ def read_measurements(
     return Measurements(columns, run, specimen)
 
 
+def of_specimen(measured: Measurements, label: str) -> Measurements:
+    """Return what was measured on one of several specimens.
+
+    Raises:
+        InputError: none is called so, or it has too few rows.
+    """
+    findings, names = measured.columns.findings, measured.specimen.names
+    if label not in names:
+        listed = ", ".join(map(quoted, names[:_LISTED]))
+        listed += f" and {len(names) - _LISTED} more" * (len(names) > _LISTED)
+        words = f"no specimen is called {quoted(label)}"
+        if len(names) == 1:
+            findings.refuse(words, "Say `columns` 'specimen=HEADER', which tells them")
+        findings.refuse(words, f"There are {listed}")
+    here = measured.specimen.index == names.index(label)
+    if np.sum(here) < FEWEST_ROWS:
+        words = f"specimen {quoted(label)} has {np.sum(here)} rows"
+        findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
+    columns = measured.columns
+    index, kept = pd.factorize(measured.run.index[here])
+    return Measurements(
+        replace(
+            columns,
+            values={name: v[here] for name, v in columns.values.items()},
+            table=replace(columns.table, rows=columns.table.rows[here]),
+        ),
+        Labels(index, tuple(measured.run.names[run] for run in kept)),
+        Labels(np.zeros(len(index), int), (label,)),
+    )
+
+
 def read_columns(
     path: Any,
     mapping: Mapping[str, str] | None,
@@ -119,14 +152,14 @@ def read_columns(
     named = {"numbered": numbered, "labelled": "run" in mapping}
     table = split_table(utf8, findings, **named)
     used = match_columns(table, mapping, quantities, required, findings)
-    values = read_cells(table, used, findings)
+    values, told = read_cells(table, used, findings)
     for quantity, column in used.items():
         if quantity not in LABELS:
             # a wild number may overflow here; the limits below report it
             with np.errstate(over="ignore"):
                 converted = column_to_code(values[quantity], quantity, column.unit)
             values[quantity] = converted
-    notes = tuple(_assumed(guessed, table, used))
+    notes = (*_assumed(guessed, table, used), *(f"{ASSUMED}{note}" for note in told))
     columns = Columns(values, used, table, sha256, findings, notes)
     check_values(columns, fewest)
     return columns
@@ -138,19 +171,21 @@ def _assumed(
     """Yield what was guessed of a file, each with how to say otherwise."""
     for note in (*([guessed] if guessed else []), *table.notes):
         yield f"{ASSUMED}{note}"
-    for quantity, column in used.items():
+    for column in used.values():
         if column.against:
             yield (
                 f"{ASSUMED}{quoted(column.header)} is in {column.unit}, as was said, "
                 f"though it names {column.against}"
             )
-        if column.guessed:
-            unit = f" in {column.unit}" if column.unit else ""
-            form = "HEADER" if quantity in LABELS else "HEADER[UNIT]"
-            yield (
-                f"{ASSUMED}{quoted(column.header)} is the {quantity}{unit}. If not, "
-                f"name the column: --column '{quantity}={form}'"
-            )
+    guesses = [column for column in used.values() if column.guessed]
+    if guesses:
+        said = ", ".join(
+            f"{quoted(c.header)} is the {c.quantity}{f' in {c.unit}' * bool(c.unit)}"
+            for c in guesses
+        )
+        one = guesses[0].quantity
+        form = "HEADER" if one in LABELS else "HEADER[UNIT]"
+        yield f"{ASSUMED}{said}. If not, name the column: --column '{one}={form}'"
 
 
 def _labels(labels: np.ndarray | None, rows: int) -> Labels:

@@ -1,6 +1,7 @@
 """Read one case: a table of measurements and the gear it was taken on."""
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,17 @@ from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion, derive_motion
-from hdcal.data.measurements import ASSUMED, Measurements, read_measurements
+from hdcal.data.measurements import (
+    ASSUMED,
+    Measurements,
+    of_specimen,
+    read_measurements,
+)
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError, quoted
 
+_NO_NAME = re.compile(r'[\\/:?"<>|]+')
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 # What is told where no gear file was named, and none lies beside the data.
@@ -43,6 +50,7 @@ def read_case(
     encoding: str | None = None,
     sheet: str | None = None,
     reading: str | None = None,
+    specimen: str | None = None,
 ) -> Case:
     """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
@@ -64,6 +72,7 @@ def read_case(
             asterisk, as in ``Probe*``, it stands for several, each a specimen.
         reading: of the deformation, `radial` or `diametral`, where the gear file is
             silent; by default it is taken for radial, and said to be so.
+        specimen: label of the one whose rows are wanted; by default all of them.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -90,13 +99,15 @@ def read_case(
             read_measurements, table if in_memory else csv_path, named, encoding, sheet
         )
         wrong += of_gear
+        if measured is not None and specimen is not None:
+            measured = wrong.attempt(of_specimen, measured, str(specimen))
         if measured is not None and found is not None:
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
-        name=_name(data, folder, sheet),
+        name=_name(data, folder, sheet, specimen),
         gear=at_full_scale(found, _full_scale(measured, found)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
@@ -115,10 +126,12 @@ def read_case(
     )
 
 
-def _name(data: Path, folder: bool, sheet: str | None) -> str:
-    """Return what the case is called, after its file and the sheet that was named."""
+def _name(data: Path, folder: bool, *parts: str | None) -> str:
+    """Return what the case is called, after its file and the parts of it named."""
     name = (data.resolve().name if folder else data.stem) or "case"
-    return name if sheet is None else f"{name}-{sheet.replace('*', '').strip()}"
+    # A folder may be called after it.
+    named = (_NO_NAME.sub("_", part.replace("*", "").strip()) for part in parts if part)
+    return "-".join([name, *named])
 
 
 def _full_scale(measured: Measurements, gear: Gear) -> FullScale:
@@ -193,7 +206,7 @@ def _left_out(columns: Columns) -> Iterator[str]:
             label = guess.quantity in LABELS
             why = "names no unit"
             if label:
-                why = "differs from row to row, or another may be meant"
+                why = "differs from row to row"
             example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (
                 f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
