@@ -18,6 +18,7 @@ from hdcal.diagnosis.refit import (
     refit,
     with_sampled_size,
 )
+from hdcal.diagnosis.repeats import without_repeats
 from hdcal.diagnosis.seen import what_is_seen
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
@@ -57,6 +58,7 @@ def diagnose(
     require_case(case)
     _check(case, library, seed)
     require_scatter(case)
+    case, repeated = without_repeats(case)
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.
     weighed = weigh(case, library, rng.spawn(1)[0])
@@ -78,7 +80,10 @@ def diagnose(
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),
-        notes=tuple(_notes(evidence, fits, weighed.averaged_rows, weighed.row_step)),
+        notes=(
+            *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
+            *_left_out(repeated),
+        ),
         reasons=failure_reasons(fits),
         averaged_rows=weighed.averaged_rows,
         row_step=weighed.row_step,
@@ -148,3 +153,10 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[
     if group > 1 or step > 1:
         notes.append("the noise of single rows was not looked at")
     return notes
+
+
+def _left_out(repeated: int) -> list[str]:
+    many = f"{repeated} readings that repeat a turning point are"
+    many = "1 reading that repeats a turning point is" if repeated == 1 else many
+    words = f"{many} left out: of loading or of unloading, nothing tells"
+    return [words] * (repeated > 0)
