@@ -4,6 +4,7 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
+from hdcal.evidence.prepare import moments
 from hdcal.fleets.answer import FleetAnswer, FutureGear, GearBounds, PopulationAnswer
 from hdcal.fleets.document import fleet_document, headline, notes_of
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
@@ -14,11 +15,13 @@ from hdcal.report.write import Report
 
 # Shares of gears to come for which bounds are told.
 CONTENTS = (0.9, 0.99)
+# Ends and middle of an interval.
+_ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
 
 
 def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     """Return what is known of each gear, the columns of gears.csv."""
-    low, middle, high = np.quantile(found.stiffness, [0.025, 0.5, 0.975], axis=0)
+    low, middle, high = np.quantile(found.stiffness, _ENDS, axis=0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
         "rows": found.rows,
@@ -28,8 +31,8 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "stiffness_hi": high,
     }
     if found.case.gear.theory != SPRING:
-        ends = {"K": middle, "K_lo": low, "K_hi": high}
-        columns |= {name: end / found.unit for name, end in ends.items()}
+        K_low, K, K_high = np.quantile(_influence(found), _ENDS, axis=0)
+        columns |= {"K": K, "K_lo": K_low, "K_hi": K_high}
     failed = bool(found.reasons)
     return columns | {
         "zero_N": found.zero,
@@ -40,6 +43,14 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "called_off": found.called,
         "status": np.full(len(middle), "failed" if failed else "ok"),
     }
+
+
+def _influence(found: Fleet) -> np.ndarray:
+    """Return draws of K of every gear: data tell its product with the modulus only."""
+    mean, sd = moments(found.case.gear.priors["E0"])
+    rng = np.random.default_rng(int(str(found.settings["seed"])))
+    modulus = 1.0 + sd / mean * rng.standard_normal((len(found.stiffness), 1))
+    return found.stiffness / (found.unit * modulus)
 
 
 def fleet_answer(found: Fleet) -> FleetAnswer:
