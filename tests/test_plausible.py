@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 import click
+import numpy as np
 import pytest
 from commands import XB1
 from moving import still_posterior
@@ -19,7 +20,7 @@ from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
 from hdcal.data.gear import read_gear
 from hdcal.data.measurements import read_measurements
-from hdcal.data.plausible import NAMES, RANGES, Range, range_of
+from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
 from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import InputError
 from hdcal.prediction.tolerance_factors import k_factor
@@ -336,3 +337,13 @@ def test_numbers_beyond_any_computer_are_refused():
     for value in (10**400, -(10**5000), float("inf")):
         with pytest.raises(InputError, match="does not lie between"):
             hdcal.calibrate(hdcal.read_case(XB1), seed=value)
+
+
+@pytest.mark.parametrize("given", [[{"force_N": 1.0}], np.ones((5, 2)), 3])
+def test_what_is_no_table_is_told(given):
+    with pytest.raises(InputError, match="Give a path, a DataFrame, or arrays"):
+        hdcal.read_case(given)
+
+
+def test_a_text_is_no_number():
+    assert "'a' is no number" in str(InputError(implausible("seed", "a")))

@@ -80,3 +80,21 @@ def test_models_of_other_data_are_refused(one):
     for models in ([], [(0.0, one)], [(-1.0, one), (2.0, one)]):
         with pytest.raises(InputError, match="no probability"):
             hdcal.margin(models, 0.4)
+
+
+@pytest.mark.parametrize("given", [[0.3, 0.4], "0.3 mm"])
+def test_one_number_is_asked_at_a_time(one, given):
+    with pytest.raises(InputError, match="deformation: is not one number"):
+        hdcal.margin(one, given)
+    with pytest.raises(InputError, match="limit_force: is not one number"):
+        hdcal.margin(one, 0.3, limit_force=given)
+
+
+def test_forces_are_asked_at_numbers(one):
+    with pytest.raises(InputError, match="deformation: is no list of numbers"):
+        hdcal.predict(one, {"deformation_mm": [0.3]})
+
+
+def test_another_result_is_no_calibration(one):
+    with pytest.raises(InputError, match="a Margin is no calibration"):
+        hdcal.summarise(hdcal.margin(one, 0.3, sensitivities=False))

@@ -20,6 +20,7 @@ from hdcal.calibration.document import (
 from hdcal.calibration.loop_stiffness import loop_stiffness
 from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, InputError
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
@@ -42,7 +43,14 @@ def summarise(posterior: Posterior, left: Residuals | None = None) -> dict:
     Args:
         posterior: from `calibrate`.
         left: its residuals, if they are at hand.
+
+    Raises:
+        InputError: it is another result.
     """
+    if not isinstance(posterior, Posterior):
+        words = f"a {type(posterior).__name__} is no calibration"
+        remedy = "Its numbers are in .to_frame() and .to_datatree()"
+        raise InputError([Finding("posterior", words, remedy)])
     return as_plain(calibration_answer(posterior, left))
 
 

@@ -6,7 +6,7 @@ large or small, comes near the ends. docs/reliability.md prints this table.
 
 from typing import Any, NamedTuple
 
-from hdcal.errors import Finding
+from hdcal.errors import Finding, quoted
 
 
 class Range(NamedTuple):
@@ -170,6 +170,8 @@ def out_of_range(name: str, given: Any, known: Range) -> list[Finding]:
     """Return a finding as `implausible` does, of a range that is known."""
     numbers = [] if given is None else _flat(given)
     for number in numbers:
+        if isinstance(number, str):
+            return [Finding(name, f"{quoted(number)} is no number", "Give one")]
         if not known.holds(number):
             words = f"{known.shown(number)} {known.problem()}"
             unit = " and its unit" if known.unit else ""

@@ -82,6 +82,9 @@ def read_case(
         raise InputError([Finding("columns", "is no mapping", remedy)])
     columns = {name: str(header) for name, header in (columns or {}).items()}
     in_memory = is_frame(data)
+    if not in_memory and not isinstance(data, str | os.PathLike):
+        remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
+        raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
     table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)

@@ -6,6 +6,7 @@ effects have not begun.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
 import jax
 import numpy as np
@@ -117,10 +118,23 @@ def predict(
     causes = causes_of(posterior, allow_failed=allow_failed)
     case = causes[0].posterior.case
     warm = usual_temperature(case) if temperature is None else temperature
-    along = np.atleast_1d(np.asarray(deformation, dtype=float))
-    levels = np.atleast_1d(np.asarray(warm, dtype=float))
+    along = _numbers("deformation", deformation)
+    levels = _numbers("temperature", warm)
     _check(likeliest(causes), along, levels, direction, interval, seed)
     return _bands(causes, along, levels, direction, interval, seed)
+
+
+def _numbers(name: str, given: Any) -> np.ndarray:
+    """Return what was asked as an array of numbers, shape (n,)."""
+    try:
+        found = np.atleast_1d(np.asarray(given, dtype=float))
+    except (TypeError, ValueError):
+        found = np.zeros((0, 0))
+    if found.ndim == 1:
+        return found
+    words = "is no list of numbers"
+    remedy = "Give numbers one by one, as in [0.2, 0.4], or a column of a table"
+    raise InputError([Finding(name, words, remedy)])
 
 
 def _bands(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hdcal.errors import Finding, InputError
 from hdcal.prediction.engine.causes import (
     Cause,
     causes_of,
@@ -108,6 +109,14 @@ def margin(
         NotUsable: a calibration failed its checks.
         InputError: what is asked cannot be answered; holds every finding.
     """
+    asked = {"deformation": deformation, "limit_force": limit_force}
+    asked |= {"given_force": given_force}
+    if wrong := [
+        Finding(name, "is not one number", "Ask for one at a time")
+        for name, given in asked.items()
+        if given is not None and (np.ndim(given) or isinstance(given, str))
+    ]:
+        raise InputError(wrong)
     sizes = {name: float(width) for name, width in (tolerances or {}).items()}
     about = direction, sizes, population, quantity, given_force, seed
     request = MarginRequest(deformation, temperature, *about)
