@@ -4,7 +4,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 
 from hdcal.calibration.answer import CalibrationAnswer, LocalStiffness
-from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING, THEORY_WORDS
 from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
 from hdcal.inference.posterior import Posterior
@@ -78,7 +77,7 @@ _LACKING: Mapping[str, str] = {
 
 def headline(
     found: Interval,
-    case: Case,
+    posterior: Posterior,
     bend: Sequence[LocalStiffness] = (),
     *,
     looped: bool = False,
@@ -88,12 +87,12 @@ def headline(
 
     Args:
         found: of a straight line.
-        case: whose it is; without temperatures it holds at that of the test.
+        posterior: whose it is; without temperatures it holds at that of the test.
         bend: its slope at several places, where the readings bend.
         looped: whether readings on loading and on unloading differ from it.
         beside_a_loop: stiffness of a model with a loop of any shape.
     """
-    middle, span = estimate(found)
+    case, (middle, span) = posterior.case, estimate(found)
     # Three digits of each slope.
     slopes = " to ".join(
         f"{number(slope, slope)} N/mm at {each.deformation_mm:.2g} mm"
@@ -110,6 +109,8 @@ def headline(
     warm = f" at {case.gear.reference_temperature:g} °C" * was_read
     many = len(case.specimen_labels)
     whose = f"Mean stiffness of the {many} gears tested" if many > 1 else "Stiffness"
+    acting = [e.name for e in posterior.effects if e.stage != "noise"]
+    whose += f" apart from {' and '.join(acting).replace('_', ' ')}" * bool(acting)
     return (
         f"{whose}{warm}: {middle} N/mm, 95 % credible interval {span} N/mm, per "
         f"millimetre as read{told}."
@@ -170,7 +171,7 @@ def calibration_document(
         # Of a failed calibration the page shows it struck through.
         headline=headline(
             found.stiffness_N_per_mm,
-            posterior.case,
+            posterior,
             found.bend,
             looped=LOOPED in {shape.name for shape in found.residuals},
             beside_a_loop=found.beside_a_loop,

@@ -72,7 +72,7 @@ def calibration_answer(
     plain = not posterior.effects and not posterior.settings["with_gap"]
     beside = _beside_a_loop(posterior.case) if looped and plain and not bend else None
     loop = {"looped": looped, "beside_a_loop": beside}
-    first = headline(stiffness, posterior.case, bend, **loop)
+    first = headline(stiffness, posterior, bend, **loop)
     entries = posterior_entries(posterior, first, steps)
     entries["warnings"] += tuple(shape.words for shape in found)
     return CalibrationAnswer(
