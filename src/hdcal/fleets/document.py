@@ -58,10 +58,14 @@ def headline(
     centre = estimate(population.stiffness_N_per_mm)[0]
     alike = total - len(called)
     if alike == total:
-        return (
+        told = (
             f"None of {total} gears is called off: they scatter by {middle} % (sd, "
-            f"{span} %) about {centre} N/mm."
+            f"{span} %) about {centre} N/mm"
         )
+        far = columns["gear"][int(np.argmax(columns["probability_off"]))]
+        odd = next(_off(population, [str(far)], columns))
+        odd = odd.replace("(probability", "(off with probability")
+        return told + f"; oddest: {odd}." if total < _FEW else f"{told}."
     told = "; ".join(_off(population, called, columns))
     return f"{alike} of {total} gears scatter by {middle} % (sd); {told}."
 

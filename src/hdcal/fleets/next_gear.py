@@ -43,6 +43,6 @@ def stiffness_bounds(
     reach = draws["specimen_sd"] * high
     ends = draws["stiffness"] * (1.0 - reach), draws["stiffness"] * (1.0 + reach)
     return (
-        float(np.quantile(ends[0], 1.0 - CONFIDENCE)),
+        max(float(np.quantile(ends[0], 1.0 - CONFIDENCE)), 0.0),
         float(np.quantile(ends[1], CONFIDENCE)),
     )

@@ -137,15 +137,14 @@ def open_tree(path) -> xr.DataTree:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             loaded = tree.load()
     except FileNotFoundError as error:
-        raise InputError(
-            [
-                Finding(
-                    str(path),
-                    "there is no such file",
-                    "Name the folder that hdcal calibrate wrote",
-                )
-            ]
-        ) from error
+        words, remedy = "there is no such file", "Name the folder of a calibration"
+        if (Path(path).parent / "gears.csv").exists():
+            words = "a fleet leaves no posterior"
+            remedy = (
+                "What a gear to come needs is `next_gear` in its summary.json; for one "
+                "gear calibrate it alone, with --specimen"
+            )
+        raise InputError([Finding(str(path), words, remedy)]) from error
     except InputError:
         raise
     except Exception as error:
