@@ -32,7 +32,8 @@ def fleet_chart(found: Fleet) -> Chart:
         if rows.any()
     ]
     axis = "gears by their stiffness", "stiffness as read [N/mm]"
-    return Chart(*axis, [*curves, *points], [(0, 1, 0.25)])
+    names = [found.case.specimen_labels[gear] for gear in order]
+    return Chart(*axis, [*curves, *points], [(0, 1, 0.25)], names=names)
 
 
 def _boxes(ends: np.ndarray) -> np.ndarray:

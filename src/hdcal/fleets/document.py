@@ -27,7 +27,7 @@ _MOST_NAMED = 3
 RESTS_ON = (
     "Of each mounting a straight line is taken, with a zero of its own and noise that "
     "is independent from reading to reading: what bends it, a loop or a drift, is not "
-    "modelled here. To see it diagnose one of them: diagnose DATA --specimen LABEL."
+    "modelled here. To see it diagnose one by itself, with `--specimen LABEL`."
 )
 ONE_MOUNTING = (
     "Every gear was mounted once: how much mountings scatter is told by the zeros "

@@ -1,5 +1,8 @@
 """A fleet as an answer, and all that its result folder holds."""
 
+import shlex
+from collections.abc import Sequence
+
 import numpy as np
 
 from hdcal.data.theory_names import SPRING
@@ -70,7 +73,7 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
         headline=said,
-        next_step=f"Look at {called[0]} by itself: diagnose it." if called else None,
+        next_step=_next_step(called),
         gears=len(found.off),
         rows=int(found.rows.sum()),
         called_off=tuple(called),
@@ -90,6 +93,13 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         versions=versions(),
         data_sha256=found.case.data_sha256,
     )
+
+
+def _next_step(called: Sequence[str]) -> str | None:
+    if not called:
+        return None
+    alone = f"`--specimen {shlex.quote(called[0])}`"
+    return f"Look at {called[0]} by itself: diagnose the same data with {alone}."
 
 
 def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:

@@ -49,6 +49,7 @@ class Chart:
         bands: pairs of series (upper, lower) by their places, and the opacity of what
             lies between them.
         height: in pixels.
+        names: what stands at 1, 2, … of the axis, in place of the numbers.
     """
 
     x: str
@@ -56,6 +57,7 @@ class Chart:
     series: Sequence[Series]
     bands: Sequence[tuple[int, int, float]] = ()
     height: int = 380
+    names: Sequence[str] = ()
 
     def plain(self) -> dict:
         """Return it as the page's script takes it: all series over the same places."""
@@ -78,6 +80,7 @@ class Chart:
             "x": self.x,
             "y": self.y,
             "height": self.height,
+            "names": [*self.names],
             "bands": [list(band) for band in self.bands],
             "series": [
                 {n: v for n, v in vars(each).items() if n not in ("x", "y")}

@@ -8,6 +8,8 @@ from hdcal.report.chart import Chart
 _INK = "#222222"
 # A legend of more lines hides what it explains.
 _MOST_NAMED, _LONGEST = 8, 40
+# More names, and longer ones, leave an axis no room.
+_MOST_PLACES, _LONGEST_PLACE = 60, 16
 
 
 def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
@@ -31,6 +33,9 @@ def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
             line = ":" if series.dashed else "-"
             axes.plot(series.x, series.y, line, color=colour, label=label)
     axes.set_xlabel(chart.x)
+    if 0 < len(chart.names) <= _MOST_PLACES:
+        names = [plain(name, _LONGEST_PLACE) for name in chart.names]
+        axes.set_xticks(range(1, len(names) + 1), names, rotation=90, fontsize=7)
     axes.set_ylabel(chart.y)
     if len(axes.get_legend_handles_labels()[1]) <= _MOST_NAMED:
         axes.legend(fontsize="small")

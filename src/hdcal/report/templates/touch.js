@@ -40,7 +40,13 @@ function touch(figure) {
   }
 
   function shown(value) {
-    return value == null ? "–" : Number(value.toPrecision(5)).toString();
+    return value == null ? "" : Number(value.toPrecision(5)).toString();
+  }
+
+  // What stands at a place of the axis: a number, or one of its names.
+  function placed(chart, value) {
+    if (!chart.names.length || value == null) return shown(value);
+    return chart.names[Math.round(value) - 1] ?? "";
   }
 
   const isEdge = each => !each.points && each.width === 0;
@@ -70,8 +76,13 @@ function touch(figure) {
       axes: [chart.x, chart.y].map(label => ({
         label: label, stroke: text, grid: {stroke: line, width: 1},
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
+        ...(label === chart.x && chart.names.length ? {
+          size: 100, rotate: -90, space: 16, incrs: [1, 2, 5].flatMap(
+            n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
+          values: (_, places) => places.map(place => placed(chart, place).slice(0, 12)),
+        } : {}),
       })),
-      series: [{label: chart.x, value: (_, value) => shown(value)}].concat(
+      series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({
           label: k in band ? each.label.replace(/, [^,]*( \[[^\]]*\])$/, "$1") : each.label,
           stroke: hue(each), width: each.points ? 0 : each.width,
