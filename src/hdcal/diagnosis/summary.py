@@ -9,7 +9,6 @@ from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict
-from hdcal.diagnosis.where import interval
 from hdcal.diagnosis.words import answer, headline, limits, next_step
 from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN
 from hdcal.inference.mixed_posterior import mixed_posterior
@@ -17,7 +16,7 @@ from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.document import spoken_of
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
 
@@ -81,7 +80,7 @@ def _stiffness(verdict: Verdict) -> Interval | None:
     """Return the stiffness as read, hypotheses weighed by their probabilities."""
     if verdict.reasons or not verdict.posteriors:
         return None
-    return interval(mixed_posterior(verdict.posteriors).draws["stiffness"])
+    return credible_interval(mixed_posterior(verdict.posteriors).draws["stiffness"])
 
 
 def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]:

@@ -77,8 +77,10 @@ def _sentences(found: VerdictAnswer) -> list[str]:
     if found.stiffness_N_per_mm is not None:
         middle, span = estimate(found.stiffness_N_per_mm)
         over = "" if found.which.verdict == "none" else ", causes weighed as told"
-        sure = f"{percent(found.interval)}: {span}"
-        said.append(f"The stiffness{over}: {middle} N/mm ({sure}), per mm as read.")
+        said.append(
+            f"The stiffness{over}: {middle} N/mm, 95 % credible interval {span} N/mm, "
+            "per millimetre as read."
+        )
     return said
 
 

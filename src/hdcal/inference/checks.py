@@ -137,10 +137,10 @@ def correlation_check(
     if CORRELATION not in draws:
         words = f"a correlation of neighbours is not inferred for these data: {reason}"
         return Check(INDEPENDENT, "note", words)
-    low, middle, high = np.quantile(draws[CORRELATION], [0.05, 0.5, 0.95])
-    if low < _TOLD_CORRELATION:
+    least, *ends, middle = np.quantile(draws[CORRELATION], [0.05, 0.025, 0.975, 0.5])
+    if least < _TOLD_CORRELATION:
         return Check(INDEPENDENT, "passed", "no correlation of neighbours is seen")
-    span = f"{middle:.2f} ({low:.2f} to {high:.2f}, 90 %)"
+    span = f"{middle:.2f} ({ends[0]:.2f} to {ends[1]:.2f}, 95 %)"
     words = f"the errors of neighbouring readings have a correlation of {span}"
     left = worth(rows, float(middle))
     if middle < _STRONG_CORRELATION or left > _LITTLE_WORTH:
