@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -44,6 +45,7 @@ PUBLIC = [
 ]
 LOADED = """
 import sys
+from pathlib import Path
 before = set(sys.modules)
 import hdcal
 print(*sorted({name.partition(".")[0] for name in set(sys.modules) - before}))
@@ -108,3 +110,9 @@ def test_the_force_can_be_differentiated_batched_and_compiled():
     assert slope.radius == pytest.approx(-3.0 * force / 40.0)
     assert slope.length == pytest.approx(force / 70.0)
     assert slope.poisson == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_page_of_the_library_tells_every_public_name():
+    told = (Path(__file__).parents[1] / "docs" / "api.md").read_text()
+    missing = [name for name in hdcal.__all__ if f"hdcal.{name}" not in told]
+    assert missing == []

@@ -7,6 +7,7 @@ import pytest
 from rigs import make_case, make_records
 from scipy import stats
 
+from hdcal.classical.fit.document import notes
 from hdcal.classical.fit.fit import fit, fit_powers
 from hdcal.classical.fit.notation import model_name
 from hdcal.classical.fit.summary import fit_answer
@@ -211,9 +212,9 @@ def test_exact_data_leave_nothing_to_divide_by():
 
 def test_the_summary_says_what_the_curves_leave_out(pontius):
     case = read_case(DATASETS / "thermal-demo")
-    notes = " ".join(fit_answer(case, fit(case)).notes)
-    assert "no curve here knows it" in notes
-    assert "loading and unloading are fitted as one curve" in notes
+    told = " ".join(fit_answer(case, fit(case)).notes)
+    assert "no curve here knows it" in told
+    assert "loading and unloading are fitted as one curve: they lie" in told
     found = as_plain(fit_answer(pontius, fit(pontius, [1, 2]), at=1.0))
     assert "2 runs are fitted as one" in " ".join(found["notes"])
     assert found["fits"][0]["held_out_runs_N"] > found["fits"][2]["held_out_runs_N"]
@@ -224,3 +225,13 @@ def test_the_summary_says_what_the_curves_leave_out(pontius):
     assert top["at"]["force_N"] == pytest.approx(force, rel=1e-12)
     with pytest.raises(InputError, match="no deformation of this gear"):
         fit_answer(pontius, fit(pontius), at=400.0)
+
+
+def test_a_loop_that_counts_as_scatter_is_told_with_its_width():
+    up = np.linspace(0.0, 0.5, 26)
+    x = np.concatenate([up, up[-2::-1]])
+    force = 100.0 * x + 0.9 * np.where(np.arange(51) < 26, 1.0, -1.0)
+    force += 0.05 * np.random.default_rng(0).normal(size=51)
+    case = read_case({"deformation_mm": x, "force_N": force})
+    told = notes(case)
+    assert any("they lie 1.8 N apart in the mean" in words for words in told)

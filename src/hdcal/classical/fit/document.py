@@ -12,7 +12,7 @@ from hdcal.data.case import Case
 from hdcal.report.document import Document, Picture, Section, Table, Text, notices
 from hdcal.report.parameters import Interval
 from hdcal.report.provenance import data_rows, gear_rows
-from hdcal.report.words import estimate, number
+from hdcal.report.words import estimate, newton, number
 
 
 def headline(curves: Sequence[FittedCurve]) -> str:
@@ -26,6 +26,10 @@ def headline(curves: Sequence[FittedCurve]) -> str:
     return f"Of these, {best.model} describes the data best (AICc){also}."
 
 
+# Degree of a curve that leaves of readings what no bend is.
+_SMOOTH = 3
+
+
 def notes(case: Case) -> Iterator[str]:
     """Yield what the curves leave out of account."""
     records = case.records
@@ -34,8 +38,15 @@ def notes(case: Case) -> Iterator[str]:
         yield (
             f"the temperature went from {cold:g} to {warm:g} °C: no curve here knows it"
         )
-    if len(np.unique(records.sense)) > 1:
-        yield "loading and unloading are fitted as one curve"
+    sense = np.asarray(records.sense)
+    if np.any(sense > 0.0) and np.any(sense < 0.0):
+        x, force = np.asarray(records.deformation), np.asarray(records.force)
+        error = force - np.polyval(np.polyfit(x, force, _SMOOTH), x)
+        loop = newton(abs(float(error[sense > 0.0].mean() - error[sense < 0.0].mean())))
+        yield (
+            f"loading and unloading are fitted as one curve: they lie {loop} apart in "
+            "the mean, which counts as scatter here"
+        )
     for kind, labels in (("run", case.run_labels), ("gear", case.specimen_labels)):
         if len(labels) > 1:
             yield (
