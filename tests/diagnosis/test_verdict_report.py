@@ -41,6 +41,13 @@ def test_where_nothing_is_suspected_no_run_is_proposed():
     assert "What to do next" not in words and "tells apart" not in words
 
 
+def test_outside_the_library_the_next_step_is_a_gap():
+    found = verdict_answer(replace(KINDS["unknown"](), next_test=()))
+    assert found.next_step is not None
+    assert found.next_step.startswith("Calibrate with a gap")
+    assert verdict_answer(replace(named(), next_test=())).next_step is None
+
+
 def test_what_stands_in_backticks_is_code_and_nothing_else_is():
     words = page(replace(named(), next_test=(), no_run="see `a <b>` and <i>"))
     assert "see <code>a &lt;b&gt;</code> and &lt;i&gt;." in words

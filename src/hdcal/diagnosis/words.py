@@ -31,6 +31,11 @@ NO_PROOF = (
     "close it as well."
 )
 
+_WITHOUT_A_RUN = (
+    "Calibrate with a gap: its bands hold what no effect of the library explains. Of a "
+    "cause that it does not have it cannot say what to measure."
+)
+
 # A correlation of neighbours from which on it is told.
 _ALIKE = 0.5
 # A gap of r noise sds in n independent rows is detected nine times in ten from
@@ -46,9 +51,11 @@ def headline(found: VerdictAnswer) -> str:
 
 
 def next_step(found: VerdictAnswer) -> str | None:
-    """Return the run that would tell most, or None."""
-    if found.status != "ok" or not found.next_test or nothing_suspected(found):
+    """Return the run that would tell most, or what to do without one."""
+    if found.status != "ok" or nothing_suspected(found):
         return None
+    if not found.next_test:
+        return _WITHOUT_A_RUN if found.which.verdict == "unknown" else None
     lead = "Next run" if found.which.verdict != "named" else "To be surer"
     return f"{lead}: {found.next_test[0].run.rstrip('.')}."
 
