@@ -232,6 +232,17 @@ def test_one_of_several_specimens_is_read_alone(folder):
     assert not {"specimen", "specimens"} & case.records.known
 
 
+def test_a_specimen_may_be_named_by_its_number_and_has_to_be_moved(folder):
+    data = _labelled(folder, ("Prüfling", 1, 2))
+    assert read_case(data, specimen=1).name == "data-1"
+    table = pd.read_csv(data)
+    table.loc[6:, "Weg [mm]"] = 0.1
+    table.to_csv(data, index=False)
+    assert len(read_case(data, specimen="1").records.force) == 6
+    with pytest.raises(InputError, match="the deformation is constant"):
+        read_case(data, specimen="2")
+
+
 def test_a_specimen_that_is_not_there_is_told_with_those_that_are(folder):
     data = _labelled(folder, ("Prüfling", *"abcd"))
     for label, words in (("x", "no specimen is called 'x'"), ("a", "has 3 rows")):

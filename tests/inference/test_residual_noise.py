@@ -158,3 +158,25 @@ def test_a_slip_is_the_first_thing_to_look_at():
     assert told.startswith(f"Reading 18, {force[17]:.4g} N at {x[17]:.4g} mm, lies ")
     off = float(told.partition("lies ")[2].partition(" N off")[0])
     assert off == pytest.approx(9.0 * force[17], rel=0.1)
+
+
+@pytest.mark.parametrize("sd", [0.2, 0.25, 0.35])
+def test_the_steps_of_a_display_are_no_slips(sd):
+    rng = np.random.default_rng(4)
+    force = [np.round(200.0 * X + rng.normal(0.0, sd, ROWS)) for _ in range(100)]
+    line = np.column_stack([np.ones(ROWS), X])
+    alarms = []
+    for shown in force:
+        error = shown - line @ np.linalg.lstsq(line, shown, rcond=None)[0]
+        noise = float(np.std(error))
+        data = Whitened(error / noise, line / noise, {})
+        records = make_records(X, force=shown)
+        found = noise_faults(data, records, np.full(ROWS, noise), rounded=False)
+        alarms.append(WILD in {fault.name for fault in found})
+    assert np.mean(alarms) <= 0.02
+
+
+def test_many_jumps_are_no_slips():
+    error = correlated(0.0, np.random.default_rng(5))
+    error[10:60:10] += 50.0
+    assert WILD not in faults(error)

@@ -82,12 +82,19 @@ def test_models_of_other_data_are_refused(one):
             hdcal.margin(models, 0.4)
 
 
-@pytest.mark.parametrize("given", [[0.3, 0.4], "0.3 mm"])
+@pytest.mark.parametrize("given", [[0.3, 0.4], "0.3 mm", {}, [[1], [2, 3]], 1j])
 def test_one_number_is_asked_at_a_time(one, given):
     with pytest.raises(InputError, match="deformation: is not one number"):
         hdcal.margin(one, given)
     with pytest.raises(InputError, match="limit_force: is not one number"):
         hdcal.margin(one, 0.3, limit_force=given)
+
+
+def test_of_temperatures_and_shares_numbers_are_asked(one):
+    with pytest.raises(InputError) as refused:
+        hdcal.margin(one, None, temperature="warm", content="x")
+    told = {finding.file for finding in refused.value.findings}
+    assert told == {"deformation", "temperature", "content"}
 
 
 def test_forces_are_asked_at_numbers(one):

@@ -74,13 +74,15 @@ def _parts(records: Records, line, loops, free: int) -> np.ndarray:
     before, force = previous_rows(records), np.asarray(records.force)
     table = np.column_stack([line, loops, force])
     found = []
-    for correlation in _CORRELATIONS:
+    # Flat in the correlation, whose places are not evenly apart.
+    widths = np.gradient(_CORRELATIONS)
+    for correlation, width in zip(_CORRELATIONS, widths, strict=True):
         own = whiten(table, before, correlation)
         volume = float(log_volume(np.sum(before >= 0), correlation))
         products = own.T @ own
         for size in _SIZES:
             part = _part(products, line.shape[1], size, free)
-            found.append((part[0] - volume, *part[1:]))
+            found.append((part[0] - volume + np.log(width), *part[1:]))
     return np.array(found)
 
 

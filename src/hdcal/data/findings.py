@@ -12,11 +12,15 @@ LISTED = 20  # findings of one kind that are spelled out before "and N more"
 _Found = tuple[int, str, str]
 
 
-def _blocks(found: Sequence[_Found]) -> list[list[_Found]]:
+def _blocks(
+    found: Sequence[_Found], places: Sequence[tuple[str, int]]
+) -> list[list[_Found]]:
     """Return findings with those of the row above that say the same beside them."""
     blocks: list[list[_Found]] = []
     for one in found:
-        if blocks and blocks[-1][-1][0] == one[0] - 1 and blocks[-1][-1][1:] == one[1:]:
+        above = blocks[-1][-1] if blocks else (-1, "", "")
+        below = above[0] == one[0] - 1 and above[1:] == one[1:]
+        if below and (not places or places[above[0] - 1][0] == places[one[0] - 1][0]):
             blocks[-1].append(one)
         else:
             blocks.append([one])
@@ -73,7 +77,9 @@ class FileFindings(Findings):
             kind: what they are, in the plural.
         """
         every = [*found]
-        blocks = _blocks(every) if len(every) > LISTED else [[one] for one in every]
+        blocks = [[one] for one in every]
+        if len(every) > LISTED:
+            blocks = _blocks(every, self.places)
         for block in blocks[:LISTED]:
             row, problem, remedy = block[0]
             if len(block) > 1:

@@ -23,7 +23,7 @@ from hdcal.data.frames import NAME, frame_text, is_frame
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
-from hdcal.errors import quoted
+from hdcal.errors import InputError, quoted
 
 # How a note begins that says what was guessed.
 ASSUMED = "ASSUMED: "
@@ -104,14 +104,17 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     if np.sum(here) < FEWEST_ROWS:
         words = f"specimen {quoted(label)} has {np.sum(here)} rows"
         findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
-    columns = measured.columns
+    columns = replace(
+        measured.columns,
+        values={name: v[here] for name, v in measured.columns.values.items()},
+        table=replace(measured.columns.table, rows=measured.columns.table.rows[here]),
+    )
+    check_values(columns, 0)
+    if findings:
+        raise InputError(findings)
     index, kept = pd.factorize(measured.run.index[here])
     return Measurements(
-        replace(
-            columns,
-            values={name: v[here] for name, v in columns.values.items()},
-            table=replace(columns.table, rows=columns.table.rows[here]),
-        ),
+        columns,
         Labels(index, tuple(measured.run.names[run] for run in kept)),
         Labels(np.zeros(len(index), int), (label,)),
     )

@@ -130,10 +130,10 @@ def read_case(
 
 
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
-    """Return what the case is called, after its file and the parts of it named."""
+    """Return what the case, or its folder, is called: after file and parts named."""
     name = (data.resolve().name if folder else data.stem) or "case"
-    # A folder may be called after it.
-    named = (_NO_NAME.sub("_", part.replace("*", "").strip()) for part in parts if part)
+    told = (str(part).replace("*", "").strip() for part in parts if part is not None)
+    named = (_NO_NAME.sub("_", part) for part in told)
     return "-".join([name, *named])
 
 

@@ -27,6 +27,12 @@ def require_scatter(case: Case) -> None:
         "the forces lie on a straight line to the last digit, so that nothing tells "
         "how far readings scatter"
     )
+    members = len(np.unique(records.run)) + len(case.specimen_labels)
+    if len(force) <= members:
+        words = (
+            "no reading is left over that tells how far readings scatter: each run has "
+            "as few as its line and its zero need"
+        )
     remedy = (
         "Say the step of the display as force_resolution_N under [measurement] of the "
         "gear file; to readings that were computed, add noise"
@@ -39,9 +45,12 @@ def reading_step(case: Case) -> float:
 
     Zero where all forces are the same.
     """
-    if case.gear.force_resolution > 0.0:
-        return case.gear.force_resolution
-    force = np.asarray(case.records.force)
+    return case.gear.force_resolution or least_step(case.records.force)
+
+
+def least_step(force) -> float:
+    """Return the least difference of two forces [N]; zero where all are the same."""
+    force = np.asarray(force)
     steps = np.diff(np.unique(force))
     steps = steps[steps > _NOTHING * np.max(np.abs(force))]
     return float(np.min(steps, initial=np.inf)) if len(steps) else 0.0

@@ -98,8 +98,9 @@ def _as_one(told: list[Seen], size: float, words: str) -> tuple[Seen, ...]:
     place = next(i for i, each in enumerate(told) if each.covariate == "run")
     zeros = [each for each in told if each.covariate == "run"]
     others = [each for each in told if each.covariate != "run"]
-    # A difference of two runs, of which each contrast says one against the mean.
-    half = np.sqrt(2.0) * max(each.size_N.hi - each.size_N.median for each in zeros)
+    # A difference of two runs, of which each contrast says one against the mean; that
+    # of the last one is beside all the others.
+    half = np.sqrt(2.0) * min(each.size_N.hi - each.size_N.median for each in zeros)
     whole = replace(
         zeros[0],
         statement=words,

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 
 from hdcal.data.records import Records
+from hdcal.data.scatter import least_step
 from hdcal.inference.noise_form import growth_p_value
 from hdcal.inference.residual_shapes import (
     FALSE_ALARM,
@@ -24,8 +25,9 @@ NEIGHBOURS, SCATTER, WILD = "neighbours", "scatter", "wild readings"
 # A normal sd over the median of absolute errors, and what that median is worth: as much
 # as the sd of so large a share of the errors.
 _NORMAL, _WORTH = 1.4826, 0.37
-# Errors that lie nearer are those of noise with long tails, of which a slip is none.
-_WILD = 12.0
+# Errors that lie nearer are those of noise with long tails, of which a slip is none; it
+# has so large a share of all squares, and there are few: jumps of a rig are many.
+_WILD, _SHARE, _FEW = 12.0, 0.02, 3
 # Name, p value, size [N], words.
 _Test = tuple[str, float, float, str]
 
@@ -145,7 +147,8 @@ def _neighbours(rest: _Left, before, sd: np.ndarray, correlation: float) -> _Tes
 def _wild(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
     """Test whether a reading lies farther off than noise ever does, as slips do.
 
-    Against the median of all, which a few wild ones do not move.
+    Against the median of all, which a few wild ones do not move, and the rounding of a
+    display, below which the median may lie.
 
     Args:
         rest: what is left of the rows.
@@ -155,12 +158,17 @@ def _wild(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
     size = len(sd)
     kept = 1.0 - np.sum(rest.basis[:size] ** 2, axis=1)
     far = np.abs(rest.error[:size]) / np.sqrt(np.maximum(kept, 1e-6))
-    scale = _NORMAL * float(np.median(far))
-    times = far / max(scale, 1e-300)
+    rounding = least_step(records.force) / np.sqrt(12.0)
+    scale = np.maximum(_NORMAL * float(np.median(far)), rounding / sd)
+    times = far / np.maximum(scale, 1e-300)
     chance = 2.0 * size * stats.t.sf(times, _WORTH * rest.free)
-    chance = np.where(times < _WILD, 1.0, chance)
-    row, many = int(np.argmax(far)), int(np.sum(chance <= FALSE_ALARM))
-    others = f", and {many - 1} more lie far off" * (many > 1)
+    row = int(np.argmax(far))
+    wild = np.flatnonzero((chance <= FALSE_ALARM) & (times >= _WILD))
+    # What comes after one errs beside it.
+    many = int(np.sum(np.diff(wild, prepend=-2) > 1))
+    slips = many <= _FEW and far[row] ** 2 >= _SHARE * float(far @ far)
+    chance = chance if len(wild) and slips else np.ones(size)
+    others = f" ({many} such readings)" * (many > 1)
     off = float(far[row] * sd[row])
     force, place = (float(v[row]) for v in (records.force, records.deformation))
     words = (

@@ -110,18 +110,32 @@ def margin(
         InputError: what is asked cannot be answered; holds every finding.
     """
     asked = {"deformation": deformation, "limit_force": limit_force}
-    asked |= {"given_force": given_force}
-    if wrong := [
+    asked |= {"given_force": given_force, "content": content, "confidence": confidence}
+    asked |= {"required_probability": required_probability}
+    optional = {"limit_force", "given_force", "required_probability"}
+    wrong = [
         Finding(name, "is not one number", "Ask for one at a time")
         for name, given in asked.items()
-        if given is not None and (np.ndim(given) or isinstance(given, str))
-    ]:
+        if _axes(given) != 0 and not (given is None and name in optional)
+    ]
+    if temperature is not None and _axes(temperature) not in (0, 1):
+        wrong.append(Finding("temperature", "is no list of numbers", "Give degrees C"))
+    if wrong:
         raise InputError(wrong)
     sizes = {name: float(width) for name, width in (tolerances or {}).items()}
     about = direction, sizes, population, quantity, given_force, seed
     request = MarginRequest(deformation, temperature, *about)
     criteria = Criteria(content, confidence, required_probability, limit_force, rule)
     return _margin(causes_of(models), request, criteria, sensitivities)
+
+
+def _axes(given: object) -> int | None:
+    """Return the number of axes of numbers, None of what is none."""
+    try:
+        found = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        return None
+    return None if given is None or isinstance(given, str) else found.ndim
 
 
 def _margin(

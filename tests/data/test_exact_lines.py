@@ -49,3 +49,10 @@ def test_a_display_that_shows_a_line_is_answered_by_its_step():
 def test_the_step_is_the_stated_one_or_the_least_between_forces():
     assert reading_step(_case(np.round(103 * _LINE), step=0.5)) == 0.5
     assert reading_step(_case([5, 8, 11, 13, 17, 19, 29, 31, 40, 51.0])) == 2.0
+
+
+def test_readings_of_which_none_is_left_over_are_refused_in_other_words():
+    force = [0.0, 21.0, 43.0, 60.0, 82.0, 99.0]
+    x = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
+    with pytest.raises(InputError, match="no reading is left over"):
+        calibrate(_case(force, x, run=np.arange(6)))
