@@ -38,7 +38,7 @@ def loop_stiffness(case: Case, levels: np.ndarray) -> np.ndarray | None:
 
     Returns:
         Quantiles, shape (q,); None where rows are too many or too few, of several
-        specimens, or each have an sd of their own.
+        specimens, or each have an sd of their own, and where gauges have gains.
     """
     records = case.records
     rows, runs = len(records.force), len(np.unique(records.run))
@@ -46,6 +46,9 @@ def loop_stiffness(case: Case, levels: np.ndarray) -> np.ndarray | None:
     if rows > _MOST_ROWS or runs > _MOST_RUNS or free < _FEWEST_FREE + len(_REACHES):
         return None
     if len(case.specimen_labels) > 1 or "force_sd" in records.known:
+        return None
+    # Gains that certificates state are taken off a calibration's stiffness, not here.
+    if case.gear.gauge_priors:
         return None
     if "unloading" not in records.known:
         return None
