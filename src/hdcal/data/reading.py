@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.columns import LABELS, Columns
+from hdcal.data.columns import Columns
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
-from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
@@ -21,9 +20,10 @@ from hdcal.data.measurements import (
     of_specimen,
     read_measurements,
 )
+from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, Findings, InputError, quoted
+from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
 DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
@@ -34,9 +34,6 @@ UNSIZED = (
     "stiffness is asked, no K. K needs sizes, stated in a gear file, named or as "
     f"{GEAR_NAME} beside the data"
 )
-MOST_ROWS = 8  # listed in one note
-USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
-THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
 
@@ -77,14 +74,7 @@ def read_case(
     Raises:
         InputError: holds everything that is wrong with either file.
     """
-    if columns is not None and not isinstance(columns, Mapping):
-        remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
-        raise InputError([Finding("columns", "is no mapping", remedy)])
-    columns = {name: str(header) for name, header in (columns or {}).items()}
-    in_memory = is_frame(data)
-    if not in_memory and not isinstance(data, str | os.PathLike):
-        remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
-        raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
+    columns, in_memory = _asked(data, columns)
     table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
@@ -119,14 +109,22 @@ def read_case(
         notes=(
             *measured.columns.notes,
             *told,
-            *_thick_wall(found),
-            *_unusual_temperature(measured),
-            *_left_out(measured.columns),
-            *_off_scale(measured, found),
-            *_resets(measured, motion),
+            *reading_notes(measured, found, motion),
         ),
         columns=measured.columns.as_named(),
     )
+
+
+def _asked(data: Any, columns: Mapping[str, str] | None) -> tuple[dict[str, str], bool]:
+    """Return columns as texts, and whether the data are a table in memory."""
+    if columns is not None and not isinstance(columns, Mapping):
+        remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
+        raise InputError([Finding("columns", "is no mapping", remedy)])
+    if not is_frame(data) and not isinstance(data, str | os.PathLike):
+        remedy = "Give a path, a DataFrame, or arrays by header as {'force_N': …}"
+        raise InputError([Finding("data", f"is a {type(data).__name__}", remedy)])
+    named = {name: str(header) for name, header in (columns or {}).items()}
+    return named, is_frame(data)
 
 
 def _name(data: Path, folder: bool, *parts: str | None) -> str:
@@ -199,28 +197,6 @@ def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
     return [Finding(file, words, remedy, row, header)]
 
 
-def _left_out(columns: Columns) -> Iterator[str]:
-    positions = {column.position for column in columns.used.values()}
-    headers = enumerate(columns.table.headers)
-    extra = [header for place, header in headers if place not in positions]
-    for header in extra:
-        guess = guess_header(header)
-        if guess is not None and not guess.unit and guess.quantity not in columns.used:
-            label = guess.quantity in LABELS
-            why = "names no unit"
-            if label:
-                why = "differs from row to row"
-            example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
-            yield (
-                f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
-                f"used, as it {why}. Name the column to use it: {example}"
-            )
-    if extra:
-        yield f"columns not used: {', '.join(map(quoted, extra))}"
-    if skipped := columns.table.skipped:
-        yield f"{skipped} empty lines between the readings were skipped"
-
-
 def _gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     beside: Path | None,
@@ -259,42 +235,4 @@ def _unsaid(gear: Gear) -> Iterator[str]:
         yield (
             f"{ASSUMED}the gear is of steel. If not, which changes K and what heat "
             "does, the gear file has to name its material"
-        )
-
-
-def _thick_wall(gear: Gear) -> Iterator[str]:
-    size = gear.geometry
-    share = float(size.wall_thickness / size.radius)
-    if gear.theory != SPRING and share > THIN:
-        yield (
-            f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
-            "is not thin, as the theories take it to be. Check both sizes, and units"
-        )
-
-
-def _unusual_temperature(measured: Measurements) -> Iterator[str]:
-    found = measured.columns.values.get("temperature")
-    if found is not None and not USUAL[0] <= np.median(found) <= USUAL[1]:
-        yield (
-            f"temperatures about {np.median(found):.4g} °C are far from those of any "
-            "rig. Check the unit of the column"
-        )
-
-
-def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:
-    step, force = gear.force_resolution, measured.columns.values["force"]
-    if step:
-        off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
-        if off:
-            yield f"{off} of {force.size} forces are not multiples of {step:g} N"
-
-
-def _resets(measured: Measurements, motion: Motion) -> Iterator[str]:
-    if motion.resets:
-        rows = [str(measured.columns.table.rows[row]) for row in motion.resets]
-        more = ", …" if len(rows) > MOST_ROWS else ""
-        yield (
-            f"the deformation goes back over most of its range in one step (row "
-            f"{', '.join(rows[:MOST_ROWS])}{more}), which counts as no measured "
-            "unloading. Where a new mounting begins there, say so in a column `run`"
         )

@@ -1,0 +1,84 @@
+"""What is told of a case that was read, beside what was guessed of its file."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hdcal.data.case import Gear
+from hdcal.data.columns import LABELS, Columns
+from hdcal.data.header_words import guess_header
+from hdcal.data.loading import Motion
+from hdcal.data.measurements import ASSUMED, Measurements
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import quoted
+
+MOST_ROWS = 8  # listed in one note
+USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
+THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
+
+
+def reading_notes(measured: Measurements, gear: Gear, motion: Motion) -> Iterator[str]:
+    """Yield what is unusual of measurements, or was left out of them."""
+    yield from _thick_wall(gear)
+    yield from _unusual_temperature(measured)
+    yield from _left_out(measured.columns)
+    yield from _off_scale(measured, gear)
+    yield from _resets(measured, motion)
+
+
+def _thick_wall(gear: Gear) -> Iterator[str]:
+    size = gear.geometry
+    share = float(size.wall_thickness / size.radius)
+    if gear.theory != SPRING and share > THIN:
+        yield (
+            f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
+            "is not thin, as the theories take it to be. Check both sizes, and units"
+        )
+
+
+def _unusual_temperature(measured: Measurements) -> Iterator[str]:
+    found = measured.columns.values.get("temperature")
+    if found is not None and not USUAL[0] <= np.median(found) <= USUAL[1]:
+        yield (
+            f"temperatures about {np.median(found):.4g} °C are far from those of any "
+            "rig. Check the unit of the column"
+        )
+
+
+def _left_out(columns: Columns) -> Iterator[str]:
+    positions = {column.position for column in columns.used.values()}
+    headers = enumerate(columns.table.headers)
+    extra = [header for place, header in headers if place not in positions]
+    for header in extra:
+        guess = guess_header(header)
+        if guess is not None and not guess.unit and guess.quantity not in columns.used:
+            label = guess.quantity in LABELS
+            why = "differs from row to row" if label else "names no unit"
+            example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
+            yield (
+                f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
+                f"used, as it {why}. Name the column to use it: {example}"
+            )
+    if extra:
+        yield f"columns not used: {', '.join(map(quoted, extra))}"
+    if skipped := columns.table.skipped:
+        yield f"{skipped} empty lines between the readings were skipped"
+
+
+def _off_scale(measured: Measurements, gear: Gear) -> Iterator[str]:
+    step, force = gear.force_resolution, measured.columns.values["force"]
+    if step:
+        off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
+        if off:
+            yield f"{off} of {force.size} forces are not multiples of {step:g} N"
+
+
+def _resets(measured: Measurements, motion: Motion) -> Iterator[str]:
+    if motion.resets:
+        rows = [str(measured.columns.table.rows[row]) for row in motion.resets]
+        more = ", …" if len(rows) > MOST_ROWS else ""
+        yield (
+            f"the deformation goes back over most of its range in one step (row "
+            f"{', '.join(rows[:MOST_ROWS])}{more}), which counts as no measured "
+            "unloading. Where a new mounting begins there, say so in a column `run`"
+        )
