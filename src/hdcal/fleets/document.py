@@ -67,7 +67,7 @@ def headline(
         odd = odd.replace("(probability", "(off with probability")
         return told + f"; oddest: {odd}." if total < _FEW else f"{told}."
     told = "; ".join(_off(population, called, columns))
-    return f"{alike} of {total} gears scatter by {middle} % (sd); {told}."
+    return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
 def _off(

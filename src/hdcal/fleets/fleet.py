@@ -118,7 +118,6 @@ def fleet(
     require_case(case)
     check_settings(chains, warmup, draws, seed)
     check_fleet(case)
-    require_scatter(case)
     bound_executables()
     sums, gears = mounting_sums(case), len(case.specimen_labels)
     unit, priors = _priors(case)
@@ -219,6 +218,7 @@ def check_fleet(case: Case) -> None:
     ]
     if findings:
         raise InputError(findings)
+    require_scatter(case)
 
 
 def _checks(found: Draws, priors: Mapping[str, Prior]) -> tuple[Check, ...]:
