@@ -274,6 +274,12 @@ FILES = {
         + "".join(f"\t{row}\t\n" for row in lines("\t").strip().split("\n")),
         ("lines above the table", "'X_Value'"),
     ),
+    "a mean and a remark below the readings, in cells of the table": Written(
+        "Prüfling,Weg [mm],Kraft [N]\n"
+        + "".join(f"A,{row}\n" for row in lines().strip().split("\n"))
+        + ",,\nMittelwert:,0.25,52\nBemerkung: i.O.,,\n",
+        ("'Prüfling' is the specimen",),
+    ),
     "labels in the first row of what they name, as merged cells are": Written(
         "Prüfling,Weg [mm],Kraft [N]\n"
         + "".join(

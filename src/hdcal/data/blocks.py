@@ -10,6 +10,14 @@ import numpy as np
 
 from hdcal.data.table_start import is_number, is_reading, split_line
 
+# What begins a line below the readings that sums them up.
+_SUMMARIES = {
+    *("mean", "average", "sum", "total", "sd", "std", "stdev", "std dev", "median"),
+    *("standard deviation", "minimum", "maximum", "min", "max", "mittelwert", "summe"),
+    *("standardabweichung", "stdabw", "moyenne", "somme", "écart type"),
+    *("平均", "平均值", "最大值", "最小值"),
+}
+
 
 class Blocks(NamedTuple):
     """Which lines below the first headers are readings.
@@ -134,7 +142,7 @@ def _counts(cell: str) -> bool:
 
 
 def _is_footer(line: str, separator: str, width: int) -> bool:
-    """Tell whether a line holds words, and not as many cells as a reading.
+    """Tell whether a line sums up what is above it, or is a remark.
 
     A reading that breaks off begins with a number or a time, and is told of as such;
     so is one with a cell too many.
@@ -143,5 +151,9 @@ def _is_footer(line: str, separator: str, width: int) -> bool:
     filled = [cell for cell in cells if cell]
     if not filled:
         return True
+    if filled[0].strip(" .:").lower() in _SUMMARIES:
+        return True
     words = any(letter.isalpha() for letter in filled[0]) and not _counts(filled[0])
-    return words and len(cells) != width and sum(map(is_number, filled)) < 2
+    # In a workbook a remark has empty cells beside it.
+    other = len(cells) != width or len(filled) == 1
+    return words and other and sum(map(is_number, filled)) < 2
