@@ -90,7 +90,7 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     """Return what was measured on one of several specimens.
 
     Raises:
-        InputError: none is called so, or it has too few rows.
+        InputError: none is called so, or it has too few rows, or was not moved.
     """
     findings, names = measured.columns.findings, measured.specimen.names
     if label not in names:
