@@ -30,7 +30,7 @@ TABLES = {
     "Fleet": "fleets.summary.gear_columns",
     "InverseDesign": "design.chart.candidate_rows",
     "Margin": "prediction.margin.chart.level_rows",
-    "Posterior": "report.parameters.parameter_estimates",
+    "Posterior": "report.parameters.posterior_rows",
     "Residuals": "calibration.residuals_document.residual_columns",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",

@@ -198,8 +198,8 @@ ROW = BarResult(
             ("no target", "93.4 %", "–", "–"),
         ),
         (
-            {"met": None, "value": None, "lo": None, "target": (0.85, 0.95)},
-            ("no cases", "–", "–", "85 … 95 %"),
+            {"met": None, "value": None, "lo": None, "target": (0.90, 0.98)},
+            ("no cases", "–", "–", "90 … 98 %"),
         ),
         (
             {"unit": "p", "value": 0.001, "lo": None, "target": 0.01},

@@ -139,7 +139,7 @@ def test_sizes_by_hand():
     found = scored(labels, answers)
     assert row(found, "amplitude").value == pytest.approx((0.1 + 0.5) / 2)
     assert row(found, "amplitude_holds").value == 0.5
-    assert row(found, "amplitude_holds").target == (0.85, 0.95)
+    assert row(found, "amplitude_holds").target == (0.90, 0.98)
     assert row(found, "gap").value == pytest.approx(0.5)
     assert row(found, "gap_holds").value == 0.5
 

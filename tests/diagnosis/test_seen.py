@@ -74,13 +74,13 @@ def test_of_pure_noise_nothing_is_seen():
 
 
 def test_the_sizes_hold():
-    """Simultaneous 90 % intervals; of 40 rigs 31 or fewer would hold once in 100."""
+    """Simultaneous 95 % intervals; of 40 rigs 33 or fewer would hold once in 300."""
     hold = 0
     for seed in range(40):
         case = simulated(rich(), {"coulomb_friction": {"force": 1.0}}, seed=seed)
         size = seen(case)[0].size_N
         hold += size.lo < 2.0 < size.hi
-    assert hold >= 32
+    assert hold >= 34
 
 
 def test_a_step_between_runs_and_a_gear_of_its_own_are_told_by_their_labels():

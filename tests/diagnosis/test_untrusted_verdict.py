@@ -8,6 +8,7 @@ from hostile_names import NAMES
 from rich.console import Console
 from verdicts import named
 
+from hdcal.diagnosis.chart import where_charts
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.figure.closure import shrink_figure
 from hdcal.diagnosis.figure.where import where_figure
@@ -15,6 +16,7 @@ from hdcal.diagnosis.figure.which import which_figure
 from hdcal.diagnosis.overview import overview_document, verdicts_answer
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.report.canvas import render
+from hdcal.report.chart import charts_json
 from hdcal.report.html import html_page
 from hdcal.report.terminal import terminal_lines
 
@@ -46,6 +48,7 @@ def test_names_are_only_text(name: str):
         tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
         assert not tags & {"script", "img", "foreignObject", "a"}
     page = html_page(verdict_document(found, verdict.case, name), images)
+    assert "<" not in charts_json(where_charts(verdict))
     assert "<script" not in page and "<img src=x" not in page and "<!--" not in page
     assert "\x00" not in page and "\x1b" not in page and "49" + "{%" not in page
     assert page.count("<title>") == page.count("</title>") == 1

@@ -322,3 +322,6 @@ def test_unloading_begins_at_the_top():
     )
     gap = up.worst.force_N.median - down.worst.force_N.median
     assert gap == pytest.approx(8.0, abs=0.1)
+    begins = "Unloading is taken to begin at 0.54 mm, the largest tested."
+    assert begins in down.remarks
+    assert begins not in up.remarks

@@ -8,7 +8,9 @@ import pytest
 from browser import Seen, look, play
 from commands import Done
 
-from hdcal.report.chart import Chart, Series, charts_json
+from hdcal.report.chart import Chart, Series, boxes, charts_json
+from hdcal.report.document import Document, Picture, Section
+from hdcal.report.html import html_page
 
 X = np.array([0.0, 1.0, 2.0, 3.0])
 CURVE = Series("curve </script>", X, 10.0 * X, "#0072B2")
@@ -31,6 +33,13 @@ def test_series_share_their_places():
     assert points == [None, 2.0, 3.0, None, None, 1.0, None]
     assert plain["series"][0]["label"] == CURVE.label
     assert plain["bands"] == [[0, 1, 0.2]]
+
+
+def test_boxes_are_level_and_nothing_is_between_them():
+    x, y = boxes(np.array([0.0, 1.0]), np.array([1.0, 3.0]), np.array([5.0, 7.0]))
+    assert (np.diff(x) > 0.0).all() and x[0] > 0.0 and x[-1] < 3.0
+    over = np.array([0.5, 1.0, 2.0])
+    np.testing.assert_array_equal(np.interp(over, x, y), [5.0, np.nan, 7.0])
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +89,16 @@ def test_the_wheel_zooms_both_and_two_clicks_show_all(calibrated, tmp_path):
     ends = [row for row in said if "…" in row]
     assert len(ends) >= 2 and not any("2.5 %" in row for row in said)
     assert re.search(r"force model \[N\] ?[-\d.]+ … [-\d.]+", " ".join(ends))
+
+
+def test_charts_over_another_axis_stay_where_they_are(tmp_path):
+    other = Chart("time [s]", "y [N]", [Series("late", 5.0 * X, X, "#0072B2")])
+    picture = Section("Curves", [Picture("curves", "Three of them", "")])
+    words = {"name": "gear 7", "kind": "test", "subtitle": "", "headline": "Three."}
+    document = Document(**words, sections=[picture], provenance=[])
+    charts = {"curves": [CHART, other, CHART]}
+    page = tmp_path / "page.html"
+    page.write_text(html_page(document, {"curves": b"<svg/>"}, charts=charts))
+    found = play(page, tmp_path, TURN)
+    assert found["turned"] == [True, False, True]
+    assert found["back"] == [True, True, True]

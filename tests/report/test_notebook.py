@@ -106,8 +106,10 @@ def test_tables_hold_what_the_results_say(results):
     bands, posterior = results["Bands"][0], results["Posterior"][0]
     np.testing.assert_array_equal(bands.to_frame().tested, bands.tested)
     parameters = posterior.to_frame().set_index("name")
-    low, middle, high = parameters.loc["K", ["lo", "median", "hi"]]
-    assert low < middle < high
+    for name in ("K", "stiffness"):
+        low, middle, high = parameters.loc[name, ["lo", "median", "hi"]]
+        assert low < middle < high
+    assert parameters["median"]["stiffness"] == np.median(posterior.draws["stiffness"])
     assert posterior.to_datatree() is posterior.tree
 
 

@@ -233,12 +233,12 @@ def _sized(answer: CaseAnswer, label: Label, seen, closure, rng) -> CaseAnswer:
     sd = ROWS**-0.5
     if answer.effect is not None:
         size = float(seen @ own[answer.effect]) * sd
-        found = (size, size - 1.645 * sd, size + 1.645 * sd)
+        found = (size, size - 1.96 * sd, size + 1.96 * sd)
         answer = replace(answer, amplitude={f"{answer.effect}.size": found})
-    # Eight numbers hold the whole curve, whose root mean square is theirs.
-    size = label.r / DIMENSIONS**0.5 + float(rng.normal(0.0, 0.02))
-    answer = replace(answer, gap=(size, size - 0.033, size + 0.033))
+    size = float(np.sqrt(np.mean(np.square(label.curve or 0.0))))
+    size += float(rng.normal(0.0, 0.02))
+    answer = replace(answer, gap=(size, size - 0.039, size + 0.039))
     if closure is not None:
         share = closure + float(rng.normal(0.0, 0.04))
-        answer = replace(answer, closed=(share, share - 0.07, share + 0.07))
+        answer = replace(answer, closed=(share, share - 0.08, share + 0.08))
     return answer

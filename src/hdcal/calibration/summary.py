@@ -25,7 +25,6 @@ from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands
-from hdcal.report.document import spoken_of
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
@@ -155,7 +154,7 @@ def calibration_report(
         return {"calibration": calibration_charts(bands(), left)}
 
     return Report(
-        spoken_of(calibration_document(posterior, found, command), posterior.theory),
+        calibration_document(posterior, found, command),
         found,
         "summary.json",
         figures,
@@ -163,6 +162,7 @@ def calibration_report(
         tables=lambda: {"bands.csv": bands().columns()},
         others=lambda: [(FILE_NAME, posterior.to_netcdf())],
         charts=charts,
+        theory=posterior.theory,
     )
 
 

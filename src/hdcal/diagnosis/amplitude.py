@@ -11,7 +11,7 @@ from hdcal.evidence.noise_evidence import weighted_quantiles
 from hdcal.evidence.single_evidence import CellEvidence
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import INTERVAL, Interval
 
 _DRAWS = 4000
 
@@ -44,7 +44,7 @@ def amplitude_of(
 def _piecewise_amplitude(
     evidence: CaseEvidence, name: str, rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """Return quantiles .05, .5, .95 of the amplitude of an effect in pieces."""
+    """Return quantiles .025, .5, .975 of the amplitude of an effect in pieces."""
     index = evidence.single.names.index(name)
     draws = [_draw(part.of(index), rng) for part in evidence.single.parts]
     log_total = np.array([total for _, total in draws])
@@ -72,9 +72,8 @@ def _spread(evidence: CaseEvidence, name: str) -> Interval:
     own = evidence.subspaces.of(name)[0]
     weight = np.logaddexp.reduce(evidence.subspaces.log_evidence[:, own], axis=0)
     weight = np.exp(weight - weight.max())
-    place = (np.cumsum(weight) - 0.5 * weight) / weight.sum()
     scale = np.log(evidence.subspaces.scale[own])
-    low, middle, high = np.exp(np.interp((0.05, 0.5, 0.95), place, scale))
+    low, middle, high = np.exp(weighted_quantiles(scale, weight))
     return Interval(float(middle), float(low), float(high))
 
 
@@ -90,5 +89,6 @@ def _largest(evidence: CaseEvidence, name: str, effect: type[Effect]):
     sd = np.sqrt(np.diag(fit.covariance)[width : width + count])
     top = int(np.argmax(np.abs(mean)))
     unit = float(evidence.prepared.priors[f"{name}.{fields[top]}"].numbers[-1])
-    low, high = mean[top] - 1.645 * sd[top], mean[top] + 1.645 * sd[top]
+    half = float(ndtri(0.5 + 0.5 * INTERVAL)) * sd[top]
+    low, high = mean[top] - half, mean[top] + half
     return fields[top], Interval(*(float(v * unit) for v in (mean[top], low, high)))

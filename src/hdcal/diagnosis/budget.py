@@ -13,7 +13,7 @@ class BudgetPart:
 
     Attributes:
         name: for people.
-        factor: posterior of the factor, 90 % interval [-].
+        factor: posterior of the factor, 95 % interval [-].
         prior: the same before the data.
         driven_by: prior or data.
         split_by: the extra run or measurement that would tell it from the others.

@@ -14,7 +14,7 @@ from hdcal.evidence.row_features import (
     scale_to_unit,
 )
 from hdcal.evidence.smooth_gap import SmoothGap
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import INTERVAL, Interval
 
 _SAMPLES = 1000
 # A free curve of as many parameters may be this large, in noise sds.
@@ -41,7 +41,7 @@ def closed_share(
         rng: source of randomness.
 
     Returns:
-        Median and 90 % interval over resampled blocks and draws of the noise
+        Median and 95 % interval over resampled blocks and draws of the noise
         variance, and what was left out.
     """
     block, word = _left_out(evidence, names)
@@ -59,13 +59,14 @@ def closed_share(
     closed = closed[np.isfinite(closed)]
     if len(closed) < _SAMPLES // 2:
         return None, f"leave-one-{word}-out"
-    low, high = np.quantile(closed, [0.05, 0.95])
+    below = 0.5 - 0.5 * INTERVAL
+    low, high = np.quantile(closed, [below, 1.0 - below])
     middle = float(_closed(weight @ parts / weight.sum(), after.noise_sd**2)[0])
     middle = float(np.median(closed)) if np.isnan(middle) else middle
     # With few blocks the prediction's own variance is only an estimate: the lower end
     # does without it.
     careful = _closed(squares + squares[:, 3:] * [0.0, 1.0, 0.0, 0.0], variance)
-    low = min(low, float(np.nanquantile(careful, 0.05)))
+    low = min(low, float(np.nanquantile(careful, below)))
     low, high = min(float(low), middle), max(float(high), middle)
     return Interval(middle, low, high), f"leave-one-{word}-out"
 

@@ -11,7 +11,6 @@ from hdcal.diagnosis.closed_share import (
     placebo_share,
 )
 from hdcal.diagnosis.verdict import Closure, LadderEntry
-from hdcal.diagnosis.where import interval
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.design_matrix import DesignMatrix, fit_design, join_designs
 from hdcal.evidence.hypothesis_design import design_of
@@ -22,6 +21,7 @@ from hdcal.evidence.smooth_gap import (
     SmoothGap,
     fit_smooth_gap,
 )
+from hdcal.report.parameters import credible_interval
 
 # Sds of its own error by which a remainder must lower the noise variance to count.
 _VISIBLE = 1.64
@@ -54,7 +54,9 @@ def closure(
     else:
         reason = ""
     if reason:
-        return Closure(ladder, None, "", None, None, interval(after.rms), reason)
+        return Closure(
+            ladder, None, "", None, None, credible_interval(after.rms), reason
+        )
     closed, held_out = closed_share(evidence, names, after, correlation, rng)
     noise = after.noise_sd
     return Closure(
@@ -63,7 +65,7 @@ def closure(
         held_out=held_out,
         extrapolated_closed=extrapolated_share(evidence, names, noise, correlation),
         placebo_closed=placebo_share(evidence, len(design.columns), noise, correlation),
-        remainder_N=interval(after.rms),
+        remainder_N=credible_interval(after.rms),
         reason="" if closed else "no block shows a gap beyond the noise",
         bars=_closed_by_member(evidence, members, after, correlation, rng),
     )

@@ -11,7 +11,6 @@ from hdcal.diagnosis.where import (
     FALSE_ALARM,
     declared_directions,
     describe_where,
-    interval,
 )
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, CaseEvidence
 from hdcal.evidence.residual_test import residual_test
@@ -21,7 +20,7 @@ from hdcal.evidence.smooth_gap import (
     additive_basis,
     fit_smooth_gap,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import Interval, credible_interval
 
 # An AR(1) coefficient of this probability stands alone among those weighed.
 _DECIDED = 0.9
@@ -62,7 +61,7 @@ class Detection:
             case: for the largest force.
             noise_sd: of a reading [N]; None for that of the base model.
         """
-        size = _NOT_SEEN if self.smooth is None else interval(self.smooth.rms)
+        size = _NOT_SEEN if self.smooth is None else credible_interval(self.smooth.rms)
         return Gap(
             self.detected,
             1.0 - self.posterior.probabilities[NONE],

@@ -31,6 +31,8 @@ from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.words import hypothesis, percent
 
+# Rows from which on a model with a memory takes minutes and more to calibrate.
+_MOST_FITTED = 5_000
 _NO_GAP = "no gap is detected, so that there is nothing to close"
 _NO_CAUSE = "that nothing is missing remains the most probable hypothesis"
 
@@ -67,7 +69,8 @@ def diagnose(
     found = detect_gap(evidence, posterior, diagnosed, rng)
     which = identify_cause(evidence, found, diagnosed, library, rng)
     closed = _closure(evidence, which, found, rng)
-    fits = refit(case, posterior, library, seed, progress, quick=quick)
+    fitted = case if len(case.records.force) <= _MOST_FITTED else diagnosed
+    fits = refit(fitted, posterior, library, seed, progress, quick=quick)
     runs, no_run = rank_runs(evidence, posterior, library, rng)
     return Verdict(
         case=case,
@@ -82,6 +85,7 @@ def diagnose(
         library=tuple(library),
         notes=(
             *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
+            *_fewer(case, fitted, quick),
             *_left_out(repeated),
         ),
         reasons=failure_reasons(fits),
@@ -153,6 +157,17 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[
     if group > 1 or step > 1:
         notes.append("the noise of single rows was not looked at")
     return notes
+
+
+def _fewer(case: Case, fitted: Case, quick: bool) -> list[str]:
+    """Say that the corrected model was not calibrated on all rows."""
+    rows, used = len(case.records.force), len(fitted.records.force)
+    if quick or used == rows:
+        return []
+    return [
+        f"the corrected model was calibrated on the {used} rows or means that were "
+        f"diagnosed, not on all {rows} rows"
+    ]
 
 
 def _left_out(repeated: int) -> list[str]:

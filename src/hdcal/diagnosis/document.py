@@ -118,7 +118,7 @@ def _budget(found: VerdictAnswer) -> Iterator[Section]:
     middle, span = estimate(budget.K)
     words = (
         f"K by the {budget.formula} formula, at the prior's mean modulus, is {middle}, "
-        f"90 % interval {span}. It is fitted beside {_fitted_beside(found)}; a "
+        f"95 % interval {span}. It is fitted beside {_fitted_beside(found)}; a "
         f"calibration with other effects, or with none, gives another K. {budget.note}"
     )
     rows = [
@@ -131,7 +131,7 @@ def _budget(found: VerdictAnswer) -> Iterator[Section]:
         ]
         for part in budget.parts
     ]
-    numbers = ("factor", "90 % interval", "before the data")
+    numbers = ("factor", "95 % interval", "before the data")
     columns = ["part of K", *numbers, "driven by", "what would tell it"]
     table = [Table(columns, rows, frozenset(numbers))] if rows else []
     yield Section("Why K is not 1", [Text(words), *table])

@@ -16,7 +16,7 @@ class Gap:
     Attributes:
         detected: the residual test is significant at 5 %.
         probability: posterior probability that anything is missing (1 − P(none)).
-        rms_N: root mean square of the gap at the tested rows, 90 % interval; NaN
+        rms_N: root mean square of the gap at the tested rows, 95 % interval; NaN
             where none is detected.
         noise_sd_N: of a reading, without the gap.
         share_of_full_scale: rms over the largest tested force [-].
@@ -69,7 +69,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class CovariateShare:
-    """Part of the gap's variance along one covariate, 90 % interval."""
+    """Part of the gap's variance along one covariate, 95 % interval."""
 
     covariate: Words
     share: Interval
@@ -97,6 +97,25 @@ class Where:
     gap_N: np.ndarray
     records: Records
 
+    def values_of(self, covariate: str) -> np.ndarray | None:
+        """Return a covariate at each row; None of a product or of what was not read."""
+        if covariate == "angle":  # its ranges are those of one turn
+            return np.mod(self.records.angle, 2.0 * np.pi)
+        return getattr(self.records, covariate, None)
+
+    def by_covariate(self) -> tuple[dict[str, list[Cell]], dict[str, list[Cell]]]:
+        """Return the cells that have ends, deformation first, and those with a name.
+
+        Products come last.
+        """
+        ranges: dict[str, list[Cell]] = {"deformation": []}
+        names: dict[str, list[Cell]] = {}
+        for cell in sorted(self.cells, key=lambda cell: "×" in cell.covariate):
+            placed = np.isfinite([cell.from_, cell.to]).all()
+            kind = ranges if placed and "×" not in cell.covariate else names
+            kind.setdefault(cell.covariate, []).append(cell)
+        return ranges, names
+
     @property
     def regions(self) -> tuple[Cell, ...]:
         """Return the hot cells, largest |z| first."""
@@ -110,7 +129,7 @@ class Seen:
     Attributes:
         statement: in words.
         covariate: with which it goes.
-        size_N: from its lowest to its highest place, simultaneous 90 % interval.
+        size_N: from its lowest to its highest place, simultaneous 95 % interval.
         p_value: adjusted for all that was looked for.
         material: it is more than a thousandth of the largest force.
     """

@@ -17,12 +17,12 @@ from hdcal.calibration.calibrate import calibrate
 from hdcal.data.case import Case
 from hdcal.diagnosis.model_posterior import ModelPosterior
 from hdcal.diagnosis.verdict import Which
-from hdcal.diagnosis.where import interval
 from hdcal.evidence.case_evidence import UNKNOWN
 from hdcal.inference.hypotheses import LeftOut, parts_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
+from hdcal.report.parameters import credible_interval
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
@@ -165,7 +165,7 @@ def with_sampled_size(which: Which, fits: Refits) -> Which:
     draws = posterior.draws.get(f"{size.effect}.{size.parameter}")
     if draws is None:
         return which
-    return replace(which, amplitude=replace(size, **vars(interval(draws))))
+    return replace(which, amplitude=replace(size, **vars(credible_interval(draws))))
 
 
 def failure_reasons(fits: Refits) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ def seen_section(found: VerdictAnswer) -> Section:
         ]
         for each in found.seen
     ]
-    numbers = ("size [N]", "90 % interval", "p")
+    numbers = ("size [N]", "95 % interval", "p")
     note = (
         "Size: from the lowest to the highest place of what slope and zero cannot take "
         "up. Intervals hold all together; p counts all that was looked for. The "
@@ -63,8 +63,8 @@ def where_section(found: VerdictAnswer) -> Section:
     caption = (
         "Bars: mean of measured minus calibrated force in ranges chosen before "
         "looking. Blue shade: how far noise alone would move them, in 95 % of all "
-        "programs for all ranges together. Red on amber: off. Thin line: the gap. In "
-        "the running sums noise stays in the grey band, a gap keeps its course."
+        "programs for all ranges together. Red or orange: off. Thin line or green: "
+        "gap. In the running sums noise stays in the grey band, a gap keeps its course."
     )
     shows = "Measured minus calibrated force over everything that was measured"
     picture = Picture("where", shows, caption, tall=True)
@@ -100,7 +100,7 @@ def _size_rows(gap: Gap) -> list[tuple[str, str, str]]:
     middle, span = estimate(gap.rms_N)
     share = percent(gap.share_of_full_scale)
     return [
-        ("size", f"{middle} N", f"root mean square; 90 % interval {span} N"),
+        ("size", f"{middle} N", f"root mean square; 95 % interval {span} N"),
         ("of full scale", share, "size over the largest force tested"),
     ]
 
@@ -212,4 +212,4 @@ def _closed_rows(shrink: Closure) -> Iterator[tuple[str, str]]:
         yield f"by {hypothesis(name)}", percent(share)
     if shrink.remainder_N is not None:
         middle, span = estimate(shrink.remainder_N)
-        yield "left after it", f"{middle} N, 90 % interval {span} N"
+        yield "left after it", f"{middle} N, 95 % interval {span} N"

@@ -26,7 +26,7 @@ from hdcal.inference.residual_shapes import (
     find_structure,
 )
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import INTERVAL, Interval
 from hdcal.report.words import newton
 
 # Below this share of the largest force what is seen is said to be immaterial.
@@ -35,8 +35,6 @@ _MATERIAL = 1e-3
 _ANY_MATERIAL = 1e-3
 # Swing of a column, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
-# Simultaneous intervals hold with this probability.
-_LEVEL = 0.9
 
 
 def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
@@ -59,7 +57,7 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     data = _whitened(prepared, tried, sd, sign, own=own)
     found = _found(data, sd, noise, np.asarray(turned.run))
     scale = float(np.max(np.abs(prepared.records.force)))
-    quantile = float(stats.norm.isf((1.0 - _LEVEL) / (2.0 * max(len(tried), 1))))
+    quantile = float(stats.norm.isf((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
     # A loop is told once, by the shape that shows it best.
     once: dict[str, Structure] = {}
     for each in found:

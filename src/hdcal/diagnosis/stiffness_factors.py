@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import ndtri
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.certificates import GAINS
@@ -15,9 +16,11 @@ from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.prepare import log_moments
 from hdcal.inference.distributions import moments
 from hdcal.physics.theory import THEORIES
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import INTERVAL, Interval
 
-_Z = 1.6448536269514722
+_Z = float(ndtri(0.5 + 0.5 * INTERVAL))
+# Half of a range that was read off drawings, in sds: nine of ten lie in it.
+_RANGE_Z = 1.645
 # Sizes of the causes, each with its source of size.
 WALL_SD_MM, RADIUS_SD_MM, HEIGHT_SD_MM = 0.0133, 0.05, 3.0
 # Below this sd of its log a factor is a number that was given, not one to be freed.
@@ -110,7 +113,7 @@ def _causes(case: Case) -> list[tuple[str, float, float, str]]:
         (
             "tooth band",
             float(tooth.mean()),
-            float(np.diff(tooth)[0] / (2.0 * _Z)),
+            float(np.diff(tooth)[0] / (2.0 * _RANGE_Z)),
             "press a blank without teeth",
         ),
         (

@@ -15,12 +15,9 @@ from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.posterior import FILE_NAME, Posterior
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
-from hdcal.report.document import spoken_of
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
-
-INTERVAL = 0.9
 
 
 def verdict_answer(verdict: Verdict) -> VerdictAnswer:
@@ -110,22 +107,23 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
 
     def charts():
         from hdcal.calibration.chart import calibration_charts
+        from hdcal.diagnosis.chart import where_charts
 
         # Of a failed fit there is the marked figure alone.
-        if refit is None or not refit[1].usable:
-            return {}
-        return {"bands": calibration_charts(bands(), residuals(refit[1]))}
+        made = {"where": where_charts(verdict)} if verdict.status == "ok" else {}
+        if refit is not None and refit[1].usable:
+            made["bands"] = calibration_charts(bands(), residuals(refit[1]))
+        return made
 
     return Report(
-        spoken_of(
-            verdict_document(found, verdict.case, command, refit), found.gear.theory
-        ),
+        verdict_document(found, verdict.case, command, refit),
         found,
         "verdict.json",
         figures,
         tables=lambda: {} if refit is None else {"bands.csv": bands().columns()},
         others=lambda: _models(verdict),
         charts=charts,
+        theory=found.gear.theory,
     )
 
 

@@ -29,7 +29,7 @@ Chances = Annotated[
 
 @dataclass(frozen=True)
 class Amplitude(Interval):
-    """Size of the named effect, 90 % credible interval."""
+    """Size of the named effect, 95 % credible interval."""
 
     effect: EffectName
     parameter: Words
@@ -50,7 +50,7 @@ class Remainder:
 
     Attributes:
         probability: that there is some, given the effect.
-        share: of the gap that it is, by rms, 90 % interval.
+        share: of the gap that it is, by rms, 95 % interval.
     """
 
     probability: Probability
@@ -155,11 +155,11 @@ class Closure:
 
     Attributes:
         ladder: nominal, calibrated, with the effect, with the remainder, noise.
-        closed: share of the gap closed on blocks it was not fitted to, 90 % interval.
+        closed: share of the gap closed on blocks it was not fitted to, 95 % interval.
         held_out: what was left out, such as `leave-one-half-cycle-out`.
         extrapolated_closed: with the upper third of the deformation left out.
         placebo_closed: by a free spline of as many parameters.
-        remainder_N: rms of what is left after the effect, 90 % interval.
+        remainder_N: rms of what is left after the effect, 95 % interval.
         reason: why `closed` is missing.
         bars: closed share of each member of the set, by effect.
     """

@@ -11,17 +11,10 @@ from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.local_structure import direction_families
 from hdcal.evidence.residual_test import Directions, ResidualTest
 from hdcal.evidence.smooth_gap import SmoothGap
-from hdcal.report.parameters import Interval
+from hdcal.report.parameters import Interval, credible_interval
 
 # Family-wise probability that pure noise is called a gap.
 FALSE_ALARM = 0.05
-LEVELS = (0.05, 0.5, 0.95)
-
-
-def interval(draws) -> Interval:
-    """Return the equal-tailed 90 % interval of draws."""
-    low, middle, high = np.quantile(np.asarray(draws), LEVELS)
-    return Interval(float(middle), float(low), float(high))
 
 
 def about(middle: float, half_width: float) -> Interval:
@@ -108,5 +101,8 @@ def describe_where(
 
 
 def _shares(smooth: SmoothGap) -> tuple[CovariateShare, ...]:
-    found = [CovariateShare(n, interval(draws)) for n, draws in smooth.shares.items()]
+    found = [
+        CovariateShare(n, credible_interval(draws))
+        for n, draws in smooth.shares.items()
+    ]
     return tuple(sorted(found, key=lambda share: -share.share.median))

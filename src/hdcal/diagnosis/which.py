@@ -26,7 +26,6 @@ from hdcal.diagnosis.model_posterior import (
 )
 from hdcal.diagnosis.naming import naming
 from hdcal.diagnosis.verdict import Certificate, NotTestable, Remainder, Which
-from hdcal.diagnosis.where import interval
 from hdcal.evidence.case_evidence import (
     NONE,
     CaseEvidence,
@@ -36,6 +35,7 @@ from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
+from hdcal.report.parameters import credible_interval
 
 # Probability from which on what acts beside an effect is told, where neither is named.
 _LIKELY = 0.5
@@ -132,7 +132,7 @@ def _remainder(
     if effect is None or not len(closed):
         return None
     chance = posterior.probabilities[with_remainder(effect)]
-    share = interval(1.0 - closed)
+    share = credible_interval(1.0 - closed)
     return Remainder(chance / max(posterior.inclusion[effect], chance, 1e-300), share)
 
 

@@ -223,10 +223,10 @@ def _least_squares(problem: NoiseProblem, noise_sd: float) -> np.ndarray:
 
 
 def weighted_quantiles(values, weight) -> tuple[float, float, float]:
-    """Return the quantiles .05, .5 and .95 of a weighted sample."""
+    """Return the quantiles .025, .5 and .975 of a weighted sample."""
     order = np.argsort(values)
     place = np.cumsum(weight[order]) - 0.5 * weight[order]
     low, middle, high = np.interp(
-        (0.05, 0.5, 0.95), place / weight.sum(), values[order]
+        (0.025, 0.5, 0.975), place / weight.sum(), values[order]
     )
     return float(low), float(middle), float(high)

@@ -3,10 +3,10 @@
 import numpy as np
 
 from hdcal.fleets.fleet import Fleet
-from hdcal.report.chart import COLOURS, Chart, Series
+from hdcal.report.chart import COLOURS, Chart, Series, boxes
 
-# Where the interval of a gear begins and ends, and that nothing is beyond.
-_BOX = np.array([-0.3, 0.3, 0.301, 0.31])
+# Half of the width at which the interval of a gear is drawn.
+_HALF = 0.3
 _MOST_NAMED = 3
 
 
@@ -15,13 +15,14 @@ def fleet_chart(found: Fleet) -> Chart:
     low, middle, high = np.quantile(found.stiffness, [0.025, 0.5, 0.975], axis=0)
     order = np.argsort(middle, kind="stable")
     place, off = np.arange(1.0, len(order) + 1.0), found.called[order]
-    along = np.ravel(place[:, None] + _BOX)
     curves = [
-        Series(f"95 % interval, {side} [N/mm]", along, boxes, COLOURS[0], width=0.0)
-        for side, boxes in (
-            ("97.5 %", _boxes(high[order])),
-            ("2.5 %", _boxes(low[order])),
+        Series(
+            f"95 % interval, {side} [N/mm]",
+            *boxes(place - _HALF, place + _HALF, ends[order]),
+            COLOURS[0],
+            width=0.0,
         )
+        for side, ends in (("97.5 %", high), ("2.5 %", low))
     ]
     odd = [found.case.specimen_labels[gear] for gear in order[off]]
     called = "called off" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)
@@ -34,8 +35,3 @@ def fleet_chart(found: Fleet) -> Chart:
     axis = "gears by their stiffness", "stiffness as read [N/mm]"
     names = [found.case.specimen_labels[gear] for gear in order]
     return Chart(*axis, [*curves, *points], [(0, 1, 0.25)], names=names)
-
-
-def _boxes(ends: np.ndarray) -> np.ndarray:
-    """Return a level for each gear, with a gap behind it."""
-    return np.ravel(np.column_stack([ends, ends, ends, np.full(len(ends), np.nan)]))

@@ -12,7 +12,6 @@ from hdcal.fleets.answer import FleetAnswer, FutureGear, GearBounds, PopulationA
 from hdcal.fleets.document import fleet_document, headline, notes_of
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
-from hdcal.report.document import spoken_of
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.write import Report
 
@@ -118,10 +117,11 @@ def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:
     answer, columns = fleet_answer(found), gear_columns(found)
     document = fleet_document(found, answer, columns, command)
     return Report(
-        spoken_of(document, found.case.gear.theory),
+        document,
         answer,
         "summary.json",
         figures,
         tables=lambda: {"gears.csv": columns},
         charts=charts,
+        theory=found.case.gear.theory,
     )

@@ -90,6 +90,26 @@ class Chart:
         }
 
 
+def boxes(
+    starts: np.ndarray, stops: np.ndarray, levels: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a curve that is level from each start to its stop, nothing between them.
+
+    Args:
+        starts: shape (n,), in ascending order.
+        stops: shape (n,), none beyond the next start.
+        levels: shape (n,).
+
+    Returns:
+        Places and values, each of shape (4n,).
+    """
+    # Wide enough to be seen: a narrower one falls between two points of a screen.
+    edge = 0.04 * (stops - starts)
+    last, nothing = stops - edge, np.full(len(starts), np.nan)
+    along = np.column_stack([starts + edge, last, last + 0.1 * edge, last + 0.5 * edge])
+    return along.ravel(), np.column_stack([levels, levels, levels, nothing]).ravel()
+
+
 def charts_json(charts: Sequence[Chart]) -> str:
     """Return charts as the text of a script element, in which nothing can end it."""
     text = json.dumps([chart.plain() for chart in charts], separators=(",", ":"))

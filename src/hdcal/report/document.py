@@ -7,12 +7,13 @@ A document holds texts and the names of figures, no numbers and no files: `html_
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, TypeVar, cast
 
 from hdcal.data.theory_names import SPRING
 
 # Sentences beside the headline: the first screen has three in all.
 MOST_SAID = 2
+A = TypeVar("A")
 Tone = Literal["good", "caution", "bad", "neutral"]
 
 
@@ -240,6 +241,17 @@ def spoken_of(document: Document, theory: str) -> Document:
         sections=sections,
         provenance=document.provenance,
     )
+
+
+def answer_spoken_of(answer: A, theory: str) -> A:
+    """Return an answer whose sentences speak as its document does."""
+    if theory != SPRING:
+        return answer
+    held = vars(answer)
+    told = {
+        n: _of_part(held[n]) for n in ("headline", "answer", "next_step") if n in held
+    }
+    return replace(cast(Any, answer), **told)
 
 
 def _of_part(held: Any) -> Any:

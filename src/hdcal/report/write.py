@@ -9,7 +9,7 @@ import numpy as np
 
 from hdcal.report.chart import Chart
 from hdcal.report.csv_table import columns_csv
-from hdcal.report.document import Document
+from hdcal.report.document import Document, answer_spoken_of, spoken_of
 from hdcal.report.html import html_page
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
@@ -38,6 +38,7 @@ class Report(Generic[A]):
         tables: makes the columns of the CSV files, by the names of the files.
         others: makes the content of other files, each with its name.
         charts: the document's pictures that can be touched, by name.
+        theory: of the model; of a spring no gear need be meant.
     """
 
     document: Document
@@ -48,6 +49,14 @@ class Report(Generic[A]):
     tables: Callable[[], Tables] = dict
     others: Callable[[], Iterable[tuple[str, bytes]]] = tuple
     charts: Callable[[], Charts] = dict
+    theory: str = ""
+
+    def __post_init__(self):
+        """Speak of a part where no gear need be meant."""
+        document = spoken_of(self.document, self.theory)
+        object.__setattr__(self, "document", document)
+        answer = answer_spoken_of(self.answer, self.theory)
+        object.__setattr__(self, "answer", answer)
 
 
 def write_report(report: Report, target: TargetFolder) -> None:

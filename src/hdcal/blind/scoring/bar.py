@@ -131,10 +131,10 @@ ROWS = {
     ),
     "amplitude": BarRow("error of the amplitude", "at most", 0.07),
     "amplitude_holds": BarRow(
-        "90 % interval holds the amplitude", "within", (0.85, 0.95)
+        "95 % interval holds the amplitude", "within", (0.90, 0.98)
     ),
     "gap": BarRow("error of the gap's size"),
-    "gap_holds": BarRow("90 % interval holds the gap's size", "within", (0.85, 0.95)),
+    "gap_holds": BarRow("95 % interval holds the gap's size", "within", (0.90, 0.98)),
     "closed": BarRow(
         "error of the closed share, true effect named", "at most", 0.08, "points"
     ),

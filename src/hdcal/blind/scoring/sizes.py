@@ -11,7 +11,7 @@ from hdcal.blind.scoring.scored_case import Cases
 
 @dataclass(frozen=True)
 class Sizes:
-    """Median relative error, and how often the 90 % interval holds the truth."""
+    """Median relative error, and how often the 95 % interval holds the truth."""
 
     error: Estimate
     held: Estimate

@@ -108,7 +108,7 @@ def _rows(shrink: Closure) -> list[tuple]:
     assert shrink.closed is not None
     closed = shrink.closed
     span = (closed.lo, closed.hi) if np.isfinite([closed.lo, closed.hi]).all() else None
-    rows: list[tuple] = [("rows held out\n(90 % interval)", closed.median, span, BLUE)]
+    rows: list[tuple] = [("rows held out\n(95 % interval)", closed.median, span, BLUE)]
     bars = [(plain(hypothesis(n), 26), v) for n, v in shrink.bars.items()]
     if len(bars) > 1:
         rows += [

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from hdcal.diagnosis.chart import running_sums
 from hdcal.diagnosis.gap import Cell
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.report.canvas import (
@@ -30,9 +31,7 @@ _LIGHT = "#b9c2ca"
 
 def where_figure(verdict: Verdict) -> Figure:
     """Draw the residuals of the calibrated model and the cells that they fall in."""
-    scales, labels = _by_covariate(verdict.where.cells)
-    # Products last: the panels are in this order.
-    labels = dict(sorted(labels.items(), key=lambda item: "×" in item[0]))
+    scales, labels = verdict.where.by_covariate()
     with style():
         figure, first, others, last = _panels(scales, labels)
         for axes, (covariate, cells) in zip(
@@ -48,17 +47,6 @@ def where_figure(verdict: Verdict) -> Figure:
         if verdict.status != "ok":
             watermark(figure)
     return figure
-
-
-def _by_covariate(cells: tuple[Cell, ...]) -> tuple[dict, dict]:
-    """Return the cells that have ends and those that have a name, by covariate."""
-    scales: dict[str, list[Cell]] = {"deformation": []}
-    labels: dict[str, list[Cell]] = {}
-    for cell in cells:
-        placed = np.isfinite([cell.from_, cell.to]).all()
-        kind = scales if placed and "×" not in cell.covariate else labels
-        kind.setdefault(cell.covariate, []).append(cell)
-    return scales, labels
 
 
 def _panels(scales: dict, labels: dict) -> tuple[Figure, Axes, list[Axes], list[Axes]]:
@@ -82,14 +70,8 @@ def _panels(scales: dict, labels: dict) -> tuple[Figure, Axes, list[Axes], list[
     return figure, top.subplots(), others, list(bottom.subplots(1, 2))
 
 
-def _covariate(verdict: Verdict, name: str) -> np.ndarray | None:
-    if name == "angle":  # its ranges are those of one turn
-        return np.mod(verdict.where.records.angle, 2.0 * np.pi)
-    return getattr(verdict.where.records, name, None)
-
-
 def _draw_scale(axes: Axes, verdict: Verdict, name: str, cells: list[Cell]) -> None:
-    values = _covariate(verdict, name)
+    values = verdict.where.values_of(name)
     residual = verdict.where.residual_N
     rows = thinned(len(residual))
     axes.axhline(0.0, color=DARK, linewidth=0.8)
@@ -164,18 +146,10 @@ def _draw_labels(axes: Axes, covariate: str, cells: list[Cell]) -> None:
 
 def _draw_sums(panels: list[Axes], verdict: Verdict) -> None:
     """Draw running sums: noise wanders, a gap keeps its course."""
-    residual = np.nan_to_num(np.asarray(verdict.where.residual_N))
-    deformation = np.asarray(verdict.where.records.deformation)
-    order = np.argsort(deformation, kind="stable")
-    size = len(residual)
-    texts = ("deformation [mm]", "row of the data")
-    curves = (
-        (deformation[order], np.cumsum(residual[order])),
-        (np.arange(1, size + 1), np.cumsum(residual)),
-    )
-    for axes, text, (x, total) in zip(panels, texts, curves, strict=True):
+    for axes, (text, x, total, reach) in zip(
+        panels, running_sums(verdict), strict=True
+    ):
         axes.axhline(0.0, color=DARK, linewidth=0.8)
-        reach = _wander(verdict, size)
         if math.isfinite(reach):
             axes.axhspan(-reach, reach, color=GREY, alpha=0.14, linewidth=0.0)
         axes.plot(x, total, color=BLUE, linewidth=1.3)
@@ -183,14 +157,6 @@ def _draw_sums(panels: list[Axes], verdict: Verdict) -> None:
     panels[0].set_ylabel("running sum [N]")
     heading(panels[0], "Running sum over deformation")
     heading(panels[1], "Running sum, row by row")
-
-
-def _wander(verdict: Verdict, size: int) -> float:
-    """Return how far the running sum of noise alone goes, in 95 % of programs [N]."""
-    # 1.36 is the 95 % point of a Brownian bridge's largest excursion (Kolmogorov).
-    memory = min(max(verdict.gap.autocorrelation, 0.0), 0.98)
-    stretch = math.sqrt((1.0 + memory) / (1.0 - memory))
-    return 1.36 * verdict.gap.noise_sd_N * math.sqrt(size) * stretch
 
 
 def _legend(axes: Axes, verdict: Verdict) -> None:

@@ -10,7 +10,6 @@ from hdcal.motion.respond.answer import (
 )
 from hdcal.motion.respond.document import headline, next_steps, response_document
 from hdcal.motion.respond.respond import Response
-from hdcal.report.document import spoken_of
 from hdcal.report.parameters import INTERVAL
 from hdcal.report.write import Report
 
@@ -60,15 +59,13 @@ def response_report(response: Response, command: str = "") -> Report[ResponseAns
 
     found = response_answer(response)
     return Report(
-        spoken_of(
-            response_document(response, found, command),
-            response.posterior.case.gear.theory,
-        ),
+        response_document(response, found, command),
         found,
         "response.json",
         figures,
         tables=lambda: {"response.csv": response.columns()},
         charts=charts,
+        theory=response.posterior.case.gear.theory,
     )
 
 

@@ -8,7 +8,11 @@ from hdcal.inference.checks import listed
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
 from hdcal.prediction.engine.causes import left_out_words
-from hdcal.prediction.engine.conditions import beyond_tested, temperature_is_tested
+from hdcal.prediction.engine.conditions import (
+    Conditions,
+    beyond_tested,
+    temperature_is_tested,
+)
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
 from hdcal.prediction.engine.population_force import PopulationForce, bend_sd
@@ -169,7 +173,7 @@ def remarks(
     first = _main(forces)
     said = left_out_words([force.cause for force in forces])
     said += [*_signs(levels, first.sense), *_of_population(first)]
-    said += _of_steps(grid)
+    said += [*_of_turning(first.conditions), *_of_steps(grid)]
     # Where causes are averaged, what no model explains is one of them.
     alone = len(forces) == 1
     straight = all(force.cause.problem.discrepancy is None for force in forces)
@@ -183,6 +187,15 @@ def remarks(
     if used < total:
         said.append(f"{used} of {total} draws were used.")
     return tuple(dict.fromkeys(said))
+
+
+def _of_turning(asked: Conditions) -> Iterator[str]:
+    """Say where unloading begins."""
+    if not asked.down:
+        return
+    turn, at = float(asked.turn), float(asked.deformation)
+    why = "the largest tested" if turn != at else "as far as what is asked for"
+    yield f"Unloading is taken to begin at {turn:g} mm, {why}."
 
 
 def _of_steps(grid: ReadingGrid) -> Iterator[str]:

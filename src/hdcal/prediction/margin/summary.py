@@ -13,7 +13,6 @@ from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
 from hdcal.prediction.margin.stated import BudgetLine
-from hdcal.report.document import spoken_of
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report
 
@@ -88,11 +87,18 @@ def margin_report(
 
     answer = margin_answer(found, posterior, seed=seed)
     document = whole_document(answer, posterior, command)
-    document = spoken_of(document, posterior.theory)
     others = []
     if certificate is not None:
         page = certificate_page(answer, posterior, certificate)
         others.append((FILE, page.encode("utf-8", "xmlcharrefreplace")))
     tables = {"budget.csv": budget_columns(found)} if found.budget else {}
-    made = {"tables": lambda: tables, "others": lambda: others}
-    return Report(document, answer, "margin.json", figures, charts=charts, **made)
+    return Report(
+        document,
+        answer,
+        "margin.json",
+        figures,
+        tables=lambda: tables,
+        others=lambda: others,
+        charts=charts,
+        theory=posterior.theory,
+    )

@@ -4,13 +4,18 @@
 function touch(figure) {
   const charts = JSON.parse(figure.querySelector("script").textContent);
   const room = document.createElement("div");
-  room.className = "touch";
+  room.className = charts.length > 2 ? "touch many" : "touch";
+  const cells = charts.map(() => room.appendChild(document.createElement("div")));
   const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name);
-  const sync = uPlot.sync(Math.random().toString());
+  // Charts over the same axis move together.
+  const syncs = Object.fromEntries(
+    charts.map(chart => [chart.x, uPlot.sync(Math.random().toString())]));
   let drawn = [];
 
   function limits(plot, low, high) {
-    for (const each of drawn) each.setScale("x", {min: low, max: high});
+    for (const each of drawn)
+      if (each.axes[0].label === plot.axes[0].label)
+        each.setScale("x", {min: low, max: high});
   }
 
   function moving(plot) {
@@ -56,17 +61,24 @@ function touch(figure) {
     return Object.fromEntries(chart.bands.filter(([high]) => isEdge(chart.series[high])));
   }
 
+  function sized(chart, which) {
+    const width = cells[which].clientWidth;
+    return {width: width, height: Math.min(chart.height, 0.9 * width)};
+  }
+
   function draw() {
     for (const plot of drawn) plot.destroy();
     const line = ink("--line"), text = ink("--soft");
     const hue = each => each.colour || ink("--ink").trim();
-    const every = charts.flatMap(chart => chart.data[0]);
-    const ends = {min: Math.min(...every), max: Math.max(...every)};
-    const margin = 0.02 * (ends.max - ends.min);
-    drawn = charts.map(chart => { const band = bandsOf(chart); return new uPlot({
-      width: room.clientWidth,
-      height: Math.min(chart.height, 0.9 * room.clientWidth),
-      cursor: {sync: {key: sync.key, scales: ["x", null]}, drag: {x: true, y: false}},
+    drawn = charts.map((chart, which) => {
+      const every = charts.filter(each => each.x === chart.x)
+        .flatMap(each => [each.data[0][0], each.data[0].at(-1)]);
+      const ends = {min: Math.min(...every), max: Math.max(...every)};
+      const margin = 0.02 * (ends.max - ends.min);
+      const band = bandsOf(chart);
+      return new uPlot({
+      ...sized(chart, which),
+      cursor: {sync: {key: syncs[chart.x].key, scales: ["x", null]}, drag: {x: true, y: false}},
       scales: {x: {time: false, range: (_, low, high) =>
         low === chart.data[0][0] && high === chart.data[0].at(-1)
           ? [ends.min - margin, ends.max + margin] : [low, high]}},
@@ -77,9 +89,10 @@ function touch(figure) {
         label: label, stroke: text, grid: {stroke: line, width: 1},
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
         ...(label === chart.x && chart.names.length ? {
-          size: 100, rotate: -90, space: 16, incrs: [1, 2, 5].flatMap(
+          size: 40 + 6 * Math.min(26, Math.max(...chart.names.map(name => name.length))),
+          rotate: -90, space: 16, incrs: [1, 2, 5].flatMap(
             n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
-          values: (_, places) => places.map(place => placed(chart, place).slice(0, 12)),
+          values: (_, places) => places.map(place => placed(chart, place).slice(0, 26)),
         } : {}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
@@ -98,9 +111,9 @@ function touch(figure) {
           Math.round(255 * strength).toString(16).padStart(2, "0"),
       })),
       hooks: {ready: [moving]},
-    }, chart.data, room); });
+    }, chart.data, cells[which]); });
     drawn.forEach((plot, which) => {
-      sync.sub(plot);
+      syncs[charts[which].x].sub(plot);
       // Both ends of a band share a line; bands of several curves would fill the page.
       const {series, bands} = charts[which], band = bandsOf(charts[which]);
       const rows = plot.root.querySelectorAll(".u-legend .u-series");
@@ -115,8 +128,7 @@ function touch(figure) {
   figure.classList.add("touched");
   draw();
   new ResizeObserver(() => {
-    for (const plot of drawn)
-      plot.setSize({width: room.clientWidth, height: Math.min(plot.height, 0.9 * room.clientWidth)});
+    drawn.forEach((plot, which) => plot.setSize(sized(charts[which], which)));
   }).observe(room);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 }
