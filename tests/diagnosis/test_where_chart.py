@@ -1,10 +1,13 @@
 """Where the gap lies, as charts: the same means, readings and sums as the verdict's."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from verdicts import named, none
 
 from hdcal.diagnosis.chart import running_sums, verdict_chart, where_charts
+from hdcal.diagnosis.where import about
 
 
 def levels(series) -> np.ndarray:
@@ -40,6 +43,24 @@ def test_every_covariate_has_a_chart_with_its_means_and_what_is_off():
     (warm,) = (chart for chart in charts if chart.x.startswith("temperature"))
     box = warm.series[0].x[:2]
     assert 1.0 < np.ptp(box) < 5.0
+
+
+def test_levels_that_are_near_do_not_stand_in_each_others_place():
+    verdict = named()
+    first = next(c for c in verdict.where.cells if c.covariate == "temperature")
+    near = [
+        replace(first, from_=level, to=level, bias_N=about(level, 1.0))
+        for level in (100.0, 20.0, 21.0)
+    ]
+    where = replace(verdict.where, cells=tuple(near))
+    (chart,) = (
+        chart
+        for chart in where_charts(replace(verdict, where=where))
+        if chart.x.startswith("temperature")
+    )
+    mean = next(one for one in chart.series if one.label.startswith("mean"))
+    for level in (20.0, 21.0, 100.0):
+        assert np.interp(level, mean.x, mean.y) == level
 
 
 def test_readings_and_gap_lie_where_they_were_read():

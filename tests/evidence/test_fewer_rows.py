@@ -7,7 +7,12 @@ import pytest
 from rigs import cycles, make_case, make_records
 
 from hdcal.data.loading import derive_motion
-from hdcal.evidence.fewer_rows import average_rows, rows_of_half_cycle, thin_rows
+from hdcal.evidence.fewer_rows import (
+    average_rows,
+    rows_of_half_cycle,
+    single_rows,
+    thin_rows,
+)
 from hdcal.evidence.row_features import half_cycles, take_rows
 
 CASE = make_case(cycles(144))
@@ -28,6 +33,23 @@ def test_rows_of_runs_that_alternate_are_thinned_run_by_run():
     mixed = make_case(take_rows(OF_THREE_RUNS.records, one_by_one))
     thinned, plain = (thin_rows(case, 5).records for case in (mixed, OF_THREE_RUNS))
     np.testing.assert_array_equal(thinned.force, plain.force)
+
+
+@pytest.mark.parametrize("step", [2, 7, 40])
+def test_single_rows_keep_the_turns(step):
+    """Where rows are counted past the turns, tops are lost."""
+    whole, kept = OF_THREE_RUNS.records, single_rows(OF_THREE_RUNS, step).records
+    assert len(kept.force) < len(whole.force)
+    for run in range(3):
+        ends = [
+            (np.min(at), np.max(at))
+            for records in (whole, kept)
+            for at in [np.asarray(records.deformation)[records.run == run]]
+        ]
+        assert ends[0] == ends[1]
+    assert set(np.asarray(kept.force)) <= set(np.asarray(whole.force))
+    assert np.max(thin_rows(OF_THREE_RUNS, 40).records.deformation) < 0.54
+    assert single_rows(CASE, 1) is CASE
 
 
 def ramps(*rows: int) -> np.ndarray:

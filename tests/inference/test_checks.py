@@ -155,6 +155,11 @@ def test_much_noise_alone_is_what_the_model_lacks_rather_than_a_unit():
     much = conflict_check({"sigma": own, "K": ordinary}, prior)
     assert much.outcome == "warning" and "that the model lacks" in much.words
     assert "unit" not in much.words
+    alike = prior | {"noise_correlation": Prior("beta", (1.0, 9.0))}
+    told = {"noise_correlation": 0.99 + 1e-4 * GOOD, "sigma": own, "K": ordinary}
+    words = conflict_check(told, alike).words
+    assert "noise_correlation" in words and "that the model lacks" in words
+    assert "Is it a wrong unit" in conflict_check(told | {"K": GOOD + 4.0}, alike).words
     little = conflict_check({"sigma": 0.001 * own, "K": ordinary}, prior)
     assert "Is it a wrong unit" in little.words
     both = conflict_check({"sigma": own, "K": ordinary + 4.0}, prior)

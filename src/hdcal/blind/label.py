@@ -97,9 +97,10 @@ class CaseAnswer:
         inclusion: of each effect over all hypotheses that hold it.
         detected: whether the residual test found a gap.
         p_value: of the residual test.
-        gap: RMS of the gap, quantiles .5, .05, .95 [N].
-        amplitude: value of a parameter `effect.parameter`, quantiles .5, .05, .95.
-        closed: share closed on held-out rows, quantiles .5, .05, .95.
+        gap: RMS of the gap, quantiles .5, .025, .975 [N].
+        amplitude: value of a parameter `effect.parameter`, quantiles .5, .025,
+            .975.
+        closed: share closed on held-out rows, quantiles .5, .025, .975.
         noise_sd: of a reading [N].
         group: that leads, several where the loading cannot part them; empty where no
             group is said.

@@ -12,7 +12,15 @@ from hdcal.data.units import known_unit
 # misspelt, as loggers spell it.
 WORDS: dict[str, tuple[str, ...]] = {
     "deformation": (
-        *("deformation", "displacement", "displacment", "deflection", "travel"),
+        *(
+            "deformation",
+            "displacement",
+            "displacment",
+            "deflection",
+            "travel",
+            "defl",
+            "lvdt",
+        ),
         *("disp",),
         *("stroke", "extension", "crosshead", "weg", "standardweg", "traversenweg"),
         *("verformung", "verschiebung", "hub", "déformation", "déplacement"),
@@ -26,7 +34,16 @@ WORDS: dict[str, tuple[str, ...]] = {
     "time": ("time", "zeit", "prüfzeit", "temps", "durée", "时间"),
     "angle": ("angle", "winkel", "drehwinkel", "角度"),
     "run": (
-        *("run", "mounting", "repeat", "lauf", "messung", "versuch", "einspannung"),
+        *(
+            "run",
+            "mounting",
+            "repeat",
+            "lauf",
+            "messung",
+            "versuch",
+            "einspannung",
+            "aufspannung",
+        ),
         *("wiederholung", "essai"),
     ),
     "specimen": (
@@ -41,6 +58,8 @@ _OTHERWISE = {
     *("sd", "std", "deviation", "offset", "tare", "limit", "grenze"),
     *("diameter", "durchmesser", "diamètre", "corrected", "korrigiert", "corrigé"),
 }
+# What stands for a quantity in formulas.
+_LETTERS = {"F": "force", "T": "temperature", "t": "time"}
 # What says no more than that a column holds labels.
 _LABELS = {"no", "nr", "number", "nummer", "id", "numéro"}
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*[(\[]\s*(?P<unit>[^()\[\]]*?)\s*[)\]]\s*")
@@ -71,9 +90,11 @@ def guess_header(header: str) -> Guess | None:
         match = pattern.fullmatch(header)
         if match is None:
             continue
-        # A letter means a force where a unit of force is beside it.
-        force = Guess("force", "", True) if match["name"] == "F" else None
-        found = _quantity(match["name"]) or force
+        # A letter means a quantity where a unit of it is beside it.
+        letter = _LETTERS.get(match["name"], "")
+        found = _quantity(match["name"]) or (
+            Guess(letter, "", True) if letter else None
+        )
         if found is None:
             continue
         unit = known_unit(found.quantity, match["unit"])

@@ -148,7 +148,7 @@ def _sheets(path: Path, findings: FileFindings) -> dict[str, Rows]:
     try:
         import openpyxl
     except ImportError:
-        remedy = "Save it as CSV, or install what reads it: hdcal[files]"
+        remedy = "Save it as CSV, or install what reads it: pip install openpyxl"
         findings.refuse("is a workbook", remedy)
     try:
         with zipfile.ZipFile(path) as archive:

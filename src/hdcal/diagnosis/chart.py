@@ -101,9 +101,11 @@ def _means(
         return [], []
     order = np.argsort(starts, kind="stable")
     starts, stops = starts[order], stops[order]
-    # A level is a range without width; it gets one that can be seen.
-    thin = 0.02 * (float(np.max(stops) - np.min(starts)) or 1.0)
+    # A level is a range without width: it gets one that can be seen, no wider than the
+    # next level is far.
     at = 0.5 * (starts + stops)
+    near = np.min(np.diff(at), initial=np.inf)
+    thin = min(0.02 * (float(np.max(stops) - np.min(starts)) or 1.0), 0.5 * near)
     starts, stops = np.minimum(starts, at - thin), np.maximum(stops, at + thin)
     stops[:-1] = np.minimum(stops[:-1], starts[1:])
     middle, high = (

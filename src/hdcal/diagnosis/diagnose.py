@@ -1,6 +1,7 @@
 """Diagnose a case: where, which, how far, and what to test next."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from hdcal.diagnosis.weighing import weigh
 from hdcal.diagnosis.which import identify_cause
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import CaseEvidence
+from hdcal.evidence.fewer_rows import single_rows
+from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
@@ -69,7 +72,7 @@ def diagnose(
     found = detect_gap(evidence, posterior, diagnosed, rng)
     which = identify_cause(evidence, found, diagnosed, library, rng)
     closed = _closure(evidence, which, found, rng)
-    fitted = case if len(case.records.force) <= _MOST_FITTED else diagnosed
+    fitted = _fitted(case, weighed.averaged_rows * weighed.row_step)
     fits = refit(fitted, posterior, library, seed, progress, quick=quick)
     runs, no_run = rank_runs(evidence, posterior, library, rng)
     return Verdict(
@@ -79,14 +82,14 @@ def diagnose(
         which=with_sampled_size(which, fits),
         shrink=closed,
         next_test=runs,
-        budget=stiffness_budget(evidence, case, which.named),
+        budget=stiffness_budget(evidence, case, which.named, _stiffness(fits)),
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),
         notes=(
             *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
-            *_fewer(case, fitted, quick),
             *_left_out(repeated),
+            *[note for note in fitted.notes if note not in case.notes and not quick],
         ),
         reasons=failure_reasons(fits),
         averaged_rows=weighed.averaged_rows,
@@ -96,6 +99,13 @@ def diagnose(
         seed=seed,
         quick=quick,
     )
+
+
+def _stiffness(fits: Refits) -> np.ndarray | None:
+    """Return draws of the stiffness as read over all models [N/mm]."""
+    if not fits.models:
+        return None
+    return mixed_posterior(fits.models).draws["stiffness"]
 
 
 def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
@@ -159,15 +169,22 @@ def _notes(evidence: CaseEvidence, fits: Refits, group: int, step: int) -> list[
     return notes
 
 
-def _fewer(case: Case, fitted: Case, quick: bool) -> list[str]:
-    """Say that the corrected model was not calibrated on all rows."""
-    rows, used = len(case.records.force), len(fitted.records.force)
-    if quick or used == rows:
-        return []
-    return [
-        f"the corrected model was calibrated on the {used} rows or means that were "
-        f"diagnosed, not on all {rows} rows"
-    ]
+def _fitted(case: Case, step: int) -> Case:
+    """Return the rows that the corrected model is calibrated on.
+
+    Single ones, as it speaks of the noise of a reading, and as far apart as those that
+    were diagnosed: those between err like them.
+
+    Args:
+        case: all rows.
+        step: one of so many rows was diagnosed, or went into a mean.
+    """
+    rows = len(case.records.force)
+    if rows <= _MOST_FITTED:
+        return case
+    few = single_rows(case, max(step, -(-rows // _MOST_FITTED)))
+    words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
+    return replace(few, notes=(*few.notes, words))
 
 
 def _left_out(repeated: int) -> list[str]:

@@ -32,7 +32,10 @@ _NOTE = (
 
 
 def stiffness_budget(
-    evidence: CaseEvidence, case: Case, names: Sequence[str] = ()
+    evidence: CaseEvidence,
+    case: Case,
+    names: Sequence[str] = (),
+    stiffness: np.ndarray | None = None,
 ) -> Budget | None:
     """Split K into factors by prior and likelihood in log space; a spring has none.
 
@@ -45,11 +48,17 @@ def stiffness_budget(
         evidence: for the fitted stiffness.
         case: the gear.
         names: effects beside which the stiffness is fitted.
+        stiffness: draws of it as read where it was sampled [N/mm].
     """
     if case.gear.theory == SPRING:
         return None
     causes = _causes(case)
-    log_k, log_k_sd = _measured(evidence, names)
+    if stiffness is None:
+        log_k, log_k_sd = _measured(evidence, names)
+    else:
+        half = 0.5 if case.gear.reading == "diametral" else 1.0
+        drawn = np.log(stiffness / (half * float(evidence.prepared.ring)))
+        log_k, log_k_sd = float(np.median(drawn)), float(np.std(drawn))
     mean = np.array([m for _, m, _, _ in causes])
     sd = np.array([s for _, _, s, _ in causes])
     whole = np.sum(sd**2) + log_k_sd**2

@@ -61,6 +61,22 @@ def thin_rows(case: Case, step: int) -> Case:
     return replace(case, records=take_rows(records, kept))
 
 
+def single_rows(case: Case, step: int) -> Case:
+    """Keep one row of so many in each half cycle, and those at which it turns.
+
+    Args:
+        case: with rows in the order they were taken.
+        step: 1 leaves it as it is.
+    """
+    if step == 1:
+        return case
+    records = _run_after_run(case)
+    half = half_cycles(records)
+    last = np.diff(half, append=half[-1] + 1) != 0
+    kept = np.flatnonzero((_place(half) % step == 0) | last)
+    return replace(case, records=take_rows(records, kept))
+
+
 def rows_of_half_cycle(case: Case) -> int:
     """Return how many rows the half cycle has in which the median row lies.
 

@@ -208,7 +208,8 @@ def conflict_check(
         return Check(PLAUSIBLE, "passed", "every median lies within its prior's 99.7 %")
     each = [f"{name} = {about}" for name, about in far.items()]
     words = f"far outside what was expected before the data: {listed(each)}"
-    if [*far] == ["sigma"] and _above(draws["sigma"], priors["sigma"]):
+    noise = {*far} <= {"sigma", CORRELATION}
+    if noise and all(_above(draws[name], priors[name]) for name in far):
         # A wrong unit shows in the stiffness too.
         remedy = "A loop, a bend or a drift that the model lacks counts as noise here"
         return Check(NOISY, "warning", f"{words}. {remedy}")

@@ -34,6 +34,9 @@ _DRAWS = 200
 # How a warning begins that a shape is left in the residuals.
 SHAPED = "This takes the model's shape for right, but its residuals have one."
 _DIAGNOSE = "Diagnose", "Diagnose, or calibrate with a gap"
+_BESIDE = "That is left out, and little beside the noise."
+# Share of the noise below which a shape widens what one reading does by a twentieth.
+_SMALL = 1.0 / 3.0
 UNNAMED = "No cause named makes it"
 _DIAGNOSED = UNNAMED, f"{UNNAMED}: calibrate with a gap"
 
@@ -163,11 +166,12 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
     remedies = _DIAGNOSED if ORIGIN in posterior.settings else _DIAGNOSE
     remedy = remedies[posterior.problem.discrepancy is None]
+    noise_sd = float(np.median(posterior.draws["sigma"]))
+    told = left.structure if shapes else ()
+    large = [shape for shape in told if shape.size_N > _SMALL * noise_sd]
     return (
-        *(
-            f"{SHAPED} {shape.words.rstrip('.')}. {remedy}."
-            for shape in (left.structure if shapes else ())
-        ),
+        *(f"{SHAPED} {shape.words.rstrip('.')}. {remedy}." for shape in large),
+        *(f"{shape.words} {_BESIDE}" for shape in told if shape not in large),
         *(fault.words for fault in left.noise),
         *(
             [f"{alike.words[:1].upper()}{alike.words[1:]}."]

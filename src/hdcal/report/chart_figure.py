@@ -47,5 +47,5 @@ def axes_or_new(axes: Axes | None) -> Axes:
     if axes is None:
         from matplotlib import pyplot
 
-        return pyplot.subplots()[1]
+        return pyplot.subplots(layout="constrained")[1]
     return axes

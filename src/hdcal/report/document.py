@@ -244,7 +244,7 @@ def spoken_of(document: Document, theory: str) -> Document:
 
 
 def answer_spoken_of(answer: A, theory: str) -> A:
-    """Return an answer whose sentences speak as its document does."""
+    """Return an answer whose first sentences speak as its document does."""
     if theory != SPRING:
         return answer
     held = vars(answer)

@@ -33,6 +33,7 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
     if not held:
         quick = " and a quick verdict holds none" * (held is not None)
         words = f"{type(models).__name__} is no calibrated model{quick}"
-        remedy = "Calibrate first, or diagnose without quick"
+        remedy = "Give what calibrate or diagnose returned, itself"
+        remedy += "; diagnose without quick" * bool(quick)
         raise InputError([Finding("models", words, remedy)])
     return list(held.values())

@@ -165,7 +165,7 @@ def _margin(
         quantity=request.quantity,
         population=whose,
         population_words=population_words(whose, main.problem),
-        basis=_basis(whose, criteria, beyond_tested(forces[0].conditions)),
+        basis=_basis(whose, criteria, forces[0]),
         content=criteria.content,
         confidence=criteria.confidence,
         required_probability=criteria.required,
@@ -276,9 +276,15 @@ def _tested(main: Cause, request: MarginRequest, sense, warm) -> np.ndarray:
     )
 
 
-def _basis(population: Population, criteria: Criteria, beyond: float) -> str:
-    """Return the name of such a bound, of gears whose deformation was tested."""
-    if population != "specimens" or beyond > FAR:
+def _basis(population: Population, criteria: Criteria, force: PopulationForce) -> str:
+    """Return the name of such a bound, of gears whose deformation was tested.
+
+    It has none where the prior tells how much gears differ.
+    """
+    beyond = beyond_tested(force.conditions)
+    scatter = force.cause.posterior.diagnoses.get("specimen_sd")
+    by_prior = scatter is not None and scatter.driven_by == "prior"
+    if population != "specimens" or beyond > FAR or by_prior:
         return ""
     pair = (criteria.content, criteria.confidence)
     return next((name for name, shares in BASES.items() if shares == pair), "")
