@@ -160,14 +160,14 @@ def test_a_mapping_wins_over_a_name(folder):
 
 
 def test_notes_name_what_was_left_out(folder):
-    content = "deformation_mm,force_N,operator\n" + "".join(
-        f"{i / 10},{i}.98,me\n\n" for i in range(6)
+    content = "deformation_mm,force_N,weather\n" + "".join(
+        f"{i / 10},{i}.98,dry\n\n" for i in range(6)
     )
     gear = folder / "gear.toml"
     gear.write_text(gear.read_text() + "force_resolution_N = 0.98\n")
     notes = read(folder, content).notes
     assert notes == (
-        "columns not used: 'operator'",
+        "columns not used: 'weather'",
         "5 empty lines between the readings were skipped",
         "5 of 6 forces are not multiples of 0.98 N",
     )
@@ -244,3 +244,36 @@ def test_file_and_folder_give_the_same_case(folder):
     raw = (folder / "data.csv").read_bytes()
     assert from_folder.data_sha256 == hashlib.sha256(raw).hexdigest()
     assert from_file.data_sha256 == from_folder.data_sha256
+
+
+LOTS = """specimen,Charge,lot,Bediener,run,deformation_mm,force_N
+A,9,L1,Kern,1,0.1,10
+A,9,L1,Kern,1,0.2,20
+A,9,L1,Moss,2,0.1,10
+A,9,L1,Moss,2,0.2,21
+B,9,,Kern,1,0.1,11
+B,9,,Kern,1,0.2,23
+"""
+
+
+def test_lots_are_those_of_gears_and_operators_those_of_mountings(folder):
+    case = read(folder, LOTS)
+    assert (case.specimen_labels, case.lots) == (("A", "B"), ("L1", "not stated"))
+    assert case.run_labels == ("A/1", "A/2", "B/1")
+    assert case.operators == ("Kern", "Moss", "Kern")
+    # A number that stays the same is no force, whatever Charge means in French.
+    assert case.records.force[-1] == 23.0
+
+
+def test_lots_of_which_a_gear_has_several_are_not_used(folder):
+    mixed = LOTS.replace("A,9,L1,Moss,2,0.2", "A,9,L2,Kern,2,0.2")
+    case = read(folder, mixed)
+    assert (case.lots, case.operators) == ((), ())
+    assert "lots are not used: specimen 'A' has several" in case.notes
+    assert "operators are not used: run 'A/2' has several" in case.notes
+
+
+def test_who_tested_may_stand_above_the_table_too(folder):
+    above = "Operator,Moss\nLot,L3\ndeformation_mm,force_N\n"
+    case = read(folder, above + "".join(f"{i / 10},{20 * i}\n" for i in range(6)))
+    assert len(case.records.force) == 6 and case.operators == ()

@@ -40,7 +40,7 @@ SILICON = [
 BETWEEN, WITHIN = 5.11462616e-2, 2.16636560e-1
 
 
-def sums_of(mountings):
+def sums_of(mountings, operators=None):
     """Return the sums of (gear, x, y) for each mounting."""
     rows = []
     for gear, x, y in mountings:
@@ -48,11 +48,13 @@ def sums_of(mountings):
         products = about_x @ about_x, about_x @ about_y, about_y @ about_y
         rows.append((gear, len(x), x.mean(), y.mean(), *products))
     columns = np.array(rows).T
-    return MountingSums(columns[0].astype(int), *columns[1:])
+    by = np.zeros(len(rows), int) if operators is None else np.array(operators)
+    return MountingSums(columns[0].astype(int), *columns[1:], by)
 
 
-def problem_of(mountings, gears):
-    return PopulationProblem({}, gear_sums(sums_of(mountings), gears))
+def problem_of(mountings, gears, lots=None, operators=None):
+    lot = np.zeros(gears, int) if lots is None else np.array(lots)
+    return PopulationProblem({}, gear_sums(sums_of(mountings, operators), lot))
 
 
 VALUES = {
@@ -80,39 +82,59 @@ def fleet(seed=0, gears=3):
     return found
 
 
-def dense(mountings, values):
-    """Return log p and the mean stiffness of one gear, for both kinds of gears."""
+def dense(mountings, values, lot=0.0, operators=None):
+    """Return log p and the mean stiffness of one gear, for both kinds of gears.
+
+    Args:
+        mountings: of it.
+        values: of the population.
+        lot: by which share its lot is stiffer.
+        operators: by how much the zero of each mounting's operator is higher [N].
+    """
     x = np.concatenate([x for _, x, _ in mountings])
     y = np.concatenate([y for _, _, y in mountings])
     run = np.repeat(np.arange(len(mountings)), [len(x) for _, x, _ in mountings])
     noise = values["sigma"] ** 2 * np.eye(len(x))
     noise += values["run_offset_sd"] ** 2 * (run[:, None] == run)
-    mean = values["stiffness"] * x + values["zero"]
+    centre = values["stiffness"] * (1.0 + lot)
+    by = np.zeros(len(mountings)) if operators is None else np.array(operators)
+    mean = centre * x + values["zero"] + by[run]
     found = []
     for wide in (1.0, np.sqrt(1.0 + values["off_ratio"] ** 2)):
-        between = (values["specimen_sd"] * values["stiffness"] * wide) ** 2
+        between = (values["specimen_sd"] * centre * wide) ** 2
         whole = noise + between * np.outer(x, x)
         gain = between * x @ np.linalg.solve(whole, y - mean)
         law = multivariate_normal(mean, whole)
-        found.append((law.logpdf(y), values["stiffness"] + gain))
+        found.append((law.logpdf(y), centre + gain))
     return np.array(found)
 
 
-def test_the_likelihood_is_that_of_all_rows_with_their_covariance():
+@pytest.mark.parametrize("groups", [False, True])
+def test_the_likelihood_is_that_of_all_rows_with_their_covariance(groups):
     mountings = fleet()
+    lots, operators = np.zeros(3, int), np.zeros(6, int)
+    values = dict(VALUES)
+    if groups:
+        lots, operators = np.array([0, 1, 1]), np.array([0, 1, 0, 1, 1, 0])
+        values |= {"lot_1": 0.02, "lot_2": -0.02, "lot_sd": 0.01}
+        values |= {"operator_1": 0.7, "operator_2": -0.7, "operator_sd": 1.0}
+    of_lot = np.array([values.get("lot_1", 0.0), values.get("lot_2", 0.0)])
+    by = np.array([values.get("operator_1", 0.0), values.get("operator_2", 0.0)])
     shares = np.log([1.0 - VALUES["off_share"], VALUES["off_share"]])
     expected, means, chances = 0.0, [], []
     for gear in range(3):
-        logs, mean = dense([m for m in mountings if m[0] == gear], VALUES).T
+        here = np.array([m[0] == gear for m in mountings])
+        own = [m for m, inside in zip(mountings, here, strict=True) if inside]
+        logs, mean = dense(own, values, of_lot[lots[gear]], by[operators[here]]).T
         whole = np.logaddexp.reduce(logs + shares)
         # The sums leave out what does not depend on the parameters.
         rows = [len(x) for one, x, _ in mountings if one == gear]
         expected += whole + 0.5 * sum(n * np.log(2.0 * np.pi) + np.log(n) for n in rows)
         means.append(mean)
         chances.append(np.exp(logs + shares - whole))
-    problem = problem_of(mountings, 3)
-    assert log_likelihood(problem, VALUES) == pytest.approx(expected, abs=1e-9)
-    law = gear_law(problem, VALUES)
+    problem = problem_of(mountings, 3, lots, operators)
+    assert log_likelihood(problem, values) == pytest.approx(expected, abs=1e-9)
+    law = gear_law(problem, values)
     np.testing.assert_allclose(law.mean[:, 0], means, rtol=1e-10)
     np.testing.assert_allclose(np.exp(law.log_weight).sum(axis=1), chances, rtol=1e-8)
 

@@ -23,6 +23,7 @@ def handmade() -> Fleet:
         "specimen_sd": rng.uniform(0.005, 0.01, 50),
         "run_offset_sd": rng.uniform(0.5, 1.5, 50),
         "sigma": rng.uniform(0.4, 0.6, 50),
+        "noise_spread": rng.uniform(0.0, 0.1, 50),
         "off_share": rng.uniform(0.0, 0.1, 50),
         "off_ratio": rng.uniform(4.0, 8.0, 50),
     }
@@ -41,6 +42,9 @@ def handmade() -> Fleet:
         rows=np.full(4, 5),
         mountings=np.ones(4, int),
         misfit=Misfit(0.0, 0.0, 0.0),
+        lots=[],
+        operators=[],
+        force_tolerance=None,
         checks=(Check("chains agree (R-hat)", "passed", "the largest R-hat is 1.0"),),
         settings={"seed": 0, "chains": 4, "warmup": 500, "draws": 500},
     )

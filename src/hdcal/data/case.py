@@ -86,6 +86,8 @@ class Case(Shown):
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
+        lots: lot of each specimen index; empty where none is told.
+        operators: who mounted each run index; empty where none is told.
     """
 
     name: str
@@ -96,6 +98,8 @@ class Case(Shown):
     data_sha256: str
     notes: tuple[str, ...] = ()
     columns: dict[str, str] = field(default_factory=dict)
+    lots: tuple[str, ...] = ()
+    operators: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         rows = len(self.records.force)

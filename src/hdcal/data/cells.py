@@ -10,11 +10,13 @@ from hdcal.data.columns import LABELS, Column
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.formula_cells import with_formula
+from hdcal.data.header_words import GROUPINGS
 from hdcal.errors import quoted
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Whole numbers, their thousands behind points.
 _IN_THOUSANDS = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
+_NOT_STATED = "not stated"
 _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 
 
@@ -45,6 +47,8 @@ def read_cells(
             words = "stands in the first row of each: the rows below it are taken for"
             notes.append(f"the label of {quoted(column.header)} {words} the same")
             cells = [*accumulate(cells, lambda above, own: own or above)]
+        if column.quantity in GROUPINGS:
+            cells = [cell or _NOT_STATED for cell in cells]
         words = f"the {column.quantity} label is empty"
         empty = [
             (int(row), words, "Name it")

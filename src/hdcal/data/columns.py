@@ -8,12 +8,12 @@ import numpy as np
 
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import guess_header
+from hdcal.data.header_words import GROUPINGS, guess_header
 from hdcal.data.label_columns import label_columns
 from hdcal.data.units import COLUMN_UNITS, known_unit
 from hdcal.errors import quoted
 
-LABELS = ("run", "specimen")
+LABELS = ("run", "specimen", *GROUPINGS)
 QUANTITIES = (*COLUMN_UNITS, *LABELS)
 REQUIRED = ("deformation", "force")
 _LONGEST_FIRST = sorted(QUANTITIES, key=len, reverse=True)
@@ -180,6 +180,8 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
     # One that names nothing else is meant rather than one that says more.
     whole = [column for column, alone in found if alone]
     likely = whole or [column for column, _ in found]
+    # A lot of German rings is a Charge, which is a load in French: that has a unit.
+    likely = [column for column in likely if column.unit] or likely
     if len(likely) > 1 and quantity in REQUIRED:
         _ask_which(quantity, [column.position for column in likely], table, findings)
     if len(likely) != 1:
@@ -199,7 +201,7 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
 
 def _labels(quantity: str, table: CsvTable, findings: FileFindings) -> Column | None:
     found = label_columns(table, quantity)
-    if len(found) > 1:
+    if len(found) > 1 and quantity not in GROUPINGS:
         _ask_which(quantity, found, table, findings)
     alone = [Column(quantity, table.headers[at], at, guessed=True) for at in found]
     return alone[0] if len(alone) == 1 else None

@@ -6,7 +6,7 @@ A guess: it is told before anything else, with how to correct it.
 import re
 from typing import NamedTuple
 
-from hdcal.data.units import known_unit
+from hdcal.data.units import COLUMN_UNITS, known_unit
 
 # Words for each quantity, in lower case: English, German, French, Chinese. One is
 # misspelt, as loggers spell it.
@@ -50,7 +50,11 @@ WORDS: dict[str, tuple[str, ...]] = {
         *("specimen", "gear", "serial", "seriennummer", "probe", "prüfling"),
         "éprouvette",
     ),
+    "lot": ("lot", "batch", "los"),
+    "operator": ("operator", "inspector", "bediener", "prüfer", "opérateur"),
 }
+# Labels that say more of a gear or a mounting, and that no answer has to have.
+GROUPINGS = ("lot", "operator")
 # What says that a column is something else about the quantity.
 _OTHERWISE = {
     *("setpoint", "set", "target", "command", "soll", "sollwert", "consigne"),
@@ -120,5 +124,5 @@ def _quantity(name: str) -> Guess | None:
     if len(found) != 1:
         return None
     (quantity,) = found
-    of_labels = _LABELS if quantity in ("run", "specimen") else set()
+    of_labels = set() if quantity in COLUMN_UNITS else _LABELS
     return Guess(quantity, "", len([w for w in words if w not in of_labels]) == 1)

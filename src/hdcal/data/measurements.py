@@ -86,6 +86,29 @@ def read_measurements(
     return Measurements(columns, run, specimen)
 
 
+def grouping(measured: Measurements, quantity: str) -> tuple[tuple[str, ...], str]:
+    """Return the lot of each specimen, or the operator of each run, and a note.
+
+    Nothing is returned where the file does not tell them or one has several, which the
+    note says.
+
+    Args:
+        measured: the readings.
+        quantity: lot or operator.
+    """
+    labels = measured.columns.values.get(quantity)
+    if labels is None:
+        return (), ""
+    of = measured.specimen if quantity == "lot" else measured.run
+    pairs = pd.DataFrame({"of": of.index, "label": labels}).drop_duplicates()
+    twice = pairs["of"].duplicated()
+    if twice.any():
+        one = of.names[int(np.asarray(pairs["of"])[np.argmax(twice)])]
+        word = "specimen" if quantity == "lot" else "run"
+        return (), f"{quantity}s are not used: {word} {quoted(one)} has several"
+    return tuple(pairs.sort_values("of")["label"]), ""
+
+
 def of_specimen(measured: Measurements, label: str) -> Measurements:
     """Return what was measured on one of several specimens.
 

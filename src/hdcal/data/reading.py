@@ -13,10 +13,12 @@ from hdcal.data.columns import Columns
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
+from hdcal.data.header_words import GROUPINGS
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
     Measurements,
+    grouping,
     of_specimen,
     read_measurements,
 )
@@ -98,6 +100,9 @@ def read_case(
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
+    (lots, of_lots), (operators, of_operators) = (
+        grouping(measured, quantity) for quantity in GROUPINGS
+    )
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
         name=_name(data, folder, sheet, specimen),
@@ -110,8 +115,11 @@ def read_case(
             *measured.columns.notes,
             *told,
             *reading_notes(measured, found, motion),
+            *filter(None, (of_lots, of_operators)),
         ),
         columns=measured.columns.as_named(),
+        lots=lots,
+        operators=operators,
     )
 
 

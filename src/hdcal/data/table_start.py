@@ -8,7 +8,7 @@ import csv
 import re
 from typing import NamedTuple
 
-from hdcal.data.header_words import guess_header
+from hdcal.data.header_words import GROUPINGS, guess_header
 from hdcal.data.units import COLUMN_UNITS, known_unit
 
 # Titles are sought in this many lines; so many lines of readings are a table.
@@ -128,7 +128,9 @@ def _start(
 
 def _names(cells: list[str]) -> bool:
     """Tell whether cells are headers, some of a quantity that is known."""
-    return any(guess_header(cell) for cell in cells)
+    guesses = filter(None, map(guess_header, cells))
+    # Who tested and which lot stand above a table too.
+    return any(guess.quantity not in GROUPINGS for guess in guesses)
 
 
 def _are_units(cells: dict[int, list[str]], lines: list[int]) -> bool:

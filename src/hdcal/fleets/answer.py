@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from hdcal.fleets.gauge import GaugeAnswer
 from hdcal.fleets.misfit import Misfit
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
 from hdcal.report.parameters import Interval
@@ -14,15 +15,37 @@ class PopulationAnswer:
 
     Attributes:
         stiffness_N_per_mm: of the centre of ordinary gears, per mm as read.
-        gear_sd_percent: between ordinary gears.
+        gear_sd_percent: between ordinary gears of a lot.
+        lot_sd_percent: between lots; None where none are told apart.
+        operator_sd_N: of the zero between operators, likewise.
         mounting_sd_N: of the zero from mounting to mounting.
         reading_sd_N: of single readings.
     """
 
     stiffness_N_per_mm: Interval
     gear_sd_percent: Interval
+    lot_sd_percent: Interval | None
+    operator_sd_N: Interval | None
     mounting_sd_N: Interval
     reading_sd_N: Interval
+
+
+@dataclass(frozen=True)
+class LotAnswer:
+    """A lot, with the stiffness about which its ordinary gears scatter."""
+
+    lot: Words
+    gears: Count
+    stiffness_N_per_mm: Interval
+
+
+@dataclass(frozen=True)
+class OperatorAnswer:
+    """An operator, with the zero of their mountings over the mean of all operators."""
+
+    operator: Words
+    mountings: Count
+    zero_apart_N: Interval
 
 
 @dataclass(frozen=True)
@@ -57,7 +80,10 @@ class FleetAnswer(Answer):
         false_calls: share of these that may be ordinary gears, as expected.
         interval: probability that every interval holds.
         population: what they come from.
-        next_gear: one more of them.
+        lots: where they are told.
+        operators: likewise.
+        next_gear: one more of them, of another lot.
+        gauge_rr: how well one reading of the force tells gears apart.
         misfit: what the readings have beside straight lines.
         notes: from reading, and on what the answer rests.
         seed: of the draws.
@@ -72,7 +98,10 @@ class FleetAnswer(Answer):
     false_calls: float
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
     population: PopulationAnswer
+    lots: tuple[LotAnswer, ...]
+    operators: tuple[OperatorAnswer, ...]
     next_gear: FutureGear
+    gauge_rr: GaugeAnswer
     misfit: Misfit
     notes: Sentences
     seed: Count

@@ -5,6 +5,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
+from hdcal.cli.option_types import FORCE
 from hdcal.cli.options import (
     case_options,
     folder_options,
@@ -16,11 +17,16 @@ from hdcal.cli.options import (
 
 @command(short_help="Many gears: which one is off, and how much do they scatter?")
 @case_options
+@click.option(
+    "--force-tolerance",
+    type=FORCE,
+    help="Width within which the force at the largest deformation may lie [N].",
+)
 @seed_option
 @folder_options("Result folder [default: NAME-fleet].")
 @json_option
 @click.pass_obj
-def fleet(console: Console, out, force, seed, **given):
+def fleet(console: Console, out, force, seed, force_tolerance, **given):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
 
     DATA names the gear of each row in a column `specimen`, also called gear or serial.
@@ -30,6 +36,7 @@ def fleet(console: Console, out, force, seed, **given):
 
     with console.wrong as wrong:
         wrong += implausible("seed", seed)
+        wrong += implausible("force_tolerance", force_tolerance, "sigma")
         case = read_given(console, **given)
         if case is not None:
             from hdcal.fleets.fleet import check_fleet
@@ -39,9 +46,10 @@ def fleet(console: Console, out, force, seed, **given):
         console.reserve_folder(out, force)
     assert case is not None and out is not None
     keep_compilations()
+    asked = {"seed": seed, "force_tolerance": force_tolerance}
     from hdcal.fleets.fleet import fleet as fit_fleet
     from hdcal.fleets.summary import fleet_report
 
     with progress_bar() as progress:
-        found = fit_fleet(case, seed=seed, progress=progress)
+        found = fit_fleet(case, progress=progress, **asked)
     return console.report(fleet_report(found, console.command))

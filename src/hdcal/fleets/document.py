@@ -38,7 +38,7 @@ FEW_GEARS = (
     "So few gears say little of how much ordinary ones scatter: only a gear very far "
     "out can be called off. Ten tell clearly more."
 )
-_FEW = 8
+_FEW, _FEW_GROUPS = 8, 5
 
 
 def headline(
@@ -112,6 +112,7 @@ def fleet_document(
         sections=[
             _gears(columns, answer),
             _scatter(answer),
+            _gauge(answer),
             Section(
                 "Checks", [Sentences([c.words for c in found.checks])], False, True
             ),
@@ -131,6 +132,12 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     told = f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm"
     also = "; that it may be an odd one is in it" * bool(answer.called_off)
     yield f"{told}{also}."
+    if answer.gears < _FEW:
+        yield (
+            f"{answer.gears} gears say too little for bounds on most gears to come: "
+            "these would rest on what was believed before."
+        )
+        return
     one = answer.next_gear.stiffness_N_per_mm
     width = one.hi - one.lo
     ends = [
@@ -188,20 +195,78 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
 def _scatter(answer: FleetAnswer) -> Section:
     population = answer.population
     rows = [
+        ("between lots", population.lot_sd_percent, "%"),
         ("between ordinary gears", population.gear_sd_percent, "%"),
+        ("zero, between operators", population.operator_sd_N, "N"),
         ("zero, between mountings", population.mounting_sd_N, "N"),
         ("single readings", population.reading_sd_N, "N"),
     ]
     told = [
         (what, f"{estimate(one)[0]} {unit} ({estimate(one)[1]})")
         for what, one, unit in rows
+        if one is not None
     ]
-    return Section("What scatters, sd with 95 % interval", [Facts(told)], brief=True)
+    heading = "What scatters, sd with 95 % interval"
+    return Section(heading, [Facts(told), *_groups(answer)], brief=True)
+
+
+def _groups(answer: FleetAnswer) -> Iterator[Table]:
+    """Yield what is known of each lot and each operator."""
+    if answer.lots:
+        numbers = ("gears", "N/mm", "95 % interval")
+        rows = [
+            [lot.lot, str(lot.gears), *estimate(lot.stiffness_N_per_mm)]
+            for lot in answer.lots
+        ]
+        yield Table(["lot", *numbers], rows, frozenset(numbers))
+    if answer.operators:
+        numbers = ("mountings", "zero over the mean [N]", "95 % interval")
+        rows = [
+            [one.operator, str(one.mountings), *estimate(one.zero_apart_N)]
+            for one in answer.operators
+        ]
+        yield Table(["operator", *numbers], rows, frozenset(numbers))
+
+
+def _gauge(answer: FleetAnswer) -> Section:
+    """Return how well one reading tells gears apart, as quality people read it."""
+    found = answer.gauge_rr
+    rows = [
+        ("repeatability: readings", found.repeatability_N, "N"),
+        ("reproducibility: mountings and operators", found.reproducibility_N, "N"),
+        ("gears and lots", found.gears_N, "N"),
+        (
+            "gauge, of all that scatters (study variation)",
+            found.percent_study_variation,
+            "%",
+        ),
+        ("gauge, of the tolerance", found.percent_tolerance, "%"),
+        ("distinct categories", found.distinct_categories, ""),
+    ]
+    told = [
+        (what, f"{estimate(one)[0]} {unit} ({estimate(one)[1]})".replace("  ", " "))
+        for what, one, unit in rows
+        if one is not None
+    ]
+    words = (
+        f"Of one reading of the force at {found.deformation_mm:g} mm, by standard "
+        "deviations. Below 10 % of study variation or tolerance a gauge is usually "
+        "called good, above 30 % it is not, and it should tell five categories or "
+        "more. The stiffness above rests on all readings of a gear and is told far "
+        "better than by one."
+    )
+    return Section("Gauge R&R", [Facts(told), Text(words, soft=True)])
 
 
 def notes_of(found: Fleet) -> Sequence[str]:
     """Return what the reader of a fleet must know."""
+    scarce = [
+        f"{len(names)} {kind} say little of how much {kind} scatter: its interval is "
+        "mostly what was believed before."
+        for kind, names in (("lots", found.lots), ("operators", found.operators))
+        if 0 < len(names) < _FEW_GROUPS
+    ]
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
     few = [FEW_GEARS] if len(found.off) < _FEW else []
     beside = misfit_words(found.misfit)
-    return [*beside, *found.case.notes, RESTS_ON, *few, *once]
+    return [*beside, *found.case.notes, RESTS_ON, *few, *scarce, *once]

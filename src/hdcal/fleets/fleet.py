@@ -1,7 +1,7 @@
 """Many gears of one kind: each one, the population they come from, the next one."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import jax
@@ -10,12 +10,18 @@ import xarray as xr
 from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case, require_case
+from hdcal.data.plausible import implausible
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step, require_scatter
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.misfit import Misfit, misfit
-from hdcal.fleets.mounting_sums import mounting_sums
+from hdcal.fleets.mounting_sums import (
+    groups,
+    lot_grouping,
+    mounting_sums,
+    operator_grouping,
+)
 from hdcal.fleets.next_gear import next_gear
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
@@ -23,9 +29,11 @@ from hdcal.inference.diagnostics import mixing
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.gear_sums import gear_sums
 from hdcal.inference.population_problem import (
+    GROUP_RATIO,
     POPULATION_PRIORS,
     PopulationProblem,
     draw_gears,
+    gear_centres,
 )
 from hdcal.inference.problem import problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
@@ -47,7 +55,9 @@ class Fleet(Shown):
         case: their readings.
         draws: of the population by site, shape (d,): stiffness [N/mm as read],
             specimen_sd (relative), zero and run_offset_sd [N], sigma [N], noise_spread,
-            off_share and off_ratio.
+            off_share and off_ratio; where they are told lot_sd (relative) and
+            operator_sd [N], and how far each lies from the mean of all, lot_1, …
+            (relative) and operator_1, … [N].
         stiffness: of each gear, of as many draws, shape (t, g) [N/mm as read].
         noise_sd: of each gear, shape (g,) [N].
         zero: of each gear in the mean of its mountings, shape (g,) [N].
@@ -57,9 +67,13 @@ class Fleet(Shown):
         called: which gears are called off.
         next_stiffness: of a gear not yet measured, shape (d,) [N/mm as read].
         unit: stiffness at K = 1 [N/mm as read].
+        lots: their names, in the order of lot_1, … of the draws; empty where none are
+            told apart.
+        operators: likewise of operator_1, ….
         rows: of each gear, shape (g,).
         mountings: of each gear, shape (g,).
         misfit: what the readings have beside straight lines.
+        force_tolerance: width that a force may lie in [N]; None where none is stated.
         checks: of the sampler.
         settings: of the run.
     """
@@ -75,9 +89,12 @@ class Fleet(Shown):
     called: np.ndarray
     next_stiffness: np.ndarray
     unit: float
+    lots: Sequence[str]
+    operators: Sequence[str]
     rows: np.ndarray
     mountings: np.ndarray
     misfit: Misfit
+    force_tolerance: float | None
     checks: tuple[Check, ...]
     settings: Mapping[str, object] = field(default_factory=dict)
 
@@ -94,6 +111,7 @@ def fleet(
     warmup: int = 500,
     draws: int = 800,
     seed: int = 0,
+    force_tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Fleet:
     """Say of many gears how stiff each one is, and which ones are off.
@@ -108,6 +126,7 @@ def fleet(
         warmup: iterations of adaptation per chain.
         draws: draws kept per chain.
         seed: of all random numbers; the same seed gives the same answer.
+        force_tolerance: width that the force at the largest deformation may lie in [N].
         progress: called with (iterations done, iterations in all).
 
     Raises:
@@ -117,11 +136,18 @@ def fleet(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
+    with Findings() as wrong:
+        wrong += implausible("force_tolerance", force_tolerance, "sigma")
     check_fleet(case)
     bound_executables()
-    sums, gears = mounting_sums(case), len(case.specimen_labels)
+    sums, (lots, lot) = mounting_sums(case), groups(case.lots)
+    lot = lot if lots else np.zeros(len(case.specimen_labels), int)
+    operators = groups(case.operators)[0]
     unit, priors = _priors(case)
-    problem = PopulationProblem(priors, gear_sums(sums, gears, reading_step(case)))
+    told = {"lot": lot_grouping(sums, lot)} if lots else {}
+    told |= {"operator": operator_grouping(sums)} if operators else {}
+    priors |= {f"{kind}_ratio": GROUP_RATIO for kind in told}
+    problem = PopulationProblem(priors, gear_sums(sums, lot, reading_step(case)), told)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}
@@ -134,7 +160,7 @@ def fleet(
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
     # About a centre and a scatter that the gear itself has no part in: where it is off.
     chance = np.sum(off * np.asarray(drawn.chance), axis=0) / np.sum(off, axis=0)
-    centre = chosen["stiffness"][:, None]
+    centre = np.asarray(gear_centres(chosen, lot)).T
     apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
     rows = np.bincount(sums.gear, sums.rows)
     noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
@@ -151,9 +177,12 @@ def fleet(
         called=called_off(chance),
         next_stiffness=next_gear(flat, np.random.default_rng(seed)),
         unit=unit,
+        lots=lots,
+        operators=operators,
         rows=rows.astype(int),
         mountings=np.bincount(sums.gear),
         misfit=misfit(case, np.median(stiffness, axis=0), noise_sd),
+        force_tolerance=force_tolerance,
         checks=_checks(found, priors),
         settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
     )
@@ -225,5 +254,6 @@ def _checks(found: Draws, priors: Mapping[str, Prior]) -> tuple[Check, ...]:
     over = ("chain", "draw")
     names = ("energy", "diverging", "n_steps")
     stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
-    free = {n: v for n, v in found.values.items() if priors[n].family != "fixed"}
+    fixed = {name for name, prior in priors.items() if prior.family == "fixed"}
+    free = {name: v for name, v in found.values.items() if name not in fixed}
     return sampling_checks(stats, mixing(free))

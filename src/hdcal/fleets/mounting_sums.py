@@ -1,10 +1,59 @@
 """From readings to what each mounting says: seven sums, whatever the number of rows."""
 
+from collections.abc import Sequence
+
 import numpy as np
+from scipy import stats
 
 from hdcal.data.case import Case
 from hdcal.evidence.prepare import moments
 from hdcal.inference.gear_sums import MountingSums
+from hdcal.inference.groupings import Grouping, grouping
+
+# Lots, or operators, each of which has a number of its own.
+MOST_GROUPS = 40
+
+
+def groups(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
+    """Return the lots of gears, or the operators of runs, and the index of each.
+
+    Nothing of a single one, which cannot be told from all, of very many, and of as many
+    as there are gears or runs.
+    """
+    names, index = np.unique(np.array(labels, str), return_inverse=True)
+    told = 1 < len(names) <= min(MOST_GROUPS, len(labels) - 1)
+    return (names.tolist(), index) if told else ([], np.zeros(0, int))
+
+
+def lot_grouping(sums: MountingSums, lot: np.ndarray) -> Grouping:
+    """Return where lots seem to be, as shares of the stiffness.
+
+    Args:
+        sums: of every mounting.
+        lot: index of each gear's lot, shape (g,).
+    """
+    slope = _slopes(sums)
+    return _estimated(slope / np.median(slope), lot)
+
+
+def operator_grouping(sums: MountingSums) -> Grouping:
+    """Return where the zeros of operators seem to be [N]."""
+    zero = np.asarray(sums.y) - _slopes(sums)[sums.gear] * np.asarray(sums.x)
+    return _estimated(zero, np.asarray(sums.operator))
+
+
+def _slopes(sums: MountingSums) -> np.ndarray:
+    """Return the stiffness of each gear by its own line [N/mm as read]."""
+    return np.bincount(sums.gear, sums.xy) / np.bincount(sums.gear, sums.xx)
+
+
+def _estimated(values: np.ndarray, group: np.ndarray) -> Grouping:
+    """Return groups by their medians, so that a gear that is off moves none."""
+    middle = np.array([np.median(values[group == k]) for k in range(group.max() + 1)])
+    # Sd of a normal law by its median absolute deviation.
+    sd = np.median(np.abs(values - middle[group])) / stats.norm.ppf(0.75)
+    least = 1e-6 * np.max(np.abs(values))
+    return grouping(middle, max(sd, least) ** 2 / np.bincount(group))
 
 
 def mounting_sums(case: Case) -> MountingSums:
@@ -21,4 +70,6 @@ def mounting_sums(case: Case) -> MountingSums:
     about_x, about_y = x - mean_x[of_row], y - mean_y[of_row]
     products = (about_x**2, about_x * about_y, about_y**2)
     xx, xy, yy = (np.bincount(of_row, product) for product in products)
-    return MountingSums(pairs[0], rows, mean_x, mean_y, xx, xy, yy)
+    operator = groups(case.operators)[1]
+    by = operator[pairs[1]] if len(operator) else np.zeros(len(rows), int)
+    return MountingSums(pairs[0], rows, mean_x, mean_y, xx, xy, yy, by)

@@ -10,12 +10,28 @@ CONFIDENCE, _BISECTIONS = 0.95, 40
 
 
 def next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.ndarray:
-    """Return the stiffness of one more gear, for each draw [N/mm as read]."""
+    """Return the stiffness of one more gear, for each draw [N/mm as read].
+
+    It is of a lot that was not measured.
+    """
     size = len(draws["stiffness"])
     off = rng.random(size) < draws["off_share"]
     wide = np.sqrt(1.0 + off * draws["off_ratio"] ** 2)
-    apart = draws["specimen_sd"] * wide * rng.standard_normal(size)
+    spread = np.hypot(draws["specimen_sd"] * wide, _lot_sd(draws))
+    apart = spread * rng.standard_normal(size)
     return draws["stiffness"] * (1.0 + apart)
+
+
+def _lot_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return how far a new lot lies from the mean of those measured, relative.
+
+    Their mean lies as far from that of all as a lot, over the root of their number.
+    Zero where none are told.
+    """
+    if "lot_sd" not in draws:
+        return np.zeros(1)
+    lots = sum(name.startswith("lot_") for name in draws) - 1
+    return draws["lot_sd"] * np.sqrt(1.0 + 1.0 / lots)
 
 
 def stiffness_bounds(
@@ -31,7 +47,9 @@ def stiffness_bounds(
         content: the share, above a half.
     """
     share, ratio = draws["off_share"], draws["off_ratio"]
-    wide = np.sqrt(1.0 + ratio**2)
+    ordinary = np.hypot(draws["specimen_sd"], _lot_sd(draws))
+    far = np.hypot(draws["specimen_sd"] * np.sqrt(1.0 + ratio**2), _lot_sd(draws))
+    wide = far / ordinary
     # Where the mixture of ordinary and off gears has its quantile, in ordinary sds.
     low, high = np.zeros_like(share), stats.norm.ppf(content) * wide
     for _ in range(_BISECTIONS):
@@ -40,7 +58,7 @@ def stiffness_bounds(
         below += share * stats.norm.cdf(middle / wide)
         low = np.where(below < content, middle, low)
         high = np.where(below < content, high, middle)
-    reach = draws["specimen_sd"] * high
+    reach = ordinary * high
     ends = draws["stiffness"] * (1.0 - reach), draws["stiffness"] * (1.0 + reach)
     return (
         max(float(np.quantile(ends[0], 1.0 - CONFIDENCE)), 0.0),

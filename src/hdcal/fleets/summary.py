@@ -1,18 +1,28 @@
 """A fleet as an answer, and all that its result folder holds."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
 from hdcal.evidence.prepare import moments
-from hdcal.fleets.answer import FleetAnswer, FutureGear, GearBounds, PopulationAnswer
+from hdcal.fleets.answer import (
+    FleetAnswer,
+    FutureGear,
+    GearBounds,
+    LotAnswer,
+    OperatorAnswer,
+    PopulationAnswer,
+)
 from hdcal.fleets.document import fleet_document, headline, notes_of
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
+from hdcal.fleets.gauge import gauge
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
-from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.inference.groupings import group_offsets
+from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
 
 # Shares of gears to come for which bounds are told.
@@ -63,6 +73,8 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
     population = PopulationAnswer(
         stiffness_N_per_mm=credible_interval(draws["stiffness"]),
         gear_sd_percent=credible_interval(100.0 * draws["specimen_sd"]),
+        lot_sd_percent=_spread(draws, "lot_sd", 100.0),
+        operator_sd_N=_spread(draws, "operator_sd"),
         mounting_sd_N=credible_interval(draws["run_offset_sd"]),
         reading_sd_N=credible_interval(draws["sigma"]),
     )
@@ -79,6 +91,9 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
         population=population,
+        lots=tuple(_lots(found)),
+        operators=tuple(_operators(found)),
+        gauge_rr=gauge(draws, _largest(found.case), found.force_tolerance),
         misfit=found.misfit,
         next_gear=FutureGear(
             credible_interval(found.next_stiffness),
@@ -92,6 +107,35 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
         versions=versions(),
         data_sha256=found.case.data_sha256,
     )
+
+
+def _spread(
+    draws: Mapping[str, np.ndarray], name: str, factor: float = 1.0
+) -> Interval | None:
+    return credible_interval(factor * draws[name]) if name in draws else None
+
+
+def _lots(found: Fleet) -> Iterator[LotAnswer]:
+    if not found.lots:
+        return
+    centre = found.draws["stiffness"] * (1.0 + group_offsets(found.draws, "lot"))
+    for name, one in zip(found.lots, np.asarray(centre), strict=True):
+        yield LotAnswer(name, found.case.lots.count(name), credible_interval(one))
+
+
+def _operators(found: Fleet) -> Iterator[OperatorAnswer]:
+    if not found.operators:
+        return
+    zeros = np.asarray(group_offsets(found.draws, "operator"))
+    for name, one in zip(found.operators, zeros, strict=True):
+        many = found.case.operators.count(name)
+        yield OperatorAnswer(name, many, credible_interval(one))
+
+
+def _largest(case: Case) -> float:
+    """Return the largest deformation that was read, with its sign [mm]."""
+    read = np.asarray(case.records.deformation)
+    return float(read[np.argmax(np.abs(read))])
 
 
 def _next_step(called: Sequence[str]) -> str | None:

@@ -21,6 +21,7 @@ class MountingSums(eqx.Module):
         xx: squares about the mean, summed [mm²].
         xy: products likewise [N mm].
         yy: squares likewise [N²].
+        operator: index of who mounted it.
     """
 
     gear: Int[Array, " m"]
@@ -30,12 +31,14 @@ class MountingSums(eqx.Module):
     xx: Float[Array, " m"]
     xy: Float[Array, " m"]
     yy: Float[Array, " m"]
+    operator: Int[Array, " m"]
 
 
 class GearSums(eqx.Module):
-    """What the readings of each gear say: its mountings of equally many rows together.
+    """What the readings of each gear say, with mountings that are alike together.
 
-    Whatever the law of their zeros, these have one and the same.
+    They have equally many rows and the same operator: whatever the law of their zeros,
+    these have one and the same.
 
     Attributes:
         mountings: how many have so many rows; 0 where a gear has no more kinds.
@@ -50,6 +53,8 @@ class GearSums(eqx.Module):
         own_yy: squares likewise [N²].
         noise_free: degrees of freedom that a gear's own line leaves; [gear].
         log_noise_sd: log of the noise sd beside it [N]; 0 where nothing tells it.
+        operator: index of who mounted them; [gear, kind].
+        lot: index of its lot; [gear].
     """
 
     mountings: Float[Array, "g s"]
@@ -64,22 +69,25 @@ class GearSums(eqx.Module):
     own_yy: Float[Array, "g s"]
     noise_free: Float[Array, " g"]
     log_noise_sd: Float[Array, " g"]
+    operator: Int[Array, "g s"]
+    lot: Int[Array, " g"]
 
 
-def gear_sums(each: MountingSums, gears: int, step: float = 0.0) -> GearSums:
+def gear_sums(each: MountingSums, lot: np.ndarray, step: float = 0.0) -> GearSums:
     """Return the sums of gears from those of their mountings.
 
     Args:
         each: mounting.
-        gears: how many there are.
+        lot: index of each gear's lot, shape (g,).
         step: of the force display [N]: a few readings that it shows on a line by
             chance scatter nevertheless, by its rounding.
     """
-    kinds, kind = np.unique([each.gear, each.rows], axis=1, return_inverse=True)
+    alike = [each.gear, each.rows, each.operator]
+    kinds, kind = np.unique(alike, axis=1, return_inverse=True)
     gear = kinds[0].astype(int)
     # Kinds are in the order of their gears: place within its own.
     slot = np.arange(len(gear)) - np.searchsorted(gear, gear)
-    shape = gears, int(slot.max(initial=0)) + 1
+    shape = len(lot), int(slot.max(initial=0)) + 1
 
     def summed(values) -> np.ndarray:
         table = np.zeros(shape)
@@ -88,6 +96,8 @@ def gear_sums(each: MountingSums, gears: int, step: float = 0.0) -> GearSums:
 
     rows = np.ones(shape)
     rows[gear, slot] = kinds[1]
+    operator = np.zeros(shape, int)
+    operator[gear, slot] = kinds[2]
     x, y = each.x, each.y
     count = summed(np.ones_like(x))
     own = [summed(values) for values in (each.xx, each.xy, each.yy)]
@@ -105,6 +115,8 @@ def gear_sums(each: MountingSums, gears: int, step: float = 0.0) -> GearSums:
         own_yy=own[2],
         noise_free=free,
         log_noise_sd=log_sd,
+        operator=operator,
+        lot=lot,
     )
 
 

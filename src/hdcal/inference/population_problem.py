@@ -3,12 +3,14 @@
 A mounting's readings are y = s x + z + e, with s of its gear, z = zero + N(0,
 mounting_sd²) its own, and e ~ N(0, σ²) with a σ of its gear. About a gear's σ and its
 kind (ordinary or off) all is Gaussian in s: readings say no more than sums. σ is
-integrated by Gauss and Hermite's rule, the kind by its two cases.
+integrated by Gauss and Hermite's rule, the kind by its two cases. Where lots are told,
+each has a centre of its own, and where operators are, each a zero of its own.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -19,6 +21,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.gear_sums import GearSums
+from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.model import model, sample_site
 from hdcal.inference.sampled_problem import Sampled
 
@@ -55,17 +58,31 @@ POPULATION_PRIORS: Mapping[str, Prior] = {
 }
 
 
+# Scatter of groups in that of their members, before the data, and the site of these.
+GROUP_RATIO = Prior(
+    "half_normal",
+    (1.0,),
+    "1",
+    "engineering judgement: lots scatter as gears of one lot do, or up to twice as "
+    "far, and operators' zeros as those of mountings",
+)
+_MEMBERS = {"lot": "specimen_sd", "operator": "run_offset_sd"}
+
+
 class PopulationProblem(Sampled):
     """Gears of one kind, measured alike.
 
     Attributes:
         priors: by site: stiffness [N/mm as read], specimen_sd, zero [N],
-            run_offset_sd [N], sigma [N] and those of `POPULATION_PRIORS`.
+            run_offset_sd [N], sigma [N] and those of `POPULATION_PRIORS`; where they
+            are told lot_ratio and operator_ratio.
         sums: of every gear.
+        groups: lots and operators, where they are told.
     """
 
     priors: dict[str, Prior]
     sums: GearSums
+    groups: dict[str, Grouping] = eqx.field(default_factory=dict)
 
 
 class GearLaw(NamedTuple):
@@ -90,7 +107,9 @@ class GearLaw(NamedTuple):
 def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
     """Return log p(readings of a gear, noise, kind), and its stiffness given these."""
     sums = jax.tree.map(lambda column: column[..., None], problem.sums)
-    centre, zero = values["stiffness"], values["zero"]
+    centre = gear_centres(values, problem.sums.lot)[:, None, None]
+    by = group_offsets(values, "operator")[problem.sums.operator]
+    zero = values["zero"] + by[..., None]
     sigma, log_weight = _noise_nodes(problem.sums, values)
     noise = sigma[:, None] ** 2
     of_mean = values["run_offset_sd"] ** 2 + noise / sums.rows
@@ -128,6 +147,18 @@ def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
     return GearLaw(log_joint, mean, jnp.sqrt(between / shrunk), sigma, far)
 
 
+def gear_centres(values: Mapping, lot) -> Float[Array, "g ..."]:
+    """Return the stiffness about which the gears of each gear's lot scatter [N/mm].
+
+    A lot's offset is a share of the stiffness.
+
+    Args:
+        values: of the population, of one draw or of many.
+        lot: of each gear, shape (g,).
+    """
+    return values["stiffness"] * (1.0 + group_offsets(values, "lot"))[lot]
+
+
 def _noise_nodes(sums: GearSums, values: Mapping):
     """Return noise sds of a gear [N] and the logs of their weights, both [gear, node].
 
@@ -159,6 +190,10 @@ def _(problem: PopulationProblem, values: Mapping) -> Float[Array, ""]:
 @model.register
 def _(problem: PopulationProblem) -> None:
     values = {name: sample_site(name, p) for name, p in problem.priors.items()}
+    for kind, groups in problem.groups.items():
+        spread = values[f"{kind}_ratio"] * values[_MEMBERS[kind]]
+        numpyro.deterministic(f"{kind}_sd", spread)
+        values |= sample_offsets(kind, groups, spread)
     numpyro.factor("force", log_likelihood(problem, values))
 
 

@@ -95,7 +95,7 @@ def _more_members(count: int, what: str) -> str:
     for size in range(count + 1, _MOST_MEMBERS):
         if width(size) <= 0.5 * width(count):
             return f"{size} {what} instead of {count}"
-    return f"less scatter between {what}: no number of tested ones halves it"
+    return f"half the scatter between {what}; to test more of them does not halve it"
 
 
 def check_words(about, drawn, check: LinearCheck, error: float) -> str:
