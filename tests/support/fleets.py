@@ -20,6 +20,7 @@ def handmade() -> Fleet:
     truth = np.array([199.0, 200.0, 201.0, 180.0])
     draws = {
         "stiffness": rng.normal(200.0, 0.5, 50),
+        "zero": rng.normal(0.0, 0.1, 50),
         "specimen_sd": rng.uniform(0.005, 0.01, 50),
         "run_offset_sd": rng.uniform(0.5, 1.5, 50),
         "sigma": rng.uniform(0.4, 0.6, 50),

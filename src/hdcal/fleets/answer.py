@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from hdcal.fleets.gauge import GaugeAnswer
 from hdcal.fleets.misfit import Misfit
+from hdcal.fleets.next_force import NextForce
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
 from hdcal.report.parameters import Interval
 
@@ -83,6 +84,7 @@ class FleetAnswer(Answer):
         lots: where they are told.
         operators: likewise.
         next_gear: one more of them, of another lot.
+        next_force: that it needs at a deformation; None where none was asked for.
         gauge_rr: how well one reading of the force tells gears apart.
         misfit: what the readings have beside straight lines.
         notes: from reading, and on what the answer rests.
@@ -101,6 +103,7 @@ class FleetAnswer(Answer):
     lots: tuple[LotAnswer, ...]
     operators: tuple[OperatorAnswer, ...]
     next_gear: FutureGear
+    next_force: NextForce | None
     gauge_rr: GaugeAnswer
     misfit: Misfit
     notes: Sentences

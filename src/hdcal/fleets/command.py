@@ -5,7 +5,7 @@ import click
 from hdcal.cli.command import command
 from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
-from hdcal.cli.option_types import FORCE
+from hdcal.cli.option_types import FORCE, LENGTH
 from hdcal.cli.options import (
     case_options,
     folder_options,
@@ -13,10 +13,19 @@ from hdcal.cli.options import (
     read_given,
     seed_option,
 )
+from hdcal.errors import Finding
 
 
 @command(short_help="Many gears: which one is off, and how much do they scatter?")
 @case_options
+@click.option(
+    "--deformation",
+    type=LENGTH,
+    help="Deformation as read at which the force of gears to come is asked for [mm].",
+)
+@click.option(
+    "--limit-force", type=FORCE, help="Capacity to compare that force with [N]."
+)
 @click.option(
     "--force-tolerance",
     type=FORCE,
@@ -26,7 +35,16 @@ from hdcal.cli.options import (
 @folder_options("Result folder [default: NAME-fleet].")
 @json_option
 @click.pass_obj
-def fleet(console: Console, out, force, seed, force_tolerance, **given):
+def fleet(
+    console: Console,
+    out,
+    force,
+    seed,
+    deformation,
+    limit_force,
+    force_tolerance,
+    **given,
+):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
 
     DATA names the gear of each row in a column `specimen`, also called gear or serial.
@@ -37,6 +55,11 @@ def fleet(console: Console, out, force, seed, force_tolerance, **given):
     with console.wrong as wrong:
         wrong += implausible("seed", seed)
         wrong += implausible("force_tolerance", force_tolerance, "sigma")
+        wrong += implausible("deformation", deformation)
+        wrong += implausible("limit_force", limit_force, "sigma")
+        if limit_force is not None and deformation is None:
+            remedy = "Say --deformation, at which that force is needed"
+            wrong.append(Finding("limit_force", "has no deformation", remedy))
         case = read_given(console, **given)
         if case is not None:
             from hdcal.fleets.fleet import check_fleet
@@ -52,4 +75,7 @@ def fleet(console: Console, out, force, seed, force_tolerance, **given):
 
     with progress_bar() as progress:
         found = fit_fleet(case, progress=progress, **asked)
-    return console.report(fleet_report(found, console.command))
+    needed = None
+    if deformation is not None and not found.reasons:
+        needed = found.next_force(deformation, limit_force)
+    return console.report(fleet_report(found, console.command, needed))

@@ -7,6 +7,7 @@ import numpy as np
 from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.misfit import misfit_words
+from hdcal.fleets.next_force import NextForce
 from hdcal.report.document import (
     Document,
     Facts,
@@ -123,6 +124,8 @@ def fleet_document(
 
 
 def _answers(answer: FleetAnswer) -> Iterator[str]:
+    if answer.next_force is not None:
+        yield from _force(answer.next_force)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
         f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "
@@ -150,6 +153,29 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     sure = percent(answer.next_gear.bounds[0].confidence)
     told = "; ".join(ends)
     yield f"Of gears to come, each bound by itself with {sure} confidence: {told}."
+
+
+def _force(found: NextForce) -> Iterator[str]:
+    """Yield what a gear to come needs at the deformation that was asked for."""
+    middle, span = estimate(found.force_N)
+    width = found.force_N.hi - found.force_N.lo
+    limit, beyond = found.limit_force_N, found.probability_exceeded
+    if limit is not None and beyond is not None:
+        middle_, low, high = (percent(p) for p in vars(beyond).values())
+        yield (
+            f"{middle_} of gears to come need more than {limit:g} N at "
+            f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
+        )
+    many = "; ".join(
+        f"{percent(each.content)} need at most {number(each.at_most_N, width)} N"
+        for each in found.bounds
+    )
+    sure = percent(found.bounds[0].confidence)
+    yield (
+        f"At {found.deformation_mm:g} mm the next gear needs {middle} N, 95 % "
+        f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
+        f"confidence {many}."
+    )
 
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:

@@ -13,7 +13,7 @@ from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step, require_scatter
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.mounting_sums import (
@@ -22,6 +22,7 @@ from hdcal.fleets.mounting_sums import (
     mounting_sums,
     operator_grouping,
 )
+from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
@@ -97,6 +98,26 @@ class Fleet(Shown):
     force_tolerance: float | None
     checks: tuple[Check, ...]
     settings: Mapping[str, object] = field(default_factory=dict)
+
+    def next_force(
+        self, deformation: float, limit_force: float | None = None
+    ) -> NextForce:
+        """Return the force that a gear to come needs at a deformation.
+
+        Args:
+            deformation: as read, with the sign of the data [mm].
+            limit_force: a capacity, its size [N].
+
+        Raises:
+            InputError: a number is impossible, or the result failed its checks.
+        """
+        with Findings() as wrong:
+            wrong += implausible("deformation", deformation)
+            wrong += implausible("limit_force", limit_force, "sigma")
+        if self.reasons:
+            raise NotUsable("this fleet failed its checks: " + "; ".join(self.reasons))
+        seed = int(str(self.settings["seed"]))
+        return next_force(self.draws, deformation, limit_force, seed)
 
     @property
     def reasons(self) -> tuple[str, ...]:

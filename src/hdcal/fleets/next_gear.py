@@ -17,21 +17,27 @@ def next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.n
     size = len(draws["stiffness"])
     off = rng.random(size) < draws["off_share"]
     wide = np.sqrt(1.0 + off * draws["off_ratio"] ** 2)
-    spread = np.hypot(draws["specimen_sd"] * wide, _lot_sd(draws))
+    lots = new_group_sd(draws, "lot")
+    spread = np.hypot(draws["specimen_sd"] * wide, lots)
     apart = spread * rng.standard_normal(size)
     return draws["stiffness"] * (1.0 + apart)
 
 
-def _lot_sd(draws: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return how far a new lot lies from the mean of those measured, relative.
+def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
+    """Return how far a new lot, or operator, lies from the mean of those measured.
 
-    Their mean lies as far from that of all as a lot, over the root of their number.
-    Zero where none are told.
+    Their mean lies as far from that of all as one of them, over the root of their
+    number. Zero where none are told.
+
+    Args:
+        draws: of the population by site, shape (d,).
+        kind: lot or operator.
     """
-    if "lot_sd" not in draws:
+    if f"{kind}_sd" not in draws:
         return np.zeros(1)
-    lots = sum(name.startswith("lot_") for name in draws) - 1
-    return draws["lot_sd"] * np.sqrt(1.0 + 1.0 / lots)
+    measured = sum(name.startswith(f"{kind}_") for name in draws) - 1
+    measured -= f"{kind}_ratio" in draws
+    return draws[f"{kind}_sd"] * np.sqrt(1.0 + 1.0 / measured)
 
 
 def stiffness_bounds(
@@ -47,10 +53,29 @@ def stiffness_bounds(
         content: the share, above a half.
     """
     share, ratio = draws["off_share"], draws["off_ratio"]
-    ordinary = np.hypot(draws["specimen_sd"], _lot_sd(draws))
-    far = np.hypot(draws["specimen_sd"] * np.sqrt(1.0 + ratio**2), _lot_sd(draws))
+    own, lots = draws["specimen_sd"], new_group_sd(draws, "lot")
+    ordinary = np.hypot(own, lots)
+    far = np.hypot(own * np.sqrt(1.0 + ratio**2), lots)
     wide = far / ordinary
-    # Where the mixture of ordinary and off gears has its quantile, in ordinary sds.
+    high = quantile_of_mixture(content, share, wide)
+    reach = ordinary * high
+    ends = draws["stiffness"] * (1.0 - reach), draws["stiffness"] * (1.0 + reach)
+    return (
+        max(float(np.quantile(ends[0], 1.0 - CONFIDENCE)), 0.0),
+        float(np.quantile(ends[1], CONFIDENCE)),
+    )
+
+
+def quantile_of_mixture(
+    content: float, share: np.ndarray, wide: np.ndarray
+) -> np.ndarray:
+    """Return how far a share of all members reaches, in sds of ordinary ones.
+
+    Args:
+        content: the share, above a half.
+        share: of members that are off.
+        wide: their sd in that of ordinary ones.
+    """
     low, high = np.zeros_like(share), stats.norm.ppf(content) * wide
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
@@ -58,9 +83,4 @@ def stiffness_bounds(
         below += share * stats.norm.cdf(middle / wide)
         low = np.where(below < content, middle, low)
         high = np.where(below < content, high, middle)
-    reach = ordinary * high
-    ends = draws["stiffness"] * (1.0 - reach), draws["stiffness"] * (1.0 + reach)
-    return (
-        max(float(np.quantile(ends[0], 1.0 - CONFIDENCE)), 0.0),
-        float(np.quantile(ends[1], CONFIDENCE)),
-    )
+    return high

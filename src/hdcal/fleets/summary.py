@@ -20,13 +20,12 @@ from hdcal.fleets.answer import (
 from hdcal.fleets.document import fleet_document, headline, notes_of
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
 from hdcal.fleets.gauge import gauge
+from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.inference.groupings import group_offsets
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
 
-# Shares of gears to come for which bounds are told.
-CONTENTS = (0.9, 0.99)
 # Ends and middle of an interval.
 _ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
 
@@ -65,8 +64,13 @@ def _influence(found: Fleet) -> np.ndarray:
     return found.stiffness / (found.unit * modulus)
 
 
-def fleet_answer(found: Fleet) -> FleetAnswer:
-    """Return a fleet as an answer, ready for JSON."""
+def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
+    """Return a fleet as an answer, ready for JSON.
+
+    Args:
+        found: the fleet.
+        force: of a gear to come, where it was asked for.
+    """
     draws, columns = found.draws, gear_columns(found)
     order = np.argsort(-found.off, kind="stable")
     called = [found.case.specimen_labels[row] for row in order if found.called[row]]
@@ -102,6 +106,7 @@ def fleet_answer(found: Fleet) -> FleetAnswer:
                 for content in CONTENTS
             ),
         ),
+        next_force=force,
         notes=tuple(notes_of(found)),
         seed=int(str(found.settings["seed"])),
         versions=versions(),
@@ -145,8 +150,16 @@ def _next_step(called: Sequence[str]) -> str | None:
     return f"Look at {called[0]} by itself: diagnose the same data with {alone}."
 
 
-def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:
-    """Return all that `hdcal fleet` leaves behind."""
+def fleet_report(
+    found: Fleet, command: str = "", force: NextForce | None = None
+) -> Report[FleetAnswer]:
+    """Return all that `hdcal fleet` leaves behind.
+
+    Args:
+        found: the fleet.
+        command: that made it.
+        force: of a gear to come, where it was asked for.
+    """
 
     def figures():
         from hdcal.fleets.figure import fleet_figure
@@ -158,7 +171,7 @@ def fleet_report(found: Fleet, command: str = "") -> Report[FleetAnswer]:
 
         return {} if found.reasons else {"gears": [fleet_chart(found)]}
 
-    answer, columns = fleet_answer(found), gear_columns(found)
+    answer, columns = fleet_answer(found, force), gear_columns(found)
     document = fleet_document(found, answer, columns, command)
     return Report(
         document,

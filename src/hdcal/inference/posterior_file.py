@@ -141,7 +141,7 @@ def open_tree(path) -> xr.DataTree:
         if (Path(path).parent / "gears.csv").exists():
             words = "a fleet leaves no posterior"
             remedy = (
-                "What a gear to come needs is `next_gear` in its summary.json; for one "
+                "The force of a gear to come is told by fleet --deformation; for one "
                 "gear calibrate it alone, with --specimen"
             )
         raise InputError([Finding(str(path), words, remedy)]) from error

@@ -1,0 +1,99 @@
+"""The force that a gear to come needs at a deformation, and a capacity beside it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from hdcal.fleets.next_gear import CONFIDENCE, new_group_sd, quantile_of_mixture
+from hdcal.report.answer import Probability, Real
+from hdcal.report.parameters import Interval, credible_interval
+
+# Shares of gears to come for which bounds are told.
+CONTENTS = (0.9, 0.99)
+
+
+@dataclass(frozen=True)
+class ForceBounds:
+    """What a share `content` of gears to come needs at least, and at most, in size.
+
+    One-sided each, with the stated confidence, for one reading in a new mounting.
+    """
+
+    content: Probability
+    confidence: Probability
+    at_least_N: Real
+    at_most_N: Real
+
+
+@dataclass(frozen=True)
+class NextForce:
+    """The force that a gear not yet measured needs, in size.
+
+    Of one reading in a new mounting at the reference temperature; an odd gear is in it.
+
+    Attributes:
+        deformation_mm: that is asked for, as read.
+        force_N: of one such gear, 95 % predictive interval.
+        bounds: for many of them.
+        limit_force_N: a capacity, its size; None where none is asked about.
+        probability_exceeded: share of gears to come that need more, 95 % credible
+            interval; None without a capacity.
+    """
+
+    deformation_mm: Real
+    force_N: Interval
+    bounds: tuple[ForceBounds, ...]
+    limit_force_N: Real | None
+    probability_exceeded: Interval | None
+
+
+def next_force(
+    draws: Mapping[str, np.ndarray],
+    deformation: float,
+    limit_force: float | None = None,
+    seed: int = 0,
+) -> NextForce:
+    """Return the force of gears to come at a deformation.
+
+    Args:
+        draws: of the population by site, shape (d,).
+        deformation: as read, with the sign of the data [mm].
+        limit_force: a capacity, its size [N].
+        seed: of the predictive draws.
+    """
+    sense = np.sign(deformation) or 1.0
+    mean = draws["stiffness"] * abs(deformation) + sense * draws["zero"]
+    ordinary, far = _sds(draws, abs(deformation))
+    share = draws["off_share"]
+    rng = np.random.default_rng(seed)
+    wide = np.where(rng.random(len(mean)) < share, far, ordinary)
+    one = mean + wide * rng.standard_normal(len(mean))
+    bounds = []
+    for content in CONTENTS:
+        reach = ordinary * quantile_of_mixture(content, share, far / ordinary)
+        low = float(np.quantile(mean - reach, 1.0 - CONFIDENCE))
+        high = float(np.quantile(mean + reach, CONFIDENCE))
+        bounds.append(ForceBounds(content, CONFIDENCE, max(low, 0.0), high))
+    exceeded = None
+    if limit_force is not None:
+        beyond = (stats.norm.sf((limit_force - mean) / sd) for sd in (ordinary, far))
+        usual, odd = beyond
+        exceeded = credible_interval((1.0 - share) * usual + share * odd)
+    told = credible_interval(one)
+    return NextForce(deformation, told, tuple(bounds), limit_force, exceeded)
+
+
+def _sds(draws: Mapping[str, np.ndarray], size: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return sds of one reading of an ordinary new gear, and of an odd one [N]."""
+    reading = draws["sigma"] * np.exp(draws["noise_spread"] ** 2)
+    mounted = np.hypot(draws["run_offset_sd"], new_group_sd(draws, "operator"))
+    rest = np.hypot(reading, mounted)
+    own, lots = draws["specimen_sd"], new_group_sd(draws, "lot")
+    force = draws["stiffness"] * size
+    ratio = np.sqrt(1.0 + draws["off_ratio"] ** 2)
+    return (
+        np.hypot(rest, force * np.hypot(own, lots)),
+        np.hypot(rest, force * np.hypot(own * ratio, lots)),
+    )
