@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
     from hdcal.classical.fit.fit import fit
+    from hdcal.comparison.compare import compare
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
     from hdcal.data.reading import read_case
@@ -52,6 +53,7 @@ _HOMES = {
     "Verdict": "diagnosis.verdict",
     "calibrate": "calibration.calibrate",
     "calibrate_dynamic": "motion.dynamic_calibration",
+    "compare": "comparison.compare",
     "diagnose": "diagnosis.diagnose",
     "fit": "classical.fit.fit",
     "fleet": "fleets.fleet",

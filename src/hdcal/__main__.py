@@ -21,6 +21,7 @@ from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
 from hdcal.cli.topics import COMPLETE, show_completion, show_topic
+from hdcal.comparison.command import compare
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
@@ -71,6 +72,7 @@ for _command in (
     calibrate,
     diagnose,
     fleet,
+    compare,
     predict,
     margin,
     design,

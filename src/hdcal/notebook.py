@@ -11,6 +11,7 @@ from typing import Any
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "Case": "calibration.check.summary.case_document",
+    "Comparison": "comparison.summary.comparison_report",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "InverseDesign": "design.summary.inverse_report",
@@ -26,6 +27,7 @@ TELLERS = {
 TABLES = {
     "Bands": "report.tables.own_columns",
     "Case": "calibration.check.summary.reading_columns",
+    "Comparison": "comparison.summary.comparison_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "InverseDesign": "design.chart.candidate_rows",
@@ -41,6 +43,7 @@ TABLES = {
 CHARTS = {
     "Bands": "prediction.bands.chart.bands_chart",
     "Case": "calibration.check.chart.case_chart",
+    "Comparison": "comparison.chart.comparison_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "InverseDesign": "design.chart.candidate_chart",
     "Posterior": "calibration.chart.posterior_chart",

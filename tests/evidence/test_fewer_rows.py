@@ -10,7 +10,6 @@ from hdcal.data.loading import derive_motion
 from hdcal.evidence.fewer_rows import (
     average_rows,
     rows_of_half_cycle,
-    single_rows,
     thin_rows,
 )
 from hdcal.evidence.row_features import half_cycles, take_rows
@@ -38,7 +37,10 @@ def test_rows_of_runs_that_alternate_are_thinned_run_by_run():
 @pytest.mark.parametrize("step", [2, 7, 40])
 def test_single_rows_keep_the_turns(step):
     """Where rows are counted past the turns, tops are lost."""
-    whole, kept = OF_THREE_RUNS.records, single_rows(OF_THREE_RUNS, step).records
+    whole, kept = (
+        OF_THREE_RUNS.records,
+        thin_rows(OF_THREE_RUNS, step, turns=True).records,
+    )
     assert len(kept.force) < len(whole.force)
     for run in range(3):
         ends = [
@@ -49,7 +51,6 @@ def test_single_rows_keep_the_turns(step):
         assert ends[0] == ends[1]
     assert set(np.asarray(kept.force)) <= set(np.asarray(whole.force))
     assert np.max(thin_rows(OF_THREE_RUNS, 40).records.deformation) < 0.54
-    assert single_rows(CASE, 1) is CASE
 
 
 def ramps(*rows: int) -> np.ndarray:

@@ -27,7 +27,7 @@ from hdcal.diagnosis.weighing import weigh
 from hdcal.diagnosis.which import identify_cause
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import CaseEvidence
-from hdcal.evidence.fewer_rows import single_rows
+from hdcal.evidence.fewer_rows import thin_rows
 from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
@@ -182,7 +182,7 @@ def _fitted(case: Case, step: int) -> Case:
     rows = len(case.records.force)
     if rows <= _MOST_FITTED:
         return case
-    few = single_rows(case, max(step, -(-rows // _MOST_FITTED)))
+    few = thin_rows(case, max(step, -(-rows // _MOST_FITTED)), turns=True)
     words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
     return replace(few, notes=(*few.notes, words))
 

@@ -43,37 +43,24 @@ def average_rows(case: Case, most: int) -> tuple[Case, int]:
     return replace(case, records=short), group
 
 
-def thin_rows(case: Case, step: int) -> Case:
+def thin_rows(case: Case, step: int, *, turns: bool = False) -> Case:
     """Keep one row of so many in each run, the first one among them.
 
     What is left of an AR(1) series is one, of the coefficient's power: means of it are
     none, so that where neighbours err much alike rows are left out, not averaged.
-    Turns are not looked at: as many rows lie between any two that are left.
+    Then as many rows lie between any two that are left, and turns are not looked at.
 
     Args:
         case: with rows in the order they were taken.
         step: 1 leaves it as it is.
+        turns: count rows from the turns on, and keep those at which the path turns.
     """
     if step == 1:
         return case
     records = _run_after_run(case)
-    kept = np.flatnonzero(_place(np.asarray(records.run)) % step == 0)
-    return replace(case, records=take_rows(records, kept))
-
-
-def single_rows(case: Case, step: int) -> Case:
-    """Keep one row of so many in each half cycle, and those at which it turns.
-
-    Args:
-        case: with rows in the order they were taken.
-        step: 1 leaves it as it is.
-    """
-    if step == 1:
-        return case
-    records = _run_after_run(case)
-    half = half_cycles(records)
-    last = np.diff(half, append=half[-1] + 1) != 0
-    kept = np.flatnonzero((_place(half) % step == 0) | last)
+    label = half_cycles(records) if turns else np.asarray(records.run)
+    last = np.diff(label, append=label[-1] + 1) != 0
+    kept = np.flatnonzero((_place(label) % step == 0) | (turns & last))
     return replace(case, records=take_rows(records, kept))
 
 

@@ -3,10 +3,8 @@
 import numpy as np
 
 from hdcal.fleets.fleet import Fleet
-from hdcal.report.chart import COLOURS, Chart, Series, boxes
+from hdcal.report.chart import COLOURS, Chart, Series, interval_boxes
 
-# Half of the width at which the interval of a gear is drawn.
-_HALF = 0.3
 _MOST_NAMED = 3
 
 
@@ -15,15 +13,7 @@ def fleet_chart(found: Fleet) -> Chart:
     low, middle, high = np.quantile(found.stiffness, [0.025, 0.5, 0.975], axis=0)
     order = np.argsort(middle, kind="stable")
     place, off = np.arange(1.0, len(order) + 1.0), found.called[order]
-    curves = [
-        Series(
-            f"95 % interval, {side} [N/mm]",
-            *boxes(place - _HALF, place + _HALF, ends[order]),
-            COLOURS[0],
-            width=0.0,
-        )
-        for side, ends in (("97.5 %", high), ("2.5 %", low))
-    ]
+    curves = interval_boxes(place, low[order], high[order])
     odd = [found.case.specimen_labels[gear] for gear in order[off]]
     called = "called off" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)
     kinds = (("gears", ~off, COLOURS[0]), (called, off, COLOURS[1]))

@@ -11,6 +11,8 @@ import numpy as np
 
 # Okabe and Ito's colours, told apart by every kind of colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Half of the width at which an interval at a whole number is drawn.
+_HALF = 0.3
 # Digits of a number: more than a screen shows when it is zoomed in.
 _DIGITS = 6
 
@@ -108,6 +110,27 @@ def boxes(
     last, nothing = stops - edge, np.full(len(starts), np.nan)
     along = np.column_stack([starts + edge, last, last + 0.1 * edge, last + 0.5 * edge])
     return along.ravel(), np.column_stack([levels, levels, levels, nothing]).ravel()
+
+
+def interval_boxes(
+    place: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> list[Series]:
+    """Return 95 % intervals [N/mm] as a band of boxes: upper ends, then lower ones.
+
+    Args:
+        place: of each, whole numbers, shape (n,).
+        low: lower ends, shape (n,).
+        high: upper ends, shape (n,).
+    """
+    return [
+        Series(
+            f"95 % interval, {side} [N/mm]",
+            *boxes(place - _HALF, place + _HALF, ends),
+            COLOURS[0],
+            width=0.0,
+        )
+        for side, ends in (("97.5 %", high), ("2.5 %", low))
+    ]
 
 
 def charts_json(charts: Sequence[Chart]) -> str:

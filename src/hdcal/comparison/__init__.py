@@ -1,0 +1,1 @@
+"""Finished results side by side: how they differ, and how surely."""
