@@ -127,7 +127,7 @@ NAMES = {
     **dict.fromkeys(("deformation_offset", "initial_deformation"), "deformation"),
     **dict.fromkeys(("limit_force", "given_force", "amplitude"), "force"),
     "force_offset": "force",
-    **dict.fromkeys(("run_offset_sd", "gap_sd"), "sigma"),
+    **dict.fromkeys(("run_offset_sd", "gap_sd", "force_tolerance"), "sigma"),
     **dict.fromkeys(("temperatures", "reference_temperature"), "temperature"),
     **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), "size"),
     **dict.fromkeys(("nominal_deformation", "gauge_range"), "size"),

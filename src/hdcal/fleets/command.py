@@ -54,7 +54,7 @@ def fleet(
 
     with console.wrong as wrong:
         wrong += implausible("seed", seed)
-        wrong += implausible("force_tolerance", force_tolerance, "sigma")
+        wrong += implausible("force_tolerance", force_tolerance)
         wrong += implausible("deformation", deformation)
         wrong += implausible("limit_force", limit_force, "sigma")
         if limit_force is not None and deformation is None:

@@ -158,7 +158,7 @@ def fleet(
     require_case(case)
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
-        wrong += implausible("force_tolerance", force_tolerance, "sigma")
+        wrong += implausible("force_tolerance", force_tolerance)
     check_fleet(case)
     bound_executables()
     sums, (lots, lot) = mounting_sums(case), groups(case.lots)
