@@ -208,3 +208,22 @@ def test_silicon_is_as_certified():
     between = (BETWEEN / 4.0 - WITHIN / 20.0) / 5.0
     expected = np.sqrt([between, WITHIN / 20.0])
     np.testing.assert_allclose(reml(SILICON), expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("spread", [0.05, 0.3])
+def test_the_gradient_is_near_that_of_the_density(spread):
+    """It leaves out how nodes move, which the integral hardly depends on."""
+    problem = problem_of(fleet(seed=6, gears=8), 8)
+    values = {name: jnp.asarray(value) for name, value in VALUES.items()}
+    values["noise_spread"] = jnp.asarray(spread)
+    slope = jax.grad(lambda at: log_likelihood(problem, at))(values)
+    for name, at in values.items():
+        step = 1e-4 * float(abs(at))
+        ends = [
+            float(log_likelihood(problem, {**values, name: at + side * step}))
+            for side in (1.0, -1.0)
+        ]
+        # In steps of a tenth of the parameter, of which a nat is a standard error.
+        expected = 0.1 * float(abs(at)) * (ends[0] - ends[1]) / (2.0 * step)
+        found = 0.1 * float(abs(at)) * float(slope[name])
+        assert found == pytest.approx(expected, rel=0.05, abs=0.1), name
