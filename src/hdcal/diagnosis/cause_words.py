@@ -59,7 +59,11 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     assert which.effect is not None and which.group is not None
     yield what_is_seen(found)
     own = [GROUPS[name] for name in which.group.split(JOINED) if name in GROUPS]
-    meaning = ", or ".join(group.meaning for group in own) or which.group
+    # What is seen may tell which of two opposite ones it is.
+    told = [
+        g for g in own if any(s.statement.startswith(g.meaning) for s in found.seen)
+    ]
+    meaning = ", or ".join(group.meaning for group in told or own) or which.group
     likely = [n for n in which.group_members if which.inclusion[n] >= _WORTH_SAYING]
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
     causes = ", ".join(_with_chance(which, name) for name in ranked)

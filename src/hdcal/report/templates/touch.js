@@ -56,6 +56,12 @@ function touch(figure) {
 
   const isEdge = each => !each.points && each.width === 0;
 
+  // Bands are paler than lines and points, dashed lines hollow.
+  function marker(each) {
+    if (each.dashed) return "transparent";
+    return each.colour && isEdge(each) ? each.colour + "55" : each.colour || ink("--ink").trim();
+  }
+
   // The lower end of each band by its upper one, of those without lines.
   function bandsOf(chart) {
     return Object.fromEntries(chart.bands.filter(([high]) => isEdge(chart.series[high])));
@@ -83,7 +89,10 @@ function touch(figure) {
         low === chart.data[0][0] && high === chart.data[0].at(-1)
           ? [ends.min - margin, ends.max + margin] : [low, high]}},
       legend: {markers: {
-        width: 0, fill: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
+        width: (_, k) => k && chart.series[k - 1].dashed ? 2 : 0,
+        dash: () => "dashed",
+        stroke: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
+        fill: (_, k) => k ? marker(chart.series[k - 1]) : "transparent",
       }},
       axes: [chart.x, chart.y].map(label => ({
         label: label, stroke: text, grid: {stroke: line, width: 1},
