@@ -85,6 +85,13 @@ def test_what_cannot_be_compared_is_refused():
         hdcal.compare({"one": one})
     with pytest.raises(hdcal.InputError, match="tolerance"):
         hdcal.compare({"A": one, "B": of(200.0, 1.0, 2)}, tolerance=-1.0)
+    for nothing in ([], "B/run", [1, 2], 3.0, None):
+        with pytest.raises(hdcal.InputError):
+            hdcal.compare({"A": one, "B": nothing})
+    with pytest.raises(hdcal.InputError, match="by their names"):
+        hdcal.compare({1: one, "1": of(200.0, 1.0, 2)})
+    with pytest.raises(hdcal.InputError, match="not of the same data"):
+        hdcal.compare({"A": one, "B": [(0.5, one), (0.5, of(210.0, 1.0, 2))]})
     across = of(200.0, 1.0, 2, reading="diametral")
     with pytest.raises(hdcal.InputError, match="A is radial, B is diametral"):
         hdcal.compare({"A": one, "B": across})
@@ -104,6 +111,17 @@ def test_the_command_writes_a_folder_and_refuses_one_result(here: Hdcal, tmp_pat
     assert {"summary.json", "gears.csv", "report.html", "results.png"} <= kept
     page = (tmp_path / "side" / "report.html").read_text("utf-8")
     assert "before" in page and "cannot be told" not in page
-    for wrong in (["before"], ["before", "before"], ["before", "nowhere"]):
+    for wrong in (
+        ["before"],
+        ["before", "before"],
+        ["before", "./before/"],
+        ["before", "before/posterior.nc"],
+        ["before", "nowhere"],
+        ["before", "after", "--out", "before", "--force"],
+    ):
         done = here("compare", *wrong)
         assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert "'before' is read too" in done.stderr
+    assert (tmp_path / "before" / "posterior.nc").exists()
+    done = here("compare", "before", "side")
+    assert done.returncode == 2 and "a comparison leaves no posterior" in done.stderr

@@ -277,3 +277,15 @@ def test_who_tested_may_stand_above_the_table_too(folder):
     above = "Operator,Moss\nLot,L3\ndeformation_mm,force_N\n"
     case = read(folder, above + "".join(f"{i / 10},{20 * i}\n" for i in range(6)))
     assert len(case.records.force) == 6 and case.operators == ()
+
+
+def test_an_empty_lot_is_filled_by_the_others_of_its_gear(folder):
+    case = read(folder, LOTS.replace("A,9,L1,Moss,2,0.2", "A,9,,Moss,2,0.2"))
+    assert case.lots == ("L1", "not stated")
+    assert not any("several" in note for note in case.notes)
+
+
+def test_who_stands_beside_a_gauge_does_not_name_what_it_reads(folder):
+    header = "deformation_mm,Operator force [N]\n"
+    case = read(folder, header + "".join(f"{i / 10},{20 * i}\n" for i in range(6)))
+    assert case.records.force[2] == 40.0 and case.operators == ()

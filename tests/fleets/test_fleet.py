@@ -50,7 +50,9 @@ def measured(seed=3, gears=10, off=0.85, runs=2, rows=30, spread=SPREAD):
 @pytest.fixture(scope="module")
 def found():
     frame, stiffness = measured()
-    return hdcal.fleet(hdcal.read_case(frame, gear=NAMED)), stiffness
+    # Draws enough that ends of intervals vary little from seed to seed.
+    case = hdcal.read_case(frame, gear=NAMED)
+    return hdcal.fleet(case, draws=2000), stiffness
 
 
 def test_bounds_keep_their_share_of_gears_and_their_confidence(found):

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import click
 
-from hdcal.errors import Finding, Findings
+from hdcal.errors import Finding, Findings, quoted
 from hdcal.report.plain import as_json, printable
 
 if TYPE_CHECKING:
@@ -24,6 +24,21 @@ if TYPE_CHECKING:
     from hdcal.report.write import Report
 
 T = TypeVar("T", bound="Target")
+
+
+def _read_too(out: str) -> list[Finding]:
+    """Return a finding where a result would take the place of what it is made from."""
+    context = click.get_current_context(silent=True)
+    if context is None:
+        return []
+    read: list[str] = []
+    for parameter in context.command.params:
+        given = context.params.get(str(parameter.name))
+        if isinstance(parameter, click.Argument) and given:
+            read += [given] if isinstance(given, str) else given
+    if os.path.realpath(out) not in map(os.path.realpath, read):
+        return []
+    return [Finding("out", f"{quoted(out)} is read too", "Name another folder")]
 
 
 class Console:
@@ -89,6 +104,7 @@ class Console:
             from hdcal.report.saving.reserve import reserve_folder
 
             names = {"force": force, "replace": replace}
+            self.wrong += _read_too(out)
             self.folder = self.hold(partial(reserve_folder, out, **names))
 
     def hold(self, reserve: Callable[[], T]) -> T | None:

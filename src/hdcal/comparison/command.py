@@ -1,5 +1,6 @@
 """`hdcal compare`: finished results side by side."""
 
+import os
 from pathlib import Path
 
 import click
@@ -33,7 +34,8 @@ def compare(console: Console, runs, out, force, **asked):
 
     with console.wrong as wrong:
         names = _names(runs)
-        if len(runs) < 2 or len(names) < len(runs):
+        once = {_folder(run) for run in runs}
+        if len(runs) < 2 or len(once) < len(runs):
             words = "two results or more are compared, each once"
             wrong.append(Finding("runs", words, "Name the folders of two results"))
         results = {n: wrong.attempt(read_models, run) for n, run in names.items()}
@@ -43,8 +45,16 @@ def compare(console: Console, runs, out, force, **asked):
     return console.report(comparison_report(found, console.command))
 
 
+def _folder(run: str) -> Path:
+    """Return the folder of a result, however it is spelled."""
+    from hdcal.inference.posterior import FILE_NAME
+
+    path = Path(os.path.realpath(run))
+    return path.parent if path.name == FILE_NAME else path
+
+
 def _names(runs: tuple[str, ...]) -> dict[str, str]:
     """Return the folders by their names, by their paths where two have one name."""
-    last = [Path(run).name or run for run in runs]
+    last = [_folder(run).name or run for run in runs]
     alone = len(set(last)) == len(set(runs))
     return {name if alone else run: run for name, run in zip(last, runs, strict=True)}

@@ -1,18 +1,16 @@
 """How much the stiffness of several results differs, and how surely."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.mixed_posterior import mixed_posterior
-from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
-from hdcal.prediction.engine.models import Models, model_pairs
+from hdcal.prediction.engine.causes import Cause, causes_of
+from hdcal.prediction.engine.models import Models
 from hdcal.report.words import label
 
 # Draws of each result that are compared with those of the others.
@@ -70,32 +68,50 @@ def compare(
     with Findings() as wrong:
         wrong += implausible("tolerance", tolerance, "rate")
         wrong += implausible("seed", seed)
-        if not isinstance(results, Mapping) or not 2 <= len(results) <= MOST:
+        named = {str(name) for name in results} if isinstance(results, Mapping) else ()
+        if not 2 <= len(named) <= MOST or len(named) < len(results):
             words = f"a comparison takes 2 to {MOST} results by their names"
             remedy = "Give them as {'before': result, 'after': result}"
             wrong.append(Finding("results", words, remedy))
-    pairs = {str(name): model_pairs(result) for name, result in results.items()}
-    for models in pairs.values():
-        for _, model in models:
-            model.require_usable()
-    cases = {name: models[0][1].case for name, models in pairs.items()}
+    causes = {str(name): _causes(str(name), one) for name, one in results.items()}
+    cases = {name: models[0].posterior.case for name, models in causes.items()}
     _require_alike(cases)
     rng = np.random.default_rng(seed)
     return Comparison(
-        names=tuple(pairs),
-        stiffness=np.stack([_draws(models, rng) for models in pairs.values()]),
+        names=tuple(causes),
+        stiffness=np.stack([_draws(models, rng) for models in causes.values()]),
         rows=np.array([len(case.records.force) for case in cases.values()]),
         tolerance=tolerance,
-        notes=tuple(_notes(pairs, cases)),
+        notes=tuple(_notes(causes, cases)),
         seed=seed,
     )
 
 
-def _draws(models: Sequence[tuple[float, Posterior]], rng) -> np.ndarray:
+def _causes(name: str, result: Models) -> tuple[Cause, ...]:
+    """Return the models of a result.
+
+    Raises:
+        InputError: it is none.
+        NotUsable: it failed its checks.
+    """
+    try:
+        return causes_of(result)
+    except (TypeError, ValueError, AttributeError) as error:
+        words = f"{name} is no calibrated model"
+        remedy = "Give what calibrate or diagnose returned, itself"
+        raise InputError([Finding("results", words, remedy)]) from error
+
+
+def _draws(models: Sequence[Cause], rng: np.random.Generator) -> np.ndarray:
     """Return draws of the stiffness over all models, in any order [N/mm as read]."""
-    weighed = {str(k): pair for k, pair in enumerate(models)}
-    drawn = mixed_posterior(weighed).draws["stiffness"]
-    return rng.permutation(np.resize(rng.permutation(drawn), _DRAWS))
+    parts = [
+        np.resize(
+            rng.permutation(model.values["stiffness"]),
+            round(_DRAWS * model.probability) + 1,
+        )
+        for model in models
+    ]
+    return rng.permutation(np.concatenate(parts))[:_DRAWS]
 
 
 def _require_alike(cases: Mapping[str, Case]) -> None:
@@ -112,7 +128,9 @@ def _require_alike(cases: Mapping[str, Case]) -> None:
         raise InputError([Finding("results", words, remedy)])
 
 
-def _notes(pairs: Mapping[str, Any], cases: Mapping[str, Case]):
+def _notes(
+    causes: Mapping[str, Sequence[Cause]], cases: Mapping[str, Case]
+) -> Iterator[str]:
     """Yield what else may make a difference, or is in none."""
     files: dict[str, str] = {}
     for name, case in cases.items():
@@ -124,9 +142,9 @@ def _notes(pairs: Mapping[str, Any], cases: Mapping[str, Case]):
             )
     effects = {
         name: " and ".join(
-            sorted({label(e.name) for _, m in models for e in m.effects})
+            sorted({label(e.name) for one in models for e in one.posterior.effects})
         )
-        for name, models in pairs.items()
+        for name, models in causes.items()
     }
     if len(set(effects.values())) > 1:
         told = "; ".join(f"{name}: {what or 'none'}" for name, what in effects.items())
@@ -135,6 +153,12 @@ def _notes(pairs: Mapping[str, Any], cases: Mapping[str, Case]):
     if len(set(warm.values())) > 1:
         told = ", ".join(f"{name} {at:g} °C" for name, at in warm.items())
         yield f"Each stiffness is at its own reference temperature ({told})."
+    if any(case.gear.gauge_priors for case in cases.values()):
+        yield (
+            "What certificates state of gauges is in the interval of each result by "
+            "itself: where it is the same gauge, the difference is surer than it says."
+        )
+        return
     yield (
         "An error that all of them share, such as that of one load cell, is in no "
         "difference; one that only some have, such as that of another rig, is in no "

@@ -16,7 +16,8 @@ from hdcal.errors import quoted
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Whole numbers, their thousands behind points.
 _IN_THOUSANDS = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
-_NOT_STATED = "not stated"
+# Label of what names none.
+NOT_STATED = "not stated"
 _ENDLESS = re.compile(r"[+-]?(inf|infinity|nan)", re.IGNORECASE)
 
 
@@ -48,7 +49,7 @@ def read_cells(
             notes.append(f"the label of {quoted(column.header)} {words} the same")
             cells = [*accumulate(cells, lambda above, own: own or above)]
         if column.quantity in GROUPINGS:
-            cells = [cell or _NOT_STATED for cell in cells]
+            cells = [cell or NOT_STATED for cell in cells]
         words = f"the {column.quantity} label is empty"
         empty = [
             (int(row), words, "Name it")

@@ -121,6 +121,8 @@ def _quantity(name: str) -> Guess | None:
         for quantity, known in WORDS.items()
         if any(word in words or (_WIDE.match(word) and word in name) for word in known)
     ]
+    # Who stood beside a gauge does not name what it reads.
+    found = [name for name in found if name not in GROUPINGS] or found
     if len(found) != 1:
         return None
     (quantity,) = found

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.data.cells import read_cells
+from hdcal.data.cells import NOT_STATED, read_cells
 from hdcal.data.columns import (
     LABELS,
     QUANTITIES,
@@ -101,12 +101,18 @@ def grouping(measured: Measurements, quantity: str) -> tuple[tuple[str, ...], st
         return (), ""
     of = measured.specimen if quantity == "lot" else measured.run
     pairs = pd.DataFrame({"of": of.index, "label": labels}).drop_duplicates()
-    twice = pairs["of"].duplicated()
-    if twice.any():
-        one = of.names[int(np.asarray(pairs["of"])[np.argmax(twice)])]
-        word = "specimen" if quantity == "lot" else "run"
-        return (), f"{quantity}s are not used: {word} {quoted(one)} has several"
-    return tuple(pairs.sort_values("of")["label"]), ""
+    told: dict[int, list[str]] = {}
+    for one, label in zip(pairs["of"].tolist(), pairs["label"].tolist(), strict=True):
+        told.setdefault(one, []).append(label)
+    for one, several in told.items():
+        # A cell that was left empty is filled by the others of its gear or mounting.
+        stated = [label for label in several if label != NOT_STATED] or several
+        if len(stated) > 1:
+            word = "specimen" if quantity == "lot" else "run"
+            name = quoted(of.names[one])
+            return (), f"{quantity}s are not used: {word} {name} has several"
+        told[one] = stated
+    return tuple(told[place][0] for place in range(len(of.names))), ""
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
+from hdcal.fleets.answer import FleetAnswer, LotAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
-from hdcal.fleets.misfit import misfit_words
 from hdcal.fleets.next_force import NextForce
+from hdcal.fleets.notes import FEW
 from hdcal.report.document import (
     Document,
     Facts,
@@ -25,27 +25,13 @@ from hdcal.report.words import estimate, number, percent
 # gears.csv.
 MOST_LISTED, _AT_ONCE = 10_000, 25
 _MOST_NAMED = 3
-RESTS_ON = (
-    "Of each mounting a straight line is taken, with a zero of its own and noise that "
-    "is independent from reading to reading: what bends it, a loop or a drift, is not "
-    "modelled here. To see it diagnose one by itself, with `--specimen LABEL`."
-)
-ONE_MOUNTING = (
-    "Every gear was mounted once: how much mountings scatter is told by the zeros "
-    "alone, and what a mounting does to the slope counts as of the gear."
-)
-
-FEW_GEARS = (
-    "So few gears say little of how much ordinary ones scatter: only a gear very far "
-    "out can be called off. Ten tell clearly more."
-)
-_FEW, _FEW_GROUPS = 8, 5
 
 
 def headline(
     population: PopulationAnswer,
     called: Sequence[str],
     columns: Mapping[str, np.ndarray],
+    lots: Sequence[LotAnswer] = (),
 ) -> str:
     """Return how many gears are alike, and which ones are off, in one sentence.
 
@@ -53,6 +39,7 @@ def headline(
         population: of the gears.
         called: off, the surest first.
         columns: of gears.csv.
+        lots: where they are told: a gear is off from its own.
     """
     total = len(columns["gear"])
     middle, span = estimate(population.gear_sd_percent)
@@ -64,10 +51,10 @@ def headline(
             f"{span} %) about {centre} N/mm"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off(population, [str(far)], columns))
+        odd = next(_off(population, [str(far)], columns, lots))
         odd = odd.replace("(probability", "(off with probability")
-        return told + f"; oddest: {odd}." if total < _FEW else f"{told}."
-    told = "; ".join(_off(population, called, columns))
+        return told + f"; oddest: {odd}." if total < FEW else f"{told}."
+    told = "; ".join(_off(population, called, columns, lots))
     return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
@@ -75,16 +62,20 @@ def _off(
     population: PopulationAnswer,
     called: Sequence[str],
     columns: Mapping[str, np.ndarray],
+    lots: Sequence[LotAnswer],
 ) -> Iterator[str]:
     """Yield what is said of the gears that are called off, the surest first."""
-    centre = population.stiffness_N_per_mm.median
+    own = {lot.lot: lot.stiffness_N_per_mm.median for lot in lots}
+    than = " than its lot" if lots else ""
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
         row = place[name]
+        centre = population.stiffness_N_per_mm.median
+        centre = own[str(columns["lot"][row])] if lots else centre
         apart = columns["stiffness_N_per_mm"][row] / centre - 1.0
         word = "softer" if apart < 0.0 else "stiffer"
         sure = percent(columns["probability_off"][row])
-        yield f"{name} is {100.0 * abs(apart):.2g} % {word} (probability {sure})"
+        yield f"{name} is {100.0 * abs(apart):.2g} % {word}{than} (probability {sure})"
     rest = len(called) - _MOST_NAMED
     if rest > 0:
         yield f"{rest} more are off"
@@ -135,7 +126,7 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     told = f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm"
     also = "; that it may be an odd one is in it" * bool(answer.called_off)
     yield f"{told}{also}."
-    if answer.gears < _FEW:
+    if answer.gears < FEW:
         yield (
             f"{answer.gears} gears say too little for bounds on most gears to come: "
             "these would rest on what was believed before."
@@ -282,17 +273,3 @@ def _gauge(answer: FleetAnswer) -> Section:
         "better than by one."
     )
     return Section("Gauge R&R", [Facts(told), Text(words, soft=True)])
-
-
-def notes_of(found: Fleet) -> Sequence[str]:
-    """Return what the reader of a fleet must know."""
-    scarce = [
-        f"{len(names)} {kind} say little of how much {kind} scatter: its interval is "
-        "mostly what was believed before."
-        for kind, names in (("lots", found.lots), ("operators", found.operators))
-        if 0 < len(names) < _FEW_GROUPS
-    ]
-    once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
-    few = [FEW_GEARS] if len(found.off) < _FEW else []
-    beside = misfit_words(found.misfit)
-    return [*beside, *found.case.notes, RESTS_ON, *few, *scarce, *once]

@@ -17,11 +17,12 @@ from hdcal.fleets.answer import (
     OperatorAnswer,
     PopulationAnswer,
 )
-from hdcal.fleets.document import fleet_document, headline, notes_of
+from hdcal.fleets.document import fleet_document, headline
 from hdcal.fleets.fleet import FALSE_CALLS, Fleet
 from hdcal.fleets.gauge import gauge
 from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
+from hdcal.fleets.notes import notes_of
 from hdcal.inference.groupings import group_offsets
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
@@ -35,6 +36,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     low, middle, high = np.quantile(found.stiffness, _ENDS, axis=0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
+        **({"lot": np.array(found.case.lots)} if found.lots else {}),
         "rows": found.rows,
         "runs": found.mountings,
         "stiffness_N_per_mm": middle,
@@ -82,8 +84,9 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         mounting_sd_N=credible_interval(draws["run_offset_sd"]),
         reading_sd_N=credible_interval(draws["sigma"]),
     )
+    lots = tuple(_lots(found))
     failed = f"This result failed its checks: {'; '.join(found.reasons)}."
-    said = failed if found.reasons else headline(population, called, columns)
+    said = failed if found.reasons else headline(population, called, columns, lots)
     return FleetAnswer(
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
@@ -95,7 +98,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
         population=population,
-        lots=tuple(_lots(found)),
+        lots=lots,
         operators=tuple(_operators(found)),
         gauge_rr=gauge(draws, _largest(found.case), found.force_tolerance),
         misfit=found.misfit,

@@ -60,11 +60,11 @@ POPULATION_PRIORS: Mapping[str, Prior] = {
 
 # Scatter of groups in that of their members, before the data, and the site of these.
 GROUP_RATIO = Prior(
-    "half_normal",
-    (1.0,),
+    "lognormal",
+    (0.7, 1.2),
     "1",
-    "engineering judgement: lots scatter as gears of one lot do, or up to twice as "
-    "far, and operators' zeros as those of mountings",
+    "engineering judgement: lots scatter about as gears of one lot do, seldom a tenth "
+    "of it or seven times as far, and operators' zeros as those of mountings",
 )
 _MEMBERS = {"lot": "specimen_sd", "operator": "run_offset_sd"}
 

@@ -138,7 +138,11 @@ def open_tree(path) -> xr.DataTree:
             loaded = tree.load()
     except FileNotFoundError as error:
         words, remedy = "there is no such file", "Name the folder of a calibration"
-        if (Path(path).parent / "gears.csv").exists():
+        kind = _kind_beside(Path(path))
+        if kind == "hdcal.compare/1":
+            words = "a comparison leaves no posterior"
+            remedy = "Name the folders of the results that were compared"
+        if kind == "hdcal.fleet/1":
             words = "a fleet leaves no posterior"
             remedy = (
                 "The force of a gear to come is told by fleet --deformation; for one "
@@ -150,6 +154,15 @@ def open_tree(path) -> xr.DataTree:
     except Exception as error:
         raise InputError([not_a_posterior(path)]) from error
     return loaded
+
+
+def _kind_beside(path: Path) -> str:
+    """Return the schema of the answer that lies beside a file; empty without one."""
+    try:
+        told = json.loads((path.parent / "summary.json").read_bytes())
+        return str(told["schema"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
 
 
 def not_a_posterior(path) -> Finding:

@@ -1,0 +1,55 @@
+"""What the reader of a fleet must know: on what it rests, and what it leaves out."""
+
+from collections.abc import Iterator, Sequence
+
+from hdcal.data.cells import NOT_STATED
+from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.misfit import misfit_words
+
+RESTS_ON = (
+    "Of each mounting a straight line is taken, with a zero of its own and noise that "
+    "is independent from reading to reading: what bends it, a loop or a drift, is not "
+    "modelled here. To see it diagnose one by itself, with `--specimen LABEL`."
+)
+ONE_MOUNTING = (
+    "Every gear was mounted once: how much mountings scatter is told by the zeros "
+    "alone, and what a mounting does to the slope counts as of the gear."
+)
+
+FEW_GEARS = (
+    "So few gears say little of how much ordinary ones scatter: only a gear very far "
+    "out can be called off. Ten tell clearly more."
+)
+# Fewer gears than the first, and fewer groups than the second, say little of scatter.
+FEW, _FEW_GROUPS = 8, 5
+
+
+def notes_of(found: Fleet) -> Sequence[str]:
+    """Return what the reader of a fleet must know."""
+    scarce = [
+        f"{len(names)} {kind} say little of how much {kind} scatter: its interval is "
+        "mostly what was believed before."
+        for kind, names in (("lots", found.lots), ("operators", found.operators))
+        if 0 < len(names) < _FEW_GROUPS
+    ]
+    once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
+    few = [FEW_GEARS] if len(found.off) < FEW else []
+    beside = misfit_words(found.misfit)
+    untold = [*_untold(found)]
+    return [*beside, *found.case.notes, RESTS_ON, *few, *scarce, *untold, *once]
+
+
+def _untold(found: Fleet) -> Iterator[str]:
+    """Yield which lots and operators were read but not told apart."""
+    case = found.case
+    for kind, read, used in (
+        ("lots", case.lots, found.lots),
+        ("operators", case.operators, found.operators),
+    ):
+        if len(set(read)) > 1 and not used:
+            yield (
+                f"{len(set(read))} {kind} are too many to be told apart: they are "
+                "taken for one."
+            )
+        if NOT_STATED in used:
+            yield f"What names none of the {kind} is taken to be of one more."
