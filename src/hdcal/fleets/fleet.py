@@ -7,20 +7,20 @@ from dataclasses import dataclass, field
 import jax
 import numpy as np
 import xarray as xr
+from jaxtyping import Key
 from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
 from hdcal.data.prior import Prior
-from hdcal.data.scatter import reading_step, require_scatter
+from hdcal.data.records import Array
+from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError, NotUsable
-from hdcal.evidence.prepare import moments, stiffness_prior
+from hdcal.fleets.fleet_problem import fleet_problem
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.mounting_sums import (
     groups,
-    lot_grouping,
     mounting_sums,
-    operator_grouping,
 )
 from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
@@ -28,15 +28,12 @@ from hdcal.inference import laplace
 from hdcal.inference.checks import Check, sampling_checks
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.executables import bound_executables
-from hdcal.inference.gear_sums import gear_sums
+from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.population_problem import (
-    GROUP_RATIO,
-    POPULATION_PRIORS,
     PopulationProblem,
     draw_gears,
     gear_centres,
 )
-from hdcal.inference.problem import problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.notebook import Shown
 
@@ -161,52 +158,57 @@ def fleet(
         wrong += implausible("force_tolerance", force_tolerance)
     check_fleet(case)
     bound_executables()
-    sums, (lots, lot) = mounting_sums(case), groups(case.lots)
-    lot = lot if lots else np.zeros(len(case.specimen_labels), int)
-    operators = groups(case.operators)[0]
-    unit, priors = _priors(case)
-    told = {"lot": lot_grouping(sums, lot)} if lots else {}
-    told |= {"operator": operator_grouping(sums)} if operators else {}
-    priors |= {f"{kind}_ratio": GROUP_RATIO for kind in told}
-    problem = PopulationProblem(priors, gear_sums(sums, lot, reading_step(case)), told)
+    sums = mounting_sums(case)
+    problem, unit = fleet_problem(case, sums)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}
     whitening = laplace.fit(problem, start)
     found = sample(problem, whitening, of_draws, progress=progress, **size)
     flat = {name: v.reshape(-1) for name, v in found.values.items()}
-    every = -(-len(flat["stiffness"]) // _GEAR_DRAWS)
-    chosen = {name: v[::every] for name, v in flat.items()}
-    drawn = draw_gears(problem, chosen, of_gears)
-    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
-    # About a centre and a scatter that the gear itself has no part in: where it is off.
-    chance = np.sum(off * np.asarray(drawn.chance), axis=0) / np.sum(off, axis=0)
-    centre = np.asarray(gear_centres(chosen, lot)).T
-    apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
-    rows = np.bincount(sums.gear, sums.rows)
-    noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
-    zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
+    gears = _gears(problem, sums, flat, of_gears)
     return Fleet(
         case=case,
         draws=flat,
-        stiffness=stiffness,
-        noise_sd=noise_sd,
-        zero=np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
-        distance=np.median(apart, axis=0),
-        off=off.mean(axis=0),
-        chance=chance,
-        called=called_off(chance),
+        **gears,
+        called=called_off(gears["chance"]),
         next_stiffness=next_gear(flat, np.random.default_rng(seed)),
         unit=unit,
-        lots=lots,
-        operators=operators,
-        rows=rows.astype(int),
+        lots=groups(case.lots)[0],
+        operators=groups(case.operators)[0],
+        rows=np.bincount(sums.gear, sums.rows).astype(int),
         mountings=np.bincount(sums.gear),
-        misfit=misfit(case, np.median(stiffness, axis=0), noise_sd),
+        misfit=misfit(case, np.median(gears["stiffness"], axis=0), gears["noise_sd"]),
         force_tolerance=force_tolerance,
-        checks=_checks(found, priors),
+        checks=_checks(found, problem.priors),
         settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
     )
+
+
+def _gears(
+    problem: PopulationProblem,
+    sums: MountingSums,
+    draws: Mapping[str, np.ndarray],
+    key: Key[Array, ""],
+) -> dict[str, np.ndarray]:
+    """Return what is known of each gear, as `Fleet` has it."""
+    every = -(-len(draws["stiffness"]) // _GEAR_DRAWS)
+    chosen = {name: v[::every] for name, v in draws.items()}
+    drawn = draw_gears(problem, chosen, key)
+    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
+    centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
+    apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
+    zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
+    return {
+        "stiffness": stiffness,
+        "noise_sd": np.median(np.asarray(drawn.noise_sd), axis=0),
+        "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
+        "distance": np.median(apart, axis=0),
+        "off": off.mean(axis=0),
+        # About a centre and a scatter that the gear itself has no part in: where it is
+        # off.
+        "chance": np.sum(off * np.asarray(drawn.chance), axis=0) / np.sum(off, axis=0),
+    }
 
 
 def called_off(chance: np.ndarray) -> np.ndarray:
@@ -222,23 +224,6 @@ def called_off(chance: np.ndarray) -> np.ndarray:
         Benjamini and Hochberg, Journal of the Royal Statistical Society B 57 (1995).
     """
     return false_discovery_control(chance) <= FALSE_CALLS
-
-
-def _priors(case: Case) -> tuple[float, dict[str, Prior]]:
-    """Return the stiffness at K = 1 [N/mm as read], and the priors of all sites."""
-    own = problem_priors(case, (), {}, case.gear.theory)
-    half = 0.5 if case.gear.reading == "diametral" else 1.0
-    log_mean, log_sd, nominal, _ = stiffness_prior(case, own)
-    centre = half * float(np.exp(log_mean))
-    zero, gauge_sd = moments(own["force_offset"])
-    place, contact_sd = moments(own["deformation_offset"])
-    zero_sd = float(np.hypot(gauge_sd, centre * contact_sd))
-    return half * nominal, {
-        "stiffness": Prior("lognormal", (centre, log_sd)),
-        "zero": Prior("normal", (zero - centre * place, zero_sd)),
-        **{name: own[name] for name in ("specimen_sd", "run_offset_sd", "sigma")},
-        **POPULATION_PRIORS,
-    }
 
 
 def check_fleet(case: Case) -> None:
