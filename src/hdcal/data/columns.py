@@ -178,8 +178,7 @@ def _guessed(quantity: str, table: CsvTable, findings: FileFindings) -> Column |
         if (guess := guess_header(header)) is not None and guess.quantity == quantity
     ]
     # One that names nothing else is meant rather than one that says more.
-    whole = [column for column, alone in found if alone]
-    likely = whole or [column for column, _ in found]
+    likely = [one for one, alone in found if alone] or [one for one, _ in found]
     # A lot of German rings is a Charge, which is a load in French: that has a unit.
     likely = [column for column in likely if column.unit] or likely
     if len(likely) > 1 and quantity in REQUIRED:
@@ -271,14 +270,13 @@ def _mapped(
     header = table.headers[hits[0]]
     if quantity in LABELS:
         return Column(quantity, header, hits[0])
-    bracketed = unit is not None
     guess, own = guess_header(header), _split_brackets(header)[1]
     own = own or (guess.unit if guess is not None else "")
     own = own or (header.rpartition("_")[2] if "_" in header else "")
     known = known_unit(quantity, unit or own)
     if known is None:
         words = f"has no unit that is known for {quantity}"
-        if bracketed:
+        if unit is not None:
             words = f"unknown unit '{unit or own}' for {quantity}"
         units = ", ".join(COLUMN_UNITS[quantity])
         remedy = f"Write {option}'{name}[UNIT]' with one of: {units}"
