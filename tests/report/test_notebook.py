@@ -9,7 +9,7 @@ import xarray as xr
 from fleets import handmade
 from matplotlib.figure import Figure
 from moving import still_posterior
-from posteriors import single
+from posteriors import single, stiffer
 from verdicts import named
 
 import hdcal
@@ -41,6 +41,10 @@ def results():
     gear, posterior = read_gear(GEAR), single()
     return {
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
+        "Comparison": (
+            hdcal.compare({"old": posterior, "new": stiffer(posterior, 1.1)}),
+            "% stiffer than old",
+        ),
         "Fleet": (handmade(), "D is 10 % softer"),
         "InverseDesign": (
             hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
