@@ -129,7 +129,8 @@ def _means(
 
 def _sum(drawn: tuple[str, np.ndarray, np.ndarray, float]) -> Chart:
     along, x, total, reach = drawn
-    series = [Series("running sum [N]", x, total, COLOURS[0])]
+    rows = thinned(len(total))
+    series = [Series("running sum [N]", x[rows], total[rows], COLOURS[0])]
     if not math.isfinite(reach):
         return Chart(along, "running sum [N]", series, height=240)
     ends = np.array([x[0], x[-1]])

@@ -229,20 +229,21 @@ def _scatter(answer: FleetAnswer) -> Section:
 
 def _groups(answer: FleetAnswer) -> Iterator[Table]:
     """Yield what is known of each lot and each operator."""
-    if answer.lots:
-        numbers = ("gears", "N/mm", "95 % interval")
-        rows = [
-            [lot.lot, str(lot.gears), *estimate(lot.stiffness_N_per_mm)]
-            for lot in answer.lots
-        ]
-        yield Table(["lot", *numbers], rows, frozenset(numbers))
-    if answer.operators:
-        numbers = ("mountings", "zero over the mean [N]", "95 % interval")
-        rows = [
-            [one.operator, str(one.mountings), *estimate(one.zero_apart_N)]
-            for one in answer.operators
-        ]
-        yield Table(["operator", *numbers], rows, frozenset(numbers))
+    lots = [
+        [one.lot, str(one.gears), *estimate(one.stiffness_N_per_mm)]
+        for one in answer.lots
+    ]
+    operators = [
+        [one.operator, str(one.mountings), *estimate(one.zero_apart_N)]
+        for one in answer.operators
+    ]
+    for title, many, what, rows in (
+        ("lot", "gears", "N/mm", lots),
+        ("operator", "mountings", "zero over the mean [N]", operators),
+    ):
+        numbers = (many, what, "95 % interval")
+        if rows:
+            yield Table([title, *numbers], rows, frozenset(numbers))
 
 
 def _gauge(answer: FleetAnswer) -> Section:

@@ -106,7 +106,8 @@ class Fleet(Shown):
             limit_force: a capacity, its size [N].
 
         Raises:
-            InputError: a number is impossible, or the result failed its checks.
+            InputError: a number is impossible.
+            NotUsable: the fleet failed its checks.
         """
         with Findings() as wrong:
             wrong += implausible("deformation", deformation)
