@@ -86,7 +86,8 @@ def fleet_document(
 ) -> Document:
     """Return the report; its picture is called gears."""
     settings = found.settings
-    sampled = f"NUTS, {settings['chains']} chains of {settings['draws']} draws"
+    sampled = f"{settings['chains']} chains of {settings['draws']} draws"
+    sampled = f"{settings['sampler']}, {sampled}"
     versions = ", ".join(f"{k} {v}" for k, v in answer.versions.items())
     provenance = [
         ("SHA-256 of the data", answer.data_sha256),

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 
 import jax
 import numpy as np
-import xarray as xr
 from jaxtyping import Key
 from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
-from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError, NotUsable
@@ -24,9 +22,8 @@ from hdcal.fleets.mounting_sums import (
 )
 from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
-from hdcal.inference import laplace
-from hdcal.inference.checks import Check, sampling_checks
-from hdcal.inference.diagnostics import mixing
+from hdcal.fleets.sampling import sample_population
+from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.population_problem import (
@@ -34,7 +31,7 @@ from hdcal.inference.population_problem import (
     draw_gears,
     gear_centres,
 )
-from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 
 # Fewer gears say next to nothing of how much gears differ.
@@ -142,7 +139,8 @@ def fleet(
     Args:
         case: from `read_case`, whose rows name their specimen.
         chains: independent chains, two or more.
-        warmup: iterations of adaptation per chain.
+        warmup: iterations of adaptation per chain, where NUTS draws: independent
+            proposals, which are tried first, need none.
         draws: draws kept per chain.
         seed: of all random numbers; the same seed gives the same answer.
         force_tolerance: width that the force at the largest deformation may lie in [N].
@@ -163,17 +161,15 @@ def fleet(
     problem, unit = fleet_problem(case, sums)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    start = {"stiffness": float(np.sum(sums.xy) / np.sum(sums.xx))}
-    whitening = laplace.fit(problem, start)
-    found = sample(problem, whitening, of_draws, progress=progress, **size)
-    flat = {name: v.reshape(-1) for name, v in found.values.items()}
-    gears = _gears(problem, sums, flat, of_gears)
+    start = float(np.sum(sums.xy) / np.sum(sums.xx))
+    found = sample_population(problem, start, of_draws, progress=progress, **size)
+    gears = _gears(problem, sums, found.values, of_gears)
     return Fleet(
         case=case,
-        draws=flat,
+        draws=found.values,
         **gears,
         called=called_off(gears["chance"]),
-        next_stiffness=next_gear(flat, np.random.default_rng(seed)),
+        next_stiffness=next_gear(found.values, np.random.default_rng(seed)),
         unit=unit,
         lots=groups(case.lots)[0],
         operators=groups(case.operators)[0],
@@ -181,8 +177,13 @@ def fleet(
         mountings=np.bincount(sums.gear),
         misfit=misfit(case, np.median(gears["stiffness"], axis=0), gears["noise_sd"]),
         force_tolerance=force_tolerance,
-        checks=_checks(found, problem.priors),
-        settings={"seed": seed, **size, "seconds": time.perf_counter() - began},
+        checks=found.checks,
+        settings={
+            "seed": seed,
+            **size,
+            "sampler": found.sampler,
+            "seconds": time.perf_counter() - began,
+        },
     )
 
 
@@ -255,12 +256,3 @@ def check_fleet(case: Case) -> None:
     if findings:
         raise InputError(findings)
     require_scatter(case)
-
-
-def _checks(found: Draws, priors: Mapping[str, Prior]) -> tuple[Check, ...]:
-    over = ("chain", "draw")
-    names = ("energy", "diverging", "n_steps")
-    stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
-    fixed = {name for name, prior in priors.items() if prior.family == "fixed"}
-    free = {name: v for name, v in found.values.items() if name not in fixed}
-    return sampling_checks(stats, mixing(free))

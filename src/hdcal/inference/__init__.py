@@ -1,1 +1,1 @@
-"""The one model, the one sampler, and the checks on what they give."""
+"""The one model, the samplers, and the checks on what they give."""

@@ -14,6 +14,7 @@ import xarray as xr
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import bounds, frozen
+from hdcal.inference.independence import MAX_SHAPE
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION, worth
 
@@ -60,28 +61,11 @@ def sampling_checks(
         stats: energy, diverging, n_steps; dimensions chain and draw.
         mixed: by quantity.
     """
-    chains = stats.sizes["chain"]
-    worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
-    least = min(
-        mixed,
-        key=lambda name: _least(mixed[name]),
-    )
-    top, need = mixed[worst].rhat, ESS_PER_CHAIN * chains
-    low = _least(mixed[least])
     energy = _explored(stats["energy"].to_numpy())
     divergent = int(stats["diverging"].sum())
     saturated = float((stats["n_steps"] >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
-        _check(
-            "chains agree (R-hat)",
-            top <= MAX_RHAT,
-            f"the largest R-hat is {top:.4f} ({worst}), allowed {MAX_RHAT}",
-        ),
-        _check(
-            "enough effective draws (bulk and tail ESS)",
-            low >= need,
-            f"the smallest effective sample size is {low:.0f} ({least}), needed {need}",
-        ),
+        *mixing_checks(mixed, stats.sizes["chain"]),
         _check(
             "energy is explored (BFMI)",
             bool(np.all(energy >= MIN_BFMI)),
@@ -98,6 +82,47 @@ def sampling_checks(
             f"{saturated:.1%} of trajectories were cut off, allowed "
             f"{MAX_SATURATED:.0%}",
         ),
+    )
+
+
+def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]:
+    """Return the checks on chains, however they move.
+
+    Args:
+        mixed: by quantity.
+        chains: how many.
+    """
+    worst = max(mixed, key=lambda name: _bad(mixed[name].rhat))
+    least = min(
+        mixed,
+        key=lambda name: _least(mixed[name]),
+    )
+    top, need = mixed[worst].rhat, ESS_PER_CHAIN * chains
+    low = _least(mixed[least])
+    return (
+        _check(
+            "chains agree (R-hat)",
+            top <= MAX_RHAT,
+            f"the largest R-hat is {top:.4f} ({worst}), allowed {MAX_RHAT}",
+        ),
+        _check(
+            "enough effective draws (bulk and tail ESS)",
+            low >= need,
+            f"the smallest effective sample size is {low:.0f} ({least}), needed {need}",
+        ),
+    )
+
+
+def covering_check(shape: float) -> Check:
+    """Return the check on proposals that do not follow the posterior.
+
+    Args:
+        shape: Pareto k of the largest weights.
+    """
+    return _check(
+        "proposals cover the posterior (Pareto k)",
+        shape <= MAX_SHAPE,
+        f"the largest weights have a Pareto k of {shape:.2f}, allowed {MAX_SHAPE}",
     )
 
 

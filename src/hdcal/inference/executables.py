@@ -3,7 +3,7 @@
 import gc
 from pathlib import Path
 
-from hdcal.inference import laplace, sample
+from hdcal.inference import independence, laplace, sample
 
 _MAPS = Path("/proc/self/maps")
 _LIMIT = Path("/proc/sys/vm/max_map_count")
@@ -22,7 +22,9 @@ def bound_executables() -> bool:
     """
     if not mappings_are_scarce():
         return False
-    for compiled in (*laplace.COMPILED, *sample.COMPILED):
+    for compiled in (
+        m for room in (laplace, sample, independence) for m in room.COMPILED
+    ):
         compiled.clear_cache()  # pyright: ignore[reportAttributeAccessIssue]
     gc.collect()
     return True

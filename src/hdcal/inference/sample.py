@@ -1,4 +1,4 @@
-"""The only sampler: NumPyro's NUTS in whitened coordinates.
+"""The sampler of record: NumPyro's NUTS in whitened coordinates.
 
 One executable serves every data set of one bucket of rows, because data, priors and
 whitening are arguments of it. It advances in short stretches, so that progress can

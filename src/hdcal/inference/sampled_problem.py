@@ -1,4 +1,4 @@
-"""What the one sampler can take: a problem with priors and a declared density."""
+"""What samplers can take: a problem with priors and a declared density."""
 
 from collections.abc import Mapping
 

@@ -1,0 +1,81 @@
+"""Draws of the population: by independent proposals, or by NUTS where these fail."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from jaxtyping import Key
+
+from hdcal.data.prior import Prior
+from hdcal.data.records import Array
+from hdcal.inference import laplace
+from hdcal.inference.checks import (
+    Check,
+    covering_check,
+    mixing_checks,
+    sampling_checks,
+)
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.independence import sample_independently
+from hdcal.inference.population_problem import PopulationProblem
+from hdcal.inference.sample import Progress, sample
+
+
+class SampledPopulation(NamedTuple):
+    """Draws by site, and what is said of them.
+
+    Attributes:
+        values: of each site, of all chains, shape (d,).
+        checks: of the sampler.
+        sampler: its name.
+    """
+
+    values: dict[str, np.ndarray]
+    checks: tuple[Check, ...]
+    sampler: str
+
+
+def sample_population(
+    problem: PopulationProblem,
+    stiffness: float,
+    key: Key[Array, ""],
+    *,
+    chains: int,
+    warmup: int,
+    draws: int,
+    progress: Progress | None,
+) -> SampledPopulation:
+    """Return draws of the population.
+
+    Args:
+        problem: the gears.
+        stiffness: where to look first [N/mm as read].
+        key: source of randomness.
+        chains: chains of draws.
+        warmup: iterations of adaptation per chain, where NUTS draws.
+        draws: of each chain.
+        progress: called with (steps done, steps in all).
+    """
+    whitening = laplace.fit(problem, {"stiffness": stiffness})
+    size = {"chains": chains, "draws": draws, "progress": progress}
+    cheap = sample_independently(problem, whitening, key, **size)
+    if cheap is not None:
+        mixed = mixing(_free(cheap.values, problem.priors))
+        checks = (*mixing_checks(mixed, chains), covering_check(cheap.shape))
+        return SampledPopulation(_flat(cheap.values), checks, "independent proposals")
+    found = sample(problem, whitening, key, warmup=warmup, **size)
+    over = ("chain", "draw")
+    names = ("energy", "diverging", "n_steps")
+    stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
+    checks = sampling_checks(stats, mixing(_free(found.values, problem.priors)))
+    return SampledPopulation(_flat(found.values), checks, "NUTS")
+
+
+def _free(values: Mapping[str, np.ndarray], priors: Mapping[str, Prior]):
+    fixed = {name for name, prior in priors.items() if prior.family == "fixed"}
+    return {name: v for name, v in values.items() if name not in fixed}
+
+
+def _flat(values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: v.reshape(-1) for name, v in values.items()}

@@ -1,0 +1,143 @@
+"""Independent proposals draw from the posterior, or say that they cannot."""
+
+import jax
+import numpy as np
+import numpyro
+import numpyro.distributions as dist
+import pytest
+from scipy import stats
+
+import hdcal
+from hdcal.data.prior import Prior
+from hdcal.data.resources import datasets_folder
+from hdcal.fleets.fleet_problem import fleet_problem
+from hdcal.fleets.mounting_sums import mounting_sums
+from hdcal.inference import independence, laplace
+from hdcal.inference.diagnostics import mixing
+from hdcal.inference.independence import sample_independently
+from hdcal.inference.model import model
+from hdcal.inference.sample import sample
+from hdcal.inference.sampled_problem import Sampled
+
+
+class Skew(Sampled):
+    """Two sites: a gamma, and a normal whose centre follows it."""
+
+    priors: dict[str, Prior]
+
+
+class Tails(Sampled):
+    """A site whose tails are those of Cauchy's law."""
+
+    priors: dict[str, Prior]
+
+
+class Funnel(Sampled):
+    """A scale of eight numbers, of which nothing was measured."""
+
+    priors: dict[str, Prior]
+
+
+class Hills(Sampled):
+    """Two modes of one weight, far apart."""
+
+    priors: dict[str, Prior]
+
+
+@model.register
+def _(problem: Skew) -> None:
+    size = numpyro.sample("size", dist.Gamma(3.0))
+    numpyro.sample("place", dist.Normal(2.0 * size, 1.0))
+
+
+@model.register
+def _(problem: Tails) -> None:
+    numpyro.sample("place", dist.Cauchy(0.0, 1.0))
+
+
+@model.register
+def _(problem: Funnel) -> None:
+    scale = numpyro.sample("scale", dist.HalfNormal(1.0))
+    for place in range(8):
+        numpyro.sample(f"place_{place}", dist.Normal(0.0, scale))
+
+
+@model.register
+def _(problem: Hills) -> None:
+    mixture = dist.MixtureSameFamily(
+        dist.Categorical(np.array([0.5, 0.5])),
+        dist.Normal(np.array([-20.0, 20.0]), 1.0),
+    )
+    for place in range(3):
+        numpyro.sample(f"place_{place}", mixture)
+
+
+@pytest.fixture(autouse=True)
+def _double():
+    jax.config.update("jax_enable_x64", True)
+
+
+def drawn(problem, seed=0, chains=4, draws=800):
+    key = jax.random.key(seed)
+    whitening = laplace.fit(problem)
+    return sample_independently(problem, whitening, key, chains=chains, draws=draws)
+
+
+def test_draws_are_of_a_skewed_law():
+    found = drawn(Skew({}), draws=2000)
+    assert found is not None
+    # Thinned to what is nearly independent.
+    size, place = (found.values[name][:, ::4].ravel() for name in ("size", "place"))
+    assert stats.kstest(size, stats.gamma(3.0).cdf).pvalue > 0.001
+    assert stats.kstest(place - 2.0 * size, stats.norm.cdf).pvalue > 0.001
+
+
+def test_a_wrong_acceptance_would_be_seen(monkeypatch):
+    def everything(weight, rng):
+        return np.tile(np.arange(weight.shape[1]), (len(weight), 1))
+
+    monkeypatch.setattr(independence, "_metropolis", everything)
+    found = drawn(Skew({}), draws=2000)
+    assert found is not None
+    size = found.values["size"].ravel()
+    assert stats.kstest(size, stats.gamma(3.0).cdf).pvalue < 1e-6
+
+
+def test_the_same_key_draws_the_same():
+    first, second = drawn(Skew({})), drawn(Skew({}))
+    assert first is not None and second is not None
+    assert np.array_equal(first.values["size"], second.values["size"])
+
+
+@pytest.mark.parametrize("problem", [Tails({}), Funnel({}), Hills({})])
+def test_what_proposals_do_not_cover_is_not_drawn(problem):
+    assert [drawn(problem, seed) for seed in range(3)] == [None] * 3
+
+
+def test_a_chain_moves_by_the_ratio_of_weights():
+    # Two states of weights 1 and 3, proposed alike: a quarter of the time in the first.
+    rng = np.random.default_rng(0)
+    weight = np.log(rng.choice([1.0, 3.0], (4, 20_000)))
+    path = independence._metropolis(weight, rng)
+    share = np.mean(np.take_along_axis(weight, path, axis=1) == 0.0)
+    assert share == pytest.approx(0.25, abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_fleet_is_what_nuts_has_it():
+    case = hdcal.read_case(datasets_folder() / "fleet-demo")
+    sums = mounting_sums(case)
+    problem, _ = fleet_problem(case, sums)
+    whitening = laplace.fit(problem, {"stiffness": 200.0})
+    key = jax.random.key(1)
+    fast = sample_independently(problem, whitening, key, chains=4, draws=3000)
+    slow = sample(problem, whitening, key, chains=4, warmup=500, draws=3000)
+    assert fast is not None
+    well = [mixing(draws.values) for draws in (fast, slow)]
+    for name, values in slow.values.items():
+        share = np.array([0.05, 0.5, 0.95])
+        ends = np.quantile(fast.values[name], share)
+        apart = np.mean(values.reshape(-1, 1) <= ends, axis=0) - share
+        sizes = [min(mixed[name].ess_bulk, mixed[name].ess_tail) for mixed in well]
+        error = np.sqrt(share * (1.0 - share) * sum(1.0 / size for size in sizes))
+        assert np.all(np.abs(apart) < 4.0 * error), name
