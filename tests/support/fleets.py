@@ -47,5 +47,11 @@ def handmade() -> Fleet:
         operators=[],
         force_tolerance=None,
         checks=(Check("chains agree (R-hat)", "passed", "the largest R-hat is 1.0"),),
-        settings={"seed": 0, "chains": 4, "warmup": 500, "draws": 500},
+        settings={
+            "sampler": "NUTS",
+            "seed": 0,
+            "chains": 4,
+            "warmup": 500,
+            "draws": 500,
+        },
     )

@@ -88,6 +88,8 @@ class Case(Shown):
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
         lots: lot of each specimen index; empty where none is told.
         operators: who mounted each run index; empty where none is told.
+        dates: when each run index was measured first, in ISO 8601; an empty one of a
+            run that does not say, and empty where none is told.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Case(Shown):
     columns: dict[str, str] = field(default_factory=dict)
     lots: tuple[str, ...] = ()
     operators: tuple[str, ...] = ()
+    dates: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         rows = len(self.records.force)

@@ -52,9 +52,10 @@ WORDS: dict[str, tuple[str, ...]] = {
     ),
     "lot": ("lot", "batch", "los"),
     "operator": ("operator", "inspector", "bediener", "prüfer", "opérateur"),
+    "date": ("date", "datum", "prüfdatum"),
 }
 # Labels that say more of a gear or a mounting, and that no answer has to have.
-GROUPINGS = ("lot", "operator")
+GROUPINGS = ("lot", "operator", "date")
 # What says that a column is something else about the quantity.
 _OTHERWISE = {
     *("setpoint", "set", "target", "command", "soll", "sollwert", "consigne"),

@@ -10,10 +10,10 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
+from hdcal.data.dates import dates_of
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
-from hdcal.data.header_words import GROUPINGS
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
@@ -101,7 +101,10 @@ def read_case(
     assert measured is not None and found is not None
     motion = _motion(measured)
     (lots, of_lots), (operators, of_operators) = (
-        grouping(measured, quantity) for quantity in GROUPINGS
+        grouping(measured, quantity) for quantity in ("lot", "operator")
+    )
+    dates, of_dates = dates_of(
+        measured.columns.values.get("date", ()), measured.run.index
     )
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
@@ -115,11 +118,12 @@ def read_case(
             *measured.columns.notes,
             *told,
             *reading_notes(measured, found, motion),
-            *filter(None, (of_lots, of_operators)),
+            *filter(None, (of_lots, of_operators, of_dates)),
         ),
         columns=measured.columns.as_named(),
         lots=lots,
         operators=operators,
+        dates=dates,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from hdcal.fleets.gauge import GaugeAnswer
 from hdcal.fleets.misfit import Misfit
 from hdcal.fleets.next_force import NextForce
+from hdcal.fleets.over_time import TimeAnswer
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
 from hdcal.report.parameters import Interval
 
@@ -86,6 +87,7 @@ class FleetAnswer(Answer):
         next_gear: one more of them, of another lot.
         next_force: that it needs at a deformation; None where none was asked for.
         gauge_rr: how well one reading of the force tells gears apart.
+        over_time: how stiffness, zeros and noise go with the date, where it is told.
         misfit: what the readings have beside straight lines.
         notes: from reading, and on what the answer rests.
         seed: of the draws.
@@ -105,6 +107,7 @@ class FleetAnswer(Answer):
     next_gear: FutureGear
     next_force: NextForce | None
     gauge_rr: GaugeAnswer
+    over_time: tuple[TimeAnswer, ...]
     misfit: Misfit
     notes: Sentences
     seed: Count

@@ -8,6 +8,7 @@ from hdcal.fleets.answer import FleetAnswer, LotAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.notes import FEW
+from hdcal.fleets.time_words import time_section, time_words
 from hdcal.report.document import (
     Document,
     Facts,
@@ -84,7 +85,7 @@ def _off(
 def fleet_document(
     found: Fleet, answer: FleetAnswer, columns: Mapping[str, np.ndarray], command: str
 ) -> Document:
-    """Return the report; its picture is called gears."""
+    """Return the report; its pictures are called gears and time."""
     settings = found.settings
     sampled = f"{settings['chains']} chains of {settings['draws']} draws"
     sampled = f"{settings['sampler']}, {sampled}"
@@ -105,6 +106,7 @@ def fleet_document(
         sections=[
             _gears(columns, answer),
             _scatter(answer),
+            *([time_section(answer.over_time)] if answer.over_time else []),
             _gauge(answer),
             Section(
                 "Checks", [Sentences([c.words for c in found.checks])], False, True
@@ -118,6 +120,7 @@ def fleet_document(
 def _answers(answer: FleetAnswer) -> Iterator[str]:
     if answer.next_force is not None:
         yield from _force(answer.next_force)
+    yield from (time_words(one) for one in answer.over_time if one.changed)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
         f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "

@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from hdcal.data.case import Case
 from hdcal.evidence.prepare import moments
+from hdcal.fleets.change_points import middle_sd
 from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.groupings import Grouping, grouping
 
@@ -50,17 +50,22 @@ def _slopes(sums: MountingSums) -> np.ndarray:
 def _estimated(values: np.ndarray, group: np.ndarray) -> Grouping:
     """Return groups by their medians, so that a gear that is off moves none."""
     middle = np.array([np.median(values[group == k]) for k in range(group.max() + 1)])
-    # Sd of a normal law by its median absolute deviation.
-    sd = np.median(np.abs(values - middle[group])) / stats.norm.ppf(0.75)
+    sd = middle_sd(values - middle[group])
     least = 1e-6 * np.max(np.abs(values))
     return grouping(middle, max(sd, least) ** 2 / np.bincount(group))
+
+
+def mountings(case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """Return gear and run of each mounting, shape (2, m), and the mounting of rows."""
+    labels = np.stack([np.asarray(case.records.specimen), np.asarray(case.records.run)])
+    pairs, of_row = np.unique(labels, axis=1, return_inverse=True)
+    return pairs, of_row.ravel()
 
 
 def mounting_sums(case: Case) -> MountingSums:
     """Return the sums of a case, one entry for each gear in each mounting."""
     records, gear = case.records, case.gear
-    labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
-    pairs, of_row = np.unique(labels, axis=1, return_inverse=True)
+    pairs, of_row = mountings(case)
     warm = np.asarray(records.temperature) - gear.reference_temperature
     loss, _ = moments(gear.priors["alpha"])
     x = np.asarray(records.deformation) * (1.0 - loss * warm)

@@ -23,6 +23,7 @@ from hdcal.fleets.gauge import gauge
 from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.fleets.notes import notes_of
+from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.inference.groupings import group_offsets
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
@@ -101,6 +102,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         lots=lots,
         operators=tuple(_operators(found)),
         gauge_rr=gauge(draws, _largest(found.case), found.force_tolerance),
+        over_time=tuple(map(time_answer, time_series(found))),
         misfit=found.misfit,
         next_gear=FutureGear(
             credible_interval(found.next_stiffness),
@@ -165,14 +167,19 @@ def fleet_report(
     """
 
     def figures():
-        from hdcal.fleets.figure import fleet_figure
+        from hdcal.fleets.figure import fleet_figure, time_figure
 
-        return {"gears": fleet_figure(found)}
+        series = time_series(found)
+        drawn = {"time": time_figure(series)} if series else {}
+        return {"gears": fleet_figure(found)} | drawn
 
     def charts():
         from hdcal.fleets.chart import fleet_chart
+        from hdcal.fleets.time_chart import time_charts
 
-        return {} if found.reasons else {"gears": [fleet_chart(found)]}
+        series = time_series(found)
+        drawn = {"time": time_charts(series)} if series else {}
+        return {} if found.reasons else {"gears": [fleet_chart(found)]} | drawn
 
     answer, columns = fleet_answer(found, force), gear_columns(found)
     document = fleet_document(found, answer, columns, command)

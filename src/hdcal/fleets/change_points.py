@@ -1,0 +1,236 @@
+"""Whether values taken on dates change: not, by steps, steadily, or from day to day.
+
+Each of the four has its evidence in closed form, given by how much values of one level
+scatter, which is integrated over a grid. Levels are told, before the data, in this
+scatter. Steps are those of a product partition: any date may begin a new level.
+
+Source:
+    Barry and Hartigan, Annals of Statistics 20 (1992), product partitions; Fearnhead,
+    Statistics and Computing 16 (2006), their recursions.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+from scipy.special import logsumexp, softmax
+
+# Prior probability of each way.
+WAYS = {"none": 1 / 2, "steps": 1 / 6, "drift": 1 / 6, "days": 1 / 6}
+# Levels lie about the middle, before the data, by so many scatters of values, and the
+# ends of a drift twice as far apart.
+_LEVELS = 1.5
+# Scatters that are tried, in the sd of all values.
+_GRID = np.geomspace(0.2, 1.6, 25)
+# Steps that are expected before the data.
+_EXPECTED = 1.0
+# Probability of intervals.
+_SURE = 0.95
+
+
+@dataclass(frozen=True)
+class LevelStep:
+    """A change of the level.
+
+    Attributes:
+        before: index of the last date that lies before it, with 97.5 %.
+        after: index of the first date that lies after it, likewise.
+        size: median, lower and upper end of its 95 % interval.
+    """
+
+    before: int
+    after: int
+    size: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What is known of changes.
+
+    Attributes:
+        ways: probability of each of `WAYS`.
+        steps: the likeliest ones, if there are steps.
+        drift: from the first date to the last, if it is steady: median, lower and upper
+            end of its 95 % interval.
+        days_sd: by which dates differ, if each has a level of its own.
+    """
+
+    ways: dict[str, float]
+    steps: tuple[LevelStep, ...]
+    drift: tuple[float, float, float]
+    days_sd: float
+
+
+@dataclass(frozen=True)
+class _Sums:
+    """Values by date, one row for each scatter that is tried.
+
+    Attributes:
+        weight: Σ 1/(τ² + v), cumulated from nought; [scatter, date + 1].
+        first: Σ e/(τ² + v) likewise.
+        second: Σ e²/(τ² + v) + log(τ² + v) likewise.
+        level: variance of levels before the data; [scatter, 1].
+    """
+
+    weight: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    level: np.ndarray
+
+    def segment(self, start, stop) -> np.ndarray:
+        """Return the log evidence of one level from dates on, before others."""
+        mean, variance = self.posterior(start, stop)
+        second = self.second[:, stop] - self.second[:, start]
+        return 0.5 * (mean**2 / variance + np.log(variance / self.level) - second)
+
+    def posterior(self, start, stop) -> tuple[np.ndarray, np.ndarray]:
+        """Return mean and variance of such levels."""
+        weight = self.weight[:, stop] - self.weight[:, start]
+        variance = self.level / (1.0 + self.level * weight)
+        return variance * (self.first[:, stop] - self.first[:, start]), variance
+
+
+def changes(
+    day: np.ndarray, value: np.ndarray, variance: np.ndarray, time: np.ndarray
+) -> Changes:
+    """Say of values whether, how and when they change.
+
+    Args:
+        day: index of each value's date, in the order of dates, shape (n,).
+        value: shape (n,).
+        variance: of each value's error, shape (n,).
+        time: of each date, ascending, shape (d,), two or more.
+    """
+    # One wild value moves neither the middle nor the grid.
+    value = value - np.median(value)
+    sums = _sums(day, value, variance)
+    ends = np.arange(len(time) + 1)
+    none = sums.segment([0], [len(time)])[:, 0]
+    days = sums.segment(ends[:-1], ends[1:]).sum(axis=1)
+    steps, begins = _partitions(sums, none)
+    place = (time - time[0]) / (time[-1] - time[0]) - 0.5
+    drift, slope, slope_variance = _line(sums, place)
+    evidence = np.stack([none, steps, drift, days])
+    prior = np.log([*WAYS.values()])
+    ways = softmax(logsumexp(evidence, axis=1) + prior)
+    of_steps, of_drift, of_days = softmax(evidence, axis=1)[1:]
+    levels = sums.posterior(ends[:-1], ends[1:])[0]
+    return Changes(
+        ways=dict(zip(WAYS, ways.tolist(), strict=True)),
+        steps=tuple(_steps(sums, of_steps, of_steps @ begins)),
+        drift=_interval(of_drift, slope, slope_variance),
+        days_sd=float(np.sqrt(of_days @ levels.var(axis=1, ddof=1))),
+    )
+
+
+def middle_sd(value: np.ndarray) -> float:
+    """Return the sd of a normal law by its median absolute deviation from nought."""
+    return float(np.median(np.abs(value)) / stats.norm.ppf(0.75))
+
+
+def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
+    spread = middle_sd(value) or np.std(value)
+    scatter = _GRID[:, None] * max(float(spread), np.finfo(float).tiny ** 0.25)
+    total = scatter**2 + variance
+    parts = 1.0 / total, value / total, value**2 / total + np.log(total)
+    dates = int(day.max()) + 1
+    weight, first, second = (
+        np.cumsum([[0.0, *np.bincount(day, row, dates)] for row in part], axis=1)
+        for part in parts
+    )
+    return _Sums(weight, first, second, (_LEVELS * scatter) ** 2)
+
+
+def _partitions(sums: _Sums, none: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the log evidence of steps, one or more, and where a level begins.
+
+    Returns:
+        Shape (scatter,), and of each date the probability, shape (scatter, date).
+    """
+    scatters, dates = len(none), sums.weight.shape[1] - 1
+    begin = min(_EXPECTED / (dates - 1), 0.5)
+    go_on, anew = np.log1p(-begin), np.log(begin)
+    forward, backward = np.zeros((2, scatters, dates + 1))
+    for stop in range(1, dates + 1):
+        start = np.arange(stop)
+        prior = (stop - start - 1) * go_on + np.where(start > 0, anew, 0.0)
+        each = forward[:, :stop] + sums.segment(start, [stop]) + prior
+        forward[:, stop] = logsumexp(each, axis=1)
+    for start in range(dates - 1, 0, -1):
+        stop = np.arange(start + 1, dates + 1)
+        prior = (stop - start - 1) * go_on + np.where(stop < dates, anew, 0.0)
+        each = backward[:, stop] + sums.segment([start], stop) + prior
+        backward[:, start] = logsumexp(each, axis=1)
+    # Partitions of one level are none of steps, in the data and before them.
+    alone = none + (dates - 1) * go_on
+    whole = forward[:, -1]
+    steps = whole + np.log(-np.expm1(np.minimum(alone - whole, -1e-12)))
+    begins = forward[:, :-1] + anew + backward[:, :-1] - steps[:, None]
+    begins = np.exp(np.minimum(begins, 0.0))
+    begins[:, 0] = 0.0
+    return steps - np.log(-np.expm1((dates - 1) * go_on)), begins
+
+
+def _line(sums: _Sums, place: np.ndarray):
+    """Return the log evidence of a straight line, its slope and that one's variance."""
+    weight, first = np.diff(sums.weight), np.diff(sums.first)
+    level = sums.level[:, 0]
+    steep = 4.0 * level
+    a = weight.sum(axis=1) + 1.0 / level
+    b = weight @ place
+    c = weight @ place**2 + 1.0 / steep
+    determinant = a * c - b**2
+    p, q = first.sum(axis=1), first @ place
+    square = (c * p**2 - 2.0 * b * p * q + a * q**2) / determinant
+    evidence = 0.5 * (square - np.log(determinant * level * steep) - sums.second[:, -1])
+    return evidence, (a * q - b * p) / determinant, a / determinant
+
+
+def _steps(sums: _Sums, share: np.ndarray, begins: np.ndarray) -> Iterator[LevelStep]:
+    """Yield the likeliest steps, each where and how large given where the others are.
+
+    Args:
+        sums: of the values.
+        share: probability of each scatter.
+        begins: that a level begins at each date, shape (date,).
+    """
+    found = _likeliest(sums, int(np.argmax(share))) or [int(np.argmax(begins))]
+    ends = [0, *found, len(begins)]
+    for start, stop in zip(ends, ends[2:], strict=False):
+        place = np.arange(start + 1, stop)
+        likely = sums.segment([start], place) + sums.segment(place, [stop])
+        weight = share[:, None] * softmax(likely, axis=1)
+        within = np.cumsum(weight.sum(axis=0))
+        first, last = np.searchsorted(within, [0.5 - 0.5 * _SURE, 0.5 + 0.5 * _SURE])
+        (old, old_variance), (new, new_variance) = (
+            sums.posterior(*between) for between in (([start], place), (place, [stop]))
+        )
+        size = _interval(weight, new - old, old_variance + new_variance)
+        yield LevelStep(int(place[first]) - 1, int(place[last]), size)
+
+
+def _likeliest(sums: _Sums, scatter: int) -> list[int]:
+    """Return the dates at which levels begin in the likeliest partition."""
+    dates = sums.weight.shape[1] - 1
+    begin = min(_EXPECTED / (dates - 1), 0.5)
+    best, came = np.zeros(dates + 1), np.zeros(dates + 1, int)
+    for stop in range(1, dates + 1):
+        start = np.arange(stop)
+        each = best[:stop] + sums.segment(start, [stop])[scatter]
+        each += np.where(start > 0, np.log(begin / (1.0 - begin)), 0.0)
+        came[stop] = np.argmax(each)
+        best[stop] = each[came[stop]]
+    found, at = [], came[-1]
+    while at > 0:
+        found.insert(0, int(at))
+        at = came[at]
+    return found
+
+
+def _interval(share, mean, variance) -> tuple[float, float, float]:
+    """Return the interval of a mixture of normals by its mean and its variance."""
+    middle = float(np.sum(share * mean))
+    sd = np.sqrt(np.sum(share * (variance + (mean - middle) ** 2)))
+    low, high = stats.norm.interval(_SURE, middle, sd)
+    return middle, float(low), float(high)

@@ -1,0 +1,55 @@
+"""Dates are read as rigs write them, and never guessed."""
+
+import numpy as np
+import pytest
+
+from hdcal.data.cells import NOT_STATED
+from hdcal.data.dates import dates_of
+
+
+@pytest.mark.parametrize(
+    ("written", "read"),
+    [
+        ("2026-09-03", "2026-09-03T00:00:00"),
+        ("2026-09-03T10:20:30", "2026-09-03T10:20:30"),
+        ("2026/09/03", "2026-09-03T00:00:00"),
+        ("03.09.2026", "2026-09-03T00:00:00"),
+        ("03.09.2026 10:20", "2026-09-03T10:20:00"),
+        ("13/09/2026", "2026-09-13T00:00:00"),
+        ("09/13/2026", "2026-09-13T00:00:00"),
+    ],
+)
+def test_a_date_is_read(written, read):
+    assert dates_of([written], np.array([0])) == ((read,), "")
+
+
+def test_a_mounting_has_its_first_date():
+    labels = ["2026-09-03", "2026-09-02", NOT_STATED, NOT_STATED]
+    dates, note = dates_of(labels, np.array([0, 0, 1, 0]))
+    assert dates == ("2026-09-02T00:00:00", "")
+    assert note == ""
+
+
+@pytest.mark.parametrize("labels", [[], [NOT_STATED, NOT_STATED]])
+def test_no_date_is_told_where_none_is_stated(labels):
+    assert dates_of(labels, np.arange(len(labels))) == ((), "")
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        ("03/04/2026", "can be read in two ways"),
+        ("45123", "is none that can be read"),
+        ("yesterday", "is none that can be read"),
+        ("0203-09-01", "is none that can be read"),
+    ],
+)
+def test_what_is_no_date_is_told(written, why):
+    dates, note = dates_of([written], np.array([0]))
+    assert dates == ()
+    assert written in note and why in note
+
+
+def test_other_dates_settle_what_slashes_mean():
+    dates, _ = dates_of(["03/04/2026", "13/04/2026"], np.arange(2))
+    assert dates[0] == "2026-04-03T00:00:00"
