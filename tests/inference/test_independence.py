@@ -126,7 +126,7 @@ def test_a_chain_moves_by_the_ratio_of_weights():
 @pytest.mark.slow
 def test_a_fleet_is_what_nuts_has_it():
     case = hdcal.read_case(datasets_folder() / "fleet-demo")
-    sums = mounting_sums(case)
+    sums = mounting_sums(case, np.ones(30))
     problem, _ = fleet_problem(case, sums)
     whitening = laplace.fit(problem, {"stiffness": 200.0})
     key = jax.random.key(1)

@@ -16,7 +16,9 @@ _EARLIEST, _LATEST = np.datetime64("1950-01-01"), np.datetime64("2100-01-01")
 _REMEDY = "Write 2026-09-01"
 
 
-def dates_of(labels: Sequence[str], of: np.ndarray) -> tuple[tuple[str, ...], str]:
+def dates_of(
+    labels: Sequence[str] | np.ndarray, of: np.ndarray
+) -> tuple[tuple[str, ...], str]:
     """Return the first date of each mounting, as ISO 8601 has it, and a note.
 
     A mounting that states none has an empty one. Nothing is returned where dates cannot

@@ -22,6 +22,7 @@ def fleet_chart(found: Fleet) -> Chart:
         for words, rows, hue in kinds
         if rows.any()
     ]
-    axis = "gears by their stiffness", "stiffness as read [N/mm]"
+    sized = ", at the sizes of the gear file" * bool(np.any(found.size_ratio != 1.0))
+    axis = "gears by their stiffness", f"stiffness as read{sized} [N/mm]"
     names = [found.case.specimen_labels[gear] for gear in order]
     return Chart(*axis, [*curves, *points], [(0, 1, 0.25)], names=names)

@@ -31,6 +31,11 @@ from hdcal.errors import Finding
     type=FORCE,
     help="Width within which the force at the largest deformation may lie [N].",
 )
+@click.option(
+    "--gears",
+    metavar="TABLE",
+    help="Table of the sizes of each gear, where they differ.",
+)
 @seed_option
 @folder_options("Result folder [default: NAME-fleet].")
 @json_option
@@ -43,6 +48,7 @@ def fleet(
     deformation,
     limit_force,
     force_tolerance,
+    gears,
     **given,
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
@@ -63,13 +69,16 @@ def fleet(
         case = read_given(console, **given)
         if case is not None:
             from hdcal.fleets.fleet import check_fleet
+            from hdcal.fleets.gear_table import size_ratios
 
             wrong.attempt(check_fleet, case)
+            if gears is not None:
+                wrong.attempt(size_ratios, gears, case)
             out = f"{case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert case is not None and out is not None
     keep_compilations()
-    asked = {"seed": seed, "force_tolerance": force_tolerance}
+    asked = {"seed": seed, "force_tolerance": force_tolerance, "gears": gears}
     from hdcal.fleets.fleet import fleet as fit_fleet
     from hdcal.fleets.summary import fleet_report
 

@@ -68,12 +68,16 @@ def _off(
     """Yield what is said of the gears that are called off, the surest first."""
     own = {lot.lot: lot.stiffness_N_per_mm.median for lot in lots}
     than = " than its lot" if lots else ""
+    ones = np.ones(len(columns["gear"]))
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
         row = place[name]
         centre = population.stiffness_N_per_mm.median
         centre = own[str(columns["lot"][row])] if lots else centre
-        apart = columns["stiffness_N_per_mm"][row] / centre - 1.0
+        alike = (
+            columns["stiffness_N_per_mm"][row] / columns.get("size_ratio", ones)[row]
+        )
+        apart = alike / centre - 1.0
         word = "softer" if apart < 0.0 else "stiffer"
         sure = percent(columns["probability_off"][row])
         yield f"{name} is {100.0 * abs(apart):.2g} % {word}{than} (probability {sure})"

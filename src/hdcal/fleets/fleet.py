@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import jax
 import numpy as np
@@ -15,6 +16,7 @@ from hdcal.data.records import Array
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.fleets.fleet_problem import fleet_problem
+from hdcal.fleets.gear_table import size_ratios
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.mounting_sums import (
     groups,
@@ -53,7 +55,9 @@ class Fleet(Shown):
             off_share and off_ratio; where they are told lot_sd (relative) and
             operator_sd [N], and how far each lies from the mean of all, lot_1, …
             (relative) and operator_1, … [N].
-        stiffness: of each gear, of as many draws, shape (t, g) [N/mm as read].
+        stiffness: of each gear, of as many draws, had it the gear file's sizes, shape
+            (t, g) [N/mm as read].
+        size_ratio: of each gear, by which its own sizes make it stiffer, shape (g,).
         noise_sd: of each gear, shape (g,) [N].
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
@@ -76,6 +80,7 @@ class Fleet(Shown):
     case: Case
     draws: Mapping[str, np.ndarray]
     stiffness: np.ndarray
+    size_ratio: np.ndarray
     noise_sd: np.ndarray
     zero: np.ndarray
     distance: np.ndarray
@@ -128,6 +133,7 @@ def fleet(
     draws: int = 800,
     seed: int = 0,
     force_tolerance: float | None = None,
+    gears: Any = None,
     progress: Progress | None = None,
 ) -> Fleet:
     """Say of many gears how stiff each one is, and which ones are off.
@@ -144,6 +150,8 @@ def fleet(
         draws: draws kept per chain.
         seed: of all random numbers; the same seed gives the same answer.
         force_tolerance: width that the force at the largest deformation may lie in [N].
+        gears: table of the sizes of each gear, where they differ: a file or a table in
+            memory with a column specimen and columns such as wall_thickness_mm.
         progress: called with (iterations done, iterations in all).
 
     Raises:
@@ -156,26 +164,30 @@ def fleet(
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
     check_fleet(case)
+    ones = np.ones(len(case.specimen_labels))
+    ratio = ones if gears is None else size_ratios(gears, case)
     bound_executables()
-    sums = mounting_sums(case)
+    sums = mounting_sums(case, ratio)
     problem, unit = fleet_problem(case, sums)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = float(np.sum(sums.xy) / np.sum(sums.xx))
     found = sample_population(problem, start, of_draws, progress=progress, **size)
-    gears = _gears(problem, sums, found.values, of_gears)
+    each = _gears(problem, sums, found.values, of_gears)
+    median = ratio * np.median(each["stiffness"], axis=0)
     return Fleet(
         case=case,
         draws=found.values,
-        **gears,
-        called=called_off(gears["chance"]),
+        **each,
+        size_ratio=ratio,
+        called=called_off(each["chance"]),
         next_stiffness=next_gear(found.values, np.random.default_rng(seed)),
         unit=unit,
         lots=groups(case.lots)[0],
         operators=groups(case.operators)[0],
         rows=np.bincount(sums.gear, sums.rows).astype(int),
         mountings=np.bincount(sums.gear),
-        misfit=misfit(case, np.median(gears["stiffness"], axis=0), gears["noise_sd"]),
+        misfit=misfit(case, median, each["noise_sd"]),
         force_tolerance=force_tolerance,
         checks=found.checks,
         settings={

@@ -62,13 +62,20 @@ def mountings(case: Case) -> tuple[np.ndarray, np.ndarray]:
     return pairs, of_row.ravel()
 
 
-def mounting_sums(case: Case) -> MountingSums:
-    """Return the sums of a case, one entry for each gear in each mounting."""
+def mounting_sums(case: Case, ratio: np.ndarray) -> MountingSums:
+    """Return the sums of a case, one entry for each gear in each mounting.
+
+    Args:
+        case: the readings.
+        ratio: stiffness of each gear's sizes over that of the gear file's, by which
+            deformations count, so that all gears are of one size; shape (g,).
+    """
     records, gear = case.records, case.gear
     pairs, of_row = mountings(case)
     warm = np.asarray(records.temperature) - gear.reference_temperature
     loss, _ = moments(gear.priors["alpha"])
     x = np.asarray(records.deformation) * (1.0 - loss * warm)
+    x = x * ratio[np.asarray(records.specimen)]
     y = np.asarray(records.force)
     rows = np.bincount(of_row).astype(float)
     mean_x, mean_y = (np.bincount(of_row, v) / rows for v in (x, y))

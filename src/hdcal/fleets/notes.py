@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from hdcal.data.cells import NOT_STATED
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.misfit import misfit_words
@@ -16,6 +18,10 @@ ONE_MOUNTING = (
     "alone, and what a mounting does to the slope counts as of the gear."
 )
 
+OF_SIZES = (
+    "Gears are of several sizes: what is told of the population, of gears to come and "
+    "of forces is of a gear of the gear file's sizes."
+)
 FEW_GEARS = (
     "So few gears say little of how much ordinary ones scatter: only a gear very far "
     "out can be called off. Ten tell clearly more."
@@ -33,10 +39,11 @@ def notes_of(found: Fleet) -> Sequence[str]:
         if 0 < len(names) < _FEW_GROUPS
     ]
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
+    sized = [OF_SIZES] if np.any(found.size_ratio != 1.0) else []
     few = [FEW_GEARS] if len(found.off) < FEW else []
     beside = misfit_words(found.misfit)
     untold = [*_untold(found)]
-    return [*beside, *found.case.notes, RESTS_ON, *few, *scarce, *untold, *once]
+    return [*beside, *found.case.notes, RESTS_ON, *sized, *few, *scarce, *untold, *once]
 
 
 def _untold(found: Fleet) -> Iterator[str]:

@@ -162,7 +162,7 @@ def _wild(value: np.ndarray) -> np.ndarray:
 
 def _measured(found: Fleet):
     """Yield what goes with the date: what, unit, gear, date, name, value and sd."""
-    case, sums = found.case, mounting_sums(found.case)
+    case, sums = found.case, mounting_sums(found.case, found.size_ratio)
     gears, runs = mountings(case)[0]
     dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")[runs]
     # A gear has the date of the first of its mountings that has one.

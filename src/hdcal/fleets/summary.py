@@ -34,7 +34,9 @@ _ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
 
 def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     """Return what is known of each gear, the columns of gears.csv."""
-    low, middle, high = np.quantile(found.stiffness, _ENDS, axis=0)
+    own = found.stiffness * found.size_ratio
+    low, middle, high = np.quantile(own, _ENDS, axis=0)
+    sized = np.any(found.size_ratio != 1.0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
         **({"lot": np.array(found.case.lots)} if found.lots else {}),
@@ -43,6 +45,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "stiffness_N_per_mm": middle,
         "stiffness_lo": low,
         "stiffness_hi": high,
+        **({"size_ratio": found.size_ratio} if sized else {}),
     }
     if found.case.gear.theory != SPRING:
         K_low, K, K_high = np.quantile(_influence(found), _ENDS, axis=0)

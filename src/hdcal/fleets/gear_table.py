@@ -1,0 +1,131 @@
+"""Gears of several sizes: a table beside the readings that states those of each one."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.cells import CellError, read_number
+from hdcal.data.csv_table import CsvTable, split_table
+from hdcal.data.findings import FileFindings
+from hdcal.data.frames import frame_text, is_frame
+from hdcal.data.gear_schema import size_faults
+from hdcal.data.header_words import guess_header
+from hdcal.data.plausible import implausible
+from hdcal.data.text_file import read_text
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import quoted
+from hdcal.physics.theory import THEORIES
+
+# Sizes that a table may state, as a gear file calls them.
+SIZES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")
+NAME = "the table of gears"
+_FIRST_FEW = 3
+
+
+def size_ratios(source: Any, case: Case) -> np.ndarray:
+    """Return the stiffness at K = 1 of each gear over that of the gear file's sizes.
+
+    A size that the table does not have is that of the gear file.
+
+    Args:
+        source: a CSV file or a workbook, or a table in memory, with a column that names
+            the gear, and columns called as `SIZES`.
+        case: the readings, which name their gears.
+
+    Raises:
+        InputError: holds everything that is wrong with the table.
+
+    Returns:
+        Shape (g,).
+    """
+    in_memory = is_frame(source)
+    with FileFindings(NAME if in_memory else str(source)) as findings:
+        if case.gear.theory == SPRING:
+            words = "its sizes say nothing of the stiffness, as no gear file has sizes"
+            findings.refuse(words, "Name one, as `gear` FILE.toml")
+        text = (
+            frame_text(source, findings)
+            if in_memory
+            else read_text(Path(source), findings)
+        )
+        table = split_table(text[0], findings)
+        sizes = _sizes(table, findings)
+        rows = _rows(table, case, findings)
+        base = case.gear.geometry
+        stated = {name: column[rows] for name, column in sizes.items()}
+        if "length" in stated and "load_height" not in stated:
+            told = "load_height_mm" in case.gear.source.get("gear", {})
+            stated |= {} if told else {"load_height": stated["length"]}
+    stiffness = THEORIES[case.gear.theory]
+    own = np.asarray(stiffness(replace(base, **stated), 1.0))
+    ratio = own / np.asarray(stiffness(base, 1.0))
+    return np.broadcast_to(ratio, len(case.specimen_labels)).copy()
+
+
+def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
+    """Return the sizes of each row [mm], by their names in a geometry."""
+    places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
+    if not places:
+        words = "it states no sizes"
+        findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
+    found = {}
+    for header, place in places.items():
+        cells = table.texts([place])[place]
+        comma = table.separator != "," and any("," in cell for cell in cells)
+        column = np.full(len(cells), np.nan)
+        for index, cell in enumerate(cells):
+            row = int(table.rows[index])
+            try:
+                column[index] = read_number(cell, comma)
+            except CellError as error:
+                problem, remedy = error.args
+                findings.add(problem, remedy, row, header)
+                continue
+            for wrong in implausible(header, column[index], "size"):
+                findings.add(wrong.problem, wrong.remedy, row, header)
+        found[header.removesuffix("_mm")] = column
+    findings.add_rows(_at_odds(table, found), kind="rows of such sizes")
+    return found
+
+
+def _at_odds(
+    table: CsvTable, sizes: Mapping[str, np.ndarray]
+) -> Iterator[tuple[int, str, str]]:
+    """Yield rows whose sizes cannot be beside each other."""
+    for index, row in enumerate(table.rows):
+        one = {name: float(column[index]) for name, column in sizes.items()}
+        for name, words, remedy in size_faults(one):
+            yield int(row), f"{name}_mm: {words}", remedy
+
+
+def _rows(table: CsvTable, case: Case, findings: FileFindings) -> list[int]:
+    """Return the row of each gear."""
+    known = case.columns.get("specimen")
+    places = [
+        place
+        for place, header in enumerate(table.headers)
+        if header == known
+        or (
+            (guess := guess_header(header)) is not None and guess.quantity == "specimen"
+        )
+    ]
+    if len(places) != 1:
+        words = "it does not say which gear a row is of"
+        findings.refuse(words, f"Name one column {known or 'specimen'}")
+    found: dict[str, int] = {}
+    for index, label in enumerate(table.texts(places)[places[0]]):
+        if label in found:
+            words = f"gear {quoted(label)} has a row already"
+            findings.add(words, "Keep the one that is right", int(table.rows[index]))
+        found.setdefault(label, index)
+    gears = case.specimen_labels
+    missing = [label for label in gears if label not in found]
+    for label in missing[:_FIRST_FEW]:
+        findings.add(f"gear {quoted(label)} has no row", "Add its sizes")
+    if more := len(missing[_FIRST_FEW:]):
+        findings.add(f"and {more} more gears have none", "Add theirs too")
+    return [found.get(label, 0) for label in gears]
