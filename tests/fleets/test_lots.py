@@ -50,7 +50,8 @@ def test_a_gear_that_is_off_is_off_from_its_lot():
     case = replace(found.case, lots=("low", "low", "high", "high"))
     draws = dict(found.draws) | {"lot_sd": np.full(50, 0.1), "lot_ratio": np.ones(50)}
     draws |= {"lot_1": np.full(50, 0.1), "lot_2": np.full(50, -0.1)}
-    lots = replace(found, case=case, draws=draws, lots=["high", "low"])
+    readings = replace(found.readings, case=case)
+    lots = replace(found, readings=readings, draws=draws, lots=["high", "low"])
     said = fleet_answer(lots).headline
     # 180 of a lot of 220 N/mm.
     assert "D is 18 % softer than its lot" in said
@@ -59,7 +60,8 @@ def test_a_gear_that_is_off_is_off_from_its_lot():
 
 def test_lots_that_are_not_told_apart_are_spoken_of():
     found = handmade()
-    many = replace(found, case=replace(found.case, lots=tuple("ABCD")))
+    case = replace(found.case, lots=tuple("ABCD"))
+    many = replace(found, readings=replace(found.readings, case=case))
     assert any("4 lots are too many" in note for note in fleet_answer(many).notes)
     assert not any("lots" in note for note in fleet_answer(found).notes)
 

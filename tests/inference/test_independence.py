@@ -11,7 +11,7 @@ import hdcal
 from hdcal.data.prior import Prior
 from hdcal.data.resources import datasets_folder
 from hdcal.fleets.fleet_problem import fleet_problem
-from hdcal.fleets.mounting_sums import mounting_sums
+from hdcal.fleets.readings import fleet_readings
 from hdcal.inference import independence, laplace
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.independence import sample_independently
@@ -126,8 +126,7 @@ def test_a_chain_moves_by_the_ratio_of_weights():
 @pytest.mark.slow
 def test_a_fleet_is_what_nuts_has_it():
     case = hdcal.read_case(datasets_folder() / "fleet-demo")
-    sums = mounting_sums(case, np.ones(30))
-    problem, _ = fleet_problem(case, sums)
+    problem, _ = fleet_problem(fleet_readings(case))
     whitening = laplace.fit(problem, {"stiffness": 200.0})
     key = jax.random.key(1)
     fast = sample_independently(problem, whitening, key, chains=4, draws=3000)

@@ -8,6 +8,7 @@ from rigs import make_gear
 from hdcal.data.reading import read_case
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.misfit import Misfit
+from hdcal.fleets.readings import fleet_readings
 from hdcal.inference.checks import Check
 
 
@@ -29,7 +30,7 @@ def handmade() -> Fleet:
         "off_ratio": rng.uniform(4.0, 8.0, 50),
     }
     return Fleet(
-        case=replace(case, gear=make_gear()),
+        readings=fleet_readings(replace(case, gear=make_gear())),
         draws=draws,
         stiffness=truth + rng.normal(0.0, 0.3, (40, 4)),
         size_ratio=np.ones(4),
@@ -41,8 +42,6 @@ def handmade() -> Fleet:
         called=np.array([False, False, False, True]),
         next_stiffness=rng.normal(200.0, 2.0, 50),
         unit=80.0,
-        rows=np.full(4, 5),
-        mountings=np.ones(4, int),
         misfit=Misfit(0.0, 0.0, 0.0),
         lots=[],
         operators=[],

@@ -66,24 +66,26 @@ def fleet(
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
-        case = read_given(console, **given)
+        readings, case = None, read_given(console, **given)
         if case is not None:
             from hdcal.fleets.fleet import check_fleet
             from hdcal.fleets.gear_table import size_ratios
+            from hdcal.fleets.readings import fleet_readings
 
-            wrong.attempt(check_fleet, case)
+            readings = fleet_readings(case)
+            wrong.attempt(check_fleet, readings)
             if gears is not None:
                 wrong.attempt(size_ratios, gears, case)
             out = f"{case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
-    assert case is not None and out is not None
+    assert readings is not None
     keep_compilations()
     asked = {"seed": seed, "force_tolerance": force_tolerance, "gears": gears}
     from hdcal.fleets.fleet import fleet as fit_fleet
     from hdcal.fleets.summary import fleet_report
 
     with progress_bar() as progress:
-        found = fit_fleet(case, progress=progress, **asked)
+        found = fit_fleet(readings, progress=progress, **asked)
     needed = None
     if deformation is not None and not found.reasons:
         needed = found.next_force(deformation, limit_force)

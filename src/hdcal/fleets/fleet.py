@@ -17,17 +17,14 @@ from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.fleets.fleet_problem import fleet_problem
 from hdcal.fleets.gear_table import size_ratios
+from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
-from hdcal.fleets.mounting_sums import (
-    groups,
-    mounting_sums,
-)
 from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
+from hdcal.fleets.readings import FleetReadings, fleet_readings
 from hdcal.fleets.sampling import sample_population
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
-from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.population_problem import (
     PopulationProblem,
     draw_gears,
@@ -38,6 +35,8 @@ from hdcal.notebook import Shown
 
 # Fewer gears say next to nothing of how much gears differ.
 FEWEST = 3
+# Share of squares that rounding alone leaves of a deformation that stays.
+_STILL = 1e-24
 # Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05
 # Draws of the population for which every gear is drawn too.
@@ -49,7 +48,7 @@ class Fleet(Shown):
     """What is known of gears that were measured alike.
 
     Attributes:
-        case: their readings.
+        readings: of all of them, at the sizes of the gear file.
         draws: of the population by site, shape (d,): stiffness [N/mm as read],
             specimen_sd (relative), zero and run_offset_sd [N], sigma [N], noise_spread,
             off_share and off_ratio; where they are told lot_sd (relative) and
@@ -69,15 +68,13 @@ class Fleet(Shown):
         lots: their names, in the order of lot_1, … of the draws; empty where none are
             told apart.
         operators: likewise of operator_1, ….
-        rows: of each gear, shape (g,).
-        mountings: of each gear, shape (g,).
         misfit: what the readings have beside straight lines.
         force_tolerance: width that a force may lie in [N]; None where none is stated.
         checks: of the sampler.
         settings: of the run.
     """
 
-    case: Case
+    readings: FleetReadings
     draws: Mapping[str, np.ndarray]
     stiffness: np.ndarray
     size_ratio: np.ndarray
@@ -91,12 +88,26 @@ class Fleet(Shown):
     unit: float
     lots: Sequence[str]
     operators: Sequence[str]
-    rows: np.ndarray
-    mountings: np.ndarray
     misfit: Misfit
     force_tolerance: float | None
     checks: tuple[Check, ...]
     settings: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def case(self) -> Case:
+        """Their gears, runs and notes."""
+        return self.readings.case
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Readings of each gear, shape (g,)."""
+        sums = self.readings.sums
+        return np.bincount(sums.gear, sums.rows).astype(int)
+
+    @property
+    def mountings(self) -> np.ndarray:
+        """Mountings of each gear, shape (g,)."""
+        return np.bincount(self.readings.sums.gear)
 
     def next_force(
         self, deformation: float, limit_force: float | None = None
@@ -126,7 +137,7 @@ class Fleet(Shown):
 
 
 def fleet(
-    case: Case,
+    case: Case | FleetReadings,
     *,
     chains: int = 4,
     warmup: int = 500,
@@ -143,7 +154,8 @@ def fleet(
     population, most as ordinary ones, some farther.
 
     Args:
-        case: from `read_case`, whose rows name their specimen.
+        case: from `read_case`, whose rows name their specimen; or what `read_fleet`
+            has read, of very many gears.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain, where NUTS draws: independent
             proposals, which are tried first, need none.
@@ -159,35 +171,37 @@ def fleet(
             scatters about its line.
     """
     began = time.perf_counter()
-    require_case(case)
+    if not isinstance(case, FleetReadings):
+        require_case(case)
+        case = fleet_readings(case)
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
     check_fleet(case)
-    ones = np.ones(len(case.specimen_labels))
-    ratio = ones if gears is None else size_ratios(gears, case)
+    ratio = np.ones(len(case.case.specimen_labels))
+    if gears is not None:
+        ratio = size_ratios(gears, case.case)
     bound_executables()
-    sums = mounting_sums(case, ratio)
-    problem, unit = fleet_problem(case, sums)
+    readings = case.at_one_size(ratio)
+    sums = readings.sums
+    problem, unit = fleet_problem(readings)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = float(np.sum(sums.xy) / np.sum(sums.xx))
     found = sample_population(problem, start, of_draws, progress=progress, **size)
-    each = _gears(problem, sums, found.values, of_gears)
+    each = _gears(problem, readings, found.values, of_gears)
     median = ratio * np.median(each["stiffness"], axis=0)
     return Fleet(
-        case=case,
+        readings=readings,
         draws=found.values,
         **each,
         size_ratio=ratio,
         called=called_off(each["chance"]),
         next_stiffness=next_gear(found.values, np.random.default_rng(seed)),
         unit=unit,
-        lots=groups(case.lots)[0],
-        operators=groups(case.operators)[0],
-        rows=np.bincount(sums.gear, sums.rows).astype(int),
-        mountings=np.bincount(sums.gear),
-        misfit=misfit(case, median, each["noise_sd"]),
+        lots=groups(readings.case.lots)[0],
+        operators=groups(readings.case.operators)[0],
+        misfit=misfit(readings.case, median, each["noise_sd"]),
         force_tolerance=force_tolerance,
         checks=found.checks,
         settings={
@@ -201,7 +215,7 @@ def fleet(
 
 def _gears(
     problem: PopulationProblem,
-    sums: MountingSums,
+    readings: FleetReadings,
     draws: Mapping[str, np.ndarray],
     key: Key[Array, ""],
 ) -> dict[str, np.ndarray]:
@@ -212,6 +226,7 @@ def _gears(
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
     centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
     apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
+    sums = readings.sums
     zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
     return {
         "stiffness": stiffness,
@@ -240,30 +255,29 @@ def called_off(chance: np.ndarray) -> np.ndarray:
     return false_discovery_control(chance) <= FALSE_CALLS
 
 
-def check_fleet(case: Case) -> None:
+def check_fleet(readings: FleetReadings) -> None:
     """Refuse what no population can be told of.
 
     Raises:
         InputError: holds a finding for each gear.
     """
-    records, gears = case.records, case.specimen_labels
+    case, sums = readings.case, readings.sums
+    gears = case.specimen_labels
     if len(gears) < FEWEST:
         many = f"{len(gears)} gears" if len(gears) > 1 else "1 gear"
         words = f"{many}: how much gears differ takes {FEWEST} or more"
         remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
         raise InputError([Finding(case.name, words, remedy)])
-    index, run = np.asarray(records.specimen), np.asarray(records.run)
-    x = np.asarray(records.deformation)
     # A run has a zero of its own: only what it was moved by says how stiff a gear is.
-    first = x[np.unique(run, return_index=True)[1]][run]
+    moved = np.bincount(sums.gear, sums.xx)
+    still = moved <= _STILL * np.bincount(sums.gear, sums.rows * sums.x**2)
     findings = [
         Finding(
             case.name,
-            f"gear '{label}' was read at one deformation only in each of its runs",
+            f"gear '{gears[one]}' was read at one deformation only in each of its runs",
             "Read it at two or more in one run, or leave it out",
         )
-        for one, label in enumerate(gears)
-        if np.all((x == first)[index == one])
+        for one in np.flatnonzero(still)
     ]
     if findings:
         raise InputError(findings)

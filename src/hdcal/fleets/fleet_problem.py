@@ -6,8 +6,9 @@ from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step
 from hdcal.evidence.prepare import moments, stiffness_prior
-from hdcal.fleets.mounting_sums import groups, lot_grouping, operator_grouping
-from hdcal.inference.gear_sums import MountingSums, gear_sums
+from hdcal.fleets.groups import groups, lot_grouping, operator_grouping
+from hdcal.fleets.readings import FleetReadings
+from hdcal.inference.gear_sums import gear_sums
 from hdcal.inference.population_problem import (
     GROUP_RATIO,
     POPULATION_PRIORS,
@@ -16,8 +17,9 @@ from hdcal.inference.population_problem import (
 from hdcal.inference.problem import problem_priors
 
 
-def fleet_problem(case: Case, sums: MountingSums) -> tuple[PopulationProblem, float]:
+def fleet_problem(readings: FleetReadings) -> tuple[PopulationProblem, float]:
     """Return the problem, and the stiffness at K = 1 [N/mm as read]."""
+    case, sums = readings.case, readings.sums
     lots, lot = groups(case.lots)
     lot = lot if lots else np.zeros(len(case.specimen_labels), int)
     told = {"lot": lot_grouping(sums, lot)} if lots else {}

@@ -8,7 +8,7 @@ import numpy as np
 
 from hdcal.fleets.change_points import Changes, changes, middle_sd
 from hdcal.fleets.fleet import Fleet
-from hdcal.fleets.mounting_sums import groups, mounting_sums, mountings
+from hdcal.fleets.groups import groups
 from hdcal.inference.groupings import group_offsets
 from hdcal.report.answer import Count, Probability, Promise, Real, Words
 from hdcal.report.parameters import Interval
@@ -162,8 +162,8 @@ def _wild(value: np.ndarray) -> np.ndarray:
 
 def _measured(found: Fleet):
     """Yield what goes with the date: what, unit, gear, date, name, value and sd."""
-    case, sums = found.case, mounting_sums(found.case, found.size_ratio)
-    gears, runs = mountings(case)[0]
+    case, sums, runs = found.case, found.readings.sums, found.readings.runs
+    gears = np.asarray(sums.gear)
     dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")[runs]
     # A gear has the date of the first of its mountings that has one.
     of_gear = np.full(len(found.off), np.datetime64("NaT", "s"))

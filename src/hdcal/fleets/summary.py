@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
 from hdcal.evidence.prepare import moments
@@ -104,7 +103,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         population=population,
         lots=lots,
         operators=tuple(_operators(found)),
-        gauge_rr=gauge(draws, _largest(found.case), found.force_tolerance),
+        gauge_rr=gauge(draws, found.readings.largest, found.force_tolerance),
         over_time=tuple(map(time_answer, time_series(found))),
         misfit=found.misfit,
         next_gear=FutureGear(
@@ -143,12 +142,6 @@ def _operators(found: Fleet) -> Iterator[OperatorAnswer]:
     for name, one in zip(found.operators, zeros, strict=True):
         many = found.case.operators.count(name)
         yield OperatorAnswer(name, many, credible_interval(one))
-
-
-def _largest(case: Case) -> float:
-    """Return the largest deformation that was read, with its sign [mm]."""
-    read = np.asarray(case.records.deformation)
-    return float(read[np.argmax(np.abs(read))])
 
 
 def _next_step(called: Sequence[str]) -> str | None:

@@ -1,0 +1,72 @@
+"""From readings to what each mounting says: seven sums, whatever the number of rows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.evidence.prepare import moments
+from hdcal.fleets.groups import groups
+from hdcal.inference.gear_sums import MountingSums
+
+
+@dataclass(frozen=True)
+class FleetReadings:
+    """What was measured on a fleet.
+
+    Attributes:
+        case: its gears, runs and notes; the records are all readings, or those of the
+            first gears where there are very many.
+        sums: of each gear in each mounting.
+        runs: index of each mounting's run, shape (m,).
+        largest: deformation, with its sign [mm as read].
+    """
+
+    case: Case
+    sums: MountingSums
+    runs: np.ndarray
+    largest: float
+
+    def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
+        """Return the sums as if all gears had the gear file's sizes.
+
+        Args:
+            ratio: stiffness of each gear's sizes over that of these, by which its
+                deformations count; shape (g,).
+        """
+        one, r = self.sums, ratio[self.sums.gear]
+        sized = {"x": r * one.x, "xx": r**2 * one.xx, "xy": r * one.xy}
+        return replace(self, sums=replace(one, **sized))
+
+
+def fleet_readings(case: Case) -> FleetReadings:
+    """Return what the readings of a case come to."""
+    records, gear = case.records, case.gear
+    labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
+    (of_gear, runs), of_row = np.unique(labels, axis=1, return_inverse=True)
+    read = np.asarray(records.deformation)
+    warm = np.asarray(records.temperature) - gear.reference_temperature
+    loss, _ = moments(gear.priors["alpha"])
+    x, y = read * (1.0 - loss * warm), np.asarray(records.force)
+    operator = groups(case.operators)[1]
+    by = operator[runs] if len(operator) else np.zeros(len(runs), int)
+    sums = MountingSums(of_gear, *row_sums(of_row.ravel(), x, y), by)
+    return FleetReadings(case, sums, runs, float(read[np.argmax(np.abs(read))]))
+
+
+def row_sums(
+    of_row: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return number, means and sums about them of the readings of each mounting.
+
+    Args:
+        of_row: index of its mounting, shape (n,).
+        x: deformation, shape (n,).
+        y: force, shape (n,).
+    """
+    rows = np.bincount(of_row).astype(float)
+    mean_x, mean_y = (np.bincount(of_row, v) / rows for v in (x, y))
+    about_x, about_y = x - mean_x[of_row], y - mean_y[of_row]
+    products = (about_x**2, about_x * about_y, about_y**2)
+    xx, xy, yy = (np.bincount(of_row, each) for each in products)
+    return rows, mean_x, mean_y, xx, xy, yy
