@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from hdcal.data.cells import NOT_STATED, read_cells
+from hdcal.data.cells import read_cells
 from hdcal.data.columns import (
     LABELS,
     QUANTITIES,
@@ -84,35 +84,6 @@ def read_measurements(
         run = _runs(columns.values.get("run"), specimen, rows)
         check_time(columns, run.index)
     return Measurements(columns, run, specimen)
-
-
-def grouping(measured: Measurements, quantity: str) -> tuple[tuple[str, ...], str]:
-    """Return the lot of each specimen, or the operator of each run, and a note.
-
-    Nothing is returned where the file does not tell them or one has several, which the
-    note says.
-
-    Args:
-        measured: the readings.
-        quantity: lot or operator.
-    """
-    labels = measured.columns.values.get(quantity)
-    if labels is None:
-        return (), ""
-    of = measured.specimen if quantity == "lot" else measured.run
-    pairs = pd.DataFrame({"of": of.index, "label": labels}).drop_duplicates()
-    told: dict[int, list[str]] = {}
-    for one, label in zip(pairs["of"].tolist(), pairs["label"].tolist(), strict=True):
-        told.setdefault(one, []).append(label)
-    for one, several in told.items():
-        # A cell that was left empty is filled by the others of its gear or mounting.
-        stated = [label for label in several if label != NOT_STATED] or several
-        if len(stated) > 1:
-            word = "specimen" if quantity == "lot" else "run"
-            name = quoted(of.names[one])
-            return (), f"{quantity}s are not used: {word} {name} has several"
-        told[one] = stated
-    return tuple(told[place][0] for place in range(len(of.names))), ""
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:

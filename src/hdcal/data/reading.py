@@ -10,15 +10,14 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.columns import Columns
-from hdcal.data.dates import dates_of
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.further_labels import further_labels
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
     Measurements,
-    grouping,
     of_specimen,
     read_measurements,
 )
@@ -100,11 +99,8 @@ def read_case(
             wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
-    (lots, of_lots), (operators, of_operators) = (
-        grouping(measured, quantity) for quantity in ("lot", "operator")
-    )
-    dates, of_dates = dates_of(
-        measured.columns.values.get("date", ()), measured.run.index
+    further, of_further = further_labels(
+        measured.columns.values, measured.specimen, measured.run
     )
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
@@ -118,12 +114,10 @@ def read_case(
             *measured.columns.notes,
             *told,
             *reading_notes(measured, found, motion),
-            *filter(None, (of_lots, of_operators, of_dates)),
+            *of_further,
         ),
         columns=measured.columns.as_named(),
-        lots=lots,
-        operators=operators,
-        dates=dates,
+        **further,
     )
 
 

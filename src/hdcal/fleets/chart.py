@@ -6,12 +6,19 @@ from hdcal.fleets.fleet import Fleet
 from hdcal.report.chart import COLOURS, Chart, Series, interval_boxes
 
 _MOST_NAMED = 3
+# More than these a screen does not tell apart.
+MOST_SHOWN = 10_000
 
 
 def fleet_chart(found: Fleet) -> Chart:
     """Return the stiffness of each gear, those called off in a colour of their own."""
     low, middle, high = np.quantile(found.stiffness, [0.025, 0.5, 0.975], axis=0)
     order = np.argsort(middle, kind="stable")
+    if len(order) > MOST_SHOWN:
+        # Those called off, and others from the softest to the stiffest.
+        shown = found.called[order]
+        shown[np.linspace(0, len(order) - 1, MOST_SHOWN).astype(int)] = True
+        order = order[shown]
     place, off = np.arange(1.0, len(order) + 1.0), found.called[order]
     curves = interval_boxes(place, low[order], high[order])
     odd = [found.case.specimen_labels[gear] for gear in order[off]]

@@ -66,17 +66,15 @@ def fleet(
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
-        readings, case = None, read_given(console, **given)
-        if case is not None:
-            from hdcal.fleets.fleet import check_fleet
+        readings = _read(console, given)
+        if readings is not None:
             from hdcal.fleets.gear_table import size_ratios
-            from hdcal.fleets.readings import fleet_readings
+            from hdcal.fleets.readings import check_fleet
 
-            readings = fleet_readings(case)
             wrong.attempt(check_fleet, readings)
             if gears is not None:
-                wrong.attempt(size_ratios, gears, case)
-            out = f"{case.name}-fleet" if out is None else out
+                wrong.attempt(size_ratios, gears, readings.case)
+            out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None
     keep_compilations()
@@ -90,3 +88,17 @@ def fleet(
     if deformation is not None and not found.reasons:
         needed = found.next_force(deformation, limit_force)
     return console.report(fleet_report(found, console.command, needed))
+
+
+def _read(console: Console, given: dict):
+    """Return what was measured; Parquet is read in batches, whatever its size."""
+    from hdcal.data.parquet import is_parquet
+    from hdcal.fleets.read_fleet import read_fleet
+    from hdcal.fleets.readings import fleet_readings
+
+    if is_parquet(given["data"]) and given["columns"] is not None:
+        names = "data", "gear", "columns", "theory", "reading"
+        how = {name: given[name] for name in names}
+        return console.wrong.attempt(lambda: read_fleet(**how))
+    case = read_given(console, **given)
+    return None if case is None else fleet_readings(case)

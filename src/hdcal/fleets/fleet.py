@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -10,18 +11,18 @@ import numpy as np
 from jaxtyping import Key
 from scipy.stats import false_discovery_control
 
-from hdcal.data.case import Case, require_case
+from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
-from hdcal.data.scatter import require_scatter
-from hdcal.errors import Finding, Findings, InputError, NotUsable
-from hdcal.fleets.fleet_problem import fleet_problem
+from hdcal.errors import Findings, NotUsable
+from hdcal.fleets.fleet_problem import fleet_problem, rough_values
 from hdcal.fleets.gear_table import size_ratios
 from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
-from hdcal.fleets.readings import FleetReadings, fleet_readings
+from hdcal.fleets.read_fleet import read_fleet
+from hdcal.fleets.readings import FleetReadings, check_fleet
 from hdcal.fleets.sampling import sample_population
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
@@ -33,14 +34,12 @@ from hdcal.inference.population_problem import (
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 
-# Fewer gears say next to nothing of how much gears differ.
-FEWEST = 3
-# Share of squares that rounding alone leaves of a deformation that stays.
-_STILL = 1e-24
 # Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05
 # Draws of the population for which every gear is drawn too.
 _GEAR_DRAWS = 400
+# Draws of gears at most, whatever their number: they are held in memory.
+_MOST_DRAWN = 20_000_000
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,8 +136,10 @@ class Fleet(Shown):
 
 
 def fleet(
-    case: Case | FleetReadings,
+    data: Any,
+    gear: Path | str | Mapping[str, Any] | None = None,
     *,
+    columns: Mapping[str, str] | None = None,
     chains: int = 4,
     warmup: int = 500,
     draws: int = 800,
@@ -154,8 +155,11 @@ def fleet(
     population, most as ordinary ones, some farther.
 
     Args:
-        case: from `read_case`, whose rows name their specimen; or what `read_fleet`
-            has read, of very many gears.
+        data: a case from `read_case`, whose rows name their specimen; or a file or a
+            table in memory as that takes it; or a Parquet file or a folder of them,
+            partitioned or not, which are read in batches.
+        gear: as in `read_case`, where no case is given.
+        columns: likewise.
         chains: independent chains, two or more.
         warmup: iterations of adaptation per chain, where NUTS draws: independent
             proposals, which are tried first, need none.
@@ -171,23 +175,20 @@ def fleet(
             scatters about its line.
     """
     began = time.perf_counter()
-    if not isinstance(case, FleetReadings):
-        require_case(case)
-        case = fleet_readings(case)
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
-    check_fleet(case)
-    ratio = np.ones(len(case.case.specimen_labels))
+    readings = read_fleet(data, gear, columns=columns)
+    check_fleet(readings)
+    ratio = np.ones(len(readings.case.specimen_labels))
     if gears is not None:
-        ratio = size_ratios(gears, case.case)
+        ratio = size_ratios(gears, readings.case)
     bound_executables()
-    readings = case.at_one_size(ratio)
-    sums = readings.sums
+    readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)
     of_draws, of_gears = jax.random.split(jax.random.key(seed))
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    start = float(np.sum(sums.xy) / np.sum(sums.xx))
+    start = rough_values(problem, readings.sums)
     found = sample_population(problem, start, of_draws, progress=progress, **size)
     each = _gears(problem, readings, found.values, of_gears)
     median = ratio * np.median(each["stiffness"], axis=0)
@@ -220,7 +221,8 @@ def _gears(
     key: Key[Array, ""],
 ) -> dict[str, np.ndarray]:
     """Return what is known of each gear, as `Fleet` has it."""
-    every = -(-len(draws["stiffness"]) // _GEAR_DRAWS)
+    many = min(_GEAR_DRAWS, _MOST_DRAWN // len(problem.sums.lot))
+    every = -(-len(draws["stiffness"]) // many)
     chosen = {name: v[::every] for name, v in draws.items()}
     drawn = draw_gears(problem, chosen, key)
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
@@ -253,32 +255,3 @@ def called_off(chance: np.ndarray) -> np.ndarray:
         Benjamini and Hochberg, Journal of the Royal Statistical Society B 57 (1995).
     """
     return false_discovery_control(chance) <= FALSE_CALLS
-
-
-def check_fleet(readings: FleetReadings) -> None:
-    """Refuse what no population can be told of.
-
-    Raises:
-        InputError: holds a finding for each gear.
-    """
-    case, sums = readings.case, readings.sums
-    gears = case.specimen_labels
-    if len(gears) < FEWEST:
-        many = f"{len(gears)} gears" if len(gears) > 1 else "1 gear"
-        words = f"{many}: how much gears differ takes {FEWEST} or more"
-        remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-        raise InputError([Finding(case.name, words, remedy)])
-    # A run has a zero of its own: only what it was moved by says how stiff a gear is.
-    moved = np.bincount(sums.gear, sums.xx)
-    still = moved <= _STILL * np.bincount(sums.gear, sums.rows * sums.x**2)
-    findings = [
-        Finding(
-            case.name,
-            f"gear '{gears[one]}' was read at one deformation only in each of its runs",
-            "Read it at two or more in one run, or leave it out",
-        )
-        for one in np.flatnonzero(still)
-    ]
-    if findings:
-        raise InputError(findings)
-    require_scatter(case)

@@ -6,9 +6,16 @@ from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step
 from hdcal.evidence.prepare import moments, stiffness_prior
-from hdcal.fleets.groups import groups, lot_grouping, operator_grouping
+from hdcal.fleets.change_points import middle_sd
+from hdcal.fleets.groups import (
+    groups,
+    lot_grouping,
+    operator_grouping,
+    slopes,
+    zeros,
+)
 from hdcal.fleets.readings import FleetReadings
-from hdcal.inference.gear_sums import gear_sums
+from hdcal.inference.gear_sums import MountingSums, gear_sums
 from hdcal.inference.population_problem import (
     GROUP_RATIO,
     POPULATION_PRIORS,
@@ -28,6 +35,36 @@ def fleet_problem(readings: FleetReadings) -> tuple[PopulationProblem, float]:
     priors |= {f"{kind}_ratio": GROUP_RATIO for kind in told}
     problem = PopulationProblem(priors, gear_sums(sums, lot, reading_step(case)), told)
     return problem, unit
+
+
+# Sds from the centre at which few ordinary gears are.
+_FAR = 4.0
+# Scatters below which nothing seems to scatter: of stiffness, and in noise sds.
+_LEAST = 1e-4
+
+
+def rough_values(problem: PopulationProblem, sums: MountingSums) -> dict[str, float]:
+    """Return about where the population is: a search from there is a short one."""
+    slope, zero = slopes(sums), zeros(sums)
+    apart = slope / np.median(slope) - 1.0
+    spread, mounted = middle_sd(apart), middle_sd(zero - np.median(zero))
+    log_noise = problem.sums.log_noise_sd[problem.sums.noise_free > 0.0]
+    noise = float(np.exp(np.median(log_noise))) if len(log_noise) else 0.0
+    values = {
+        "zero": np.median(zero),
+        # With what is believed of it, one in ten, as if of ten more gears.
+        "off_share": (1.0 + np.sum(abs(apart) > _FAR * spread)) / (10.0 + len(slope)),
+    }
+    # A scatter of nought, as of few or of rounded readings, is no place to start from.
+    positive = {
+        "stiffness": (np.median(slope), 0.0),
+        "specimen_sd": (spread, _LEAST),
+        "run_offset_sd": (mounted, _LEAST * noise),
+        "sigma": (noise, 0.0),
+    }
+    values |= {name: sd for name, (sd, least) in positive.items() if sd > least}
+    free = {name for name, prior in problem.priors.items() if prior.family != "fixed"}
+    return {name: float(value) for name, value in values.items() if name in free}
 
 
 def _priors(case: Case) -> tuple[float, dict[str, Prior]]:

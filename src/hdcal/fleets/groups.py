@@ -30,19 +30,23 @@ def lot_grouping(sums: MountingSums, lot: np.ndarray) -> Grouping:
         sums: of every mounting.
         lot: index of each gear's lot, shape (g,).
     """
-    slope = _slopes(sums)
+    slope = slopes(sums)
     return _estimated(slope / np.median(slope), lot)
 
 
 def operator_grouping(sums: MountingSums) -> Grouping:
     """Return where the zeros of operators seem to be [N]."""
-    zero = np.asarray(sums.y) - _slopes(sums)[sums.gear] * np.asarray(sums.x)
-    return _estimated(zero, np.asarray(sums.operator))
+    return _estimated(zeros(sums), np.asarray(sums.operator))
 
 
-def _slopes(sums: MountingSums) -> np.ndarray:
+def slopes(sums: MountingSums) -> np.ndarray:
     """Return the stiffness of each gear by its own line [N/mm as read]."""
     return np.bincount(sums.gear, sums.xy) / np.bincount(sums.gear, sums.xx)
+
+
+def zeros(sums: MountingSums) -> np.ndarray:
+    """Return the zero of each mounting beside its gear's own line [N]."""
+    return np.asarray(sums.y) - slopes(sums)[sums.gear] * np.asarray(sums.x)
 
 
 def _estimated(values: np.ndarray, group: np.ndarray) -> Grouping:

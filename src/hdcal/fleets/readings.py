@@ -5,9 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.data.scatter import require_scatter
+from hdcal.errors import Finding, InputError
 from hdcal.evidence.prepare import moments
 from hdcal.fleets.groups import groups
 from hdcal.inference.gear_sums import MountingSums
+
+# Fewer gears say next to nothing of how much gears differ.
+FEWEST = 3
+# Share of squares that rounding alone leaves of a deformation that stays.
+_STILL = 1e-24
 
 
 @dataclass(frozen=True)
@@ -70,3 +77,32 @@ def row_sums(
     products = (about_x**2, about_x * about_y, about_y**2)
     xx, xy, yy = (np.bincount(of_row, each) for each in products)
     return rows, mean_x, mean_y, xx, xy, yy
+
+
+def check_fleet(readings: FleetReadings) -> None:
+    """Refuse what no population can be told of.
+
+    Raises:
+        InputError: holds a finding for each gear.
+    """
+    case, sums = readings.case, readings.sums
+    gears = case.specimen_labels
+    if len(gears) < FEWEST:
+        many = f"{len(gears)} gears" if len(gears) > 1 else "1 gear"
+        words = f"{many}: how much gears differ takes {FEWEST} or more"
+        remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
+        raise InputError([Finding(case.name, words, remedy)])
+    # A run has a zero of its own: only what it was moved by says how stiff a gear is.
+    moved = np.bincount(sums.gear, sums.xx)
+    still = moved <= _STILL * np.bincount(sums.gear, sums.rows * sums.x**2)
+    findings = [
+        Finding(
+            case.name,
+            f"gear '{gears[one]}' was read at one deformation only in each of its runs",
+            "Read it at two or more in one run, or leave it out",
+        )
+        for one in np.flatnonzero(still)
+    ]
+    if findings:
+        raise InputError(findings)
+    require_scatter(case)

@@ -38,7 +38,7 @@ class SampledPopulation(NamedTuple):
 
 def sample_population(
     problem: PopulationProblem,
-    stiffness: float,
+    start: Mapping[str, float],
     key: Key[Array, ""],
     *,
     chains: int,
@@ -50,14 +50,14 @@ def sample_population(
 
     Args:
         problem: the gears.
-        stiffness: where to look first [N/mm as read].
+        start: sites whose value is roughly known, where to look first.
         key: source of randomness.
         chains: chains of draws.
         warmup: iterations of adaptation per chain, where NUTS draws.
         draws: of each chain.
         progress: called with (steps done, steps in all).
     """
-    whitening = laplace.fit(problem, {"stiffness": stiffness})
+    whitening = laplace.fit(problem, start)
     size = {"chains": chains, "draws": draws, "progress": progress}
     cheap = sample_independently(problem, whitening, key, **size)
     if cheap is not None:

@@ -33,7 +33,7 @@ _WORTH, _MOST = 0.5, 8
 # Least scatter of proposals, in variances at the mode.
 _LEAST = 0.01
 # Proposals of a chain that are left out, after which it has forgotten its start.
-_FORGOTTEN = 250
+_FORGOTTEN = 100
 # Densities between two signs of life.
 _BLOCK = 500
 # Pareto shape of the weights from which on proposals miss a part that counts.

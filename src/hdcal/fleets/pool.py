@@ -1,0 +1,136 @@
+"""Rows that come in batches: of each mounting sums are kept, whatever their number."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hdcal.data.case import Case
+from hdcal.data.further_labels import further_labels
+from hdcal.data.header_words import GROUPINGS
+from hdcal.data.measurements import Labels
+from hdcal.data.parquet import Batch, Parquet
+from hdcal.evidence.prepare import moments
+from hdcal.fleets.groups import groups
+from hdcal.fleets.readings import FleetReadings, row_sums
+from hdcal.inference.gear_sums import MountingSums
+
+
+@dataclass
+class Pool:
+    """Sums of what was read so far; two of them can be joined.
+
+    Attributes:
+        case: of the first rows.
+        gears: index of each gear, in order of appearance.
+        runs: index of each gear and run, likewise.
+        parts: run, rows, means and sums of each mounting in each batch.
+        told: of each batch, runs, and their lots, operators and dates.
+        largest: deformation, with its sign [mm as read].
+    """
+
+    case: Case
+    gears: dict[str, int] = field(default_factory=dict)
+    runs: dict[tuple[int, str], int] = field(default_factory=dict)
+    parts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
+    told: list[dict[str, np.ndarray]] = field(default_factory=list)
+    largest: float = 0.0
+
+    def add(self, batch: Batch) -> None:
+        """Add some rows."""
+        gear, read = self.case.gear, batch.values["deformation"]
+        loss, _ = moments(gear.priors["alpha"])
+        warm = batch.values.get("temperature", gear.reference_temperature)
+        x = read * (1.0 - loss * (warm - gear.reference_temperature))
+        alone = np.zeros(len(read), int), np.array([""], object)
+        gear_of, gears = batch.labels["specimen"]
+        run_of, runs = batch.labels.get("run", alone)
+        first, pair = _in_order(gear_of * len(runs) + run_of)
+        each = zip(gears[gear_of[first]], runs[run_of[first]], strict=True)
+        index = np.array([self._run(str(one), str(run)) for one, run in each])
+        self.parts.append((index, *row_sums(pair, x, batch.values["force"])))
+        self.largest = max(self.largest, float(read[np.argmax(np.abs(read))]), key=abs)
+        further = {name: one for name, one in batch.labels.items() if name in GROUPINGS}
+        code = pair
+        for place, texts in further.values():
+            code = _in_order(code * len(texts) + place)[1]
+        first = _in_order(code)[0]
+        told = {name: texts[place[first]] for name, (place, texts) in further.items()}
+        self.told.append({"run": index[pair[first]], **told})
+
+    def join(self, other: "Pool") -> None:
+        """Add what another one has, whose rows come after those of this one."""
+        gears = [*other.gears]
+        index = np.array([self._run(gears[g], run) for g, run in other.runs], int)
+        self.parts += [(index[run], *sums) for run, *sums in other.parts]
+        self.told += [told | {"run": index[told["run"]]} for told in other.told]
+        self.largest = max(self.largest, other.largest, key=abs)
+
+    def _run(self, gear: str, run: str) -> int:
+        known = self.gears.setdefault(gear, len(self.gears))
+        return self.runs.setdefault((known, run), len(self.runs))
+
+    def readings(self, name: str, sha256: str) -> FleetReadings:
+        """Return what all of them come to.
+
+        Args:
+            name: of the data.
+            sha256: of their bytes.
+        """
+        run, rows, x, y, xx, xy, yy = map(np.concatenate, zip(*self.parts, strict=True))
+
+        def whole(part: np.ndarray) -> np.ndarray:
+            return np.bincount(run, part)
+
+        total = whole(rows)
+        mean_x, mean_y = whole(rows * x) / total, whole(rows * y) / total
+        off_x, off_y = x - mean_x[run], y - mean_y[run]
+        squares = [
+            whole(own + rows * between)
+            for own, between in ((xx, off_x**2), (xy, off_x * off_y), (yy, off_y**2))
+        ]
+        gears, gear = tuple(self.gears), np.array([g for g, _ in self.runs])
+        names = tuple(f"{gears[g]}/{r}" if r else gears[g] for g, r in self.runs)
+        told = {
+            name: np.concatenate([one[name] for one in self.told])
+            for name in self.told[0]
+        }
+        of = told.pop("run")
+        further, notes = further_labels(
+            told, Labels(gear[of], gears), Labels(of, names)
+        )
+        case = replace(
+            self.case,
+            name=name,
+            specimen_labels=gears,
+            run_labels=names,
+            data_sha256=sha256,
+            notes=(*self.case.notes, *notes),
+            **further,
+        )
+        operator = groups(case.operators)[1]
+        by = operator if len(operator) else np.zeros(len(gear), int)
+        sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=by)
+        return FleetReadings(case, sums, np.arange(len(gear)), self.largest)
+
+
+def pool_of(source: Parquet, files: Iterable[str]) -> Pool:
+    """Return what some files come to.
+
+    Raises:
+        InputError: holds what is wrong with the first batch that is.
+    """
+    pool = Pool(source.case)
+    for file in files:
+        for batch in source.batches(file):
+            pool.add(batch)
+    return pool
+
+
+def _in_order(code: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each value stands first, in that order, and each row's value's."""
+    _, first, index = np.unique(code, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return first[order], rank[index]

@@ -1,0 +1,43 @@
+"""Read what was measured on many gears, in whatever form it comes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from hdcal.data.case import Case
+from hdcal.data.parquet import is_parquet, read_parquet
+from hdcal.data.reading import read_case
+from hdcal.fleets.pool import pool_of
+from hdcal.fleets.readings import FleetReadings, fleet_readings
+
+
+def read_fleet(
+    data: Any,
+    gear: Path | str | Mapping[str, Any] | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    theory: str | None = None,
+    reading: str | None = None,
+) -> FleetReadings:
+    """Return what was measured on a fleet.
+
+    Args:
+        data: a case; a file, folder or table in memory as `read_case` takes it; a
+            Parquet file, or a folder of them, which are read in batches.
+        gear: as in `read_case`; a case has its own.
+        columns: likewise.
+        theory: likewise.
+        reading: likewise.
+
+    Raises:
+        InputError: holds everything that is wrong with the data.
+    """
+    if isinstance(data, FleetReadings):
+        return data
+    if isinstance(data, Case):
+        return fleet_readings(data)
+    how = {"columns": columns, "theory": theory, "reading": reading}
+    if is_parquet(data):
+        source = read_parquet(data, gear, **how)
+        return pool_of(source, source.files).readings(source.name, source.sha256)
+    return fleet_readings(read_case(data, gear, **how))

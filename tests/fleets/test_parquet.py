@@ -1,0 +1,172 @@
+"""Parquet in batches comes to the same as all rows at once."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+from commands import Hdcal
+from pyarrow import dataset as tables
+from pyarrow import parquet as pq
+
+import hdcal as api
+from hdcal.data import parquet
+from hdcal.data.parquet import is_parquet
+from hdcal.errors import InputError
+from hdcal.fleets.read_fleet import read_fleet
+
+GEARS, RUNS, ROWS = 9, 2, 20
+
+
+@pytest.fixture(scope="module")
+def frame():
+    rng = np.random.default_rng(3)
+    x = np.linspace(0.05, 0.5, ROWS)
+    parts = [
+        pd.DataFrame(
+            {
+                "serial": f"G{gear}",
+                "run": run,
+                "lot": "AB"[gear % 2],
+                "operator": ["Kim", "Ada", "Bo"][(gear + run) % 3],
+                "date": f"2026-04-{gear + 1:02d}",
+                "deformation_um": 1000.0 * x,
+                "force_N": 200.0 * x * (1 + 0.01 * rng.standard_normal())
+                + rng.normal(0.0, 0.5)
+                + rng.normal(0.0, 0.2, ROWS),
+                "temperature_C": 20.0 + gear,
+            }
+        )
+        for gear in range(GEARS)
+        for run in range(RUNS)
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def same(found, whole):
+    """Check that what was read in batches is what was read at once."""
+    gears = [whole.case.specimen_labels.index(g) for g in found.case.specimen_labels]
+    each = {(whole.sums.gear[m], whole.runs[m]): m for m in range(len(whole.runs))}
+    names = [*whole.case.run_labels]
+    order = []
+    for mounting, gear in enumerate(found.sums.gear):
+        label = found.case.run_labels[found.runs[mounting]]
+        order.append(each[gears[gear], names.index(label)])
+    for name in ("rows", "x", "y", "xx", "xy", "yy"):
+        one, other = getattr(found.sums, name), getattr(whole.sums, name)[order]
+        assert one == pytest.approx(other, rel=1e-12), name
+    assert [found.case.lots[g] for g in range(len(gears))] == [
+        whole.case.lots[g] for g in gears
+    ]
+    for one, other in (("operators", 0), ("dates", 10)):
+        mine = [getattr(found.case, one)[r][: other or None] for r in found.runs]
+        theirs = [
+            getattr(whole.case, one)[whole.runs[m]][: other or None] for m in order
+        ]
+        assert mine == theirs
+    assert found.largest == whole.largest
+
+
+@pytest.mark.parametrize("batch", [7, 100, 1 << 18])
+@pytest.mark.parametrize("shuffled", [False, True])
+def test_batches_come_to_what_all_rows_come_to(
+    frame, tmp_path, monkeypatch, batch, shuffled
+):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
+    given = frame.sample(frac=1.0, random_state=1) if shuffled else frame
+    given.to_parquet(tmp_path / "line.parquet", index=False)
+    found = read_fleet(tmp_path / "line.parquet")
+    same(found, read_fleet(frame))
+    assert found.case.name == "line"
+
+
+def test_of_many_rows_the_first_are_kept(frame, tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "_SHOWN", 50)
+    frame.to_parquet(tmp_path / "line.parquet", index=False)
+    found = read_fleet(tmp_path / "line.parquet")
+    assert len(found.case.records.force) == 50
+    same(found, read_fleet(frame))
+
+
+def test_a_folder_may_be_partitioned(frame, tmp_path):
+    table = pa.Table.from_pandas(frame, preserve_index=False)
+    kinds = pa.schema([("lot", pa.string()), ("serial", pa.string())])
+    split = tables.partitioning(kinds, flavor="hive")
+    folder = tmp_path / "line"
+    tables.write_dataset(table, folder, format="parquet", partitioning=split)
+    (folder / "gear.toml").write_text("[gear]\ntheory = 'spring'\n")
+    found = read_fleet(folder)
+    same(found, read_fleet(frame))
+    assert found.case.name == "line"
+    # Which file holds what does not matter to the answer.
+    assert is_parquet(folder) and not is_parquet(tmp_path / "none")
+
+
+def test_labels_may_be_numbers_categories_and_times(frame, tmp_path):
+    table = frame.assign(
+        serial=frame["serial"].str[1:].astype(int),
+        operator=frame["operator"].astype("category"),
+        date=pd.to_datetime(frame["date"]) + pd.to_timedelta(frame.index, unit="s"),
+    )
+    table.to_parquet(tmp_path / "line.parquet", index=False)
+    found = read_fleet(tmp_path / "line.parquet")
+    same(found, read_fleet(frame.assign(serial=frame["serial"].str[1:])))
+
+
+def test_the_answer_is_that_of_a_table(frame, tmp_path):
+    frame.to_parquet(tmp_path / "line.parquet", index=False)
+    one, other = (api.fleet(data) for data in (frame, tmp_path / "line.parquet"))
+    assert np.median(one.stiffness) == pytest.approx(np.median(other.stiffness))
+    assert one.called.tolist() == other.called.tolist()
+
+
+def wrong(path):
+    with pytest.raises(InputError) as caught:
+        read_fleet(path)
+    return "\n".join(map(str, caught.value.findings))
+
+
+def test_a_cell_that_is_no_reading_is_named_with_its_row(frame, tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "_SHOWN", 40)
+    given = frame.copy()
+    given.loc[200, "force_N"] = np.nan
+    given.loc[201, "force_N"] = 1e30
+    given.loc[202, "serial"] = None
+    given.to_parquet(tmp_path / "line.parquet", index=False)
+    told = wrong(tmp_path / "line.parquet")
+    assert "row 201" in told and "empty" in told
+    assert "row 202" in told and "row 203" in told
+    assert "line.parquet" in told
+
+
+def test_files_of_several_kinds_are_refused(frame, tmp_path):
+    frame.to_parquet(tmp_path / "a.parquet", index=False)
+    frame.assign(force_N=frame["force_N"].astype(str)).to_parquet(
+        tmp_path / "b.parquet", index=False
+    )
+    told = wrong(tmp_path)
+    assert "'force_N'" in told and "b.parquet" in told
+    frame.drop(columns="force_N").to_parquet(tmp_path / "b.parquet", index=False)
+    assert "has no column" in wrong(tmp_path)
+
+
+def test_what_is_no_parquet_inside_is_refused(tmp_path):
+    (tmp_path / "line.parquet").write_bytes(b"PAR1 and nothing else")
+    assert "no Parquet that can be read" in wrong(tmp_path / "line.parquet")
+
+
+def test_without_gears_or_numbers_it_is_refused(frame, tmp_path):
+    frame.drop(columns="serial").to_parquet(tmp_path / "line.parquet", index=False)
+    assert "which gear" in wrong(tmp_path / "line.parquet")
+    pq.write_table(pa.table({"serial": ["a"] * 6}), tmp_path / "line.parquet")
+    assert "deformation" in wrong(tmp_path / "line.parquet")
+
+
+def test_the_command_reads_it(frame, hdcal: Hdcal, tmp_path):
+    frame.to_parquet(tmp_path / "line.parquet", index=False)
+    done = hdcal("fleet", "line.parquet", "--out", tmp_path / "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    assert answer["rows"] == GEARS * RUNS * ROWS
+    assert len(answer["lots"]) == 2
