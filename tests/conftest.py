@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import pytest
 
-pytest_plugins = ["commands"]
+pytest_plugins = ["commands", "clusters"]
 
 _OWN = pytest.StashKey[str]()
 _COMPILED_PLAINLY = (

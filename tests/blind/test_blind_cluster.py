@@ -1,6 +1,5 @@
 """A Dask cluster answers a blind check: nothing is lost, nothing comes twice."""
 
-import gc
 import json
 import os
 import signal
@@ -8,12 +7,12 @@ import subprocess
 import sys
 import threading
 import time
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from clusters import local_cluster
 from commands import Hdcal
 from sealing import by_library, deadly, sealed_set, slowly
 
@@ -23,45 +22,6 @@ from hdcal.cli import cluster
 from hdcal.errors import HdcalError, InputError
 
 distributed = pytest.importorskip("distributed")
-
-
-def local_cluster(**settings) -> distributed.LocalCluster:
-    """Start a cluster; Dask gives its own thread ten seconds, which a busy machine
-    does not always grant."""
-    for _ in range(2):
-        try:
-            return distributed.LocalCluster(**settings)
-        except AssertionError:
-            pass
-        # What was half made warns when it is collected, in whatever test that is.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            gc.collect()
-    return distributed.LocalCluster(**settings)
-
-
-@pytest.fixture(scope="module")
-def local(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
-    """A scheduler here, and two workers in processes and a folder of their own.
-
-    One for all tests: who kills a worker gets a new one by its nanny.
-    """
-    import dask
-
-    quiet = {"distributed.scheduler.allowed-failures": 1}
-    with (
-        dask.config.set(quiet),
-        local_cluster(
-            n_workers=2,
-            threads_per_worker=1,
-            processes=True,
-            # Without one it would take a port that others may have taken.
-            dashboard_address=":0",
-            silence_logs=50,
-            local_directory=str(tmp_path_factory.mktemp("workers")),
-        ) as found,
-    ):
-        yield found
 
 
 def cases_of(folder: Path) -> list[str]:

@@ -1,6 +1,8 @@
 """Parquet in batches comes to the same as all rows at once."""
 
 import json
+import os
+import signal
 
 import numpy as np
 import pandas as pd
@@ -14,6 +16,7 @@ import hdcal as api
 from hdcal.data import parquet
 from hdcal.data.parquet import is_parquet
 from hdcal.errors import InputError
+from hdcal.fleets.pool import Pool
 from hdcal.fleets.read_fleet import read_fleet
 
 GEARS, RUNS, ROWS = 9, 2, 20
@@ -170,3 +173,34 @@ def test_the_command_reads_it(frame, hdcal: Hdcal, tmp_path):
     answer = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     assert answer["rows"] == GEARS * RUNS * ROWS
     assert len(answer["lots"]) == 2
+
+
+@pytest.mark.thorough
+def test_a_cluster_whose_worker_is_killed_reads_the_same(
+    frame, tmp_path, local, monkeypatch
+):
+    for gear, part in frame.groupby("serial"):
+        part.to_parquet(tmp_path / f"{gear}.parquet", index=False)
+    alone, killed, join = read_fleet(tmp_path), [], Pool.join
+
+    def kill_and_join(pool, other):
+        if not killed:
+            process = local.workers[0].process
+            killed.append(process.pid)
+            os.kill(process.pid, signal.SIGKILL)
+        join(pool, other)
+
+    monkeypatch.setattr(Pool, "join", kill_and_join)
+    together = read_fleet(tmp_path, scheduler=local.scheduler_address)
+    assert killed
+    for name in ("gear", "rows", "x", "y", "xx", "xy", "yy", "operator"):
+        one, other = getattr(together.sums, name), getattr(alone.sums, name)
+        assert np.array_equal(one, other), name
+    assert together.case.specimen_labels == alone.case.specimen_labels
+    assert together.case.run_labels == alone.case.run_labels
+    assert together.case.data_sha256 == alone.case.data_sha256
+
+
+def test_a_scheduler_reads_no_table(frame):
+    with pytest.raises(InputError, match="no Parquet"):
+        read_fleet(frame, scheduler="tcp://127.0.0.1:1")

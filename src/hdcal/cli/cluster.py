@@ -16,7 +16,7 @@ _GO_ON = "what was answered is kept; run the same command again to go on"
 
 
 def completed_on_cluster(
-    work: Callable, tasks: Iterator[tuple], address: str
+    work: Callable, tasks: Iterator[tuple], address: str, lost: str = _GO_ON
 ) -> Iterator[Any]:
     """Yield what `work` makes of every task, in the order in which they are done.
 
@@ -26,6 +26,7 @@ def completed_on_cluster(
         work: can be imported by name on the workers.
         tasks: its arguments; taken as workers become free.
         address: of the scheduler.
+        lost: what to do where the cluster is lost.
 
     Raises:
         InputError: Dask is not installed, or nobody answers or works there.
@@ -45,11 +46,11 @@ def completed_on_cluster(
                 waiting.update(list(islice(begun, 1)))
                 yield outcome
         except KilledWorker as error:
-            words = "one case has cost several workers their life (memory?)"
-            raise HdcalError(f"--scheduler {address}: {words}; {_GO_ON}") from error
+            words = "one task has cost several workers their life (memory?)"
+            raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
         except (CancelledError, OSError) as error:
             words = "the scheduler went away"
-            raise HdcalError(f"--scheduler {address}: {words}; {_GO_ON}") from error
+            raise HdcalError(f"--scheduler {address}: {words}; {lost}") from error
 
 
 @contextmanager

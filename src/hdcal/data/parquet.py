@@ -65,27 +65,6 @@ class Parquet:
     root: str
     used: Mapping[str, Column]
 
-    def batches(self, file: str) -> Iterator[Batch]:
-        """Yield the rows of one file, in their order.
-
-        Raises:
-            InputError: holds what is wrong with the first batch that is.
-        """
-        with FileFindings(file) as findings:
-            dataset = _dataset([file], self.root, findings)
-        row, headers = 1, [column.header for column in self.used.values()]
-        for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
-            values, labels = {}, {}
-            with FileFindings(file) as findings:
-                for quantity, column in self.used.items():
-                    if quantity in LABELS:
-                        labels[quantity] = _labels(batch, column, row, findings)
-                    else:
-                        values[quantity] = _numbers(batch, column, row, findings)
-            row += batch.num_rows
-            if batch.num_rows:
-                yield Batch(values, labels)
-
 
 def is_parquet(data: Any) -> bool:
     """Tell whether data are a Parquet file, or a folder that holds such ones."""
@@ -135,6 +114,33 @@ def read_parquet(
         used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
+
+
+def read_batches(file: str, root: str, used: Mapping[str, Column]) -> Iterator[Batch]:
+    """Yield the rows of one file, in their order.
+
+    Args:
+        file: one of those of a `Parquet`.
+        root: likewise.
+        used: likewise.
+
+    Raises:
+        InputError: holds what is wrong with the first batch that is.
+    """
+    with FileFindings(file) as findings:
+        dataset = _dataset([file], root, findings)
+    row, headers = 1, [column.header for column in used.values()]
+    for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
+        values, labels = {}, {}
+        with FileFindings(file) as findings:
+            for quantity, column in used.items():
+                if quantity in LABELS:
+                    labels[quantity] = _labels(batch, column, row, findings)
+                else:
+                    values[quantity] = _numbers(batch, column, row, findings)
+        row += batch.num_rows
+        if batch.num_rows:
+            yield Batch(values, labels)
 
 
 def _dataset(files: Sequence[str], root: str, findings: FileFindings) -> "Dataset":

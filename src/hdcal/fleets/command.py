@@ -36,6 +36,11 @@ from hdcal.errors import Finding
     metavar="TABLE",
     help="Table of the sizes of each gear, where they differ.",
 )
+@click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Dask scheduler whose workers read the files of a Parquet folder.",
+)
 @seed_option
 @folder_options("Result folder [default: NAME-fleet].")
 @json_option
@@ -49,6 +54,7 @@ def fleet(
     limit_force,
     force_tolerance,
     gears,
+    scheduler,
     **given,
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
@@ -66,7 +72,7 @@ def fleet(
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
-        readings = _read(console, given)
+        readings = _read(console, scheduler, given)
         if readings is not None:
             from hdcal.fleets.gear_table import size_ratios
             from hdcal.fleets.readings import check_fleet
@@ -90,15 +96,16 @@ def fleet(
     return console.report(fleet_report(found, console.command, needed))
 
 
-def _read(console: Console, given: dict):
+def _read(console: Console, scheduler: str | None, given: dict):
     """Return what was measured; Parquet is read in batches, whatever its size."""
     from hdcal.data.parquet import is_parquet
     from hdcal.fleets.read_fleet import read_fleet
-    from hdcal.fleets.readings import fleet_readings
 
     if is_parquet(given["data"]) and given["columns"] is not None:
         names = "data", "gear", "columns", "theory", "reading"
-        how = {name: given[name] for name in names}
-        return console.wrong.attempt(lambda: read_fleet(**how))
+        how: dict = {name: given[name] for name in names}
+        return console.wrong.attempt(read_fleet, **how, scheduler=scheduler)
     case = read_given(console, **given)
-    return None if case is None else fleet_readings(case)
+    if case is None:
+        return None
+    return console.wrong.attempt(read_fleet, case, scheduler=scheduler)

@@ -146,6 +146,7 @@ def fleet(
     seed: int = 0,
     force_tolerance: float | None = None,
     gears: Any = None,
+    scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Fleet:
     """Say of many gears how stiff each one is, and which ones are off.
@@ -168,6 +169,8 @@ def fleet(
         force_tolerance: width that the force at the largest deformation may lie in [N].
         gears: table of the sizes of each gear, where they differ: a file or a table in
             memory with a column specimen and columns such as wall_thickness_mm.
+        scheduler: address of a Dask scheduler, whose workers read the files of a
+            Parquet folder; they have to find them under the same names.
         progress: called with (iterations done, iterations in all).
 
     Raises:
@@ -178,7 +181,7 @@ def fleet(
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
-    readings = read_fleet(data, gear, columns=columns)
+    readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
     check_fleet(readings)
     ratio = np.ones(len(readings.case.specimen_labels))
     if gears is not None:

@@ -1,19 +1,22 @@
 """Rows that come in batches: of each mounting sums are kept, whatever their number."""
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.case import Gear
+from hdcal.data.columns import Column
 from hdcal.data.further_labels import further_labels
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
-from hdcal.data.parquet import Batch, Parquet
+from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.evidence.prepare import moments
 from hdcal.fleets.groups import groups
 from hdcal.fleets.readings import FleetReadings, row_sums
 from hdcal.inference.gear_sums import MountingSums
+
+_LOST = "start again: reading takes a small part of the time"
 
 
 @dataclass
@@ -21,7 +24,7 @@ class Pool:
     """Sums of what was read so far; two of them can be joined.
 
     Attributes:
-        case: of the first rows.
+        gear: what is known of all gears.
         gears: index of each gear, in order of appearance.
         runs: index of each gear and run, likewise.
         parts: run, rows, means and sums of each mounting in each batch.
@@ -29,7 +32,7 @@ class Pool:
         largest: deformation, with its sign [mm as read].
     """
 
-    case: Case
+    gear: Gear
     gears: dict[str, int] = field(default_factory=dict)
     runs: dict[tuple[int, str], int] = field(default_factory=dict)
     parts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
@@ -38,7 +41,7 @@ class Pool:
 
     def add(self, batch: Batch) -> None:
         """Add some rows."""
-        gear, read = self.case.gear, batch.values["deformation"]
+        gear, read = self.gear, batch.values["deformation"]
         loss, _ = moments(gear.priors["alpha"])
         warm = batch.values.get("temperature", gear.reference_temperature)
         x = read * (1.0 - loss * (warm - gear.reference_temperature))
@@ -70,12 +73,11 @@ class Pool:
         known = self.gears.setdefault(gear, len(self.gears))
         return self.runs.setdefault((known, run), len(self.runs))
 
-    def readings(self, name: str, sha256: str) -> FleetReadings:
+    def readings(self, source: Parquet) -> FleetReadings:
         """Return what all of them come to.
 
         Args:
-            name: of the data.
-            sha256: of their bytes.
+            source: where they are from.
         """
         run, rows, x, y, xx, xy, yy = map(np.concatenate, zip(*self.parts, strict=True))
 
@@ -100,12 +102,12 @@ class Pool:
             told, Labels(gear[of], gears), Labels(of, names)
         )
         case = replace(
-            self.case,
-            name=name,
+            source.case,
+            name=source.name,
             specimen_labels=gears,
             run_labels=names,
-            data_sha256=sha256,
-            notes=(*self.case.notes, *notes),
+            data_sha256=source.sha256,
+            notes=(*source.case.notes, *notes),
             **further,
         )
         operator = groups(case.operators)[1]
@@ -114,17 +116,49 @@ class Pool:
         return FleetReadings(case, sums, np.arange(len(gear)), self.largest)
 
 
-def pool_of(source: Parquet, files: Iterable[str]) -> Pool:
-    """Return what some files come to.
+def pool_of(source: Parquet, scheduler: str | None = None) -> Pool:
+    """Return what all files come to, whoever reads them.
+
+    Args:
+        source: the files.
+        scheduler: address of a Dask scheduler, whose workers read them instead; they
+            have to find them under the same names.
 
     Raises:
-        InputError: holds what is wrong with the first batch that is.
+        InputError: holds what is wrong with the first batch that is; or nobody answers
+            or works there.
+        HdcalError: the cluster was lost.
     """
-    pool = Pool(source.case)
-    for file in files:
-        for batch in source.batches(file):
-            pool.add(batch)
-    return pool
+    about = source.root, source.used, source.case.gear
+    tasks = ((place, file, *about) for place, file in enumerate(source.files))
+    if scheduler is None:
+        found = (file_pool(*task) for task in tasks)
+    else:
+        from hdcal.cli.cluster import completed_on_cluster
+
+        found = completed_on_cluster(file_pool, tasks, scheduler, _LOST)
+    whole, early, joined = Pool(source.case.gear), {}, 0
+    for place, pool in found:
+        early[place] = pool
+        # In the order of the files, so that the answer hangs on no worker.
+        while joined in early:
+            whole.join(early.pop(joined))
+            joined += 1
+    return whole
+
+
+def file_pool(
+    place: int, file: str, root: str, used: Mapping[str, Column], gear: Gear
+) -> tuple[int, Pool]:
+    """Return what one file comes to, and its place among all.
+
+    Raises:
+        InputError: holds what is wrong with its first batch that is.
+    """
+    pool = Pool(gear)
+    for batch in read_batches(file, root, used):
+        pool.add(batch)
+    return place, pool
 
 
 def _in_order(code: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

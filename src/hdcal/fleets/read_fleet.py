@@ -7,6 +7,7 @@ from typing import Any
 from hdcal.data.case import Case
 from hdcal.data.parquet import is_parquet, read_parquet
 from hdcal.data.reading import read_case
+from hdcal.errors import Finding, InputError
 from hdcal.fleets.pool import pool_of
 from hdcal.fleets.readings import FleetReadings, fleet_readings
 
@@ -18,6 +19,7 @@ def read_fleet(
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
     reading: str | None = None,
+    scheduler: str | None = None,
 ) -> FleetReadings:
     """Return what was measured on a fleet.
 
@@ -28,16 +30,22 @@ def read_fleet(
         columns: likewise.
         theory: likewise.
         reading: likewise.
+        scheduler: address of a Dask scheduler, whose workers read the files of a
+            Parquet folder.
 
     Raises:
         InputError: holds everything that is wrong with the data.
     """
     if isinstance(data, FleetReadings):
         return data
-    if isinstance(data, Case):
-        return fleet_readings(data)
     how = {"columns": columns, "theory": theory, "reading": reading}
     if is_parquet(data):
         source = read_parquet(data, gear, **how)
-        return pool_of(source, source.files).readings(source.name, source.sha256)
+        return pool_of(source, scheduler).readings(source)
+    if scheduler is not None:
+        words = "is no Parquet, which alone is read by several"
+        remedy = "Leave it out, or save the data as Parquet files"
+        raise InputError([Finding("scheduler", f"the data {words}", remedy)])
+    if isinstance(data, Case):
+        return fleet_readings(data)
     return fleet_readings(read_case(data, gear, **how))
