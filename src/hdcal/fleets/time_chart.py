@@ -46,7 +46,7 @@ def _control(series: TimeSeries) -> Chart:
         for words, rows, hue in kinds
         if rows.any()
     ]
-    axis = "date and gear, in the order of measurement", _TITLES[series.what]
+    axis = _axis(series), _TITLES[series.what]
     return Chart(*axis, [*lines, *points], height=260, names=[*_names(series)])
 
 
@@ -68,8 +68,14 @@ def _sums(series: TimeSeries) -> Chart:
             ("lower limit [sd]", np.full(len(place), -_REACH), "", True),
         )
     ]
-    axis = "date and gear, in the order of measurement", "sums of stiffness [sd]"
+    axis = _axis(series), "sums [sd]"
     return Chart(*axis, lines, height=260, names=[*_names(series)])
+
+
+def _axis(series: TimeSeries) -> str:
+    # Charts of one axis are zoomed together: those of gears, not those of mountings.
+    whose = "mounting" if series.what == "zero" else "gear"
+    return f"date and {whose}, in the order of measurement"
 
 
 def _place(series: TimeSeries) -> np.ndarray:
