@@ -12,6 +12,7 @@ NAMES = (
     "verdicts",
     "designs",
     "certificates",
+    "fleets",
 )
 
 
