@@ -39,9 +39,9 @@ def test_no_date_is_told_where_none_is_stated(labels):
     ("written", "why"),
     [
         ("03/04/2026", "can be read in two ways"),
-        ("45123", "is none that can be read"),
-        ("yesterday", "is none that can be read"),
-        ("0203-09-01", "is none that can be read"),
+        ("45123", "cannot be read as one"),
+        ("yesterday", "cannot be read as one"),
+        ("0203-09-01", "cannot be read as one"),
     ],
 )
 def test_what_is_no_date_is_told(written, why):
@@ -53,3 +53,15 @@ def test_what_is_no_date_is_told(written, why):
 def test_other_dates_settle_what_slashes_mean():
     dates, _ = dates_of(["03/04/2026", "13/04/2026"], np.arange(2))
     assert dates[0] == "2026-04-03T00:00:00"
+
+
+def test_one_wrong_date_costs_no_other():
+    labels = ["01.09.2026", "02.09.2026", "03/09/2026", "04.09.2026"]
+    dates, note = dates_of(labels, np.arange(4))
+    assert [date[:10] for date in dates] == [
+        "2026-09-01",
+        "2026-09-02",
+        "",
+        "2026-09-04",
+    ]
+    assert "'03/09/2026'" in note

@@ -51,7 +51,10 @@ def test_a_gear_that_is_off_is_off_from_its_lot():
     draws = dict(found.draws) | {"lot_sd": np.full(50, 0.1), "lot_ratio": np.ones(50)}
     draws |= {"lot_1": np.full(50, 0.1), "lot_2": np.full(50, -0.1)}
     readings = replace(found.readings, case=case)
-    lots = replace(found, readings=readings, draws=draws, lots=["high", "low"])
+    # The lots are ten percent below and above the mean of both.
+    apart = found.stiffness / np.array([180.0, 180.0, 220.0, 220.0]) - 1.0
+    told = {"draws": draws, "lots": ["high", "low"], "apart": apart}
+    lots = replace(found, readings=readings, **told)
     said = fleet_answer(lots).headline
     # 180 of a lot of 220 N/mm.
     assert "D is 18 % softer than its lot" in said

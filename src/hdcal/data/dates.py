@@ -13,7 +13,7 @@ _DAYS = ("ISO8601", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y")
 _TIMES = ("", " %H:%M", " %H:%M:%S")
 # Before and after these nobody measured: a plain number is no date.
 _EARLIEST, _LATEST = np.datetime64("1950-01-01"), np.datetime64("2100-01-01")
-_REMEDY = "Write 2026-09-01"
+_REMEDY = "Write dates as in 2026-09-01, year first"
 
 
 def dates_of(
@@ -21,8 +21,8 @@ def dates_of(
 ) -> tuple[tuple[str, ...], str]:
     """Return the first date of each mounting, as ISO 8601 has it, and a note.
 
-    A mounting that states none has an empty one. Nothing is returned where dates cannot
-    be read, which the note says.
+    A mounting that states none, or none that can be read, has an empty one. Nothing is
+    returned where most cannot be read, or all in two ways. The note says so.
 
     Args:
         labels: of each row.
@@ -33,22 +33,26 @@ def dates_of(
     place, texts = pd.factorize(np.array(labels, object))
     told = np.array([text != NOT_STATED for text in texts])
     times = np.full(len(texts), np.datetime64("NaT", "s"))
+    note = ""
     if told.any():
-        readings = _readings([text for text in texts if text != NOT_STATED])
+        stated = [text for text in texts if text != NOT_STATED]
+        readings = _readings(stated)
         if len(readings) != 1:
-            odd = quoted(next(text for text in texts if text != NOT_STATED))
-            how = "can be read in two ways" if readings else "is none that can be read"
-            return (), f"dates are not used: {odd} {how}. {_REMEDY}"
+            how = "can be read in two ways" if readings else "cannot be read as one"
+            return (), f"dates are not used: {quoted(stated[0])} {how}. {_REMEDY}"
         times[told] = readings[0]
+        if np.isnat(readings[0]).any():
+            odd = quoted(stated[int(np.argmax(np.isnat(readings[0])))])
+            note = f"the date {odd} cannot be read beside the others. {_REMEDY}"
     first = np.full(int(np.max(of)) + 1, np.datetime64("NaT", "s"))
     np.fmin.at(first, of, times[place])
     if np.isnat(first).all():
-        return (), ""
-    return tuple("" if np.isnat(one) else str(one) for one in first), ""
+        return (), note
+    return tuple("" if np.isnat(one) else str(one) for one in first), note
 
 
 def _readings(texts: Sequence[str]) -> list[np.ndarray]:
-    """Return in how many ways all texts can be read, each as times."""
+    """Return in how many ways texts can be read, most of them at least, as times."""
     found: list[np.ndarray] = []
     for day in _DAYS:
         for time in _TIMES if "%" in day else ("",):
@@ -56,7 +60,12 @@ def _readings(texts: Sequence[str]) -> list[np.ndarray]:
                 pd.Series(texts), format=day + time, errors="coerce", utc=True
             )
             times = read.dt.tz_localize(None).to_numpy().astype("datetime64[s]")
-            within = (times > _EARLIEST) & (times < _LATEST)
-            if within.all() and not any(np.array_equal(times, one) for one in found):
-                found.append(times)
-    return found
+            times[~((times > _EARLIEST) & (times < _LATEST))] = np.datetime64("NaT")
+            found.append(times)
+    # The way in which the fewest are left unread, and all others that leave as few.
+    least = min(int(np.isnat(times).sum()) for times in found)
+    best = [times for times in found if np.isnat(times).sum() == least]
+    if 2 * least >= len(texts):
+        return []
+    alike = [np.array_equal(best[0], each, equal_nan=True) for each in best]
+    return best[:1] if all(alike) else best

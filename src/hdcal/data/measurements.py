@@ -180,8 +180,7 @@ def _assumed(
                 f"{ASSUMED}{quoted(column.header)} is in {column.unit}, as was said, "
                 f"though it names {column.against}"
             )
-    # When something was measured matters to fleets alone, which show it.
-    guesses = [c for c in used.values() if c.guessed and c.quantity != "date"]
+    guesses = [column for column in used.values() if column.guessed]
     if guesses:
         said = ", ".join(
             f"{quoted(c.header)} is the {c.quantity}{f' in {c.unit}' * bool(c.unit)}"

@@ -81,6 +81,8 @@ class FleetAnswer(Answer):
         called_off: gears that are called off, the surest first.
         false_calls: share of these that may be ordinary gears, as expected.
         interval: probability that every interval holds.
+        at_one_size: whether gears of several sizes were compared at the gear file's,
+            of which then all but gears.csv is.
         population: what they come from.
         lots: where they are told.
         operators: likewise.
@@ -101,6 +103,7 @@ class FleetAnswer(Answer):
     called_off: tuple[Words, ...]
     false_calls: float
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
+    at_one_size: bool
     population: PopulationAnswer
     lots: tuple[LotAnswer, ...]
     operators: tuple[OperatorAnswer, ...]

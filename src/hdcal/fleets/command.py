@@ -37,6 +37,11 @@ from hdcal.errors import Finding
     help="Table of the sizes of each gear, where they differ.",
 )
 @click.option(
+    "--since",
+    metavar="DAY",
+    help="Leave out what was read before a day, as 2026-09-01.",
+)
+@click.option(
     "--scheduler",
     metavar="ADDRESS",
     help="Dask scheduler whose workers read the files of a Parquet folder.",
@@ -55,6 +60,7 @@ def fleet(
     force_tolerance,
     gears,
     scheduler,
+    since,
     **given,
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
@@ -73,6 +79,8 @@ def fleet(
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
         readings = _read(console, scheduler, given)
+        if readings is not None and since is not None:
+            readings = wrong.attempt(readings.since, since)
         if readings is not None:
             from hdcal.fleets.gear_table import size_ratios
             from hdcal.fleets.readings import check_fleet

@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from hdcal.fleets.answer import FleetAnswer, LotAnswer, PopulationAnswer
+from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.gauge import GaugeAnswer
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.notes import FEW
 from hdcal.fleets.time_words import time_section, time_words
@@ -20,7 +21,7 @@ from hdcal.report.document import (
     Text,
     notices,
 )
-from hdcal.report.words import estimate, number, percent
+from hdcal.report.words import estimate, known, number, percent
 
 # Gears in the table of a page, and of those that are shown at once; all of them are in
 # gears.csv.
@@ -32,7 +33,6 @@ def headline(
     population: PopulationAnswer,
     called: Sequence[str],
     columns: Mapping[str, np.ndarray],
-    lots: Sequence[LotAnswer] = (),
 ) -> str:
     """Return how many gears are alike, and which ones are off, in one sentence.
 
@@ -40,7 +40,6 @@ def headline(
         population: of the gears.
         called: off, the surest first.
         columns: of gears.csv.
-        lots: where they are told: a gear is off from its own.
     """
     total = len(columns["gear"])
     middle, span = estimate(population.gear_sd_percent)
@@ -52,35 +51,26 @@ def headline(
             f"{span} %) about {centre} N/mm"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off(population, [str(far)], columns, lots))
-        odd = odd.replace("(probability", "(off with probability")
+        odd = next(_off([str(far)], columns)).replace("; prob", "; off with prob")
         return told + f"; oddest: {odd}." if total < FEW else f"{told}."
-    told = "; ".join(_off(population, called, columns, lots))
+    told = "; ".join(_off(called, columns))
     return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
-def _off(
-    population: PopulationAnswer,
-    called: Sequence[str],
-    columns: Mapping[str, np.ndarray],
-    lots: Sequence[LotAnswer],
-) -> Iterator[str]:
+def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[str]:
     """Yield what is said of the gears that are called off, the surest first."""
-    own = {lot.lot: lot.stiffness_N_per_mm.median for lot in lots}
-    than = " than its lot" if lots else ""
-    ones = np.ones(len(columns["gear"]))
+    than = " than its lot" if "lot" in columns else ""
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
         row = place[name]
-        centre = population.stiffness_N_per_mm.median
-        centre = own[str(columns["lot"][row])] if lots else centre
-        alike = (
-            columns["stiffness_N_per_mm"][row] / columns.get("size_ratio", ones)[row]
-        )
-        apart = alike / centre - 1.0
+        ends = (float(columns[f"apart_{end}"][row]) for end in ("percent", "lo", "hi"))
+        apart, low, high = ends
         word = "softer" if apart < 0.0 else "stiffer"
+        size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
+        middle, least, most = (f"{end:.2g}" for end in size)
         sure = percent(columns["probability_off"][row])
-        yield f"{name} is {100.0 * abs(apart):.2g} % {word}{than} (probability {sure})"
+        sure = f"95 %: {least} … {most} %; probability {sure}"
+        yield f"{name} is {middle} % {word}{than} ({sure})"
     rest = len(called) - _MOST_NAMED
     if rest > 0:
         yield f"{rest} more are off"
@@ -123,7 +113,7 @@ def fleet_document(
 
 def _answers(answer: FleetAnswer) -> Iterator[str]:
     if answer.next_force is not None:
-        yield from _force(answer.next_force)
+        yield from _force(answer.next_force, answer.at_one_size)
     yield from (time_words(one) for one in answer.over_time if one.changed)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
@@ -131,7 +121,8 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
         "N/mm, per millimetre as read."
     )
     middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
-    told = f"The next gear: {middle} N/mm, 95 % predictive interval {span} N/mm"
+    sized = " of the gear file's sizes" * answer.at_one_size
+    told = f"The next gear{sized}: {middle} N/mm, 95 % predictive interval {span} N/mm"
     also = "; that it may be an odd one is in it" * bool(answer.called_off)
     yield f"{told}{also}."
     if answer.gears < FEW:
@@ -154,15 +145,16 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     yield f"Of gears to come, each bound by itself with {sure} confidence: {told}."
 
 
-def _force(found: NextForce) -> Iterator[str]:
+def _force(found: NextForce, at_one_size: bool) -> Iterator[str]:
     """Yield what a gear to come needs at the deformation that was asked for."""
     middle, span = estimate(found.force_N)
     width = found.force_N.hi - found.force_N.lo
+    sized = " of the gear file's sizes" * at_one_size
     limit, beyond = found.limit_force_N, found.probability_exceeded
     if limit is not None and beyond is not None:
         middle_, low, high = (percent(p) for p in vars(beyond).values())
         yield (
-            f"{middle_} of gears to come need more than {limit:g} N at "
+            f"{middle_} of gears to come{sized} need more than {limit:g} N at "
             f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
         )
     many = "; ".join(
@@ -171,7 +163,7 @@ def _force(found: NextForce) -> Iterator[str]:
     )
     sure = percent(found.bounds[0].confidence)
     yield (
-        f"At {found.deformation_mm:g} mm the next gear needs {middle} N, 95 % "
+        f"At {found.deformation_mm:g} mm the next gear{sized} needs {middle} N, 95 % "
         f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
         f"confidence {many}."
     )
@@ -179,7 +171,8 @@ def _force(found: NextForce) -> Iterator[str]:
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     far = np.argsort(-columns["probability_off"], kind="stable")[:MOST_LISTED]
-    numbers = ["rows", "N/mm", "95 % interval", "in sds", "noise [N]", "P(off)"]
+    numbers = ["rows", "N/mm", "95 % interval", "apart [%]", "in sds", "noise [N]"]
+    numbers += ["P(off)"]
     rows = [_gear(columns, int(row)) for row in far]
     titles = ["gear", *numbers, ""]
     table = Table(titles, rows, frozenset(numbers), page=_AT_ONCE)
@@ -193,8 +186,9 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     more = [Text(f"{listed}All of them are in gears.csv.", soft=True)]
     more *= answer.gears > _AT_ONCE
     called = (
-        "In sds: how far a gear is from the centre, counted in the scatter of ordinary "
-        "gears. Called off are those so far out that in the mean at most "
+        "Apart: from the centre, of its lot where lots are told, at one size; in sds: "
+        "counted in the scatter of ordinary gears. Called off are those so far out "
+        "that in the mean at most "
         f"{percent(answer.false_calls)} of the gears called are ordinary ones."
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
@@ -210,6 +204,7 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
         str(one["rows"]),
         number(one["stiffness_N_per_mm"], width),
         f"{number(low, width)} … {number(high, width)}",
+        f"{one['apart_percent']:+.2g}",
         f"{one['distance_sd']:+.1f}",
         f"{one['noise_sd_N']:.2g}",
         percent(one["probability_off"]),
@@ -267,13 +262,14 @@ def _gauge(answer: FleetAnswer) -> Section:
             "%",
         ),
         ("gauge, of the tolerance", found.percent_tolerance, "%"),
-        ("distinct categories", found.distinct_categories, ""),
     ]
     told = [
         (what, f"{estimate(one)[0]} {unit} ({estimate(one)[1]})".replace("  ", " "))
         for what, one, unit in rows
         if one is not None
     ]
+    many = [f"{end:.0f}" for end in vars(found.distinct_categories).values()]
+    told.append(("distinct categories", "{} ({} … {})".format(*many)))
     words = (
         f"Of one reading of the force at {found.deformation_mm:g} mm, by standard "
         "deviations. Below 10 % of study variation or tolerance a gauge is usually "
@@ -281,4 +277,24 @@ def _gauge(answer: FleetAnswer) -> Section:
         "more. The stiffness above rests on all readings of a gear and is told far "
         "better than by one."
     )
-    return Section("Gauge R&R", [Facts(told), Text(words, soft=True)])
+    asked = found.percent_tolerance is not None
+    blocks = [Text(_verdict(found)), Facts(told), Text(words, soft=True)]
+    return Section("Gauge R&R", blocks, brief=asked)
+
+
+def _verdict(found: GaugeAnswer) -> str:
+    """Return whether the gauge is good enough, by the customary bounds."""
+    against, whose = found.percent_study_variation, "of all that scatters"
+    if found.percent_tolerance is not None:
+        against, whose = found.percent_tolerance, "of the tolerance"
+    ends = [known(end) and end for end in vars(against).values()]
+    middle, span = estimate(against)
+    said = f"The gauge takes {middle} % {whose} (95 %: {span} %)"
+    for low, high, words in (
+        (-np.inf, 10.0, "which is usually called good"),
+        (10.0, 30.0, "which is usually called acceptable"),
+        (30.0, np.inf, "which is usually called not good enough"),
+    ):
+        if all(low <= end < high for end in ends):
+            return f"{said}, {words}."
+    return f"{said}: whether it is good enough these data do not settle."

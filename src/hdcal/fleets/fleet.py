@@ -33,6 +33,7 @@ from hdcal.inference.population_problem import (
 )
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
+from hdcal.report.plain import as_plain
 
 # Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05
@@ -55,6 +56,7 @@ class Fleet(Shown):
             (relative) and operator_1, … [N].
         stiffness: of each gear, of as many draws, had it the gear file's sizes, shape
             (t, g) [N/mm as read].
+        apart: of each gear from the centre of its lot, likewise, as a share of it.
         size_ratio: of each gear, by which its own sizes make it stiffer, shape (g,).
         noise_sd: of each gear, shape (g,) [N].
         zero: of each gear in the mean of its mountings, shape (g,) [N].
@@ -76,6 +78,7 @@ class Fleet(Shown):
     readings: FleetReadings
     draws: Mapping[str, np.ndarray]
     stiffness: np.ndarray
+    apart: np.ndarray
     size_ratio: np.ndarray
     noise_sd: np.ndarray
     zero: np.ndarray
@@ -129,6 +132,13 @@ class Fleet(Shown):
         seed = int(str(self.settings["seed"]))
         return next_force(self.draws, deformation, limit_force, seed)
 
+    def summary(self) -> dict:
+        """Return all that is told of them as plain data, as in summary.json."""
+        # Late: words and intervals take what a fleet is made of.
+        from hdcal.fleets.summary import fleet_answer
+
+        return as_plain(fleet_answer(self))
+
     @property
     def reasons(self) -> tuple[str, ...]:
         """Return why the result must not be used; empty where it may."""
@@ -146,6 +156,7 @@ def fleet(
     seed: int = 0,
     force_tolerance: float | None = None,
     gears: Any = None,
+    since: str | None = None,
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Fleet:
@@ -169,6 +180,7 @@ def fleet(
         force_tolerance: width that the force at the largest deformation may lie in [N].
         gears: table of the sizes of each gear, where they differ: a file or a table in
             memory with a column specimen and columns such as wall_thickness_mm.
+        since: day, as 2026-09-01, before which what was read is left out.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder; they have to find them under the same names.
         progress: called with (iterations done, iterations in all).
@@ -182,6 +194,8 @@ def fleet(
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
     readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
+    if since is not None:
+        readings = readings.since(since)
     check_fleet(readings)
     ratio = np.ones(len(readings.case.specimen_labels))
     if gears is not None:
@@ -230,14 +244,15 @@ def _gears(
     drawn = draw_gears(problem, chosen, key)
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
     centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
-    apart = (stiffness / centre - 1.0) / chosen["specimen_sd"][:, None]
+    apart = stiffness / centre - 1.0
     sums = readings.sums
     zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
     return {
         "stiffness": stiffness,
+        "apart": apart,
         "noise_sd": np.median(np.asarray(drawn.noise_sd), axis=0),
         "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
-        "distance": np.median(apart, axis=0),
+        "distance": np.median(apart / chosen["specimen_sd"][:, None], axis=0),
         "off": off.mean(axis=0),
         # About a centre and a scatter that the gear itself has no part in: where it is
         # off.

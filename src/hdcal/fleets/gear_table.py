@@ -82,8 +82,7 @@ def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
             try:
                 column[index] = read_number(cell, comma)
             except CellError as error:
-                problem, remedy = error.args
-                findings.add(problem, remedy, row, header)
+                findings.add(error.args[0], "State the size", row, header)
                 continue
             for wrong in implausible(header, column[index], "size"):
                 findings.add(wrong.problem, wrong.remedy, row, header)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hdcal.data.cells import NOT_STATED
+from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.misfit import misfit_words
 
@@ -21,6 +22,10 @@ ONE_MOUNTING = (
 OF_SIZES = (
     "Gears are of several sizes: what is told of the population, of gears to come and "
     "of forces is of a gear of the gear file's sizes."
+)
+ONE_SIZE = (
+    "All gears are taken to be of the gear file's sizes: what sizes differ in counts "
+    "as scatter, and may hide one that is off. `--gears TABLE` states those of each."
 )
 FEW_GEARS = (
     "So few gears say little of how much ordinary ones scatter: only a gear very far "
@@ -39,7 +44,8 @@ def notes_of(found: Fleet) -> Sequence[str]:
         if 0 < len(names) < _FEW_GROUPS
     ]
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
-    sized = [OF_SIZES] if np.any(found.size_ratio != 1.0) else []
+    sized = [OF_SIZES] if np.any(found.size_ratio != 1.0) else [ONE_SIZE]
+    sized = sized if found.case.gear.theory != SPRING else []
     few = [FEW_GEARS] if len(found.off) < FEW else []
     beside = misfit_words(found.misfit)
     untold = [*_untold(found)]

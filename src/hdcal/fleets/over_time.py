@@ -40,8 +40,8 @@ class TimeAnswer:
     """How one quantity goes with the date of measurement.
 
     Attributes:
-        what: stiffness of gears about the centre of their lot, zero of mountings about
-            that of their operator, or noise of gears.
+        what: stiffness of gears about the centre of their lot, zero of a gear's
+            mountings of one day about that of their operator, or noise of gears.
         unit: percent or N.
         dates: how many there are.
         first: the first of them.
@@ -100,7 +100,7 @@ def time_series(found: Fleet) -> list[TimeSeries]:
     if not found.case.dates or found.reasons:
         return []
     each = (_ordered(*one) for one in _measured(found))
-    return [one for one in each if len(np.unique(one.day)) > 1]
+    return [one for one in each if len(np.unique(one.day[~one.apart])) > 1]
 
 
 def time_answer(series: TimeSeries) -> TimeAnswer:
@@ -142,11 +142,11 @@ def _ordered(what: What, unit: Unit, day, name, value, sd) -> TimeSeries:
     order = np.flatnonzero(told)[np.argsort(day[told], kind="stable")]
     value = value[order] - np.median(value[order]) if len(order) else value[order]
     columns = day[order].astype("datetime64[D]"), name[order], value, sd[order]
-    return TimeSeries(what, unit, *columns, _wild(value))
+    return TimeSeries(what, unit, *columns, _wild(value, sd[order]))
 
 
-def _wild(value: np.ndarray) -> np.ndarray:
-    """Return which values are far from those before and after them.
+def _wild(value: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Return which values are far from those before and after them, each alone.
 
     Source:
         Hampel, The American Statistician 25 (1971); the filter that bears his name.
@@ -155,13 +155,36 @@ def _wild(value: np.ndarray) -> np.ndarray:
         return np.zeros(len(value), bool)
     padded = np.pad(value, _BESIDE, mode="reflect")
     beside = np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1)
-    apart = np.abs(value - np.median(beside, axis=1))
-    # Sd of a normal law by its median absolute deviation.
-    return apart > _WILD * middle_sd(apart)
+    apart = value - np.median(np.delete(beside, _BESIDE, axis=1), axis=1)
+    # What values scatter by beside their own errors.
+    scatter = max(middle_sd(apart) ** 2 - float(np.median(sd**2)), 0.0)
+    apart = apart / np.sqrt(scatter + sd**2)
+    wild = np.abs(apart) > _WILD * middle_sd(apart)
+    # Neighbours that are far on one side are a change, or a bad day.
+    side = np.pad(np.where(wild, np.sign(apart), 0.0), 1)
+    return wild & (side[1:-1] != side[:-2]) & (side[1:-1] != side[2:])
+
+
+def _by_day(gears, dates, zero, sums, noise, own_xx, labels):
+    """Return date, name, zero and its sd of each gear on each day.
+
+    Zeros of a gear share the error of its slope: those of one day are one value.
+    """
+    days = dates.astype("datetime64[D]")
+    keys = np.stack([gears, days.astype(np.int64)])
+    pairs, index = np.unique(keys, axis=1, return_inverse=True)
+    index = index.ravel()
+    rows = np.bincount(index, sums.rows)
+    mean = np.bincount(index, sums.rows * zero) / rows
+    x = np.bincount(index, sums.rows * sums.x) / rows
+    gear = pairs[0]
+    sd = noise[np.unique(index, return_index=True)[1]]
+    error = sd * np.sqrt(1.0 / rows + x**2 / own_xx[gear])
+    return pairs[1].astype("datetime64[D]"), labels[gear], mean, error
 
 
 def _measured(found: Fleet):
-    """Yield what goes with the date: what, unit, gear, date, name, value and sd."""
+    """Yield what goes with the date: what, unit, date, name, value and sd."""
     case, sums, runs = found.case, found.readings.sums, found.readings.runs
     gears = np.asarray(sums.gear)
     dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")[runs]
@@ -180,9 +203,8 @@ def _measured(found: Fleet):
     by = np.asarray(group_offsets(middle, "operator"))[np.asarray(sums.operator)]
     # By the gear's own line: the population's law of zeros would draw them together.
     zero = sums.y - slope[gears] * sums.x - by
-    error = found.noise_sd[gears] * np.sqrt(1.0 / sums.rows + sums.x**2 / own_xx[gears])
-    names = np.array([case.run_labels[run] for run in runs])
-    yield "zero", "N", dates, names, zero, error
+    noise = found.noise_sd[gears]
+    yield "zero", "N", *_by_day(gears, dates, zero, sums, noise, own_xx, labels)
     square = np.bincount(gears, sums.yy) - slope**2 * own_xx
     free = np.bincount(gears, sums.rows - 1.0) - 1.0
     with np.errstate(all="ignore"):

@@ -6,8 +6,9 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.scatter import require_scatter
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
+from hdcal.evidence.row_features import take_rows
 from hdcal.fleets.groups import groups
 from hdcal.inference.gear_sums import MountingSums
 
@@ -44,6 +45,65 @@ class FleetReadings:
         one, r = self.sums, ratio[self.sums.gear]
         sized = {"x": r * one.x, "xx": r**2 * one.xx, "xy": r * one.xy}
         return replace(self, sums=replace(one, **sized))
+
+    def since(self, day: str) -> "FleetReadings":
+        """Return what was read on a day or later; mountings without a date are not.
+
+        Args:
+            day: as 2026-09-01.
+
+        Raises:
+            InputError: it is no day, no dates are told, or nothing was read then.
+        """
+        try:
+            first = np.datetime64(day, "D")
+        except ValueError:
+            remedy = "Write it as 2026-09-01"
+            raise InputError(
+                [Finding("since", f"{quoted(day)} is no day", remedy)]
+            ) from None
+        case, sums = self.case, self.sums
+        dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")
+        kept = dates >= first if len(dates) else np.zeros(len(case.run_labels), bool)
+        of_mounting = kept[self.runs]
+        if not of_mounting.any():
+            words = (
+                f"nothing was read on {day} or later"
+                if len(dates)
+                else "no dates are told"
+            )
+            raise InputError([Finding("since", words, "See the dates of the data")])
+        gears, gear = np.unique(sums.gear[of_mounting], return_inverse=True)
+        runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
+        # Groups are told apart anew: some may be gone.
+        operators = _some(case.operators, runs)
+        by = groups(operators)[1]
+        by = by[run] if len(by) else np.zeros(len(run), int)
+        columns = {name: value[of_mounting] for name, value in vars(sums).items()}
+        records = case.records
+        rows = np.isin(records.run, runs) & np.isin(records.specimen, gears)
+        records = take_rows(records, np.flatnonzero(rows))
+        records = replace(
+            records,
+            specimen=np.searchsorted(gears, records.specimen),
+            run=np.searchsorted(runs, records.run),
+        )
+        case = replace(
+            case,
+            records=records,
+            specimen_labels=_some(case.specimen_labels, gears),
+            run_labels=_some(case.run_labels, runs),
+            lots=_some(case.lots, gears),
+            operators=operators,
+            dates=_some(case.dates, runs),
+            notes=(*case.notes, f"What was read before {day} is left out."),
+        )
+        sums = MountingSums(**columns | {"gear": gear, "operator": by})
+        return replace(self, case=case, sums=sums, runs=run)
+
+
+def _some(labels: tuple[str, ...], places: np.ndarray) -> tuple[str, ...]:
+    return tuple(labels[place] for place in places) if labels else ()
 
 
 def fleet_readings(case: Case) -> FleetReadings:

@@ -50,6 +50,8 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         K_low, K, K_high = np.quantile(_influence(found), _ENDS, axis=0)
         columns |= {"K": K, "K_lo": K_low, "K_hi": K_high}
     failed = bool(found.reasons)
+    apart_low, apart, apart_high = np.quantile(100.0 * found.apart, _ENDS, axis=0)
+    columns |= {"apart_percent": apart, "apart_lo": apart_low, "apart_hi": apart_high}
     return columns | {
         "zero_N": found.zero,
         "noise_sd_N": found.noise_sd,
@@ -89,7 +91,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
     )
     lots = tuple(_lots(found))
     failed = f"This result failed its checks: {'; '.join(found.reasons)}."
-    said = failed if found.reasons else headline(population, called, columns, lots)
+    said = failed if found.reasons else headline(population, called, columns)
     return FleetAnswer(
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
@@ -100,6 +102,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         called_off=tuple(called),
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
+        at_one_size=bool(np.any(found.size_ratio != 1.0)),
         population=population,
         lots=lots,
         operators=tuple(_operators(found)),

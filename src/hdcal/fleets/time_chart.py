@@ -73,9 +73,9 @@ def _sums(series: TimeSeries) -> Chart:
 
 
 def _axis(series: TimeSeries) -> str:
-    # Charts of one axis are zoomed together: those of gears, not those of mountings.
-    whose = "mounting" if series.what == "zero" else "gear"
-    return f"date and {whose}, in the order of measurement"
+    # Charts of one axis are zoomed together: those of gears, not those of days.
+    also = ", each day" * (series.what == "zero")
+    return f"date and gear{also}, in the order of measurement"
 
 
 def _place(series: TimeSeries) -> np.ndarray:

@@ -12,17 +12,23 @@ _OF = {
     "noise": "The noise of readings",
 }
 _SURE = 0.95
+_MOST_NAMED = 5
 
 
 def time_words(answer: TimeAnswer) -> str:
     """Return in one sentence whether a quantity changes, how and when."""
     what, sure = _OF[answer.what], percent(answer.probability_changed)
     if not answer.changed:
-        return f"{what}: no change is told (probability of one {sure})."
+        return f"{what}: no change is told (probability that there is one: {sure})."
     told = f"{what} changes with the date (probability {sure})"
     way = answer.ways[answer.likeliest] / answer.probability_changed
     doubt = "" if way >= _SURE else "; which way is not settled, likeliest"
-    future = ". Gears to come are told as if it did not" * (answer.what == "stiffness")
+    future = "Gears and forces to come are told as if it did not"
+    if answer.likeliest == "steps":
+        future += (
+            f"; what holds since then is told with `--since {answer.steps[-1].before}`"
+        )
+    future = f". {future}" * (answer.what != "noise")
     return f"{told}{doubt}: {_way(answer)}{future}."
 
 
@@ -56,11 +62,15 @@ def time_section(answers: Sequence[TimeAnswer]) -> Section:
         "sums of the stiffness, with limits at five. Stiffness is about the centre of "
         "the gear's lot, zeros are about that of the operator, where they are told.",
     )
-    out = [name for one in answers for name in one.left_out if one.what == "stiffness"]
+    out = [
+        f"{one.what} of {name}"
+        for one in answers
+        for name in one.left_out[:_MOST_NAMED]
+    ]
     left = f" Far from those before and after, and left out: {', '.join(out)}."
-    dates = max(one.dates for one in answers)
+    most = max(answers, key=lambda one: one.dates)
     soft = (
-        f"{dates} dates from {answers[0].first} to {answers[0].last}. What is asked is "
+        f"{most.dates} dates from {most.first} to {most.last}. What is asked is "
         "whether values stay, step, drift or differ from day to day; that they stay "
         "has the probability one half before the data. A rig that changes and gears "
         f"that change look alike.{left if out else ''}"

@@ -1,37 +1,35 @@
-"""Where a posterior is nearly normal a draw costs one density, not a trajectory.
+"""Where a posterior has a few parameters a draw costs one density, no trajectory.
 
-A multivariate t proposes, wherever a chain is, and Metropolis' rule accepts: draws are
-of the posterior itself, whatever proposes. The t is fitted to weighted proposals first,
-in rounds. Where it covers the posterior badly nothing is returned.
+A mixture of multivariate t laws proposes, wherever a chain is, and Metropolis' rule
+accepts: draws are of the posterior itself, whatever proposes. The mixture is fitted to
+all proposals so far, weighted, in rounds; a wide part of it finds what others miss.
+Where it covers the posterior badly nothing is returned.
 
 Source:
-    Tierney, Annals of Statistics 22 (1994), independence chains; Cappé, Guillin, Marin
-    and Robert, Journal of Computational and Graphical Statistics 13 (2004), rounds;
-    Vehtari et al., Journal of Machine Learning Research 25 (2024), Pareto k.
+    Tierney, Annals of Statistics 22 (1994), independence chains; Cornuet, Marin, Mira
+    and Robert, Scandinavian Journal of Statistics 39 (2012), rounds whose proposals all
+    count; Cappé, Douc, Guillin, Marin and Robert, Statistics and Computing 18 (2008),
+    mixtures; Vehtari et al., Journal of Machine Learning Research 25 (2024), Pareto k.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
 from jaxtyping import Float, Key
-from scipy import stats
 
 from hdcal.data.records import Array
 from hdcal.inference.diagnostics import have_mixed
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 
-# Tails heavier than a posterior's, which keep weights bounded.
-_FREEDOM = 8
-# Proposals of a round; rounds end when such a share of them is worth a draw.
-_ROUNDS, _EFFICIENT = (1000, 2000, 4000), 0.4
+# Proposals of a round; rounds end when such a share of the last ones is worth a draw.
+_ROUNDS, _EFFICIENT, _LIGHT = (1000, 1000, 2000, 4000, 4000, 8000), 0.5, 0.5
 # Independent draws that are aimed at for each draw that is kept, and proposals for it
 # at most.
 _WORTH, _MOST = 0.5, 8
-# Least scatter of proposals, in variances at the mode.
-_LEAST = 0.01
 # Proposals of a chain that are left out, after which it has forgotten its start.
 _FORGOTTEN = 100
 # Densities between two signs of life.
@@ -61,7 +59,7 @@ def sample_independently(
     draws: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> IndependentDraws | None:
-    """Draw from a posterior that is nearly normal in its unconstrained coordinates.
+    """Draw from a posterior that is a few parameters, in its unconstrained coordinates.
 
     Args:
         problem: the inference problem, with every parameter among its coordinates.
@@ -79,8 +77,11 @@ def sample_independently(
     if efficiency < _WORTH / _MOST:
         return None
     each = int(np.ceil(_WORTH / efficiency))
-    place = _drawn(law, (chains, _FORGOTTEN + each * draws), rng)
-    weight = _log_weights(problem, whitening, law, place, progress)
+    length = _FORGOTTEN + each * draws
+    flat = law.draw(chains * length, rng)
+    density = _log_densities(problem, whitening, flat, progress)
+    weight = (density - law.log_density(flat)).reshape(chains, length)
+    place = flat.reshape(chains, length, -1)
     shape = _pareto_shape(weight)
     if not shape <= MAX_SHAPE:
         return None
@@ -92,21 +93,32 @@ def sample_independently(
     return IndependentDraws(values, shape) if have_mixed(moving) else None
 
 
-def _adapted(problem: Sampled, whitening: Whitening, rng: np.random.Generator):
+def _adapted(
+    problem: Sampled, whitening: Whitening, rng: np.random.Generator
+) -> tuple[TMixture, float]:
     """Return the proposals, and the share of the last ones that is worth a draw."""
-    size = len(whitening.factor)
-    law, efficiency = _proposals(np.zeros(size), np.eye(size)), 0.0
+    law = first_mixture(len(whitening.factor))
+    laws, places, densities, efficiency = [], [], [], 0.0
     for count in _ROUNDS:
-        place = _drawn(law, (count, 1), rng)[:, 0]
-        weight = _log_weights(problem, whitening, law, place)
+        laws.append((count, law))
+        places.append(law.draw(count, rng))
+        densities.append(_log_densities(problem, whitening, places[-1]))
+        weight = densities[-1] - law.log_density(places[-1])
         if not np.isfinite(weight).any():
             return law, 0.0
-        share = np.exp(weight - np.logaddexp.reduce(weight))
-        efficiency = float(1.0 / (count * np.sum(share**2)))
-        law = _fitted(place, share)
-        if efficiency >= _EFFICIENT:
+        efficiency = 1.0 / (count * np.sum(_shares(weight) ** 2))
+        place, total = np.concatenate(places), sum(many for many, _ in laws)
+        # As if each had been drawn from all of the laws so far.
+        each = [np.log(many / total) + one.log_density(place) for many, one in laws]
+        share = _shares(np.concatenate(densities) - np.logaddexp.reduce(each))
+        law = fitted_mixture(place, share, rng)
+        if efficiency >= _EFFICIENT and _pareto_shape(weight) <= _LIGHT:
             break
-    return law, efficiency
+    return law, float(efficiency)
+
+
+def _shares(log_weight: np.ndarray) -> np.ndarray:
+    return np.exp(log_weight - np.logaddexp.reduce(log_weight))
 
 
 def _metropolis(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -121,23 +133,6 @@ def _metropolis(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return path
 
 
-def _fitted(place: np.ndarray, share: np.ndarray):
-    """Return the t with the mean and the scatter of weighted places."""
-    # A few places with most of the weight would say nothing of the scatter.
-    share = np.minimum(share, 1.0 / np.sqrt(len(share)))
-    share /= share.sum()
-    centre = share @ place
-    about = (place - centre) * np.sqrt(share)[:, None]
-    # One place alone has no scatter: a little of what it was proposed with.
-    scatter = about.T @ about + _LEAST * np.eye(len(centre))
-    return _proposals(centre, scatter * (_FREEDOM - 2) / _FREEDOM)
-
-
-def _proposals(centre: np.ndarray, scatter: np.ndarray) -> Any:
-    # Its stubs know of one dimension only.
-    return stats.multivariate_t(centre, scatter, _FREEDOM)  # pyright: ignore[reportArgumentType]
-
-
 def _pareto_shape(weight: np.ndarray) -> float:
     # Late: a finished result is read without it.
     from arviz_stats.base.array import array_stats
@@ -146,26 +141,20 @@ def _pareto_shape(weight: np.ndarray) -> float:
     return float(array_stats.psislw(-weight.ravel())[1])
 
 
-def _drawn(law: Any, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
-    """Return places of two leading axes, the last one of which its law may drop."""
-    return law.rvs(shape, random_state=rng).reshape(*shape, law.dim)
-
-
-def _log_weights(
-    problem: Sampled, whitening: Whitening, law: Any, place: np.ndarray, progress=None
+def _log_densities(
+    problem: Sampled, whitening: Whitening, place: np.ndarray, progress=None
 ) -> np.ndarray:
-    """Return the log weight of each place, last axis; −∞ where no density is."""
-    flat = place.reshape(-1, law.dim)
+    """Return the log density at each place, shape (n, d); −∞ where there is none."""
     found = []
-    for start in range(0, len(flat), _BLOCK):
-        block = flat[start : start + _BLOCK]
+    for start in range(0, len(place), _BLOCK):
+        block = place[start : start + _BLOCK]
         # Blocks of one length are one program.
-        padded = np.resize(block, (_BLOCK, law.dim))
+        padded = np.resize(block, (_BLOCK, place.shape[1]))
         density = -np.asarray(_potentials(problem, whitening, padded))[: len(block)]
         found.append(np.where(np.isfinite(density), density, -np.inf))
         if progress is not None:
-            progress(min(start + _BLOCK, len(flat)), len(flat))
-    return np.concatenate(found).reshape(place.shape[:-1]) - law.logpdf(place)
+            progress(min(start + _BLOCK, len(place)), len(place))
+    return np.concatenate(found)
 
 
 @jax.jit

@@ -1,0 +1,115 @@
+"""Mixtures of multivariate t laws, and how they are fitted to weighted places."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import gammaln, softmax
+
+# Tails heavier than a posterior's, which keep weights bounded.
+_FREEDOM = 8.0
+# Parts that are fitted, and steps in which they are.
+_PARTS, _STEPS = 10, 8
+# Share of the wide part, and how much farther it goes than all places do.
+_WIDE, _FARTHER = 0.2, 1.7
+# Least variance of a part, in variances at the mode, and its least share.
+_LEAST, _SMALL = 0.01, 0.01
+
+
+@dataclass(frozen=True)
+class TMixture:
+    """Some parts with eight degrees of freedom each.
+
+    Attributes:
+        share: of each part, shape (k,).
+        centre: shape (k, d).
+        root: Cholesky factor of the scale matrix, shape (k, d, d).
+    """
+
+    share: np.ndarray
+    centre: np.ndarray
+    root: np.ndarray
+
+    def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
+        """Return places, shape (count, d)."""
+        part = rng.choice(len(self.share), count, p=self.share)
+        normal = rng.standard_normal((count, self.centre.shape[1]))
+        tail = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, count))
+        step = np.einsum("nij,nj->ni", self.root[part], normal)
+        return self.centre[part] + tail[:, None] * step
+
+    def log_density(self, place: np.ndarray) -> np.ndarray:
+        """Return the log density at each place, shape (n, d)."""
+        return np.logaddexp.reduce(self.log_parts(place)[0], axis=1)
+
+    def log_parts(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the log density of each part with its share, and squared distances.
+
+        Both of shape (n, k).
+        """
+        size = place.shape[1]
+        square, volume = [], []
+        for centre, root in zip(self.centre, self.root, strict=True):
+            away = solve_triangular(root, (place - centre).T, lower=True)
+            square.append(np.sum(away**2, axis=0))
+            volume.append(np.sum(np.log(np.diag(root))))
+        distance, half = np.stack(square, axis=1), 0.5 * (_FREEDOM + size)
+        constant = gammaln(half) - gammaln(0.5 * _FREEDOM)
+        constant -= 0.5 * size * np.log(np.pi * _FREEDOM)
+        log_part = np.log(self.share) + constant - np.array(volume)
+        return log_part - half * np.log1p(distance / _FREEDOM), distance
+
+
+def first_mixture(size: int) -> TMixture:
+    """Return laws about the mode: as wide as the posterior is there, and twice so."""
+    root = np.stack([np.eye(size), _FARTHER * np.eye(size)])
+    return TMixture(np.array([0.5, 0.5]), np.zeros((2, size)), root)
+
+
+def fitted_mixture(
+    place: np.ndarray, share: np.ndarray, rng: np.random.Generator
+) -> TMixture:
+    """Return the mixture that follows weighted places, and a wide part beside it.
+
+    Args:
+        place: shape (n, d).
+        share: of each place, shape (n,); sums to 1.
+        rng: of the places from which parts start.
+    """
+    # A few places with most of the weight would be all that parts follow.
+    share = np.minimum(share, 1.0 / np.sqrt(len(share)))
+    share = share / share.sum()
+    middle, whole = _moments(place, share)
+    start = place[rng.choice(len(place), _PARTS, p=share)]
+    even = np.full(_PARTS, 1.0 / _PARTS)
+    law = TMixture(even, start, np.tile(np.linalg.cholesky(whole), (_PARTS, 1, 1)))
+    for _ in range(_STEPS):
+        law = _step(law, place, share)
+    wide = _FARTHER * np.linalg.cholesky(whole)
+    return TMixture(
+        np.append((1.0 - _WIDE) * law.share, _WIDE),
+        np.vstack([law.centre, middle]),
+        np.concatenate([law.root, wide[None]]),
+    )
+
+
+def _step(law: TMixture, place: np.ndarray, share: np.ndarray) -> TMixture:
+    """Return a mixture that follows the places better (EM of t laws)."""
+    log_part, distance = law.log_parts(place)
+    of_part = share[:, None] * softmax(log_part, axis=1)
+    near = of_part * (_FREEDOM + place.shape[1]) / (_FREEDOM + distance)
+    total = of_part.sum(axis=0)
+    parts = []
+    for part in np.flatnonzero(total > _SMALL):
+        centre = near[:, part] @ place / near[:, part].sum()
+        about = (place - centre) * np.sqrt(near[:, part] / total[part])[:, None]
+        scatter = about.T @ about + _LEAST * np.eye(place.shape[1])
+        parts.append((total[part], centre, np.linalg.cholesky(scatter)))
+    shares, centres, roots = map(np.array, zip(*parts, strict=True))
+    return TMixture(shares / shares.sum(), centres, roots)
+
+
+def _moments(place: np.ndarray, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    middle = share @ place
+    about = (place - middle) * np.sqrt(share)[:, None]
+    return middle, about.T @ about + _LEAST * np.eye(place.shape[1])
