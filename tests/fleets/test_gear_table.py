@@ -106,7 +106,7 @@ def test_what_is_wrong_with_a_table_is_told_all_at_once():
     given.loc[3, "wall_thickness_mm"] = -1.0
     given.loc[5, "wall_thickness_mm"] = 50.0
     given = pd.concat([given.iloc[:-1], given.iloc[[0]]])
-    told = wrong(given.assign(radius_mm=40.0))
+    told = wrong(given)
     for words in (
         "'thin' is not a number",
         "-1",
@@ -125,6 +125,22 @@ def test_what_is_wrong_with_a_table_is_told_all_at_once():
     ],
 )
 def test_a_table_that_says_nothing_is_refused(given, words):
+    assert words in wrong(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (table(wall_thickness_mm=50.0), "the wall is not thinner than the radius"),
+        (table(radius_mm=0.5), "the wall is not thinner than the radius"),
+        (table(load_height_mm=90.0), "the load acts beyond the length"),
+        (table(**{"radius [mm]": 60.0}), "a size is not read under this name"),
+        (table(length_um=60.0), "a size is not read under this name"),
+        (table().iloc[:0], "has no row"),
+        ([1, 2], "is a list"),
+    ],
+)
+def test_sizes_that_cannot_be_or_are_not_read_are_refused(given, words):
     assert words in wrong(given)
 
 

@@ -14,7 +14,7 @@ from pyarrow import parquet as pq
 
 import hdcal as api
 from hdcal.data import parquet
-from hdcal.data.parquet import is_parquet
+from hdcal.data.parquet_table import is_parquet
 from hdcal.errors import InputError
 from hdcal.fleets.pool import Pool
 from hdcal.fleets.read_fleet import read_fleet
@@ -151,7 +151,64 @@ def test_files_of_several_kinds_are_refused(frame, tmp_path):
     told = wrong(tmp_path)
     assert "'force_N'" in told and "b.parquet" in told
     frame.drop(columns="force_N").to_parquet(tmp_path / "b.parquet", index=False)
-    assert "has no column" in wrong(tmp_path)
+    told = wrong(tmp_path)
+    assert "b.parquet" in told and "the cell is empty" in told
+
+
+def test_columns_that_are_not_used_may_be_of_any_kind(frame, tmp_path):
+    """As pandas saves an empty column, and one that holds lists."""
+    lists = [[1.0, 2.0]] * len(frame)
+    frame.assign(remark=None, trace=lists).to_parquet(tmp_path / "a.parquet")
+    other = frame.assign(serial="H" + frame["serial"], remark="late", trace="none")
+    other.to_parquet(tmp_path / "b.parquet")
+    assert len(read_fleet(tmp_path).case.specimen_labels) == 2 * GEARS
+
+
+def test_serials_of_folders_keep_their_noughts(frame, tmp_path):
+    names = ["0012", "12", "A3", "007", "7"]
+    for place, name in enumerate(names):
+        folder = tmp_path / f"serial={name}"
+        folder.mkdir()
+        part = frame[frame["serial"] == f"G{place}"].drop(columns="serial")
+        part.to_parquet(folder / "part.parquet", index=False)
+    assert sorted(read_fleet(tmp_path).case.specimen_labels) == sorted(names)
+
+
+def test_a_folder_of_another_table_is_no_parquet(frame, tmp_path):
+    frame.to_csv(tmp_path / "data.csv", index=False)
+    (tmp_path / "results").mkdir()
+    frame.to_parquet(tmp_path / "results" / "old.parquet")
+    assert not is_parquet(tmp_path)
+
+
+def test_labels_with_gaps_are_those_of_a_table(frame, tmp_path, monkeypatch):
+    monkeypatch.setattr(parquet, "_BATCH", 100)
+    lot = frame["lot"].map({"A": 1, "B": 2}).astype("Int64")
+    lot[5] = pd.NA
+    frame.assign(lot=lot).to_parquet(tmp_path / "line.parquet", index=False)
+    assert set(read_fleet(tmp_path / "line.parquet").case.lots) == {"1", "2"}
+    given = frame.copy()
+    given.loc[300, "serial"] = ""
+    given.to_parquet(tmp_path / "line.parquet", index=False)
+    monkeypatch.setattr(parquet, "_SHOWN", 100)
+    assert "row 301" in wrong(tmp_path / "line.parquet")
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin", "Asia/Tokyo"])
+def test_a_day_is_that_of_the_clock_on_the_wall(frame, tmp_path, zone):
+    times = pd.to_datetime(frame["date"]) + pd.to_timedelta(1, unit="h")
+    frame.assign(date=times.dt.tz_localize(zone)).to_parquet(tmp_path / "l.parquet")
+    found = read_fleet(tmp_path / "l.parquet").case.dates
+    assert found[0][:10] == "2026-04-01"
+
+
+def test_a_fault_of_the_first_rows_is_told_with_its_file(frame, tmp_path):
+    frame.to_parquet(tmp_path / "a.parquet", index=False)
+    given = frame.copy()
+    given.loc[4, "force_N"] = np.nan
+    given.to_parquet(tmp_path / "b.parquet", index=False)
+    told = wrong(tmp_path)
+    assert "b.parquet, row 5" in told
 
 
 def test_what_is_no_parquet_inside_is_refused(tmp_path):

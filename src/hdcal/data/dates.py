@@ -1,5 +1,6 @@
 """Dates of mountings, as rigs and people write them."""
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ from hdcal.errors import quoted
 # How days are written; behind points the month stands second, behind slashes anywhere.
 _DAYS = ("ISO8601", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y")
 _TIMES = ("", " %H:%M", " %H:%M:%S")
+_ZONE = re.compile(r"(?<=:\d{2})(\.\d+)?(Z|[+-]\d{2}:?\d{2})$")
 # Before and after these nobody measured: a plain number is no date.
 _EARLIEST, _LATEST = np.datetime64("1950-01-01"), np.datetime64("2100-01-01")
 _REMEDY = "Write dates as in 2026-09-01, year first"
@@ -54,14 +56,16 @@ def dates_of(
 def _readings(texts: Sequence[str]) -> list[np.ndarray]:
     """Return in how many ways texts can be read, most of them at least, as times."""
     found: list[np.ndarray] = []
+    # What clocks there showed counts, not what they showed elsewhere.
+    plain = pd.Series([_ZONE.sub("", text) for text in texts])
     for day in _DAYS:
+        times = pd.Series(pd.NaT, index=plain.index, dtype="datetime64[s]")
         for time in _TIMES if "%" in day else ("",):
-            read = pd.to_datetime(
-                pd.Series(texts), format=day + time, errors="coerce", utc=True
-            )
-            times = read.dt.tz_localize(None).to_numpy().astype("datetime64[s]")
-            times[~((times > _EARLIEST) & (times < _LATEST))] = np.datetime64("NaT")
-            found.append(times)
+            read = pd.to_datetime(plain, format=day + time, errors="coerce")
+            times = times.fillna(read.astype("datetime64[s]"))
+        each = times.to_numpy().astype("datetime64[s]")
+        each[~((each > _EARLIEST) & (each < _LATEST))] = np.datetime64("NaT")
+        found.append(each)
     # The way in which the fewest are left unread, and all others that leave as few.
     least = min(int(np.isnat(times).sum()) for times in found)
     best = [times for times in found if np.isnat(times).sum() == least]

@@ -1,25 +1,26 @@
 """Parquet, a file or a folder of them: read in batches, whatever the number of rows."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from hdcal.data.array_files import PARQUET
 from hdcal.data.case import Case
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Column
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import GROUPINGS
+from hdcal.data.header_words import GROUPINGS, guess_header
 from hdcal.data.measurements import read_measurements
+from hdcal.data.parquet_table import parquet_files, parquet_table
 from hdcal.data.plausible import RANGES
 from hdcal.data.reading import GEAR_NAME, read_case
 from hdcal.data.units import column_to_code
-from hdcal.errors import quoted
+from hdcal.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
@@ -66,20 +67,6 @@ class Parquet:
     used: Mapping[str, Column]
 
 
-def is_parquet(data: Any) -> bool:
-    """Tell whether data are a Parquet file, or a folder that holds such ones."""
-    if not isinstance(data, str | Path):
-        return False
-    path = Path(data)
-    if path.is_dir():
-        return next(path.rglob("*.parquet"), None) is not None
-    try:
-        with path.open("rb") as file:
-            return file.read(len(PARQUET)) == PARQUET
-    except OSError:
-        return False
-
-
 def read_parquet(
     data: Path | str,
     gear: Path | str | Mapping[str, Any] | None = None,
@@ -103,14 +90,18 @@ def read_parquet(
             kinds of its columns.
     """
     path = Path(data)
-    files = sorted(map(str, path.rglob("*.parquet"))) if path.is_dir() else [str(path)]
+    files = parquet_files(path)
     root = str(path) if path.is_dir() else ""
     with FileFindings(str(path)) as findings:
-        dataset = _dataset(files, root, findings)
+        dataset = parquet_table(files, root, findings)
         beside = (path if root else path.parent) / GEAR_NAME
         gear = beside if gear is None and beside.exists() else gear
-        frame = dataset.head(_SHOWN).to_pandas()
-        case = read_case(frame, gear, columns=columns, theory=theory, reading=reading)
+        frame = _head(dataset, findings)
+        # Lots, operators and dates are told of all rows.
+        further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
+        shown = frame.drop(columns=further)
+        how: dict = {"columns": columns, "theory": theory, "reading": reading}
+        case = _placed(dataset, findings, lambda: read_case(shown, gear, **how))
         used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
@@ -128,7 +119,7 @@ def read_batches(file: str, root: str, used: Mapping[str, Column]) -> Iterator[B
         InputError: holds what is wrong with the first batch that is.
     """
     with FileFindings(file) as findings:
-        dataset = _dataset([file], root, findings)
+        dataset = parquet_table([file], root, findings)
     row, headers = 1, [column.header for column in used.values()]
     for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
         values, labels = {}, {}
@@ -143,28 +134,43 @@ def read_batches(file: str, root: str, used: Mapping[str, Column]) -> Iterator[B
             yield Batch(values, labels)
 
 
-def _dataset(files: Sequence[str], root: str, findings: FileFindings) -> "Dataset":
-    """Return files as one table; each column is of one kind in all of them."""
+def _head(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
+    """Return the first rows of all files, without columns that hold no plain cells."""
+    from pyarrow import types
+
+    plain = [f.name for f in dataset.schema if not types.is_nested(f.type)]
     try:
-        from pyarrow import dataset as tables
-    except ImportError:
-        words = "is Parquet, which needs pyarrow"
-        findings.refuse(words, 'pip install "hdcal[files]"')
-    split = {"partitioning": "hive", "partition_base_dir": root} if root else {}
-    try:
-        found = tables.dataset([*files], format="parquet", **split)
-        first, *others = found.get_fragments()
-        for one in others:
-            for field in first.physical_schema:
-                kind = one.physical_schema.field(field.name).type
-                if kind != field.type:
-                    words = f"{quoted(field.name)} is {kind} in {one.path}"
-                    findings.add(f"{words}, and {field.type} in others", _REMEDY)
-    except KeyError as error:
-        findings.refuse(f"one of its files has no column {error}", _REMEDY)
+        return dataset.head(_SHOWN, columns=plain).to_pandas()
     except Exception as error:  # whatever a parser makes of a broken file
         findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
-    return found
+
+
+def _placed(
+    dataset: "Dataset", findings: FileFindings, read: Callable[[], Case]
+) -> Case:
+    """Return what is read of the first rows; what is wrong is told by file and row."""
+    try:
+        return read()
+    except InputError as error:
+        ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
+        names = [str(one.path) for one in dataset.get_fragments()]
+        for wrong in error.findings:
+            if wrong.row is None:
+                findings.append(wrong)
+                continue
+            # Below a line of headers.
+            at = wrong.row - 2
+            place = int(np.searchsorted(ends, at, side="right"))
+            row = at + 1 - (int(ends[place - 1]) if place else 0)
+            findings.append(replace(wrong, file=names[place], row=row))
+        raise InputError(findings) from None
+
+
+def _quantity(header: str, columns: Mapping[str, str] | None) -> str:
+    """Return which quantity a header is taken for, or said to be."""
+    said = {name: quantity for quantity, name in (columns or {}).items()}
+    guess = guess_header(header)
+    return said.get(header, guess.quantity if guess is not None else "")
 
 
 def _numbers(
@@ -199,22 +205,37 @@ def _labels(
     batch: "RecordBatch", column: Column, row: int, findings: FileFindings
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the index of each row's label, and the labels."""
-    cells = batch.column(column.header).to_pandas()
-    if pd.api.types.is_datetime64_any_dtype(cells):
-        # A day is told, not when each reading was taken.
-        cells = cells.dt.floor("D")
-    place, found = pd.factorize(cells)
-    texts = np.array([*map(_text, found), NOT_STATED], object)
-    empty = place < 0
+    from pyarrow import compute, types
+
+    cells = batch.column(column.header)
+    if types.is_timestamp(cells.type):
+        # A day is told, as clocks there showed it, not when each reading was taken.
+        zoned = cells.type.tz is not None
+        # Functions that no stubs know of.
+        known: Any = compute
+        cells = known.local_timestamp(cells) if zoned else cells
+        cells = known.floor_temporal(cells, unit="day")
+    if not types.is_dictionary(cells.type):
+        cells = cells.dictionary_encode()
+    named = [_text(label) for label in cells.dictionary.to_pylist()]
+    if column.quantity == "date":
+        named = [re.split("[T ]", text)[0] if text else text for text in named]
+    texts, place = np.unique([*named, ""], return_inverse=True)
+    index = np.where(cells.is_null(), len(named), cells.indices.fill_null(0))
+    index = place.ravel()[index]
+    empty = index == int(np.flatnonzero(texts == "")[0])
     if column.quantity not in GROUPINGS:
         words, remedy = f"the {column.quantity} label is empty", "Name it"
         each = ((row + int(at), words, remedy) for at in np.flatnonzero(empty))
         findings.add_rows(each, column.header, "empty labels")
-    return np.where(empty, len(found), place), texts
+    return index, np.where(texts == "", NOT_STATED, texts).astype(object)
 
 
 def _text(label: Any) -> str:
-    return " ".join(str(label).split()) or NOT_STATED
+    """Return a label as text: a number is one, whatever kind it has in a file."""
+    if isinstance(label, float) and label.is_integer():
+        label = int(label)
+    return "" if label is None else " ".join(str(label).split())
 
 
 def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:

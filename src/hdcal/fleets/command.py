@@ -106,7 +106,7 @@ def fleet(
 
 def _read(console: Console, scheduler: str | None, given: dict):
     """Return what was measured; Parquet is read in batches, whatever its size."""
-    from hdcal.data.parquet import is_parquet
+    from hdcal.data.parquet_table import is_parquet
     from hdcal.fleets.read_fleet import read_fleet
 
     if is_parquet(given["data"]) and given["columns"] is not None:

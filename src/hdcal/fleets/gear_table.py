@@ -15,14 +15,18 @@ from hdcal.data.frames import frame_text, is_frame
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.header_words import guess_header
 from hdcal.data.plausible import implausible
+from hdcal.data.records import Geometry
 from hdcal.data.text_file import read_text
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import quoted
+from hdcal.errors import Finding, InputError, quoted
 from hdcal.physics.theory import THEORIES
 
 # Sizes that a table may state, as a gear file calls them.
 SIZES = ("wall_thickness_mm", "radius_mm", "length_mm", "load_height_mm")
 NAME = "the table of gears"
+_NAMES = {name.removesuffix("_mm") for name in SIZES}
+# What a header speaks of that means a size.
+_LIKE = ("wall", "radius", "length", "load_height", "diameter", "thickness")
 _FIRST_FEW = 3
 
 
@@ -43,6 +47,9 @@ def size_ratios(source: Any, case: Case) -> np.ndarray:
         Shape (g,).
     """
     in_memory = is_frame(source)
+    if not in_memory and not isinstance(source, str | Path):
+        remedy = "Give a path, a DataFrame, or arrays by header"
+        raise InputError([Finding("gears", f"is a {type(source).__name__}", remedy)])
     with FileFindings(NAME if in_memory else str(source)) as findings:
         if case.gear.theory == SPRING:
             words = "its sizes say nothing of the stiffness, as no gear file has sizes"
@@ -53,9 +60,12 @@ def size_ratios(source: Any, case: Case) -> np.ndarray:
             else read_text(Path(source), findings)
         )
         table = split_table(text[0], findings)
-        sizes = _sizes(table, findings)
-        rows = _rows(table, case, findings)
         base = case.gear.geometry
+        sizes = _sizes(table, findings)
+        findings.add_rows(_at_odds(table, sizes, base), kind="rows of such sizes")
+        rows = _rows(table, case, findings)
+        if findings:
+            raise InputError(findings)
         stated = {name: column[rows] for name, column in sizes.items()}
         if "length" in stated and "load_height" not in stated:
             told = "load_height_mm" in case.gear.source.get("gear", {})
@@ -69,6 +79,12 @@ def size_ratios(source: Any, case: Case) -> np.ndarray:
 def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
     """Return the sizes of each row [mm], by their names in a geometry."""
     places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
+    for header in table.headers:
+        if table.headers.count(header) > 1 and header in SIZES:
+            findings.add("two columns are called so", "Keep one", None, header)
+        elif header not in SIZES and any(word in header.lower() for word in _LIKE):
+            words = "a size is not read under this name"
+            findings.add(words, f"Call it one of {', '.join(SIZES)}", None, header)
     if not places:
         words = "it states no sizes"
         findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
@@ -87,16 +103,19 @@ def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
             for wrong in implausible(header, column[index], "size"):
                 findings.add(wrong.problem, wrong.remedy, row, header)
         found[header.removesuffix("_mm")] = column
-    findings.add_rows(_at_odds(table, found), kind="rows of such sizes")
     return found
 
 
 def _at_odds(
-    table: CsvTable, sizes: Mapping[str, np.ndarray]
+    table: CsvTable, sizes: Mapping[str, np.ndarray], base: Geometry
 ) -> Iterator[tuple[int, str, str]]:
-    """Yield rows whose sizes cannot be beside each other."""
+    """Yield rows whose sizes cannot be beside each other, or those of the gear file."""
+    other = {name: float(size) for name, size in vars(base).items() if name in _NAMES}
+    # Without a height of its own the load acts at the end.
+    if "length" in sizes and other["load_height"] == other["length"]:
+        del other["load_height"]
     for index, row in enumerate(table.rows):
-        one = {name: float(column[index]) for name, column in sizes.items()}
+        one = other | {name: float(column[index]) for name, column in sizes.items()}
         for name, words, remedy in size_faults(one):
             yield int(row), f"{name}_mm: {words}", remedy
 

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case
-from hdcal.data.parquet import is_parquet, read_parquet
+from hdcal.data.parquet import read_parquet
+from hdcal.data.parquet_table import is_parquet
 from hdcal.data.reading import read_case
 from hdcal.errors import Finding, InputError
 from hdcal.fleets.pool import pool_of
