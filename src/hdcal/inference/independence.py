@@ -26,10 +26,10 @@ from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 
 # Proposals of a round; rounds end when such a share of the last ones is worth a draw.
-_ROUNDS, _EFFICIENT, _LIGHT = (1000, 1000, 2000, 4000, 4000, 8000), 0.5, 0.5
-# Independent draws that are aimed at for each draw that is kept, and proposals for it
-# at most.
-_WORTH, _MOST = 0.5, 8
+_ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5
+# Independent draws aimed at first for each draw that is kept, and proposals for it at
+# most.
+_WORTH, _MOST = 0.5, 12
 # Proposals of a chain that are left out, after which it has forgotten its start.
 _FORGOTTEN = 100
 # Densities between two signs of life.
@@ -74,23 +74,30 @@ def sample_independently(
     """
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)))
     law, efficiency = _adapted(problem, whitening, rng)
-    if efficiency < _WORTH / _MOST:
+    if efficiency < 1.0 / _MOST:
         return None
-    each = int(np.ceil(_WORTH / efficiency))
-    length = _FORGOTTEN + each * draws
-    flat = law.draw(chains * length, rng)
-    density = _log_densities(problem, whitening, flat, progress)
-    weight = (density - law.log_density(flat)).reshape(chains, length)
-    place = flat.reshape(chains, length, -1)
-    shape = _pareto_shape(weight)
-    if not shape <= MAX_SHAPE:
-        return None
-    chosen = _metropolis(weight, rng)[:, _FORGOTTEN::each]
-    kept = np.take_along_axis(place, chosen[..., None], axis=1)
-    named = _named(problem, whitening, kept)
-    values = {name: np.asarray(value) for name, value in named.items()}
-    moving = {name: v for name, v in values.items() if np.ptp(v) > 0.0}
-    return IndependentDraws(values, shape) if have_mixed(moving) else None
+    each = max(1, round(_WORTH / efficiency))
+    place = np.empty((chains, 0, len(whitening.factor)))
+    weight = np.empty((chains, 0))
+    while each <= _MOST:
+        length = _FORGOTTEN + each * draws - weight.shape[1]
+        flat = law.draw(chains * length, rng)
+        density = _log_densities(problem, whitening, flat, progress)
+        new = (density - law.log_density(flat)).reshape(chains, length)
+        weight = np.concatenate([weight, new], axis=1)
+        place = np.concatenate([place, flat.reshape(chains, length, -1)], axis=1)
+        shape = _pareto_shape(weight)
+        if not shape <= MAX_SHAPE:
+            return None
+        chosen = _metropolis(weight, rng)[:, _FORGOTTEN::each]
+        kept = np.take_along_axis(place, chosen[..., None], axis=1)
+        named = _named(problem, whitening, kept)
+        values = {name: np.asarray(value) for name, value in named.items()}
+        if have_mixed({name: v for name, v in values.items() if np.ptp(v) > 0.0}):
+            return IndependentDraws(values, shape)
+        # They cover it, and are too few.
+        each *= 2
+    return None
 
 
 def _adapted(

@@ -8,8 +8,9 @@ from scipy.special import gammaln, softmax
 
 # Tails heavier than a posterior's, which keep weights bounded.
 _FREEDOM = 8.0
-# Parts that are fitted, and steps in which they are.
-_PARTS, _STEPS = 10, 8
+# Parts that are fitted at most, steps in which they are, and places that each one needs
+# for each dimension.
+_PARTS, _STEPS, _EACH = 10, 8, 10
 # Share of the wide part, and how much farther it goes than all places do.
 _WIDE, _FARTHER = 0.2, 1.7
 # Least variance of a part, in variances at the mode, and its least share.
@@ -80,9 +81,12 @@ def fitted_mixture(
     share = np.minimum(share, 1.0 / np.sqrt(len(share)))
     share = share / share.sum()
     middle, whole = _moments(place, share)
-    start = place[rng.choice(len(place), _PARTS, p=share)]
-    even = np.full(_PARTS, 1.0 / _PARTS)
-    law = TMixture(even, start, np.tile(np.linalg.cholesky(whole), (_PARTS, 1, 1)))
+    # Each part has as many places as tell its shape.
+    worth = 1.0 / np.sum(share**2)
+    parts = int(np.clip(worth / (_EACH * place.shape[1]), 1, _PARTS))
+    start = place[rng.choice(len(place), parts, p=share)] if parts > 1 else middle[None]
+    even = np.full(parts, 1.0 / parts)
+    law = TMixture(even, start, np.tile(np.linalg.cholesky(whole), (parts, 1, 1)))
     for _ in range(_STEPS):
         law = _step(law, place, share)
     wide = _FARTHER * np.linalg.cholesky(whole)
