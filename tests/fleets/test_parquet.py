@@ -258,6 +258,19 @@ def test_a_cluster_whose_worker_is_killed_reads_the_same(
     assert together.case.data_sha256 == alone.case.data_sha256
 
 
+def test_of_many_gears_those_since_a_day_may_be_none_of_the_first(
+    frame, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(parquet, "_SHOWN", 2 * RUNS * ROWS)
+    frame.to_parquet(tmp_path / "line.parquet", index=False)
+    found = api.fleet(tmp_path / "line.parquet", since="2026-04-04")
+    assert len(found.off) == GEARS - 3
+    assert not len(found.case.records.force)
+    assert found.misfit.correlation == 0.0
+    again = api.fleet(frame[frame["date"] >= "2026-04-04"])
+    assert np.median(found.stiffness) == pytest.approx(np.median(again.stiffness), 1e-3)
+
+
 def test_a_scheduler_reads_no_table(frame):
     with pytest.raises(InputError, match="no Parquet"):
         read_fleet(frame, scheduler="tcp://127.0.0.1:1")

@@ -21,6 +21,9 @@ def require_scatter(case: Case) -> None:
     if case.gear.force_resolution > 0.0 or np.any(np.asarray(records.force_sd) > 0.0):
         return
     force = np.asarray(records.force)
+    # Of many gears the first rows alone are at hand, or none of what is asked about.
+    if not len(force):
+        return
     if np.max(np.abs(_beside_lines(records))) > _NOTHING * np.max(np.abs(force)):
         return
     words = (
@@ -52,8 +55,10 @@ def least_step(force) -> float:
     """Return the least difference of two forces [N]; zero where all are the same."""
     force = np.asarray(force)
     steps = np.diff(np.unique(force))
+    if not len(steps):
+        return 0.0
     steps = steps[steps > _NOTHING * np.max(np.abs(force))]
-    return float(np.min(steps, initial=np.inf)) if len(steps) else 0.0
+    return float(np.min(steps)) if len(steps) else 0.0
 
 
 def _beside_lines(records: Records) -> np.ndarray:

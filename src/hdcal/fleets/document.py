@@ -112,9 +112,10 @@ def fleet_document(
 
 
 def _answers(answer: FleetAnswer) -> Iterator[str]:
+    # What changes with the date has a say in all that follows.
+    yield from (time_words(one) for one in answer.over_time if one.changed)
     if answer.next_force is not None:
         yield from _force(answer.next_force, answer.at_one_size)
-    yield from (time_words(one) for one in answer.over_time if one.changed)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
         f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "

@@ -80,7 +80,7 @@ class TimeSeries:
         what: they are of.
         unit: of them.
         day: of measurement.
-        name: of the gear or mounting.
+        name: of the gear.
         value: about the middle of all.
         sd: of their errors.
         apart: whether it is far from those before and after it.

@@ -57,7 +57,7 @@ class FleetReadings:
         """
         try:
             first = np.datetime64(day, "D")
-        except ValueError:
+        except (ValueError, TypeError):
             remedy = "Write it as 2026-09-01"
             raise InputError(
                 [Finding("since", f"{quoted(day)} is no day", remedy)]
