@@ -55,23 +55,11 @@ class FleetReadings:
         Raises:
             InputError: it is no day, no dates are told, or nothing was read then.
         """
-        try:
-            first = np.datetime64(day, "D")
-        except (ValueError, TypeError):
-            remedy = "Write it as 2026-09-01"
-            raise InputError(
-                [Finding("since", f"{quoted(day)} is no day", remedy)]
-            ) from None
         case, sums = self.case, self.sums
-        dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")
-        kept = dates >= first if len(dates) else np.zeros(len(case.run_labels), bool)
-        of_mounting = kept[self.runs]
+        of_mounting = _read_since(case, day)[self.runs]
         if not of_mounting.any():
-            words = (
-                f"nothing was read on {day} or later"
-                if len(dates)
-                else "no dates are told"
-            )
+            words = f"nothing was read on {quoted(day)} or later"
+            words = words if case.dates else "no dates are told"
             raise InputError([Finding("since", words, "See the dates of the data")])
         gears, gear = np.unique(sums.gear[of_mounting], return_inverse=True)
         runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
@@ -100,6 +88,19 @@ class FleetReadings:
         )
         sums = MountingSums(**columns | {"gear": gear, "operator": by})
         return replace(self, case=case, sums=sums, runs=run)
+
+
+def _read_since(case: Case, day: str) -> np.ndarray:
+    """Return which runs were read on a day or later, shape (r,)."""
+    try:
+        first = np.datetime64(day, "D")
+    except (ValueError, TypeError):
+        words, remedy = f"{quoted(day)} is no day", "Write it as 2026-09-01"
+        raise InputError([Finding("since", words, remedy)]) from None
+    if not case.dates:
+        return np.zeros(len(case.run_labels), bool)
+    dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")
+    return dates >= first
 
 
 def _some(labels: tuple[str, ...], places: np.ndarray) -> tuple[str, ...]:

@@ -10,14 +10,9 @@ from jaxtyping import Key
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.inference import laplace
-from hdcal.inference.checks import (
-    Check,
-    covering_check,
-    mixing_checks,
-    sampling_checks,
-)
+from hdcal.inference.checks import Check, mixing_checks, sampling_checks
 from hdcal.inference.diagnostics import mixing
-from hdcal.inference.independence import sample_independently
+from hdcal.inference.independence import MAX_SHAPE, sample_independently
 from hdcal.inference.population_problem import PopulationProblem
 from hdcal.inference.sample import Progress, sample
 
@@ -62,7 +57,7 @@ def sample_population(
     cheap = sample_independently(problem, whitening, key, **size)
     if cheap is not None:
         mixed = mixing(_free(cheap.values, problem.priors))
-        checks = (*mixing_checks(mixed, chains), covering_check(cheap.shape))
+        checks = (*mixing_checks(mixed, chains), _covering(cheap.shape))
         return SampledPopulation(_flat(cheap.values), checks, "independent proposals")
     found = sample(problem, whitening, key, warmup=warmup, **size)
     over = ("chain", "draw")
@@ -70,6 +65,12 @@ def sample_population(
     stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
     checks = sampling_checks(stats, mixing(_free(found.values, problem.priors)))
     return SampledPopulation(_flat(found.values), checks, "NUTS")
+
+
+def _covering(shape: float) -> Check:
+    """Return how well proposals followed the posterior: others were not taken."""
+    words = f"the largest weights have a Pareto k of {shape:.2f}, allowed {MAX_SHAPE}"
+    return Check("proposals cover the posterior (Pareto k)", "passed", words)
 
 
 def _free(values: Mapping[str, np.ndarray], priors: Mapping[str, Prior]):

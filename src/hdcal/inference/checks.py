@@ -14,7 +14,6 @@ import xarray as xr
 from hdcal.data.priors import Prior
 from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import bounds, frozen
-from hdcal.inference.independence import MAX_SHAPE
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION, worth
 
@@ -110,19 +109,6 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
             low >= need,
             f"the smallest effective sample size is {low:.0f} ({least}), needed {need}",
         ),
-    )
-
-
-def covering_check(shape: float) -> Check:
-    """Return the check on proposals that do not follow the posterior.
-
-    Args:
-        shape: Pareto k of the largest weights.
-    """
-    return _check(
-        "proposals cover the posterior (Pareto k)",
-        shape <= MAX_SHAPE,
-        f"the largest weights have a Pareto k of {shape:.2f}, allowed {MAX_SHAPE}",
     )
 
 
