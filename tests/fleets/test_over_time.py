@@ -79,8 +79,6 @@ def test_a_drift_is_told():
 
 
 def test_a_gear_that_is_off_is_no_change():
-    frame = measured().records
-    assert frame is not None
     case = measured()
     off = np.asarray(case.records.specimen) == 22
     force = np.where(off, 0.9, 1.0) * np.asarray(case.records.force)

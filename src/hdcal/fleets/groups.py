@@ -23,6 +23,17 @@ def groups(labels: Sequence[str]) -> tuple[list[str], np.ndarray]:
     return (names.tolist(), index) if told else ([], np.zeros(0, int))
 
 
+def operator_of(operators: Sequence[str], runs: np.ndarray) -> np.ndarray:
+    """Return the index of who mounted each run; noughts where none are told apart.
+
+    Args:
+        operators: of each run.
+        runs: index of the runs that are asked about.
+    """
+    index = groups(operators)[1]
+    return index[runs] if len(index) else np.zeros(len(runs), int)
+
+
 def lot_grouping(sums: MountingSums, lot: np.ndarray) -> Grouping:
     """Return where lots seem to be, as shares of the stiffness.
 

@@ -11,9 +11,8 @@ from hdcal.data.further_labels import further_labels
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
-from hdcal.evidence.prepare import moments
-from hdcal.fleets.groups import groups
-from hdcal.fleets.readings import FleetReadings, row_sums
+from hdcal.fleets.groups import operator_of
+from hdcal.fleets.readings import FleetReadings, modulus_left, row_sums
 from hdcal.inference.gear_sums import MountingSums
 
 _LOST = "start again: reading takes a small part of the time"
@@ -42,9 +41,8 @@ class Pool:
     def add(self, batch: Batch) -> None:
         """Add some rows."""
         gear, read = self.gear, batch.values["deformation"]
-        loss, _ = moments(gear.priors["alpha"])
         warm = batch.values.get("temperature", gear.reference_temperature)
-        x = read * (1.0 - loss * (warm - gear.reference_temperature))
+        x = read * modulus_left(gear, warm)
         alone = np.zeros(len(read), int), np.array([""], object)
         gear_of, gears = batch.labels["specimen"]
         run_of, runs = batch.labels.get("run", alone)
@@ -110,10 +108,10 @@ class Pool:
             notes=(*source.case.notes, *notes),
             **further,
         )
-        operator = groups(case.operators)[1]
-        by = operator if len(operator) else np.zeros(len(gear), int)
+        runs = np.arange(len(gear))
+        by = operator_of(case.operators, runs)
         sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=by)
-        return FleetReadings(case, sums, np.arange(len(gear)), self.largest)
+        return FleetReadings(case, sums, runs, self.largest)
 
 
 def pool_of(source: Parquet, scheduler: str | None = None) -> Pool:

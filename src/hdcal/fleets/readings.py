@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.case import Case, Gear
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows
-from hdcal.fleets.groups import groups
+from hdcal.fleets.groups import operator_of
 from hdcal.inference.gear_sums import MountingSums
 
 # Fewer gears say next to nothing of how much gears differ.
@@ -65,8 +65,7 @@ class FleetReadings:
         runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
         # Groups are told apart anew: some may be gone.
         operators = _some(case.operators, runs)
-        by = groups(operators)[1]
-        by = by[run] if len(by) else np.zeros(len(run), int)
+        by = operator_of(operators, run)
         columns = {name: value[of_mounting] for name, value in vars(sums).items()}
         records = case.records
         rows = np.isin(records.run, runs) & np.isin(records.specimen, gears)
@@ -112,14 +111,17 @@ def fleet_readings(case: Case) -> FleetReadings:
     records, gear = case.records, case.gear
     labels = np.stack([np.asarray(records.specimen), np.asarray(records.run)])
     (of_gear, runs), of_row = np.unique(labels, axis=1, return_inverse=True)
-    read = np.asarray(records.deformation)
-    warm = np.asarray(records.temperature) - gear.reference_temperature
-    loss, _ = moments(gear.priors["alpha"])
-    x, y = read * (1.0 - loss * warm), np.asarray(records.force)
-    operator = groups(case.operators)[1]
-    by = operator[runs] if len(operator) else np.zeros(len(runs), int)
+    read, y = np.asarray(records.deformation), np.asarray(records.force)
+    x = read * modulus_left(gear, np.asarray(records.temperature))
+    by = operator_of(case.operators, runs)
     sums = MountingSums(of_gear, *row_sums(of_row.ravel(), x, y), by)
     return FleetReadings(case, sums, runs, float(read[np.argmax(np.abs(read))]))
+
+
+def modulus_left(gear: Gear, temperature):
+    """Return the modulus at temperatures [°C] over that at the reference."""
+    loss, _ = moments(gear.priors["alpha"])
+    return 1.0 - loss * (temperature - gear.reference_temperature)
 
 
 def row_sums(
