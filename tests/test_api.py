@@ -28,6 +28,7 @@ PUBLIC = [
     "Verdict",
     "calibrate",
     "calibrate_dynamic",
+    "causes",
     "compare",
     "diagnose",
     "fit",

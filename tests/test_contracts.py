@@ -21,6 +21,7 @@ CONTRACTS = {
 VIOLATIONS = {
     "rooms": ("data/records.py", "import hdcal.physics.chain"),
     "blind": ("blind/answer.py", "import hdcal.design.sizes"),
+    "shared_causes": ("shared_causes/summary.py", "import hdcal.design.sizes"),
     "diagnosis": ("diagnosis/library.py", "import hdcal.tracking.tracker"),
     "engine": (
         "prediction/engine/mixture.py",

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from hdcal.physics.registry import EFFECTS
     from hdcal.prediction.bands.bands import predict
     from hdcal.prediction.margin.margin import margin
+    from hdcal.shared_causes.causes import causes
     from hdcal.tracking.tracker import Tracker
 
 _HOMES = {
@@ -53,6 +54,7 @@ _HOMES = {
     "Verdict": "diagnosis.verdict",
     "calibrate": "calibration.calibrate",
     "calibrate_dynamic": "motion.dynamic_calibration",
+    "causes": "shared_causes.causes",
     "compare": "comparison.compare",
     "diagnose": "diagnosis.diagnose",
     "fit": "classical.fit.fit",

@@ -31,6 +31,7 @@ from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
 from hdcal.prediction.margin.command import margin
 from hdcal.report.plain import printable
+from hdcal.shared_causes.command import causes
 from hdcal.tracking.command import track
 
 DONE, NOT_TO_BE_USED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -72,6 +73,7 @@ for _command in (
     calibrate,
     diagnose,
     fleet,
+    causes,
     compare,
     predict,
     margin,

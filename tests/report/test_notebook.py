@@ -6,7 +6,7 @@ from dataclasses import is_dataclass, replace
 import numpy as np
 import pytest
 import xarray as xr
-from fleets import handmade
+from fleets import handmade, shared
 from matplotlib.figure import Figure
 from moving import still_posterior
 from posteriors import single, stiffer
@@ -46,6 +46,7 @@ def results():
             "% stiffer than old",
         ),
         "Fleet": (handmade(), "D is 10 % softer"),
+        "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
         "InverseDesign": (
             hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
             "keeps 90 N",

@@ -156,6 +156,12 @@ def asked_reading(console: Console, case: "Case | None") -> str | None:
     return click.prompt(words, default="radial", type=kinds, err=True)
 
 
+def library_option(command: Callable) -> Callable:
+    """Add --library."""
+    words = "Leave effects out of the library [default: all of them]."
+    return click.option("--library", metavar="minus:NAME[,NAME]", help=words)(command)
+
+
 def json_option(command: Callable) -> Callable:
     """Add --json; the console knows it already, click has to accept it."""
     words = "Print one JSON object; words go to standard error."

@@ -9,6 +9,7 @@ from hdcal.cli.options import (
     asked_reading,
     force_option,
     json_option,
+    library_option,
     reading_options,
     seed_option,
     take_reading,
@@ -21,11 +22,7 @@ MANY = 20
 @command(short_help="Where, why and how far the model is off.")
 @reading_options
 @click.argument("cases", metavar="CASE...", nargs=-1, required=True)
-@click.option(
-    "--library",
-    metavar="minus:NAME[,NAME]",
-    help="Leave effects out of the library [default: all of them].",
-)
+@library_option
 @click.option("--quick", is_flag=True, help="Answer without sampling: no margins.")
 @click.option(
     "--report/--no-report",

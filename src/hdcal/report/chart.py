@@ -113,18 +113,19 @@ def boxes(
 
 
 def interval_boxes(
-    place: np.ndarray, low: np.ndarray, high: np.ndarray
+    place: np.ndarray, low: np.ndarray, high: np.ndarray, unit: str = "N/mm"
 ) -> list[Series]:
-    """Return 95 % intervals [N/mm] as a band of boxes: upper ends, then lower ones.
+    """Return 95 % intervals as a band of boxes: upper ends, then lower ones.
 
     Args:
         place: of each, whole numbers, shape (n,).
         low: lower ends, shape (n,).
         high: upper ends, shape (n,).
+        unit: of the ends.
     """
     return [
         Series(
-            f"95 % interval, {side} [N/mm]",
+            f"95 % interval, {side} [{unit}]",
             *boxes(place - _HALF, place + _HALF, ends),
             COLOURS[0],
             width=0.0,

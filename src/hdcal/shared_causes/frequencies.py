@@ -1,0 +1,101 @@
+"""How often causes are, and which one each gear has, from evidence gear by gear.
+
+Every gear has one cause, none among them; how often each one is is not known either.
+Frequencies and causes are drawn in turn. Lookalikes that trade places in all gears at
+once would be left only after very long: such exchanges are proposed beside that.
+
+Source:
+    Diebolt and Robert, Journal of the Royal Statistical Society B 56 (1994), the
+    sampler of a mixture's weights.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import gammaln, softmax
+
+# Sweeps that are left out, and exchanges that are proposed at each one.
+_FORGOTTEN, _EXCHANGES = 500, 6
+# A frequency of next to nothing has no logarithm.
+_LEAST = 1e-300
+
+
+class Frequencies(NamedTuple):
+    """Draws of how often causes are, and what gears have.
+
+    Attributes:
+        share: of each cause among gears to come, shape (chain, draw, k).
+        number: of these gears that have each cause, shape (chain, draw, k).
+        chance: of each cause in each gear, given all gears, shape (g, k).
+    """
+
+    share: np.ndarray
+    number: np.ndarray
+    chance: np.ndarray
+
+
+def sample_frequencies(
+    log_likelihood: np.ndarray,
+    counts: np.ndarray,
+    rng: np.random.Generator,
+    *,
+    chains: int = 4,
+    draws: int = 1500,
+) -> Frequencies:
+    """Draw frequencies and causes.
+
+    Args:
+        log_likelihood: of each gear's readings by cause, up to a constant of the gear,
+            shape (g, k).
+        counts: of Dirichlet's law, as if so many gears had been seen, shape (k,).
+        rng: source of randomness.
+        chains: independent ones.
+        draws: of each.
+    """
+    gears, causes = log_likelihood.shape
+    cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)
+    share, number = np.empty((2, chains, draws, causes))
+    chance = np.zeros((gears, causes))
+    each = np.arange(chains)[:, None]
+    for sweep in range(-_FORGOTTEN, draws):
+        for chain in cause:
+            for _ in range(_EXCHANGES):
+                _exchange(chain, log_likelihood, counts, rng)
+        seen = np.zeros((chains, causes))
+        np.add.at(seen, (each, cause), 1.0)
+        drawn = rng.standard_gamma(counts + seen)
+        now = drawn / drawn.sum(axis=1, keepdims=True)
+        log_joint = np.log(np.maximum(now, _LEAST))[:, None] + log_likelihood
+        cause = _drawn(log_joint, rng)
+        if sweep >= 0:
+            share[:, sweep], number[:, sweep] = now, seen
+            chance += softmax(log_joint, axis=-1).mean(axis=0)
+    return Frequencies(share, number, chance / draws)
+
+
+def _drawn(log_weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return an index along the last axis, by the weights (Gumbel's trick)."""
+    return np.argmax(log_weight + rng.gumbel(size=log_weight.shape), axis=-1)
+
+
+def _exchange(
+    cause: np.ndarray,
+    log_likelihood: np.ndarray,
+    counts: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
+    """Let the gears of two causes trade these, where that is probable enough.
+
+    Frequencies are integrated out in it, so that they follow.
+    """
+    one, other = cause[rng.integers(len(cause))], rng.integers(len(counts))
+    if one == other:
+        return
+    of_one, of_other = cause == one, cause == other
+    gain = log_likelihood[:, other] - log_likelihood[:, one]
+    n, m = of_one.sum(), of_other.sum()
+    before = gammaln(counts[one] + n) + gammaln(counts[other] + m)
+    after = gammaln(counts[one] + m) + gammaln(counts[other] + n)
+    change = gain[of_one].sum() - gain[of_other].sum() + after - before
+    if np.log(rng.random()) < change:
+        cause[of_one], cause[of_other] = other, one

@@ -1,0 +1,140 @@
+"""What gears have in common is found, and nothing where there is nothing."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import Hdcal
+from schema_checks import obeys
+
+import hdcal
+from hdcal.physics.registry import EFFECTS
+from hdcal.report.plain import as_plain
+from hdcal.shared_causes.answer import CausesAnswer
+from hdcal.shared_causes.document import headline
+from hdcal.shared_causes.summary import cause_columns, causes_answer
+
+LIBRARY = {
+    name: EFFECTS[name]
+    for name in ("coulomb_friction", "large_deflection", "run_offset")
+}
+WITH_LOOP = ("G1", "G2", "G3", "G4")
+GEARS = (*WITH_LOOP, "G5", "G6", "G7")
+
+
+def fleet(loop_N: float, seed: int = 0) -> pd.DataFrame:
+    """Return gears that are loaded and unloaded on two mountings each."""
+    rng, up = np.random.default_rng(seed), np.repeat([1.0, -1.0], [12, 11])
+    x = np.r_[np.linspace(0.02, 0.48, 12), np.linspace(0.46, 0.04, 11)]
+    parts = []
+    for gear in GEARS:
+        stiffness = 200.0 * (1.0 + 0.01 * rng.standard_normal())
+        loop = loop_N * up * (gear in WITH_LOOP)
+        for run in (1, 2):
+            noise = rng.normal(0.0, 0.3, len(x)) + rng.normal(0.0, 2.0)
+            force = np.round(stiffness * x + loop + noise, 4)
+            told = {"specimen": gear, "run": run, "deformation_mm": x, "force_N": force}
+            parts.append(pd.DataFrame(told))
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def with_loop():
+    return hdcal.causes(hdcal.read_case(fleet(0.8)), library=LIBRARY)
+
+
+def test_the_gears_with_an_effect_are_told(with_loop):
+    assert not with_loop.reasons
+    told = dict(zip(GEARS, with_loop.of_gears, strict=True))
+    assert all(told[gear] == ("coulomb_friction",) for gear in WITH_LOOP)
+    assert all("none" in told[gear] for gear in GEARS if gear not in WITH_LOOP)
+    place = with_loop.causes.index("coulomb_friction")
+    low, high = np.quantile(with_loop.share[:, place], [0.025, 0.975])
+    assert low < 4 / 7 < high and low > 0.15 and high < 0.95
+    # Gears say of each other what one alone does not.
+    chance = with_loop.chance[:4, place]
+    assert np.all(chance > with_loop.alone[:4, place])
+    answer = causes_answer(with_loop)
+    obeys(as_plain(answer), CausesAnswer)
+    assert answer.headline.startswith("Of 7 gears 4 have what looks like coulomb")
+    assert "In blind checks 24 %" in " ".join(answer.notes)
+
+
+def test_zeros_of_mountings_are_no_effect_of_a_gear():
+    found = hdcal.causes(hdcal.read_case(fleet(0.0)), library=LIBRARY)
+    assert found.of_gears == [("none",)] * len(GEARS)
+    assert "run_offset" not in found.causes
+    assert causes_answer(found).headline == "None of 7 gears shows an effect."
+    assert causes_answer(found).next_step is None
+
+
+def test_two_processes_say_the_same_bytes(with_loop):
+    case = hdcal.read_case(fleet(0.8))
+    again = hdcal.causes(case, library=LIBRARY, jobs=2)
+    for name in ("share", "number", "chance", "alone", "log_evidence"):
+        assert np.array_equal(getattr(again, name), getattr(with_loop, name)), name
+
+
+@pytest.mark.thorough
+def test_a_cluster_says_the_same_bytes(with_loop, local):
+    case = hdcal.read_case(fleet(0.8))
+    address = local.scheduler_address
+    again = hdcal.causes(case, library=LIBRARY, scheduler=address)
+    for name in ("share", "chance", "alone"):
+        assert np.array_equal(getattr(again, name), getattr(with_loop, name)), name
+
+
+def test_what_is_told_of_few_gears_names_them():
+    two = "relaxation", "coulomb_friction"
+    kinds = [("none",), two, (*two, "none"), ("none",), ("several",)]
+    assert headline("ABCDE", kinds) == (
+        "Of 5 gears B has relaxation or what looks like coulomb friction, which these "
+        "readings do not tell apart; E has two effects at once; of 1 it is not clear "
+        "whether it has an effect; 2 show none."
+    )
+
+
+def test_gears_that_say_too_little_are_named():
+    table = fleet(0.8)
+    few = table[(table.specimen != "G5") | (table.index % 12 == 0)]
+    with pytest.raises(hdcal.InputError, match="'G5' has 4 rows, too few"):
+        hdcal.causes(hdcal.read_case(few), library=LIBRARY)
+    exact = table.assign(
+        force_N=np.where(
+            table.specimen == "G6", 9 * table.deformation_mm, table.force_N
+        )
+    )
+    with pytest.raises(hdcal.InputError, match=r"gear 'G6'.*straight line"):
+        hdcal.causes(hdcal.read_case(exact), library=LIBRARY)
+
+
+def test_the_command_answers_and_says_what_it_wrote(hdcal: Hdcal, tmp_path):
+    fleet(0.8).to_csv(tmp_path / "line.csv", index=False)
+    others = ",".join(name for name in EFFECTS if name not in LIBRARY)
+    done = hdcal(
+        "causes", "line.csv", "--library", f"minus:{others}", "--json", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout)
+    obeys(answer, CausesAnswer)
+    assert answer["causes"][0]["cause"] == "coulomb_friction"
+    table = pd.read_csv(tmp_path / "line-causes" / "gears.csv")
+    assert table.gear.to_list() == [*GEARS]
+    assert table.causes.to_list()[:4] == ["coulomb_friction"] * 4
+
+
+def test_what_cannot_be_asked_is_one_finding_each(hdcal: Hdcal, tmp_path):
+    table = fleet(0.8)
+    table[table.specimen == "G1"].to_csv(tmp_path / "line.csv", index=False)
+    done = hdcal("causes", "line.csv", "--library", "all", "--jobs", 0, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "takes 3 or more" in done.stderr
+    assert "--library" in done.stderr and "--jobs" in done.stderr
+    assert not (tmp_path / "line-causes").exists()
+
+
+def test_a_row_for_each_gear(with_loop):
+    columns = cause_columns(with_loop)
+    assert {len(column) for column in columns.values()} == {len(GEARS)}
+    assert np.all(columns["probability"] >= columns["probability_none"] - 1e-12)
