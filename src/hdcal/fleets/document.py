@@ -6,8 +6,8 @@ import numpy as np
 
 from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.force.document import BEYOND, force_words
 from hdcal.fleets.gauge_words import gauge_section
-from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.notes import FEW
 from hdcal.fleets.time_words import time_section, time_words
 from hdcal.report.document import (
@@ -96,7 +96,10 @@ def fleet_document(
         headline=answer.headline,
         answers=list(_answers(answer)),
         next_steps=[answer.next_step] if answer.next_step else [],
-        notices=notices(("To be aware of", answer.notes)),
+        notices=notices(
+            ("Outside what was tested", [BEYOND] * _beyond(answer)),
+            ("To be aware of", answer.notes),
+        ),
         sections=[
             _gears(columns, answer),
             _scatter(answer),
@@ -111,11 +114,15 @@ def fleet_document(
     )
 
 
+def _beyond(answer: FleetAnswer) -> bool:
+    return answer.next_force is not None and answer.next_force.beyond_tested
+
+
 def _answers(answer: FleetAnswer) -> Iterator[str]:
     # What changes with the date has a say in all that follows.
     yield from (time_words(one) for one in answer.over_time if one.changed)
     if answer.next_force is not None:
-        yield from _force(answer.next_force, answer.at_one_size)
+        yield from force_words(answer.next_force)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
         f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "
@@ -144,30 +151,6 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     sure = percent(answer.next_gear.bounds[0].confidence)
     told = "; ".join(ends)
     yield f"Of gears to come, each bound by itself with {sure} confidence: {told}."
-
-
-def _force(found: NextForce, at_one_size: bool) -> Iterator[str]:
-    """Yield what a gear to come needs at the deformation that was asked for."""
-    middle, span = estimate(found.force_N)
-    width = found.force_N.hi - found.force_N.lo
-    sized = " of the gear file's sizes" * at_one_size
-    limit, beyond = found.limit_force_N, found.probability_exceeded
-    if limit is not None and beyond is not None:
-        middle_, low, high = (percent(p) for p in vars(beyond).values())
-        yield (
-            f"{middle_} of gears to come{sized} need more than {limit:g} N at "
-            f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
-        )
-    many = "; ".join(
-        f"{percent(each.content)} need at most {number(each.at_most_N, width)} N"
-        for each in found.bounds
-    )
-    sure = percent(found.bounds[0].confidence)
-    yield (
-        f"At {found.deformation_mm:g} mm the next gear{sized} needs {middle} N, 95 % "
-        f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
-        f"confidence {many}."
-    )
 
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
