@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
+from hdcal.fleets.curves import shown_gears
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.force.document import BEYOND, force_words
 from hdcal.fleets.gauge_words import gauge_section
@@ -79,7 +80,7 @@ def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[s
 def fleet_document(
     found: Fleet, answer: FleetAnswer, columns: Mapping[str, np.ndarray], command: str
 ) -> Document:
-    """Return the report; its pictures are called gears and time."""
+    """Return the report; its pictures are called gears, curves and time."""
     settings = found.settings
     sampled = f"{settings['chains']} chains of {settings['draws']} draws"
     sampled = f"{settings['sampler']}, {sampled}"
@@ -102,6 +103,7 @@ def fleet_document(
         ),
         sections=[
             _gears(columns, answer),
+            _curves(found),
             _scatter(answer),
             *([time_section(answer.over_time)] if answer.over_time else []),
             gauge_section(answer.gauge_rr),
@@ -177,6 +179,20 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
     return Section("The gears, the oddest first", blocks, brief=True)
+
+
+def _curves(found: Fleet) -> Section:
+    """Return the readings, and whose are shown."""
+    shown, off = shown_gears(found), int(found.called.sum())
+    few, ordinary = len(shown.ordinary), len(found.called) - off
+    whose = f"all {few}" if few == ordinary else f"{few} of {ordinary}, evenly chosen"
+    words = f"Grey: ordinary gears, {whose}."
+    named = len(shown.called)
+    whose = f"all {off}" if named == off else f"{named} of {off}"
+    words += f" In colours: gears that are called off, {whose}." * bool(named)
+    words += " Each is of its own size." * found.at_one_size
+    what = "Force over deformation of many gears, those called off in colours"
+    return Section("The readings", [Picture("curves", what, words)])
 
 
 def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:

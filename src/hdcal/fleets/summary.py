@@ -166,10 +166,11 @@ def fleet_report(
     """
 
     def figures():
-        from hdcal.fleets.figure import fleet_figure, time_figure
+        from hdcal.fleets.figure import curves_figure, fleet_figure, time_figure
 
         series = time_series(found)
         drawn = {"time": time_figure(series)} if series else {}
+        drawn["curves"] = curves_figure(found)
         return {"gears": fleet_figure(found)} | drawn
 
     def charts():
