@@ -14,6 +14,7 @@ PUBLIC = [
     "DynamicPosterior",
     "EFFECTS",
     "Effect",
+    "FleetPosterior",
     "Gear",
     "Geometry",
     "HdcalError",

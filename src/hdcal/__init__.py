@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from hdcal.diagnosis.verdict import Verdict
     from hdcal.errors import HdcalError, InputError, NotUsable
     from hdcal.fleets.fleet import fleet
+    from hdcal.fleets.fleet_posterior import FleetPosterior
     from hdcal.inference.dynamic_posterior import DynamicPosterior
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
@@ -40,6 +41,7 @@ _HOMES = {
     "DynamicPosterior": "inference.dynamic_posterior",
     "EFFECTS": "physics.registry",
     "Effect": "physics.effect",
+    "FleetPosterior": "fleets.fleet_posterior",
     "Gear": "data.case",
     "Geometry": "data.records",
     "HdcalError": "errors",

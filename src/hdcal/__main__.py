@@ -27,9 +27,9 @@ from hdcal.design.study.command import study
 from hdcal.diagnosis.command import diagnose
 from hdcal.errors import Finding, HdcalError, InputError, NotUsable, ended
 from hdcal.fleets.command import fleet
+from hdcal.fleets.force.command import margin
 from hdcal.motion.respond.command import respond
 from hdcal.prediction.bands.command import predict
-from hdcal.prediction.margin.command import margin
 from hdcal.report.plain import printable
 from hdcal.shared_causes.command import causes
 from hdcal.tracking.command import track

@@ -48,8 +48,8 @@ def test_a_gear_that_is_off_is_off_from_its_lot():
     """In a stiff lot a soft gear may be stiffer than the centre of all."""
     found = handmade()
     case = replace(found.case, lots=("low", "low", "high", "high"))
-    draws = dict(found.draws) | {"lot_sd": np.full(50, 0.1), "lot_ratio": np.ones(50)}
-    draws |= {"lot_1": np.full(50, 0.1), "lot_2": np.full(50, -0.1)}
+    draws = dict(found.draws) | {"lot_sd": np.full(400, 0.1), "lot_ratio": np.ones(400)}
+    draws |= {"lot_1": np.full(400, 0.1), "lot_2": np.full(400, -0.1)}
     readings = replace(found.readings, case=case)
     # The lots are ten percent below and above the mean of both.
     apart = found.stiffness / np.array([180.0, 180.0, 220.0, 220.0]) - 1.0

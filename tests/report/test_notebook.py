@@ -29,7 +29,9 @@ NO_RESULTS = {"PolynomialFit"}
 
 def test_every_public_result_is_shown():
     public = [getattr(hdcal, name) for name in hdcal.__all__]
-    called = filter(inspect.isfunction, public)
+    called = [one for one in public if inspect.isfunction(one)]
+    # What one asks of a fleet is a result too.
+    called.append(hdcal.FleetPosterior.next_force)
     returned = [inspect.signature(one).return_annotation for one in called]
     results = {c for c in returned if inspect.isclass(c) and is_dataclass(c)}
     assert {c.__name__ for c in results} - NO_RESULTS == set(TELLERS)
@@ -53,6 +55,7 @@ def results():
         ),
         "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
+        "NextForce": (handmade().next_force(0.4, 85.0), "gears to come need more"),
         "Posterior": (posterior, "per millimetre as read"),
         "Residuals": (hdcal.residuals(posterior), "measured − fitted"),
         "Response": (
@@ -96,7 +99,8 @@ def test_a_result_is_a_line_a_table_and_a_drawing(name: str, results):
     assert axes.get_xlabel() and named and axes.has_data()
     tree = found.to_datatree()
     assert isinstance(tree, xr.DataTree)
-    if name != "Posterior":
+    # Draws of these; their table is a frame alone.
+    if name not in {"Fleet", "Posterior"}:
         assert set(frame.columns) == set(tree.to_dataset().data_vars)
 
 
@@ -116,6 +120,9 @@ def test_tables_hold_what_the_results_say(results):
         assert low < middle < high
     assert parameters["median"]["stiffness"] == np.median(posterior.draws["stiffness"])
     assert posterior.to_datatree() is posterior.tree
+    fleet = results["Fleet"][0]
+    drawn = fleet.to_datatree()["posterior"]["stiffness"]
+    np.testing.assert_array_equal(drawn.values.ravel(), fleet.draws["stiffness"])
 
 
 def test_pyplot_is_asked_where_no_axes_are_given(results):

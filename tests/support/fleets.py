@@ -21,14 +21,14 @@ def handmade() -> Fleet:
     case = read_case(columns | {"specimen": np.repeat(list("ABCD"), 5)})
     truth = np.array([199.0, 200.0, 201.0, 180.0])
     draws = {
-        "stiffness": rng.normal(200.0, 0.5, 50),
-        "zero": rng.normal(0.0, 0.1, 50),
-        "specimen_sd": rng.uniform(0.005, 0.01, 50),
-        "run_offset_sd": rng.uniform(0.5, 1.5, 50),
-        "sigma": rng.uniform(0.4, 0.6, 50),
-        "noise_spread": rng.uniform(0.0, 0.1, 50),
-        "off_share": rng.uniform(0.0, 0.1, 50),
-        "off_ratio": rng.uniform(4.0, 8.0, 50),
+        "stiffness": rng.normal(200.0, 0.5, 400),
+        "zero": rng.normal(0.0, 0.1, 400),
+        "specimen_sd": rng.uniform(0.005, 0.01, 400),
+        "run_offset_sd": rng.uniform(0.5, 1.5, 400),
+        "sigma": rng.uniform(0.4, 0.6, 400),
+        "noise_spread": rng.uniform(0.0, 0.1, 400),
+        "off_share": rng.uniform(0.0, 0.1, 400),
+        "off_ratio": rng.uniform(4.0, 8.0, 400),
     }
     return Fleet(
         readings=fleet_readings(replace(case, gear=make_gear())),
@@ -42,7 +42,7 @@ def handmade() -> Fleet:
         off=np.array([0.01, 0.01, 0.01, 0.999]),
         chance=np.array([0.5, 1.0, 0.5, 1e-6]),
         called=np.array([False, False, False, True]),
-        next_stiffness=rng.normal(200.0, 2.0, 50),
+        next_stiffness=rng.normal(200.0, 2.0, 400),
         unit=80.0,
         misfit=Misfit(0.0, 0.0, 0.0),
         lots=[],
@@ -52,9 +52,9 @@ def handmade() -> Fleet:
         settings={
             "sampler": "NUTS",
             "seed": 0,
-            "chains": 4,
+            "chains": 2,
             "warmup": 500,
-            "draws": 500,
+            "draws": 200,
         },
     )
 

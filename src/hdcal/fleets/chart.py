@@ -29,7 +29,7 @@ def fleet_chart(found: Fleet) -> Chart:
         for words, rows, hue in kinds
         if rows.any()
     ]
-    whose = "at one size" if np.any(found.size_ratio != 1.0) else "as read"
+    whose = "at one size" if found.at_one_size else "as read"
     axis = "gears by their stiffness", f"stiffness {whose} [N/mm]"
     names = [found.case.specimen_labels[gear] for gear in order]
     return Chart(*axis, [*curves, *points], [(0, 1, 0.25)], names=names)

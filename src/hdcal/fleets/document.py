@@ -5,9 +5,10 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
+from hdcal.fleets.curves import shown_gears
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.force.document import BEYOND, force_words
 from hdcal.fleets.gauge_words import gauge_section
-from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.notes import FEW
 from hdcal.fleets.time_words import time_section, time_words
 from hdcal.report.document import (
@@ -79,7 +80,7 @@ def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[s
 def fleet_document(
     found: Fleet, answer: FleetAnswer, columns: Mapping[str, np.ndarray], command: str
 ) -> Document:
-    """Return the report; its pictures are called gears and time."""
+    """Return the report; its pictures are called gears, curves and time."""
     settings = found.settings
     sampled = f"{settings['chains']} chains of {settings['draws']} draws"
     sampled = f"{settings['sampler']}, {sampled}"
@@ -96,9 +97,13 @@ def fleet_document(
         headline=answer.headline,
         answers=list(_answers(answer)),
         next_steps=[answer.next_step] if answer.next_step else [],
-        notices=notices(("To be aware of", answer.notes)),
+        notices=notices(
+            ("Outside what was tested", [BEYOND] * _beyond(answer)),
+            ("To be aware of", answer.notes),
+        ),
         sections=[
             _gears(columns, answer),
+            _curves(found),
             _scatter(answer),
             *([time_section(answer.over_time)] if answer.over_time else []),
             gauge_section(answer.gauge_rr),
@@ -111,11 +116,15 @@ def fleet_document(
     )
 
 
+def _beyond(answer: FleetAnswer) -> bool:
+    return answer.next_force is not None and answer.next_force.beyond_tested
+
+
 def _answers(answer: FleetAnswer) -> Iterator[str]:
     # What changes with the date has a say in all that follows.
     yield from (time_words(one) for one in answer.over_time if one.changed)
     if answer.next_force is not None:
-        yield from _force(answer.next_force, answer.at_one_size)
+        yield from force_words(answer.next_force)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
         f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "
@@ -146,30 +155,6 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     yield f"Of gears to come, each bound by itself with {sure} confidence: {told}."
 
 
-def _force(found: NextForce, at_one_size: bool) -> Iterator[str]:
-    """Yield what a gear to come needs at the deformation that was asked for."""
-    middle, span = estimate(found.force_N)
-    width = found.force_N.hi - found.force_N.lo
-    sized = " of the gear file's sizes" * at_one_size
-    limit, beyond = found.limit_force_N, found.probability_exceeded
-    if limit is not None and beyond is not None:
-        middle_, low, high = (percent(p) for p in vars(beyond).values())
-        yield (
-            f"{middle_} of gears to come{sized} need more than {limit:g} N at "
-            f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
-        )
-    many = "; ".join(
-        f"{percent(each.content)} need at most {number(each.at_most_N, width)} N"
-        for each in found.bounds
-    )
-    sure = percent(found.bounds[0].confidence)
-    yield (
-        f"At {found.deformation_mm:g} mm the next gear{sized} needs {middle} N, 95 % "
-        f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
-        f"confidence {many}."
-    )
-
-
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     far = np.argsort(-columns["probability_off"], kind="stable")[:MOST_LISTED]
     numbers = ["rows", "N/mm", "95 % interval", "apart [%]", "in sds", "noise [N]"]
@@ -194,6 +179,20 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
     return Section("The gears, the oddest first", blocks, brief=True)
+
+
+def _curves(found: Fleet) -> Section:
+    """Return the readings, and whose are shown."""
+    shown, off = shown_gears(found), int(found.called.sum())
+    few, ordinary = len(shown.ordinary), len(found.called) - off
+    whose = f"all {few}" if few == ordinary else f"{few} of {ordinary}, evenly chosen"
+    words = f"Grey: ordinary gears, {whose}."
+    named = len(shown.called)
+    whose = f"all {off}" if named == off else f"{named} of {off}"
+    words += f" In colours: gears that are called off, {whose}." * bool(named)
+    words += " Each is of its own size." * found.at_one_size
+    what = "Force over deformation of many gears, those called off in colours"
+    return Section("The readings", [Picture("curves", what, words)])
 
 
 def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:

@@ -1,15 +1,23 @@
 """The figures of a fleet."""
 
 from collections.abc import Sequence
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hdcal.fleets.chart import fleet_chart
+from hdcal.fleets.curves import curve, shown_gears
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.over_time import TimeSeries
 from hdcal.fleets.time_chart import time_charts
 from hdcal.report.canvas import FAILED, heading, plain, style
+from hdcal.report.chart import COLOURS
 from hdcal.report.chart_figure import draw_chart
+
+_GREY, _LONGEST = "#808080", 40
+# The first of the colours is that of ordinary gears elsewhere.
+_HUES = (*COLOURS[1:], COLOURS[0])
 
 
 def fleet_figure(found: Fleet) -> Figure:
@@ -17,9 +25,31 @@ def fleet_figure(found: Fleet) -> Figure:
     with style():
         figure = Figure(figsize=(7.6, 4.4), layout="constrained")
         axes = draw_chart(fleet_chart(found), figure.add_subplot())
-        what = FAILED if found.reasons else "every gear with its 95 % interval"
-        heading(axes, f"{plain(found.case.name, 40)}: {what}")
+        _head(axes, found, "every gear with its 95 % interval")
     return figure
+
+
+def curves_figure(found: Fleet) -> Figure:
+    """Draw the readings: ordinary gears in grey, those called off in colours."""
+    shown = shown_gears(found)
+    with style():
+        figure = Figure(figsize=(7.6, 4.4), layout="constrained")
+        axes = figure.add_subplot()
+        look: dict[str, Any] = {"color": _GREY, "linewidth": 0.6, "alpha": 0.6}
+        axes.plot(*curve(found, shown.ordinary), label="ordinary gears", **look)
+        for gear, hue in zip(shown.called, _HUES, strict=False):
+            name = plain(found.case.specimen_labels[gear], _LONGEST)
+            axes.plot(*curve(found, gear), color=hue, linewidth=1.2, label=name)
+        axes.set_xlabel(f"deformation as read ({found.case.gear.reading}) [mm]")
+        axes.set_ylabel("force as read [N]")
+        axes.legend(fontsize="small")
+        _head(axes, found, "the readings, force over deformation")
+    return figure
+
+
+def _head(axes: Axes, found: Fleet, words: str) -> None:
+    what = FAILED if found.reasons else words
+    heading(axes, f"{plain(found.case.name, _LONGEST)}: {what}")
 
 
 def time_figure(series: Sequence[TimeSeries]) -> Figure:

@@ -3,23 +3,26 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
+import xarray as xr
 from jaxtyping import Key
 from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
-from hdcal.errors import Findings, NotUsable
+from hdcal.errors import Findings
+from hdcal.fleets.fleet_posterior import FleetPosterior
 from hdcal.fleets.fleet_problem import fleet_problem, rough_values
 from hdcal.fleets.gear_table import size_ratios
 from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
-from hdcal.fleets.next_force import NextForce, next_force
+from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.next_gear import next_gear
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings, check_fleet
@@ -111,26 +114,32 @@ class Fleet(Shown):
         """Mountings of each gear, shape (g,)."""
         return np.bincount(self.readings.sums.gear)
 
+    @property
+    def at_one_size(self) -> bool:
+        """Whether gears of several sizes were compared at the gear file's."""
+        return bool(np.any(self.size_ratio != 1.0))
+
+    @cached_property
+    def posterior(self) -> FleetPosterior:
+        """The population alone, as it is saved."""
+        return FleetPosterior.of(self)
+
+    @property
+    def tree(self) -> xr.DataTree:
+        """Draws of the population in ArviZ' groups."""
+        return self.posterior.tree
+
     def next_force(
-        self, deformation: float, limit_force: float | None = None
+        self, deformation: float, limit_force: float | None = None, **how: Any
     ) -> NextForce:
-        """Return the force that a gear to come needs at a deformation.
+        """Return the force that a gear to come needs, as its posterior tells it.
 
         Args:
             deformation: as read, with the sign of the data [mm].
             limit_force: a capacity, its size [N].
-
-        Raises:
-            InputError: a number is impossible.
-            NotUsable: the fleet failed its checks.
+            how: content and confidence, as `FleetPosterior.next_force` takes them.
         """
-        with Findings() as wrong:
-            wrong += implausible("deformation", deformation)
-            wrong += implausible("limit_force", limit_force, "sigma")
-        if self.reasons:
-            raise NotUsable("this fleet failed its checks: " + "; ".join(self.reasons))
-        seed = int(str(self.settings["seed"]))
-        return next_force(self.draws, deformation, limit_force, seed)
+        return self.posterior.next_force(deformation, limit_force, **how)
 
     def summary(self) -> dict:
         """Return all that is told of them as plain data, as in summary.json."""

@@ -1,12 +1,13 @@
 """The force that a gear to come needs at a deformation, and a capacity beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from hdcal.fleets.next_gear import CONFIDENCE, new_group_sd, quantile_of_mixture
+from hdcal.notebook import Shown
 from hdcal.report.answer import Probability, Real
 from hdcal.report.parameters import Interval, credible_interval
 
@@ -27,8 +28,8 @@ class ForceBounds:
     at_most_N: Real
 
 
-@dataclass(frozen=True)
-class NextForce:
+@dataclass(frozen=True, repr=False)
+class NextForce(Shown):
     """The force that a gear not yet measured needs, in size.
 
     Of one reading in a new mounting at the reference temperature; an odd gear is in it.
@@ -40,6 +41,9 @@ class NextForce:
         limit_force_N: a capacity, its size; None where none is asked about.
         probability_exceeded: share of gears to come that need more, 95 % credible
             interval; None without a capacity.
+        at_one_size: whether all of this is of a gear of the gear file's sizes, as those
+            that were measured differ in theirs.
+        beyond_tested: whether the deformation is larger than any that was read.
     """
 
     deformation_mm: Real
@@ -47,6 +51,8 @@ class NextForce:
     bounds: tuple[ForceBounds, ...]
     limit_force_N: Real | None
     probability_exceeded: Interval | None
+    at_one_size: bool = False
+    beyond_tested: bool = False
 
 
 def next_force(
@@ -54,6 +60,9 @@ def next_force(
     deformation: float,
     limit_force: float | None = None,
     seed: int = 0,
+    *,
+    contents: Sequence[float] = CONTENTS,
+    confidence: float = CONFIDENCE,
 ) -> NextForce:
     """Return the force of gears to come at a deformation.
 
@@ -62,6 +71,8 @@ def next_force(
         deformation: as read, with the sign of the data [mm].
         limit_force: a capacity, its size [N].
         seed: of the predictive draws.
+        contents: shares of gears to come that bounds are told of, above a half each.
+        confidence: of each bound.
     """
     sense = np.sign(deformation) or 1.0
     mean = draws["stiffness"] * abs(deformation) + sense * draws["zero"]
@@ -71,11 +82,11 @@ def next_force(
     wide = np.where(rng.random(len(mean)) < share, far, ordinary)
     one = mean + wide * rng.standard_normal(len(mean))
     bounds = []
-    for content in CONTENTS:
+    for content in contents:
         reach = ordinary * quantile_of_mixture(content, share, far / ordinary)
-        low = float(np.quantile(mean - reach, 1.0 - CONFIDENCE))
-        high = float(np.quantile(mean + reach, CONFIDENCE))
-        bounds.append(ForceBounds(content, CONFIDENCE, max(low, 0.0), high))
+        low = float(np.quantile(mean - reach, 1.0 - confidence))
+        high = float(np.quantile(mean + reach, confidence))
+        bounds.append(ForceBounds(content, confidence, max(low, 0.0), high))
     exceeded = None
     if limit_force is not None:
         beyond = (stats.norm.sf((limit_force - mean) / sd) for sd in (ordinary, far))

@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
@@ -44,7 +42,7 @@ def notes_of(found: Fleet) -> Sequence[str]:
         if 0 < len(names) < _FEW_GROUPS
     ]
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
-    sized = [OF_SIZES] if np.any(found.size_ratio != 1.0) else [ONE_SIZE]
+    sized = [OF_SIZES] if found.at_one_size else [ONE_SIZE]
     sized = sized if found.case.gear.theory != SPRING else []
     few = [FEW_GEARS] if len(found.off) < FEW else []
     beside = misfit_words(found.misfit)

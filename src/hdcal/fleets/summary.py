@@ -24,6 +24,7 @@ from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.fleets.notes import notes_of
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.inference.groupings import group_offsets
+from hdcal.inference.posterior import FILE_NAME
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
 
@@ -35,7 +36,6 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     """Return what is known of each gear, the columns of gears.csv."""
     own = found.stiffness * found.size_ratio
     low, middle, high = np.quantile(own, _ENDS, axis=0)
-    sized = np.any(found.size_ratio != 1.0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
         **({"lot": np.array(found.case.lots)} if found.lots else {}),
@@ -44,7 +44,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "stiffness_N_per_mm": middle,
         "stiffness_lo": low,
         "stiffness_hi": high,
-        **({"size_ratio": found.size_ratio} if sized else {}),
+        **({"size_ratio": found.size_ratio} if found.at_one_size else {}),
     }
     if found.case.gear.theory != SPRING:
         K_low, K, K_high = np.quantile(_influence(found), _ENDS, axis=0)
@@ -102,7 +102,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         called_off=tuple(called),
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
-        at_one_size=bool(np.any(found.size_ratio != 1.0)),
+        at_one_size=found.at_one_size,
         population=population,
         lots=lots,
         operators=tuple(_operators(found)),
@@ -166,10 +166,11 @@ def fleet_report(
     """
 
     def figures():
-        from hdcal.fleets.figure import fleet_figure, time_figure
+        from hdcal.fleets.figure import curves_figure, fleet_figure, time_figure
 
         series = time_series(found)
         drawn = {"time": time_figure(series)} if series else {}
+        drawn["curves"] = curves_figure(found)
         return {"gears": fleet_figure(found)} | drawn
 
     def charts():
@@ -188,6 +189,7 @@ def fleet_report(
         "summary.json",
         figures,
         tables=lambda: {"gears.csv": columns},
+        others=lambda: [(FILE_NAME, found.posterior.to_netcdf())],
         charts=charts,
         theory=found.case.gear.theory,
     )

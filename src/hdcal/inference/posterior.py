@@ -96,11 +96,7 @@ class Posterior(Shown):
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws in code units by site, chains joined: [draw, …]."""
-        group = self.tree["posterior"].to_dataset()
-        return {
-            str(name): values.to_numpy().reshape(-1, *values.shape[2:])
-            for name, values in group.data_vars.items()
-        }
+        return posterior_file.joined_draws(self.tree)
 
     @cached_property
     def problem(self) -> Problem:
@@ -138,13 +134,8 @@ class Posterior(Shown):
         Path(path).write_bytes(self.to_netcdf())
 
     def to_netcdf(self) -> bytes:
-        """Return the content of a NetCDF file that ArviZ opens.
-
-        Made in memory: HDF5 crashes where a disk that is full refuses its writes.
-        """
-        tree = self.tree.copy()
-        tree.attrs = {
-            "hdcal_format": posterior_file.FORMAT,
+        """Return the content of a NetCDF file that ArviZ opens."""
+        attributes = {
             "status": "ok" if self.usable else "failed",
             "case": posterior_file.describe_case(self.case),
             "model": json.dumps(
@@ -161,8 +152,8 @@ class Posterior(Shown):
                 }
             ),
         }
-        tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
-        return bytes(tree.to_netcdf(engine="h5netcdf"))
+        kind = posterior_file.CALIBRATION
+        return posterior_file.sealed(self.tree, kind, attributes)
 
     @classmethod
     def load(

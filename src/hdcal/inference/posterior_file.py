@@ -6,7 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import h5py
 import numpy as np
 import xarray as xr
 
@@ -20,9 +22,37 @@ from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
 from hdcal.inference.posterior_limits import check_container, check_rows
 from hdcal.inference.serial_correlation import CORRELATION
 
-FORMAT = "hdcal.posterior/1"
-# The attribute that holds the digest of everything else.
-DIGEST = "sha256"
+
+class Kind(NamedTuple):
+    """What a posterior file is of.
+
+    Attributes:
+        format: name and version of its format.
+        again: how it is made anew.
+        elsewhere: what it is, and what to do with it, where another kind is needed.
+    """
+
+    format: str
+    again: str
+    elsewhere: tuple[str, str]
+
+
+CALIBRATION = Kind(
+    "hdcal.posterior/1",
+    "calibrate again",
+    ("is of a calibration, not of a fleet", "Name the folder of a fleet"),
+)
+FLEET = Kind(
+    "hdcal.fleet-posterior/1",
+    "ask for the fleet again",
+    (
+        "is of a fleet, which models no gear by itself",
+        "The force of a gear to come is told by margin and fleet, with --deformation; "
+        "for one gear calibrate it alone, with --specimen",
+    ),
+)
+# The attributes that hold the format, and the digest of everything else.
+_FORMAT, DIGEST = "hdcal_format", "sha256"
 
 UNITS = {
     "deformation": "mm",
@@ -126,7 +156,7 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     )
 
 
-def open_tree(path) -> xr.DataTree:
+def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
     """Open a posterior file and read it whole.
 
     Raises:
@@ -138,22 +168,37 @@ def open_tree(path) -> xr.DataTree:
             loaded = tree.load()
     except FileNotFoundError as error:
         words, remedy = "there is no such file", "Name the folder of a calibration"
-        kind = _kind_beside(Path(path))
-        if kind == "hdcal.compare/1":
+        beside = _kind_beside(Path(path))
+        if beside == "hdcal.compare/1":
             words = "a comparison leaves no posterior"
             remedy = "Name the folders of the results that were compared"
-        if kind == "hdcal.fleet/1":
-            words = "a fleet leaves no posterior"
-            remedy = (
-                "The force of a gear to come is told by fleet --deformation; for one "
-                "gear calibrate it alone, with --specimen"
-            )
+        if beside == "hdcal.fleet/1":
+            words = "this fleet was left by an older hdcal, without a posterior"
+            remedy = FLEET.again
         raise InputError([Finding(str(path), words, remedy)]) from error
     except InputError:
         raise
     except Exception as error:
-        raise InputError([not_a_posterior(path)]) from error
+        raise InputError([not_a_posterior(path, kind)]) from error
     return loaded
+
+
+def kind_of(path: Path) -> Kind | None:
+    """Return what a file says it is of; None of what is no posterior file."""
+    try:
+        check_container(path)
+        with h5py.File(path, "r") as file:
+            written = str(file.attrs[_FORMAT])
+    except (InputError, OSError, KeyError):
+        return None
+    return _kind(written)
+
+
+def _kind(written: str) -> Kind | None:
+    """Return of what a format is, whatever its version."""
+    name = written.rpartition("/")[0]
+    kinds = (CALIBRATION, FLEET)
+    return next((k for k in kinds if k.format.rpartition("/")[0] == name), None)
 
 
 def _kind_beside(path: Path) -> str:
@@ -165,13 +210,30 @@ def _kind_beside(path: Path) -> str:
         return ""
 
 
-def not_a_posterior(path) -> Finding:
+def not_a_posterior(path, kind: Kind = CALIBRATION) -> Finding:
     """Return the finding for a file that hdcal did not write."""
-    return Finding(
-        str(path),
-        "is not a posterior that hdcal wrote, or it is damaged",
-        "Calibrate again",
-    )
+    words = "is not a posterior that hdcal wrote, or it is damaged"
+    return Finding(str(path), words, kind.again)
+
+
+def sealed(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, Any]) -> bytes:
+    """Return the content of a NetCDF file that ArviZ opens, with its digest.
+
+    Made in memory: HDF5 crashes where a disk that is full refuses its writes.
+    """
+    tree = tree.copy()
+    tree.attrs = {_FORMAT: kind.format, **attributes}
+    tree.attrs[DIGEST] = digest(tree)
+    return bytes(tree.to_netcdf(engine="h5netcdf"))
+
+
+def joined_draws(tree: xr.DataTree) -> dict[str, np.ndarray]:
+    """Return all draws of a posterior by site, chains joined: [draw, …]."""
+    group = tree["posterior"].to_dataset()
+    return {
+        str(name): values.to_numpy().reshape(-1, *values.shape[2:])
+        for name, values in group.data_vars.items()
+    }
 
 
 def digest(tree: xr.DataTree) -> str:
@@ -201,8 +263,8 @@ def _canonical(values: np.ndarray) -> tuple[str, bytes]:
     return f"text{values.shape}", json.dumps([str(v) for v in values.flat]).encode()
 
 
-def check_unchanged(tree: xr.DataTree, path) -> None:
-    """Refuse a posterior of another version, or that is not as hdcal wrote it.
+def check_unchanged(tree: xr.DataTree, path, kind: Kind = CALIBRATION) -> None:
+    """Refuse a posterior of another kind or version, or not as hdcal wrote it.
 
     The digest detects accidental changes. It is no signature: it can be computed
     anew.
@@ -210,17 +272,20 @@ def check_unchanged(tree: xr.DataTree, path) -> None:
     Raises:
         InputError: with what is wrong.
     """
-    written = str(tree.attrs.get("hdcal_format", ""))
-    if not written.startswith("hdcal.posterior/"):
-        raise InputError([not_a_posterior(path)])
-    if written != FORMAT:
-        words = f"has the format {written}, and this hdcal reads {FORMAT}"
-        remedy = "Use the hdcal that wrote it, or calibrate again"
+    written = str(tree.attrs.get(_FORMAT, ""))
+    found = _kind(written)
+    if found is None:
+        raise InputError([not_a_posterior(path, kind)])
+    if found is not kind:
+        words, remedy = found.elsewhere
+    elif written != kind.format:
+        words = f"has the format {written}, and this hdcal reads {kind.format}"
+        remedy = f"Use the hdcal that wrote it, or {kind.again}"
     elif DIGEST not in tree.attrs:
-        words, remedy = "was written by an older version of hdcal", "Calibrate again"
+        words, remedy = "was written by an older version of hdcal", kind.again
     elif tree.attrs[DIGEST] != digest(tree):
         words = "was changed after hdcal wrote it"
-        remedy = "Take the file as it was written, or calibrate again"
+        remedy = f"Take the file as it was written, or {kind.again}"
     else:
         return
     raise InputError([Finding(str(path), words, remedy)])

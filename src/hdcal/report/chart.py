@@ -113,24 +113,29 @@ def boxes(
 
 
 def interval_boxes(
-    place: np.ndarray, low: np.ndarray, high: np.ndarray, unit: str = "N/mm"
+    place: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    ends: tuple[str, str] = ("95 % interval, 97.5 %", "95 % interval, 2.5 %"),
+    unit: str = "N/mm",
 ) -> list[Series]:
-    """Return 95 % intervals as a band of boxes: upper ends, then lower ones.
+    """Return intervals as a band of boxes: upper ends, then lower ones.
 
     Args:
         place: of each, whole numbers, shape (n,).
         low: lower ends, shape (n,).
         high: upper ends, shape (n,).
-        unit: of the ends.
+        ends: what the upper ones are called, and the lower ones.
+        unit: of both.
     """
     return [
         Series(
-            f"95 % interval, {side} [{unit}]",
-            *boxes(place - _HALF, place + _HALF, ends),
+            f"{words} [{unit}]",
+            *boxes(place - _HALF, place + _HALF, levels),
             COLOURS[0],
             width=0.0,
         )
-        for side, ends in (("97.5 %", high), ("2.5 %", low))
+        for words, levels in zip(ends, (high, low), strict=True)
     ]
 
 

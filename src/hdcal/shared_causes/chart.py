@@ -14,7 +14,7 @@ def causes_chart(found: FleetCauses) -> Chart:
     order = np.argsort(-found.share.mean(axis=0), kind="stable")
     order = order[found.share.mean(axis=0)[order] >= RARE]
     place = np.arange(1.0, len(order) + 1.0)
-    curves = interval_boxes(place, low[order], high[order], "%")
+    curves = interval_boxes(place, low[order], high[order], unit="%")
     points = Series("median [%]", place, middle[order], COLOURS[1], points=True)
     names = [label(found.causes[k]) for k in order]
     axis = "causes", "share of gears to come [%]"

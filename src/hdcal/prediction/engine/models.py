@@ -35,5 +35,8 @@ def model_pairs(models: Models) -> Sequence[tuple[float, Posterior]]:
         words = f"{type(models).__name__} is no calibrated model{quick}"
         remedy = "Give what calibrate or diagnose returned, itself"
         remedy += "; diagnose without quick" * bool(quick)
+        # A fleet, or its posterior.
+        own = hasattr(models, "next_force")
+        remedy = "Ask its own next_force" if own else remedy
         raise InputError([Finding("models", words, remedy)])
     return list(held.values())

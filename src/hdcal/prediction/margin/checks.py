@@ -1,6 +1,6 @@
 """What is wrong with the questions that are asked of a margin."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,12 +22,7 @@ from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
 from hdcal.prediction.margin.stated import RULES
 from hdcal.prediction.margin.temperatures import MOST_TEMPERATURES
-from hdcal.prediction.tolerance_factors import check_shares
-
-# Draws that must lie beyond a bound: fewer do not say where it is.
-_BEYOND = 10
-# The normal law is no guide to shares rarer than this.
-_RAREST = 1e-9
+from hdcal.prediction.tolerance_factors import check_rarity, check_shares
 
 
 def check_margin(
@@ -55,12 +50,14 @@ def check_margin(
     shares = {n: v for n in names if (v := getattr(criteria, n)) is not None}
     limit, place = criteria.limit_force, f"{at:g} mm"
     forces = {"limit_force": limit, "given_force": request.given_force}
+    draws = sum(min(c.size, MOST_DRAWS) for c in causes)
+    more = ", or calibrate with more draws" if draws < MOST_DRAWS else ""
     wrong = _check_deformation(cause, at)
     findings = [
         *wrong,
         *_check_temperature(cause, temperature),
         *check_shares(**shares),
-        *_check_rarity(shares, sum(min(c.size, MOST_DRAWS) for c in causes)),
+        *check_rarity(shares, draws, more),
         *implausible("seed", request.seed),
         *check_population(request.population, cause.problem),
         *check_tolerances(request.tolerances, gear.geometry, theory),
@@ -140,23 +137,6 @@ def _check_temperature(cause: Cause, temperature) -> list[Finding]:
     return many or temperature_findings(
         cause.posterior.case.gear, cause.values, temperature
     )
-
-
-def _check_rarity(shares: Mapping[str, float], draws: int) -> list[Finding]:
-    """Refuse what these draws, or any normal law, cannot tell."""
-    findings = []
-    sure, most = shares["confidence"], 1.0 - _BEYOND / draws
-    if most < sure < 1.0:
-        words = f"{draws} draws cannot tell a confidence of {sure:g}"
-        more = ", or calibrate with more draws" if draws < MOST_DRAWS else ""
-        remedy = f"Ask for {most:.4g} or less{more}"
-        findings.append(Finding("confidence", words, remedy))
-    for name in shares.keys() - {"confidence"}:
-        if 1.0 - _RAREST < shares[name] < 1.0:
-            words = f"{shares[name]:.12g} is beyond what any model of noise can promise"
-            remedy = "Ask for 0.999999999 or less"
-            findings.append(Finding(name, words, remedy))
-    return findings
 
 
 def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:

@@ -61,7 +61,8 @@ def margin(console: Console, run, out, force, certificate, **asked):
     """Bound the force needed at a deformation, from RUN.
 
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
-    could not tell apart are averaged over by their probability.
+    could not tell apart are averaged over by their probability. Of a folder of `hdcal
+    fleet` it tells what gears to come need.
     """
     keep_compilations()
     from hdcal.prediction.engine.causes import read_models

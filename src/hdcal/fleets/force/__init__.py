@@ -1,0 +1,1 @@
+"""What force will gears to come of a fleet need?"""
