@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
+    Labels,
     Measurements,
     of_specimen,
     read_measurements,
@@ -49,6 +51,7 @@ def read_case(
     sheet: str | None = None,
     reading: str | None = None,
     specimen: str | None = None,
+    skip_bad: bool | None = None,
 ) -> Case:
     """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
@@ -71,6 +74,8 @@ def read_case(
         reading: of the deformation, `radial` or `diametral`, where the gear file is
             silent; by default it is taken for radial, and said to be so.
         specimen: label of the one whose rows are wanted; by default all of them.
+        skip_bad: leave out specimens of which a row is wrong, whole; `left_out` of the
+            case names them. False: refuse, and say that this can be asked for.
 
     Raises:
         InputError: holds everything that is wrong with either file.
@@ -90,13 +95,17 @@ def read_case(
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns
         measured = wrong.attempt(
-            read_measurements, table if in_memory else csv_path, named, encoding, sheet
+            read_measurements,
+            table if in_memory else csv_path,
+            named,
+            encoding,
+            sheet,
+            check=None if found is None else partial(_too_far, gear=found),
+            skip_bad=skip_bad,
         )
         wrong += of_gear
         if measured is not None and specimen is not None:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
-        if measured is not None and found is not None:
-            wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
     motion = _motion(measured)
     further, of_further = further_labels(
@@ -117,6 +126,7 @@ def read_case(
             *of_further,
         ),
         columns=measured.columns.as_named(),
+        left_out=measured.left_out,
         **further,
     )
 
@@ -190,17 +200,23 @@ def _known(measured: Measurements) -> frozenset[str]:
     return frozenset(known)
 
 
-def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
+def _too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
+    """Find the farthest row of each specimen that no gear of this radius reaches."""
+    # Where something else is wrong, numbers may be missing or wild.
+    if columns.findings or "deformation" not in columns.used:
+        return
     size = np.abs(columns.values["deformation"])
-    if size.max() < gear.reach:
-        return []
-    words = (
-        f"a deformation of {size.max():g} mm on a radius of {gear.geometry.radius:g} mm"
-    )
+    beyond = np.flatnonzero(size >= gear.reach)
+    rising = beyond[np.argsort(size[beyond], kind="stable")]
+    farthest = {int(specimen.index[row]): int(row) for row in rising}
+    radius = f"on a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
-    row = int(columns.table.rows[int(size.argmax())])
-    file, header = columns.findings.file, columns.used["deformation"].header
-    return [Finding(file, words, remedy, row, header)]
+    found = (
+        (int(columns.table.rows[row]), f"a deformation of {size[row]:g} mm {radius}")
+        for row in sorted(farthest.values())
+    )
+    header = columns.used["deformation"].header
+    columns.findings.add_rows(((*one, remedy) for one in found), header)
 
 
 def _gear_of(

@@ -42,6 +42,11 @@ from hdcal.errors import Finding
     help="Leave out what was read before a day, as 2026-09-01.",
 )
 @click.option(
+    "--skip-bad",
+    is_flag=True,
+    help="Leave out gears that cannot be read or sized, and say so.",
+)
+@click.option(
     "--scheduler",
     metavar="ADDRESS",
     help="Dask scheduler whose workers read the files of a Parquet folder.",
@@ -61,6 +66,7 @@ def fleet(
     gears,
     scheduler,
     since,
+    skip_bad,
     **given,
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
@@ -78,21 +84,19 @@ def fleet(
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
-        readings = _read(console, scheduler, given)
+        readings = _read(console, scheduler, given | {"skip_bad": skip_bad})
         if readings is not None and since is not None:
             readings = wrong.attempt(readings.since, since)
         if readings is not None:
-            from hdcal.fleets.gear_table import size_ratios
-            from hdcal.fleets.readings import check_fleet
+            from hdcal.fleets.usable import usable
 
-            wrong.attempt(check_fleet, readings)
-            if gears is not None:
-                wrong.attempt(size_ratios, gears, readings.case)
+            wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None
     keep_compilations()
-    asked = {"seed": seed, "force_tolerance": force_tolerance, "gears": gears}
+    asked = {"seed": seed, "force_tolerance": force_tolerance}
+    asked |= {"gears": gears, "skip_bad": skip_bad}
     from hdcal.fleets.fleet import fleet as fit_fleet
     from hdcal.fleets.summary import fleet_report
 
@@ -110,7 +114,7 @@ def _read(console: Console, scheduler: str | None, given: dict):
     from hdcal.fleets.read_fleet import read_fleet
 
     if is_parquet(given["data"]) and given["columns"] is not None:
-        names = "data", "gear", "columns", "theory", "reading"
+        names = "data", "gear", "columns", "theory", "reading", "skip_bad"
         how: dict = {name: given[name] for name in names}
         return console.wrong.attempt(read_fleet, **how, scheduler=scheduler)
     case = read_given(console, **given)

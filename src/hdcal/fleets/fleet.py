@@ -16,14 +16,14 @@ from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
 from hdcal.errors import Findings, NotUsable
 from hdcal.fleets.fleet_problem import fleet_problem, rough_values
-from hdcal.fleets.gear_table import size_ratios
 from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.next_force import NextForce, next_force
 from hdcal.fleets.next_gear import next_gear
 from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.readings import FleetReadings, check_fleet
+from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
+from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.population_problem import (
@@ -158,6 +158,7 @@ def fleet(
     gears: Any = None,
     since: str | None = None,
     scheduler: str | None = None,
+    skip_bad: bool = False,
     progress: Progress | None = None,
 ) -> Fleet:
     """Say of many gears how stiff each one is, and which ones are off.
@@ -183,23 +184,23 @@ def fleet(
         since: day, as 2026-09-01, before which what was read is left out.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder; they have to find them under the same names.
+        skip_bad: leave out gears of which a row cannot be read, the size is missing, or
+            nothing says how stiff they are: whole, and named in the notes.
         progress: called with (iterations done, iterations in all).
 
     Raises:
-        InputError: there are too few gears, one says nothing of its stiffness, or none
+        InputError: there are too few gears, one is bad and may not be left out, or none
             scatters about its line.
     """
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
-    readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
+    how: dict = {"scheduler": scheduler, "skip_bad": skip_bad}
+    readings = read_fleet(data, gear, columns=columns, **how)
     if since is not None:
         readings = readings.since(since)
-    check_fleet(readings)
-    ratio = np.ones(len(readings.case.specimen_labels))
-    if gears is not None:
-        ratio = size_ratios(gears, readings.case)
+    readings, ratio = usable(readings, gears, skip_bad=skip_bad)
     bound_executables()
     readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)

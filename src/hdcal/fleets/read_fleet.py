@@ -21,6 +21,7 @@ def read_fleet(
     theory: str | None = None,
     reading: str | None = None,
     scheduler: str | None = None,
+    skip_bad: bool = False,
 ) -> FleetReadings:
     """Return what was measured on a fleet.
 
@@ -33,16 +34,18 @@ def read_fleet(
         reading: likewise.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
+        skip_bad: leave out gears of which a row is wrong, whole.
 
     Raises:
         InputError: holds everything that is wrong with the data.
     """
     if isinstance(data, FleetReadings):
         return data
-    how = {"columns": columns, "theory": theory, "reading": reading}
+    how: dict = {"columns": columns, "theory": theory, "reading": reading}
+    how |= {"skip_bad": skip_bad}
     if is_parquet(data):
         source = read_parquet(data, gear, **how)
-        return pool_of(source, scheduler).readings(source)
+        return pool_of(source, scheduler, skip_bad=skip_bad).readings(source)
     if scheduler is not None:
         words = "is no Parquet, which alone is read by several"
         remedy = "Leave it out, or save the data as Parquet files"
