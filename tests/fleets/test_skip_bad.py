@@ -230,16 +230,6 @@ def test_parquet_stops_otherwise_and_offers_it_once(saved, monkeypatch, shown):
     assert words[-1].startswith("skip_bad") and "'G0'" in words[-1]
 
 
-@pytest.mark.thorough
-def test_workers_of_a_cluster_leave_out_the_same(saved, local, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 40)
-    alone = read_fleet(saved[0], skip_bad=True)
-    address = local.scheduler_address
-    together = read_fleet(saved[0], skip_bad=True, scheduler=address)
-    same(together, alone)
-    assert together.case.left_out == alone.case.left_out
-
-
 def test_a_row_of_nobody_stops_parquet(saved, monkeypatch):
     folder, frame = saved
     monkeypatch.setattr(parquet, "_SHOWN", 40)
