@@ -113,8 +113,8 @@ def _measured(found: Columns) -> Measurements:
     """Return what stands in columns, right or wrong: their findings say."""
     columns = _with_values(found, FEWEST_ROWS)
     rows = len(columns.table.rows)
-    specimen = _labels(columns.values.get("specimen"), rows)
-    run = _runs(columns.values.get("run"), specimen, rows)
+    specimen = labels_of(columns.values.get("specimen"), rows)
+    run = runs_of(columns.values.get("run"), specimen, rows)
     check_time(columns, run.index)
     return Measurements(columns, run, specimen)
 
@@ -257,18 +257,19 @@ def _assumed(
         yield f"{ASSUMED}{said}. If not, name the column: --column '{one}={form}'"
 
 
-def _labels(labels: np.ndarray | None, rows: int) -> Labels:
+def labels_of(labels: np.ndarray | None, rows: int) -> Labels:
+    """Return which gear each row is of; one where no labels, shape (n,), tell."""
     if labels is None:
         return Labels(np.zeros(rows, int), ("1",))
     index, names = pd.factorize(labels)
     return Labels(index, tuple(names))
 
 
-def _runs(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
+def runs_of(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
     """Runs by label; the same label on two specimens is two mountings."""
     if labels is None:
-        return specimen if specimen.index.any() else _labels(None, rows)
-    run, gears = _labels(labels, rows), len(specimen.names)
+        return specimen if specimen.index.any() else labels_of(None, rows)
+    run, gears = labels_of(labels, rows), len(specimen.names)
     index, pairs = pd.factorize(run.index * gears + specimen.index)
     if len(pairs) == len(run.names):
         return run

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,7 @@ def read_case(
         of_gear = Findings()
         beside = None if in_memory else csv_path.parent / GEAR_NAME
         found, told = of_gear.attempt(
-            _gear_of, gear, beside, folder, (theory, material, reading)
+            gear_of, gear, beside, folder, (theory, material, reading)
         ) or (None, ())
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns
@@ -100,20 +100,34 @@ def read_case(
             named,
             encoding,
             sheet,
-            check=None if found is None else partial(_too_far, gear=found),
+            check=None if found is None else partial(too_far, gear=found),
             skip_bad=skip_bad,
         )
         wrong += of_gear
         if measured is not None and specimen is not None:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
+    return case_of(measured, found, told, _name(data, folder, sheet, specimen))
+
+
+def case_of(
+    measured: Measurements, found: Gear, told: Sequence[str], name: str
+) -> Case:
+    """Return what was measured on a gear, or several of its kind, as a case.
+
+    Args:
+        measured: in which nothing is wrong.
+        found: as its file has it.
+        told: notes on how that was found.
+        name: of the case.
+    """
     motion = _motion(measured)
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
     )
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
-        name=_name(data, folder, sheet, specimen),
+        name=name,
         gear=at_full_scale(found, _full_scale(measured, found)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
@@ -200,7 +214,7 @@ def _known(measured: Measurements) -> frozenset[str]:
     return frozenset(known)
 
 
-def _too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
+def too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
     """Find the farthest row of each specimen that no gear of this radius reaches."""
     # Where something else is wrong, numbers may be missing or wild.
     if columns.findings or "deformation" not in columns.used:
@@ -219,13 +233,20 @@ def _too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
     columns.findings.add_rows(((*one, remedy) for one in found), header)
 
 
-def _gear_of(
+def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     beside: Path | None,
     folder: bool,
     asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
-    """Return the gear of a case, and what is to be told of how it was found."""
+    """Return the gear of a case, and what is to be told of how it was found.
+
+    Args:
+        gear: that was named, as in `read_case`.
+        beside: where a gear file may lie; None of a table in memory.
+        folder: whether one has to lie there.
+        asked: theory, material and reading, as in `read_case`.
+    """
     theory, material, reading = asked
     told = [f"the deformation is {reading}, as was asked"] if reading else []
     if gear is not None:

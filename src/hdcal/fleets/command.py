@@ -12,6 +12,7 @@ from hdcal.cli.options import (
     json_option,
     read_given,
     seed_option,
+    without_meaning,
 )
 from hdcal.errors import Finding
 
@@ -71,7 +72,9 @@ def fleet(
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
 
-    DATA names the gear of each row in a column `specimen`, also called gear or serial.
+    DATA names the gear of each row in a column `specimen`, also called gear or serial;
+    or it is a folder with a file for each gear, or with a folder of data.csv and
+    gear.toml for each.
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
@@ -110,11 +113,14 @@ def fleet(
 
 def _read(console: Console, scheduler: str | None, given: dict):
     """Return what was measured; Parquet is read in batches, whatever its size."""
+    from hdcal.data.gear_folder import gear_files
     from hdcal.data.parquet_table import is_parquet
     from hdcal.fleets.read_fleet import read_fleet
 
-    if is_parquet(given["data"]) and given["columns"] is not None:
-        names = "data", "gear", "columns", "theory", "reading", "skip_bad"
+    several = bool(gear_files(given["data"]))
+    if (several or is_parquet(given["data"])) and given["columns"] is not None:
+        names = "data", "gear", "columns", "theory", "reading", "encoding", "skip_bad"
+        console.wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
         how: dict = {name: given[name] for name in names}
         return console.wrong.attempt(read_fleet, **how, scheduler=scheduler)
     case = read_given(console, **given)

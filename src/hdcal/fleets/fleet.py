@@ -169,8 +169,9 @@ def fleet(
 
     Args:
         data: a case from `read_case`, whose rows name their specimen; or a file or a
-            table in memory as that takes it; or a Parquet file or a folder of them,
-            partitioned or not, which are read in batches.
+            table in memory as that takes it; or a folder with a file, or a folder of
+            data.csv and gear.toml, for each gear; or a Parquet file or a folder of
+            them, partitioned or not, which are read in batches.
         gear: as in `read_case`, where no case is given.
         columns: likewise.
         chains: independent chains, two or more.

@@ -1,10 +1,12 @@
 """Read what was measured on many gears, in whatever form it comes."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case
+from hdcal.data.gear_folder import gear_files, read_gear_folder
 from hdcal.data.parquet import read_parquet
 from hdcal.data.parquet_table import is_parquet
 from hdcal.data.reading import read_case
@@ -20,6 +22,7 @@ def read_fleet(
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
     reading: str | None = None,
+    encoding: str | None = None,
     scheduler: str | None = None,
     skip_bad: bool = False,
 ) -> FleetReadings:
@@ -27,11 +30,13 @@ def read_fleet(
 
     Args:
         data: a case; a file, folder or table in memory as `read_case` takes it; a
-            Parquet file, or a folder of them, which are read in batches.
+            folder with a file or a case for each gear; a Parquet file, or a folder of
+            them, which are read in batches.
         gear: as in `read_case`; a case has its own.
         columns: likewise.
         theory: likewise.
         reading: likewise.
+        encoding: likewise; of no Parquet.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
         skip_bad: leave out gears of which a row is wrong, whole.
@@ -52,4 +57,8 @@ def read_fleet(
         raise InputError([Finding("scheduler", f"the data {words}", remedy)])
     if isinstance(data, Case):
         return fleet_readings(data)
+    how |= {"encoding": encoding}
+    if gear_files(data):
+        case, sizes = read_gear_folder(data, gear, **how)
+        return replace(fleet_readings(case), sizes=sizes)
     return fleet_readings(read_case(data, gear, **how))

@@ -1,6 +1,6 @@
 """From readings to what each mounting says: seven sums, whatever the number of rows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,12 +24,14 @@ class FleetReadings:
         sums: of each gear in each mounting.
         runs: index of each mounting's run, shape (m,).
         largest: deformation, with its sign [mm as read].
+        sizes: of each gear, by column, where a gear file of its own states them.
     """
 
     case: Case
     sums: MountingSums
     runs: np.ndarray
     largest: float
+    sizes: Mapping[str, Sequence] | None = None
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
         """Return the sums as if all gears had the gear file's sizes.

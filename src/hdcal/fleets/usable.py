@@ -41,6 +41,10 @@ def usable(
     with Findings() as wrong:
         bad = _still(readings)
         sizes = GearSizes(np.ones(len(labels)), {}, ())
+        if gears is not None and readings.sizes is not None:
+            words = "the sizes are in the gear file of each gear"
+            wrong.append(Finding("gears", words, "Leave it out"))
+        gears = readings.sizes if gears is None else gears
         if gears is not None:
             sizes = wrong.attempt(gear_sizes, gears, case) or sizes
         if not skip_bad:
