@@ -111,6 +111,21 @@ def test_a_file_that_names_gears_is_believed(tmp_path):
     assert of_both[0] == pytest.approx(of_both[1])
 
 
+def test_a_gear_that_is_bad_in_one_file_is_left_out_of_all(tmp_path):
+    frame = measured()
+    for run, part in frame.astype({"force_N": object}).groupby("run"):
+        part = part.drop(columns="run").reset_index(drop=True)
+        part.loc[2, "force_N"] = "abc" if run else part.loc[2, "force_N"]
+        part.to_csv(tmp_path / f"F{run}.csv", index=False)
+    found = read_fleet(tmp_path, SIZES, skip_bad=True)
+    assert found.case.specimen_labels == ("G1", "G2", "G3", "G4", "G5")
+    assert set(found.case.left_out) == {"G0"}
+    # Of a file that says nothing nobody knows which gears it held.
+    (tmp_path / "F2.csv").write_text("nothing\n")
+    words = told(read_fleet, tmp_path, SIZES, skip_bad=True)
+    assert words and all("F2.csv" in one for one in words)
+
+
 def test_folders_bring_the_sizes_of_each_gear(tmp_path):
     found = read_fleet(as_cases(tmp_path / "line"))
     same(found, measured())

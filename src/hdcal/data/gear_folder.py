@@ -24,7 +24,14 @@ from hdcal.data.measurements import (
     read_measurements,
     runs_of,
 )
-from hdcal.data.reading import DATA_NAME, GEAR_NAME, case_of, gear_of, too_far
+from hdcal.data.reading import (
+    DATA_NAME,
+    GEAR_NAME,
+    asked_columns,
+    case_of,
+    gear_of,
+    too_far,
+)
 from hdcal.data.reading_notes import unused_columns
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
@@ -103,13 +110,9 @@ def read_gear_folder(
     Returns:
         The case, and a table of the sizes of each gear where they have files.
     """
-    files, asked = gear_files(data), (theory, None, reading)
-    folder = Path(data)
-    cases = [file for file in files if file.parent != folder]
-    if cases and len(cases) < len(files):
-        words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
-        remedy = f"Keep one of both; {files[-1].name} is such a file"
-        raise InputError([Finding(str(data), words, remedy)])
+    asked, (named, _) = (theory, None, reading), asked_columns(data, columns)
+    files, folder = gear_files(data), Path(data)
+    cases = _cases(files, folder)
     own = [file.parent / GEAR_NAME for file in cases]
     own = own if any(map(os.path.exists, own)) else []
     beside = folder / GEAR_NAME
@@ -117,48 +120,75 @@ def read_gear_folder(
         gear = next(filter(os.path.exists, own))
     whose = str(beside) if gear is None else "`gear`"
     whose = str(gear) if isinstance(gear, str | Path) else whose
-    wrong, bad = Findings(), {}
-    found, told = wrong.attempt(gear_of, gear, beside, False, asked) or (None, ())
-    parts: list[_Part] = []
-    for place, file in enumerate(files):
-        label = file.parent.name if cases else file.stem
-        each, its = Findings(), None
-        if own:
-            its = each.attempt(read_gear, own[place], *asked)
+    with Findings() as wrong:
+        found, told = wrong.attempt(gear_of, gear, beside, False, asked) or (None, ())
+        parts, unread = [], {}
+        how = {"encoding": encoding, "skip_bad": skip_bad or None}
+        for place, file in enumerate(files):
+            each, its = Findings(), None
+            if own:
+                its = each.attempt(read_gear, own[place], *asked)
             if its is not None and found is not None:
                 each += _differences(its, found, own[place], whose)
-        how = {"encoding": encoding, "skip_bad": skip_bad or None}
-        part = each.attempt(_measured, file, its or found, columns, **how)
-        if not each and part is not None:
-            parts.append(_Part(label, part, its))
-            bad |= part.left_out
-        elif each:
-            bad[label] = each[0]
-            wrong += [] if skip_bad else each
-    if not skip_bad and bad and parts:
-        many = sum(len(part.gears) for part in parts) + len(bad)
-        wrong.append(offer(bad, many))
-    if wrong or found is None or not parts:
-        raise InputError(dict.fromkeys(wrong or bad.values()))
-    whole = replace(_joined(parts, found.reference_temperature), left_out=bad)
+            measured = each.attempt(_measured, file, its or found, named, **how)
+            label = file.parent.name if cases else file.stem
+            if each:
+                unread[label] = each
+            elif measured is not None:
+                parts.append(_Part(label, measured, its))
+        wrong += _unread(parts, unread, skip_bad=bool(skip_bad))
+    assert found is not None
+    whole = _joined(parts, found.reference_temperature)
+    bad = {label: each[0] for label, each in unread.items()}
+    for part in parts:
+        bad |= part.measured.left_out
     kind = "folder" if cases else "file"
     notes = [f"each {kind} is a gear, called after it, unless it names gears itself"]
-    if own:
-        notes.append(
-            f"the gear file, with sizes at which gears are compared, is {whose}"
-        )
+    compared = f"the gear file, with sizes at which gears are compared, is {whose}"
+    notes += [compared] if own else []
+    whole = replace(whole, left_out=bad)
     case = case_of(whole, found, (*notes, *told), folder.resolve().name)
     return case, _sizes(parts) if own and found.theory != SPRING else None
 
 
+def _cases(files: Sequence[Path], folder: Path) -> list[Path]:
+    """Return the files in folders of their own: all of them or none.
+
+    Raises:
+        InputError: some are, and some not.
+    """
+    cases = [file for file in files if file.parent != folder]
+    if cases and len(cases) < len(files):
+        words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
+        remedy = f"Keep one of both; {files[-1].name} is such a file"
+        raise InputError([Finding(str(folder), words, remedy)])
+    return cases
+
+
+def _unread(
+    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool
+) -> list[Finding]:
+    """Return what stops all: files that cannot be read, unless they may be left out.
+
+    Where others name gears themselves nobody knows whose rows such a file holds.
+    """
+    known = not any(part.named for part in parts)
+    if skip_bad and known and parts:
+        return []
+    found = [finding for each in unread.values() for finding in each]
+    if unread and known and parts and not skip_bad:
+        bad = {label: each[0] for label, each in unread.items()}
+        found.append(offer(bad, len(parts) + len(bad)))
+    return found
+
+
 def _measured(
-    file: Path, gear: Gear | None, columns: Mapping[str, str] | None, **how
+    file: Path, gear: Gear | None, columns: dict[str, str], **how
 ) -> Measurements:
     """Return what one file holds, as its gear file and the user name its columns."""
     named = dict(gear.source.get("columns", {}) if gear is not None else {})
     check = None if gear is None else partial(too_far, gear=gear)
-    named |= {name: str(header) for name, header in (columns or {}).items()}
-    return read_measurements(file, named, check=check, **how)
+    return read_measurements(file, named | columns, check=check, **how)
 
 
 def _differences(one: Gear, other: Gear, file: Path, whose: str) -> Iterator[Finding]:

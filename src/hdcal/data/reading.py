@@ -80,7 +80,7 @@ def read_case(
     Raises:
         InputError: holds everything that is wrong with either file.
     """
-    columns, in_memory = _asked(data, columns)
+    columns, in_memory = asked_columns(data, columns)
     table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
@@ -145,7 +145,9 @@ def case_of(
     )
 
 
-def _asked(data: Any, columns: Mapping[str, str] | None) -> tuple[dict[str, str], bool]:
+def asked_columns(
+    data: Any, columns: Mapping[str, str] | None
+) -> tuple[dict[str, str], bool]:
     """Return columns as texts, and whether the data are a table in memory."""
     if columns is not None and not isinstance(columns, Mapping):
         remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"

@@ -60,5 +60,6 @@ def read_fleet(
     how |= {"encoding": encoding}
     if gear_files(data):
         case, sizes = read_gear_folder(data, gear, **how)
-        return replace(fleet_readings(case), sizes=sizes)
+        # A gear that is bad in one file may stand in others.
+        return replace(fleet_readings(case), sizes=sizes).without(case.left_out)
     return fleet_readings(read_case(data, gear, **how))
