@@ -43,15 +43,20 @@ class Finding:
         if self.column is not None:
             object.__setattr__(self, "column", _shown(self.column, _LONGEST_NAME))
 
-    def __str__(self) -> str:
+    @property
+    def where(self) -> str:
+        """Return file, row and column, as far as they are known."""
         where = _shown(self.file, _LONGEST_FILE)
         if self.row is not None:
             where += f", row {self.row}"
         if self.column is not None:
             where += f", column '{self.column}'"
+        return where
+
+    def __str__(self) -> str:
         remedy = self.remedy[:1].upper() + self.remedy[1:]
         problem, remedy = (ended(text) for text in (self.problem, remedy))
-        return f"{where}: {problem} {remedy}"
+        return f"{self.where}: {problem} {remedy}"
 
 
 def ended(text: str) -> str:

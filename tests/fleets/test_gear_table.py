@@ -9,8 +9,9 @@ from commands import Hdcal
 
 import hdcal
 from hdcal.errors import InputError
-from hdcal.fleets.gear_table import size_ratios
+from hdcal.fleets.readings import fleet_readings
 from hdcal.fleets.summary import fleet_report, gear_columns
+from hdcal.fleets.usable import usable
 
 GEARS, WALL = 12, 0.68
 SIZES = {"wall_thickness_mm": WALL, "radius_mm": 40.0, "length_mm": 70.0}
@@ -46,6 +47,10 @@ def measured(off=None):
 def table(**columns):
     names = [f"G{gear}" for gear in range(GEARS)]
     return pd.DataFrame({"gear": names, "wall_thickness_mm": walls()} | columns)
+
+
+def size_ratios(given, case):
+    return usable(fleet_readings(case), given)[1]
 
 
 @pytest.fixture(scope="module")

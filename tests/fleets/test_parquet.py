@@ -233,6 +233,22 @@ def test_the_command_reads_it(frame, hdcal: Hdcal, tmp_path):
 
 
 @pytest.mark.thorough
+def test_a_cluster_leaves_out_the_same_gears(frame, tmp_path, local, monkeypatch):
+    monkeypatch.setattr(parquet, "_SHOWN", 40)
+    given = frame.copy()
+    given.loc[[200, 300], "force_N"] = np.nan
+    for gear, part in given.groupby("serial"):
+        part.to_parquet(tmp_path / f"{gear}.parquet", index=False)
+    alone = read_fleet(tmp_path, skip_bad=True)
+    address = local.scheduler_address
+    together = read_fleet(tmp_path, skip_bad=True, scheduler=address)
+    assert set(alone.case.left_out) == {"G5", "G7"}
+    assert together.case.left_out == alone.case.left_out
+    assert together.case.specimen_labels == alone.case.specimen_labels
+    assert np.array_equal(together.sums.xy, alone.sums.xy)
+
+
+@pytest.mark.thorough
 def test_a_cluster_whose_worker_is_killed_reads_the_same(
     frame, tmp_path, local, monkeypatch
 ):

@@ -98,7 +98,7 @@ def test_what_is_told_of_few_gears_names_them():
 def test_gears_that_say_too_little_are_named():
     table = fleet(0.8)
     few = table[(table.specimen != "G5") | (table.index % 12 == 0)]
-    with pytest.raises(hdcal.InputError, match="'G5' has 4 rows, too few"):
+    with pytest.raises(hdcal.InputError, match="'G5': has 4 rows, too few"):
         hdcal.causes(hdcal.read_case(few), library=LIBRARY)
     exact = table.assign(
         force_N=np.where(
@@ -107,6 +107,15 @@ def test_gears_that_say_too_little_are_named():
     )
     with pytest.raises(hdcal.InputError, match=r"gear 'G6'.*straight line"):
         hdcal.causes(hdcal.read_case(exact), library=LIBRARY)
+
+
+def test_bad_gears_are_left_out_where_it_is_asked_for():
+    table = fleet(0.8)
+    table = table[(table.specimen != "G5") | (table.index % 12 == 0)]
+    found = hdcal.causes(table, library=LIBRARY, skip_bad=True)
+    assert found.case.specimen_labels == tuple(g for g in GEARS if g != "G5")
+    assert found.of_gears[:4] == [("coulomb_friction",)] * 4
+    assert causes_answer(found).notes[0].startswith("1 of 7 gears is left out: G5")
 
 
 def test_the_command_answers_and_says_what_it_wrote(hdcal: Hdcal, tmp_path):

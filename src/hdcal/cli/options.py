@@ -162,6 +162,12 @@ def library_option(command: Callable) -> Callable:
     return click.option("--library", metavar="minus:NAME[,NAME]", help=words)(command)
 
 
+def skip_bad_option(command: Callable) -> Callable:
+    """Add --skip-bad."""
+    words = "Leave out gears of which something is wrong, whole, and say so."
+    return click.option("--skip-bad", is_flag=True, help=words)(command)
+
+
 def json_option(command: Callable) -> Callable:
     """Add --json; the console knows it already, click has to accept it."""
     words = "Print one JSON object; words go to standard error."

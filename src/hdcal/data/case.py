@@ -90,6 +90,8 @@ class Case(Shown):
         operators: who mounted each run index; empty where none is told.
         dates: when each run index was measured first, in ISO 8601; an empty one of a
             run that does not say, and empty where none is told.
+        left_out: specimens of which no row is here, as one of theirs is wrong, each
+            with what that is; empty unless `skip_bad` was asked for.
     """
 
     name: str
@@ -103,6 +105,7 @@ class Case(Shown):
     lots: tuple[str, ...] = ()
     operators: tuple[str, ...] = ()
     dates: tuple[str, ...] = ()
+    left_out: dict[str, Finding] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         rows = len(self.records.force)

@@ -65,6 +65,13 @@ class CsvTable:
     skipped: int
     notes: tuple[str, ...] = ()
 
+    def take(self, kept: np.ndarray) -> "CsvTable":
+        """Return some of the rows; those are true in the mask, shape (n,)."""
+        lines = compress(self.body.split(b"\n"), kept)
+        filled = self.filled - int(np.sum(~kept))
+        body = b"\n".join([*lines, b""])
+        return replace(self, rows=self.rows[kept], body=body, filled=filled)
+
     def texts(self, columns: Iterable[int]) -> dict[int, list[str]]:
         """Cells of some columns as text without blanks around it, by position."""
         read = self._read(columns, "str")

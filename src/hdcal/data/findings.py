@@ -36,12 +36,15 @@ class FileFindings(Findings):
     Attributes:
         places: sheet and row of each row of a table that was joined from several
             sheets; empty of any other.
+        rows: problem, remedy and column of the first thing that is wrong with each row,
+            those that are not spelled out among them.
     """
 
     def __init__(self, file: str):
         super().__init__()
         self.file = file
         self.places: Sequence[tuple[str, int]] = ()
+        self.rows: dict[int, tuple[str, str, str | None]] = {}
 
     def row_of_file(self, row: int) -> int:
         """Return where a row of the text stands in the file, or in its sheet."""
@@ -55,11 +58,23 @@ class FileFindings(Findings):
         column: str | None = None,
     ) -> None:
         """Add one finding; its parts are those of `Finding`."""
+        if row is not None:
+            self.rows.setdefault(row, (problem, remedy, column))
+        self.append(self._finding(problem, remedy, row, column))
+
+    def of_row(self, row: int) -> Finding:
+        """Return the first thing that is wrong with a row of the text."""
+        problem, remedy, column = self.rows[row]
+        return self._finding(problem, remedy, row, column)
+
+    def _finding(
+        self, problem: str, remedy: str, row: int | None, column: str | None
+    ) -> Finding:
         file = self.file
         if self.places and row is not None:
             sheet, row = self.places[row - 1]
             file = f"{file}, sheet {quoted(sheet)}"
-        self.append(Finding(file, problem, remedy, row, column))
+        return Finding(file, problem, remedy, row, column)
 
     def add_rows(
         self,
@@ -77,6 +92,8 @@ class FileFindings(Findings):
             kind: what they are, in the plural.
         """
         every = [*found]
+        for row, problem, remedy in every:
+            self.rows.setdefault(row, (problem, remedy, column))
         blocks = [[one] for one in every]
         if len(every) > LISTED:
             blocks = _blocks(every, self.places)

@@ -1,13 +1,14 @@
 """From a CSV file to checked columns, runs and gears."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from hdcal.data.bad_gears import among, bad_gears, offer
 from hdcal.data.cells import read_cells
 from hdcal.data.columns import (
     LABELS,
@@ -23,7 +24,7 @@ from hdcal.data.frames import NAME, frame_text, is_frame
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
-from hdcal.errors import InputError, quoted
+from hdcal.errors import Finding, InputError, quoted
 
 # How a note begins that says what was guessed.
 ASSUMED = "ASSUMED: "
@@ -52,11 +53,13 @@ class Measurements:
         columns: in which nothing is wrong.
         run: the mountings.
         specimen: the gears.
+        left_out: gears that are not among them, each with what is wrong with it.
     """
 
     columns: Columns
     run: Labels
     specimen: Labels
+    left_out: dict[str, Finding] = field(default_factory=dict)
 
 
 def read_measurements(
@@ -64,6 +67,9 @@ def read_measurements(
     mapping: Mapping[str, str] | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
+    *,
+    check: Callable[[Columns, Labels], None] | None = None,
+    skip_bad: bool | None = None,
 ) -> Measurements:
     """Read a file of measurements.
 
@@ -73,16 +79,43 @@ def read_measurements(
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
         encoding: of the text; by default what it looks like.
         sheet: of a workbook; by default the one with readings.
+        check: finds what else is wrong with rows, each of a gear.
+        skip_bad: leave out gears of which a row is wrong, whole; False: refuse them,
+            and say that this can be asked for.
 
     Raises:
         InputError: holds everything that is wrong with the file.
     """
+    left_out: dict[str, Finding] = {}
     with FileFindings(NAME if is_frame(path) else str(path)) as findings:
-        columns = read_columns(path, mapping, findings, encoding=encoding, sheet=sheet)
-        rows = len(columns.table.rows)
-        specimen = _labels(columns.values.get("specimen"), rows)
-        run = _runs(columns.values.get("run"), specimen, rows)
-        check_time(columns, run.index)
+        found = _find_columns(path, mapping, findings, encoding=encoding, sheet=sheet)
+        while True:
+            measured = _measured(found)
+            columns, gears = measured.columns, measured.specimen
+            if check is not None:
+                check(columns, gears)
+            wrong, rows = columns.findings, columns.table.rows
+            bad = bad_gears(wrong, rows, gears.index, gears.names)
+            if not skip_bad or not bad or len(bad) == len(gears.names):
+                break
+            # As if they had never been in the file: what is guessed of cells, such as
+            # their decimal sign, is guessed of all of them.
+            left_out |= bad
+            kept = ~among(gears.names, bad)[gears.index]
+            found = replace(found, table=found.table.take(kept))
+        findings += wrong
+        if skip_bad is False and 0 < len(bad) < len(gears.names):
+            findings.append(offer(bad, len(gears.names)))
+    return replace(measured, left_out=left_out)
+
+
+def _measured(found: Columns) -> Measurements:
+    """Return what stands in columns, right or wrong: their findings say."""
+    columns = _with_values(found, FEWEST_ROWS)
+    rows = len(columns.table.rows)
+    specimen = labels_of(columns.values.get("specimen"), rows)
+    run = runs_of(columns.values.get("run"), specimen, rows)
+    check_time(columns, run.index)
     return Measurements(columns, run, specimen)
 
 
@@ -146,6 +179,31 @@ def read_columns(
     Raises:
         InputError: no table can be found in the file.
     """
+    found = _find_columns(
+        path,
+        mapping,
+        findings,
+        quantities=quantities,
+        required=required,
+        encoding=encoding,
+        sheet=sheet,
+    )
+    columns = _with_values(found, fewest)
+    findings += columns.findings
+    return replace(columns, findings=findings)
+
+
+def _find_columns(
+    path: Any,
+    mapping: Mapping[str, str] | None,
+    findings: FileFindings,
+    *,
+    quantities: Sequence[str] = QUANTITIES,
+    required: Sequence[str] = REQUIRED,
+    encoding: str | None = None,
+    sheet: str | None = None,
+) -> Columns:
+    """Return where the columns stand, without their values, as `read_columns` does."""
     if is_frame(path):
         utf8, sha256, guessed = frame_text(path, findings)
     else:
@@ -155,15 +213,23 @@ def read_columns(
     named = {"numbered": numbered, "labelled": "run" in mapping}
     table = split_table(utf8, findings, **named)
     used = match_columns(table, mapping, quantities, required, findings)
-    values, told = read_cells(table, used, findings)
-    for quantity, column in used.items():
+    notes = tuple(_assumed(guessed, table, used))
+    return Columns({}, used, table, sha256, findings, notes)
+
+
+def _with_values(found: Columns, fewest: int) -> Columns:
+    """Return columns with what stands in them, and findings of that alone."""
+    findings = FileFindings(found.findings.file)
+    findings.places = found.findings.places
+    values, told = read_cells(found.table, found.used, findings)
+    for quantity, column in found.used.items():
         if quantity not in LABELS:
             # a wild number may overflow here; the limits below report it
             with np.errstate(over="ignore"):
                 converted = column_to_code(values[quantity], quantity, column.unit)
             values[quantity] = converted
-    notes = (*_assumed(guessed, table, used), *(f"{ASSUMED}{note}" for note in told))
-    columns = Columns(values, used, table, sha256, findings, notes)
+    notes = (*found.notes, *(f"{ASSUMED}{note}" for note in told))
+    columns = replace(found, values=values, findings=findings, notes=notes)
     check_values(columns, fewest)
     return columns
 
@@ -191,18 +257,19 @@ def _assumed(
         yield f"{ASSUMED}{said}. If not, name the column: --column '{one}={form}'"
 
 
-def _labels(labels: np.ndarray | None, rows: int) -> Labels:
+def labels_of(labels: np.ndarray | None, rows: int) -> Labels:
+    """Return which gear each row is of; one where no labels, shape (n,), tell."""
     if labels is None:
         return Labels(np.zeros(rows, int), ("1",))
     index, names = pd.factorize(labels)
     return Labels(index, tuple(names))
 
 
-def _runs(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
+def runs_of(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
     """Runs by label; the same label on two specimens is two mountings."""
     if labels is None:
-        return specimen if specimen.index.any() else _labels(None, rows)
-    run, gears = _labels(labels, rows), len(specimen.names)
+        return specimen if specimen.index.any() else labels_of(None, rows)
+    run, gears = labels_of(labels, rows), len(specimen.names)
     index, pairs = pd.factorize(run.index * gears + specimen.index)
     if len(pairs) == len(run.names):
         return run

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from hdcal.data.bad_gears import bad_gears, offer
 from hdcal.data.case import Case
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Column
@@ -20,7 +21,7 @@ from hdcal.data.parquet_table import parquet_files, parquet_table
 from hdcal.data.plausible import RANGES
 from hdcal.data.reading import GEAR_NAME, read_case
 from hdcal.data.units import column_to_code
-from hdcal.errors import InputError, quoted
+from hdcal.errors import Finding, InputError, quoted
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch
@@ -33,17 +34,25 @@ _REMEDY = "Save it anew"
 
 
 class Batch(NamedTuple):
-    """Some rows.
+    """Some rows, without those that are wrong.
 
     Attributes:
         values: deformation [mm], force [N] and temperature [°C], as far as they are
             read; shape (n,).
         labels: of specimen, run, lot, operator and date, likewise: the index of each
             row's, and the labels.
+        bad: gears of which a row is wrong, each with what that is.
     """
 
     values: dict[str, np.ndarray]
     labels: dict[str, tuple[np.ndarray, np.ndarray]]
+    bad: dict[str, Finding]
+
+    def where(self, kept: np.ndarray) -> "Batch":
+        """Return the rows that are true in a mask, shape (n,)."""
+        values = {name: column[kept] for name, column in self.values.items()}
+        labels = {name: (at[kept], texts) for name, (at, texts) in self.labels.items()}
+        return Batch(values, labels, self.bad)
 
 
 @dataclass(frozen=True)
@@ -74,6 +83,7 @@ def read_parquet(
     columns: Mapping[str, str] | None = None,
     theory: str | None = None,
     reading: str | None = None,
+    skip_bad: bool | None = None,
 ) -> Parquet:
     """Look into a Parquet file, or a folder of them, partitioned or not.
 
@@ -84,6 +94,7 @@ def read_parquet(
         columns: as in `read_case`.
         theory: likewise.
         reading: likewise.
+        skip_bad: likewise.
 
     Raises:
         InputError: holds everything that is wrong with its first rows, or with the
@@ -101,19 +112,23 @@ def read_parquet(
         further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
         shown = frame.drop(columns=further)
         how: dict = {"columns": columns, "theory": theory, "reading": reading}
+        how |= {"skip_bad": skip_bad}
         case = _placed(dataset, findings, lambda: read_case(shown, gear, **how))
         used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
 
 
-def read_batches(file: str, root: str, used: Mapping[str, Column]) -> Iterator[Batch]:
+def read_batches(
+    file: str, root: str, used: Mapping[str, Column], *, skip_bad: bool | None = None
+) -> Iterator[Batch]:
     """Yield the rows of one file, in their order.
 
     Args:
         file: one of those of a `Parquet`.
         root: likewise.
         used: likewise.
+        skip_bad: as in `read_case`.
 
     Raises:
         InputError: holds what is wrong with the first batch that is.
@@ -129,9 +144,27 @@ def read_batches(file: str, root: str, used: Mapping[str, Column]) -> Iterator[B
                     labels[quantity] = _labels(batch, column, row, findings)
                 else:
                     values[quantity] = _numbers(batch, column, row, findings)
+            rows = np.arange(row, row + batch.num_rows)
+            found = _batch(values, labels, rows, findings, skip_bad=skip_bad)
         row += batch.num_rows
         if batch.num_rows:
-            yield Batch(values, labels)
+            yield found
+
+
+def _batch(
+    values, labels, rows: np.ndarray, findings: FileFindings, *, skip_bad: bool | None
+) -> Batch:
+    """Return what was read; where bad gears may be left out, they are no findings."""
+    gear, gears = labels["specimen"]
+    # Rows of a gear that is not named are nobody's.
+    names = ["" if name == NOT_STATED else name for name in gears]
+    bad = bad_gears(findings, rows, gear, names)
+    wrong = np.isin(rows, [*findings.rows])
+    if skip_bad and not np.any(wrong & (gears[gear] == NOT_STATED)):
+        findings.clear()
+    elif skip_bad is False and bad:
+        findings.append(offer(bad))
+    return Batch(values, labels, bad).where(~wrong)
 
 
 def _head(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
@@ -149,21 +182,25 @@ def _placed(
     dataset: "Dataset", findings: FileFindings, read: Callable[[], Case]
 ) -> Case:
     """Return what is read of the first rows; what is wrong is told by file and row."""
+    ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
+    names = [str(one.path) for one in dataset.get_fragments()]
+
+    def placed(wrong: Finding) -> Finding:
+        if wrong.row is None:
+            return wrong
+        # Below a line of headers.
+        at = wrong.row - 2
+        place = int(np.searchsorted(ends, at, side="right"))
+        row = at + 1 - (int(ends[place - 1]) if place else 0)
+        return replace(wrong, file=names[place], row=row)
+
     try:
-        return read()
+        case = read()
     except InputError as error:
-        ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
-        names = [str(one.path) for one in dataset.get_fragments()]
-        for wrong in error.findings:
-            if wrong.row is None:
-                findings.append(wrong)
-                continue
-            # Below a line of headers.
-            at = wrong.row - 2
-            place = int(np.searchsorted(ends, at, side="right"))
-            row = at + 1 - (int(ends[place - 1]) if place else 0)
-            findings.append(replace(wrong, file=names[place], row=row))
+        findings += map(placed, error.findings)
         raise InputError(findings) from None
+    left_out = {gear: placed(wrong) for gear, wrong in case.left_out.items()}
+    return replace(case, left_out=left_out)
 
 
 def _quantity(header: str, columns: Mapping[str, str] | None) -> str:
@@ -241,7 +278,8 @@ def _text(label: Any) -> str:
 def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:
     """Return the columns that are used, by quantity."""
     named = dict(case.gear.source.get("columns", {})) | dict(columns or {})
-    used = read_measurements(frame, named).columns.used
+    # What is wrong with rows was told, or is left out.
+    used = read_measurements(frame, named, skip_bad=True).columns.used
     if "specimen" not in used:
         remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
         findings.refuse("no column says which gear a row is of", remedy)

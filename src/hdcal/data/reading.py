@@ -2,7 +2,8 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
+    Labels,
     Measurements,
     of_specimen,
     read_measurements,
@@ -49,6 +51,7 @@ def read_case(
     sheet: str | None = None,
     reading: str | None = None,
     specimen: str | None = None,
+    skip_bad: bool | None = None,
 ) -> Case:
     """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
@@ -71,11 +74,13 @@ def read_case(
         reading: of the deformation, `radial` or `diametral`, where the gear file is
             silent; by default it is taken for radial, and said to be so.
         specimen: label of the one whose rows are wanted; by default all of them.
+        skip_bad: leave out specimens of which a row is wrong, whole; `left_out` of the
+            case names them. False: refuse, and say that this can be asked for.
 
     Raises:
         InputError: holds everything that is wrong with either file.
     """
-    columns, in_memory = _asked(data, columns)
+    columns, in_memory = asked_columns(data, columns)
     table, data = data, Path(NAME if in_memory else data)
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
@@ -85,26 +90,44 @@ def read_case(
         of_gear = Findings()
         beside = None if in_memory else csv_path.parent / GEAR_NAME
         found, told = of_gear.attempt(
-            _gear_of, gear, beside, folder, (theory, material, reading)
+            gear_of, gear, beside, folder, (theory, material, reading)
         ) or (None, ())
         named = dict(found.source.get("columns", {}) if found is not None else {})
         named |= columns
         measured = wrong.attempt(
-            read_measurements, table if in_memory else csv_path, named, encoding, sheet
+            read_measurements,
+            table if in_memory else csv_path,
+            named,
+            encoding,
+            sheet,
+            check=None if found is None else partial(too_far, gear=found),
+            skip_bad=skip_bad,
         )
         wrong += of_gear
         if measured is not None and specimen is not None:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
-        if measured is not None and found is not None:
-            wrong += _too_far(measured.columns, found)
     assert measured is not None and found is not None
+    return case_of(measured, found, told, _name(data, folder, sheet, specimen))
+
+
+def case_of(
+    measured: Measurements, found: Gear, told: Sequence[str], name: str
+) -> Case:
+    """Return what was measured on a gear, or several of its kind, as a case.
+
+    Args:
+        measured: in which nothing is wrong.
+        found: as its file has it.
+        told: notes on how that was found.
+        name: of the case.
+    """
     motion = _motion(measured)
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
     )
     found = behind_filter(found, measured.columns.values.get("time"))
     return Case(
-        name=_name(data, folder, sheet, specimen),
+        name=name,
         gear=at_full_scale(found, _full_scale(measured, found)),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
@@ -117,11 +140,14 @@ def read_case(
             *of_further,
         ),
         columns=measured.columns.as_named(),
+        left_out=measured.left_out,
         **further,
     )
 
 
-def _asked(data: Any, columns: Mapping[str, str] | None) -> tuple[dict[str, str], bool]:
+def asked_columns(
+    data: Any, columns: Mapping[str, str] | None
+) -> tuple[dict[str, str], bool]:
     """Return columns as texts, and whether the data are a table in memory."""
     if columns is not None and not isinstance(columns, Mapping):
         remedy = "Name quantities and headers, as {'force': 'Load[kN]'}"
@@ -190,26 +216,39 @@ def _known(measured: Measurements) -> frozenset[str]:
     return frozenset(known)
 
 
-def _too_far(columns: Columns, gear: Gear) -> list[Finding]:
+def too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
+    """Find the farthest row of each specimen that no gear of this radius reaches."""
+    # Where something else is wrong, numbers may be missing or wild.
+    if columns.findings or "deformation" not in columns.used:
+        return
     size = np.abs(columns.values["deformation"])
-    if size.max() < gear.reach:
-        return []
-    words = (
-        f"a deformation of {size.max():g} mm on a radius of {gear.geometry.radius:g} mm"
-    )
+    beyond = np.flatnonzero(size >= gear.reach)
+    rising = beyond[np.argsort(size[beyond], kind="stable")]
+    farthest = {int(specimen.index[row]): int(row) for row in rising}
+    radius = f"on a radius of {gear.geometry.radius:g} mm"
     remedy = "Check the unit of the column and the radius in the gear file"
-    row = int(columns.table.rows[int(size.argmax())])
-    file, header = columns.findings.file, columns.used["deformation"].header
-    return [Finding(file, words, remedy, row, header)]
+    found = (
+        (int(columns.table.rows[row]), f"a deformation of {size[row]:g} mm {radius}")
+        for row in sorted(farthest.values())
+    )
+    header = columns.used["deformation"].header
+    columns.findings.add_rows(((*one, remedy) for one in found), header)
 
 
-def _gear_of(
+def gear_of(
     gear: Path | str | Mapping[str, Any] | None,
     beside: Path | None,
     folder: bool,
     asked: tuple[str | None, Path | None, str | None],
 ) -> tuple[Gear, tuple[str, ...]]:
-    """Return the gear of a case, and what is to be told of how it was found."""
+    """Return the gear of a case, and what is to be told of how it was found.
+
+    Args:
+        gear: that was named, as in `read_case`.
+        beside: where a gear file may lie; None of a table in memory.
+        folder: whether one has to lie there.
+        asked: theory, material and reading, as in `read_case`.
+    """
     theory, material, reading = asked
     told = [f"the deformation is {reading}, as was asked"] if reading else []
     if gear is not None:

@@ -21,7 +21,7 @@ def reading_notes(measured: Measurements, gear: Gear, motion: Motion) -> Iterato
     """Yield what is unusual of measurements, or was left out of them."""
     yield from _thick_wall(gear)
     yield from _unusual_temperature(measured)
-    yield from _left_out(measured.columns)
+    yield from unused_columns(measured.columns)
     yield from _off_scale(measured, gear)
     yield from _resets(measured, motion)
 
@@ -45,7 +45,8 @@ def _unusual_temperature(measured: Measurements) -> Iterator[str]:
         )
 
 
-def _left_out(columns: Columns) -> Iterator[str]:
+def unused_columns(columns: Columns) -> Iterator[str]:
+    """Yield what of a file was not read."""
     positions = {column.position for column in columns.used.values()}
     headers = enumerate(columns.table.headers)
     extra = [header for place, header in headers if place not in positions]

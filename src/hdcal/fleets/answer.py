@@ -51,6 +51,14 @@ class OperatorAnswer:
 
 
 @dataclass(frozen=True)
+class GearLeftOut:
+    """A gear that is in none of the numbers, and why."""
+
+    gear: Words
+    why: Words
+
+
+@dataclass(frozen=True)
 class GearBounds:
     """What a share `content` of gears to come is stiffer than, and softer than.
 
@@ -76,8 +84,9 @@ class FleetAnswer(Answer):
     """What `hdcal fleet` answers; summary.json. Its gears are in gears.csv.
 
     Attributes:
-        gears: how many there are.
+        gears: how many there are, without those left out.
         rows: of all of them.
+        left_out: gears that are in none of the numbers, where they may be left out.
         called_off: gears that are called off, the surest first.
         false_calls: share of these that may be ordinary gears, as expected.
         interval: probability that every interval holds.
@@ -100,6 +109,7 @@ class FleetAnswer(Answer):
     schema: Literal["hdcal.fleet/1"] = "hdcal.fleet/1"
     gears: Count
     rows: Count
+    left_out: tuple[GearLeftOut, ...]
     called_off: tuple[Words, ...]
     false_calls: float
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]

@@ -12,6 +12,8 @@ from hdcal.cli.options import (
     json_option,
     read_given,
     seed_option,
+    skip_bad_option,
+    without_meaning,
 )
 from hdcal.errors import Finding
 
@@ -41,6 +43,7 @@ from hdcal.errors import Finding
     metavar="DAY",
     help="Leave out what was read before a day, as 2026-09-01.",
 )
+@skip_bad_option
 @click.option(
     "--scheduler",
     metavar="ADDRESS",
@@ -61,11 +64,14 @@ def fleet(
     gears,
     scheduler,
     since,
+    skip_bad,
     **given,
 ):
     """Say of the gears in DATA how stiff each one is, and which ones are off.
 
-    DATA names the gear of each row in a column `specimen`, also called gear or serial.
+    DATA names the gear of each row in a column `specimen`, also called gear or serial;
+    or it is a folder with a file for each gear, or with a folder of data.csv and
+    gear.toml for each.
     """
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
@@ -78,21 +84,19 @@ def fleet(
         if limit_force is not None and deformation is None:
             remedy = "Say --deformation, at which that force is needed"
             wrong.append(Finding("limit_force", "has no deformation", remedy))
-        readings = _read(console, scheduler, given)
+        readings = read_gears(console, scheduler, given | {"skip_bad": skip_bad})
         if readings is not None and since is not None:
             readings = wrong.attempt(readings.since, since)
         if readings is not None:
-            from hdcal.fleets.gear_table import size_ratios
-            from hdcal.fleets.readings import check_fleet
+            from hdcal.fleets.usable import usable
 
-            wrong.attempt(check_fleet, readings)
-            if gears is not None:
-                wrong.attempt(size_ratios, gears, readings.case)
+            wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None
     keep_compilations()
-    asked = {"seed": seed, "force_tolerance": force_tolerance, "gears": gears}
+    asked = {"seed": seed, "force_tolerance": force_tolerance}
+    asked |= {"gears": gears, "skip_bad": skip_bad}
     from hdcal.fleets.fleet import fleet as fit_fleet
     from hdcal.fleets.summary import fleet_report
 
@@ -104,13 +108,16 @@ def fleet(
     return console.report(fleet_report(found, console.command, needed))
 
 
-def _read(console: Console, scheduler: str | None, given: dict):
+def read_gears(console: Console, scheduler: str | None, given: dict):
     """Return what was measured; Parquet is read in batches, whatever its size."""
+    from hdcal.data.gear_folder import gear_files
     from hdcal.data.parquet_table import is_parquet
     from hdcal.fleets.read_fleet import read_fleet
 
-    if is_parquet(given["data"]) and given["columns"] is not None:
-        names = "data", "gear", "columns", "theory", "reading"
+    several = bool(gear_files(given["data"]))
+    if (several or is_parquet(given["data"])) and given["columns"] is not None:
+        names = "data", "gear", "columns", "theory", "reading", "encoding", "skip_bad"
+        console.wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
         how: dict = {name: given[name] for name in names}
         return console.wrong.attempt(read_fleet, **how, scheduler=scheduler)
     case = read_given(console, **given)

@@ -19,14 +19,14 @@ from hdcal.data.records import Array
 from hdcal.errors import Findings
 from hdcal.fleets.fleet_posterior import FleetPosterior
 from hdcal.fleets.fleet_problem import fleet_problem, rough_values
-from hdcal.fleets.gear_table import size_ratios
 from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.next_gear import next_gear
 from hdcal.fleets.read_fleet import read_fleet
-from hdcal.fleets.readings import FleetReadings, check_fleet
+from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
+from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
 from hdcal.inference.population_problem import (
@@ -167,6 +167,7 @@ def fleet(
     gears: Any = None,
     since: str | None = None,
     scheduler: str | None = None,
+    skip_bad: bool = False,
     progress: Progress | None = None,
 ) -> Fleet:
     """Say of many gears how stiff each one is, and which ones are off.
@@ -177,8 +178,9 @@ def fleet(
 
     Args:
         data: a case from `read_case`, whose rows name their specimen; or a file or a
-            table in memory as that takes it; or a Parquet file or a folder of them,
-            partitioned or not, which are read in batches.
+            table in memory as that takes it; or a folder with a file, or a folder of
+            data.csv and gear.toml, for each gear; or a Parquet file or a folder of
+            them, partitioned or not, which are read in batches.
         gear: as in `read_case`, where no case is given.
         columns: likewise.
         chains: independent chains, two or more.
@@ -192,23 +194,23 @@ def fleet(
         since: day, as 2026-09-01, before which what was read is left out.
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder; they have to find them under the same names.
+        skip_bad: leave out gears of which a row cannot be read, the size is missing, or
+            nothing says how stiff they are: whole, and named in the notes.
         progress: called with (iterations done, iterations in all).
 
     Raises:
-        InputError: there are too few gears, one says nothing of its stiffness, or none
+        InputError: there are too few gears, one is bad and may not be left out, or none
             scatters about its line.
     """
     began = time.perf_counter()
     check_settings(chains, warmup, draws, seed)
     with Findings() as wrong:
         wrong += implausible("force_tolerance", force_tolerance)
-    readings = read_fleet(data, gear, columns=columns, scheduler=scheduler)
+    how: dict = {"scheduler": scheduler, "skip_bad": skip_bad}
+    readings = read_fleet(data, gear, columns=columns, **how)
     if since is not None:
         readings = readings.since(since)
-    check_fleet(readings)
-    ratio = np.ones(len(readings.case.specimen_labels))
-    if gears is not None:
-        ratio = size_ratios(gears, readings.case)
+    readings, ratio = usable(readings, gears, skip_bad=skip_bad)
     bound_executables()
     readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)

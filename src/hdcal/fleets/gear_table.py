@@ -1,13 +1,14 @@
 """Gears of several sizes: a table beside the readings that states those of each one."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hdcal.data.case import Case
+from hdcal.data.bad_gears import among, bad_gears
+from hdcal.data.case import Case, Gear
 from hdcal.data.cells import CellError, read_number
 from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
@@ -30,10 +31,24 @@ _LIKE = ("wall", "radius", "length", "load_height", "diameter", "thickness")
 _FIRST_FEW = 3
 
 
-def size_ratios(source: Any, case: Case) -> np.ndarray:
-    """Return the stiffness at K = 1 of each gear over that of the gear file's sizes.
+@dataclass(frozen=True)
+class GearSizes:
+    """What a table says of the sizes of gears.
 
-    A size that the table does not have is that of the gear file.
+    Attributes:
+        ratio: stiffness at K = 1 of each gear over that of the gear file's sizes, NaN
+            of one whose sizes are missing or cannot be; shape (g,).
+        bad: those gears, each with the first thing that is wrong.
+        findings: all that is wrong with them.
+    """
+
+    ratio: np.ndarray
+    bad: Mapping[str, Finding]
+    findings: Sequence[Finding]
+
+
+def gear_sizes(source: Any, case: Case) -> GearSizes:
+    """Return the sizes of each gear; one that the table does not have is the file's.
 
     Args:
         source: a CSV file or a workbook, or a table in memory, with a column that names
@@ -41,10 +56,7 @@ def size_ratios(source: Any, case: Case) -> np.ndarray:
         case: the readings, which name their gears.
 
     Raises:
-        InputError: holds everything that is wrong with the table.
-
-    Returns:
-        Shape (g,).
+        InputError: holds what is wrong with the table, beside single gears.
     """
     in_memory = is_frame(source)
     if not in_memory and not isinstance(source, str | Path):
@@ -60,20 +72,41 @@ def size_ratios(source: Any, case: Case) -> np.ndarray:
             else read_text(Path(source), findings)
         )
         table = split_table(text[0], findings)
-        base = case.gear.geometry
-        sizes = _sizes(table, findings)
-        findings.add_rows(_at_odds(table, sizes, base), kind="rows of such sizes")
-        rows = _rows(table, case, findings)
-        if findings:
+    sizes, labels = _read(table, case, findings)
+    bad = bad_gears(findings, table.rows, np.arange(len(labels)), labels)
+    if findings:
+        # What is wrong without them is wrong with the table.
+        table, again = table.take(~among(labels, bad)), FileFindings(findings.file)
+        sizes, labels = _read(table, case, again)
+        if again:
             raise InputError(findings)
-        stated = {name: column[rows] for name, column in sizes.items()}
-        if "length" in stated and "load_height" not in stated:
-            told = "load_height_mm" in case.gear.source.get("gear", {})
-            stated |= {} if told else {"load_height": stated["length"]}
-    stiffness = THEORIES[case.gear.theory]
-    own = np.asarray(stiffness(replace(base, **stated), 1.0))
-    ratio = own / np.asarray(stiffness(base, 1.0))
-    return np.broadcast_to(ratio, len(case.specimen_labels)).copy()
+    missing = _missing(case, {*labels, *bad}, findings)
+    place = {label: row for row, label in enumerate(labels)}
+    rows = [place.get(gear, -1) for gear in case.specimen_labels]
+    own = {name: np.append(column, np.nan)[rows] for name, column in sizes.items()}
+    measured = {gear: bad[gear] for gear in case.specimen_labels if gear in bad}
+    return GearSizes(_ratio(own, case.gear), measured | missing, findings)
+
+
+def _read(
+    table: CsvTable, case: Case, findings: FileFindings
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Return sizes and gear of each row."""
+    sizes = _sizes(table, findings)
+    at_odds = _at_odds(table, sizes, case.gear.geometry)
+    findings.add_rows(at_odds, kind="rows of such sizes")
+    return sizes, _labels(table, case, findings)
+
+
+def _ratio(stated: dict[str, np.ndarray], gear: Gear) -> np.ndarray:
+    """Return the stiffness of sizes [mm], shape (g,) each, over that of a gear's."""
+    if "length" in stated and "load_height" not in stated:
+        told = "load_height_mm" in gear.source.get("gear", {})
+        stated |= {} if told else {"load_height": stated["length"]}
+    stiffness = THEORIES[gear.theory]
+    own = np.asarray(stiffness(replace(gear.geometry, **stated), 1.0))
+    one = np.asarray(stiffness(gear.geometry, 1.0))
+    return np.broadcast_to(own / one, len(next(iter(stated.values())))).copy()
 
 
 def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
@@ -120,8 +153,8 @@ def _at_odds(
             yield int(row), f"{name}_mm: {words}", remedy
 
 
-def _rows(table: CsvTable, case: Case, findings: FileFindings) -> list[int]:
-    """Return the row of each gear."""
+def _labels(table: CsvTable, case: Case, findings: FileFindings) -> list[str]:
+    """Return the gear of each row."""
     known = case.columns.get("specimen")
     places = [
         place
@@ -134,16 +167,25 @@ def _rows(table: CsvTable, case: Case, findings: FileFindings) -> list[int]:
     if len(places) != 1:
         words = "it does not say which gear a row is of"
         findings.refuse(words, f"Name one column {known or 'specimen'}")
-    found: dict[str, int] = {}
-    for index, label in enumerate(table.texts(places)[places[0]]):
-        if label in found:
+    labels = table.texts(places)[places[0]]
+    seen: set[str] = set()
+    for row, label in zip(table.rows, labels, strict=True):
+        if label in seen:
             words = f"gear {quoted(label)} has a row already"
-            findings.add(words, "Keep the one that is right", int(table.rows[index]))
-        found.setdefault(label, index)
-    gears = case.specimen_labels
-    missing = [label for label in gears if label not in found]
+            findings.add(words, "Keep the one that is right", int(row))
+        seen.add(label)
+    return labels
+
+
+def _missing(
+    case: Case, known: Container[str], findings: FileFindings
+) -> dict[str, Finding]:
+    """Return gears that have no row, each with words of its own."""
+    words, remedy = "has no row", "Add its sizes"
+    missing = [label for label in case.specimen_labels if label not in known]
     for label in missing[:_FIRST_FEW]:
-        findings.add(f"gear {quoted(label)} has no row", "Add its sizes")
+        findings.add(f"gear {quoted(label)} {words}", remedy)
     if more := len(missing[_FIRST_FEW:]):
         findings.add(f"and {more} more gears have none", "Add theirs too")
-    return [found.get(label, 0) for label in gears]
+    words = f"{words} in {findings.file}"
+    return {label: Finding(findings.file, words, remedy) for label in missing}

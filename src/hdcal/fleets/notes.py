@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from hdcal.data.bad_gears import left_out_words
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
@@ -47,7 +48,10 @@ def notes_of(found: Fleet) -> Sequence[str]:
     few = [FEW_GEARS] if len(found.off) < FEW else []
     beside = misfit_words(found.misfit)
     untold = [*_untold(found)]
-    return [*beside, *found.case.notes, RESTS_ON, *sized, *few, *scarce, *untold, *once]
+    why = found.case.left_out
+    left_out = [left_out_words(why, len(why) + len(found.off))] if why else []
+    of_data = [*left_out, *beside, *found.case.notes]
+    return [*of_data, RESTS_ON, *sized, *few, *scarce, *untold, *once]
 
 
 def _untold(found: Fleet) -> Iterator[str]:

@@ -5,12 +5,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from hdcal.data.bad_gears import among
 from hdcal.data.case import Gear
 from hdcal.data.columns import Column
 from hdcal.data.further_labels import further_labels
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
+from hdcal.errors import Finding
 from hdcal.fleets.groups import operator_of
 from hdcal.fleets.readings import FleetReadings, modulus_left, row_sums
 from hdcal.inference.gear_sums import MountingSums
@@ -29,6 +31,8 @@ class Pool:
         parts: run, rows, means and sums of each mounting in each batch.
         told: of each batch, runs, and their lots, operators and dates.
         largest: deformation, with its sign [mm as read].
+        left_out: gears of which something is wrong, each with what that is. Rows of
+            those that were known before are not read.
     """
 
     gear: Gear
@@ -37,9 +41,15 @@ class Pool:
     parts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
     told: list[dict[str, np.ndarray]] = field(default_factory=list)
     largest: float = 0.0
+    left_out: dict[str, Finding] = field(default_factory=dict)
 
     def add(self, batch: Batch) -> None:
         """Add some rows."""
+        gear_of, gears = batch.labels["specimen"]
+        batch = batch.where(~among(gears, self.left_out)[gear_of])
+        self.left_out |= batch.bad
+        if not len(batch.values["deformation"]):
+            return
         gear, read = self.gear, batch.values["deformation"]
         warm = batch.values.get("temperature", gear.reference_temperature)
         x = read * modulus_left(gear, warm)
@@ -66,13 +76,14 @@ class Pool:
         self.parts += [(index[run], *sums) for run, *sums in other.parts]
         self.told += [told | {"run": index[told["run"]]} for told in other.told]
         self.largest = max(self.largest, other.largest, key=abs)
+        self.left_out = other.left_out | self.left_out
 
     def _run(self, gear: str, run: str) -> int:
         known = self.gears.setdefault(gear, len(self.gears))
         return self.runs.setdefault((known, run), len(self.runs))
 
     def readings(self, source: Parquet) -> FleetReadings:
-        """Return what all of them come to.
+        """Return what all of them come to, without the gears that are left out.
 
         Args:
             source: where they are from.
@@ -111,23 +122,28 @@ class Pool:
         runs = np.arange(len(gear))
         by = operator_of(case.operators, runs)
         sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=by)
-        return FleetReadings(case, sums, runs, self.largest)
+        readings = FleetReadings(case, sums, runs, self.largest)
+        return readings.without(self.left_out)
 
 
-def pool_of(source: Parquet, scheduler: str | None = None) -> Pool:
+def pool_of(
+    source: Parquet, scheduler: str | None = None, *, skip_bad: bool | None = None
+) -> Pool:
     """Return what all files come to, whoever reads them.
 
     Args:
         source: the files.
         scheduler: address of a Dask scheduler, whose workers read them instead; they
             have to find them under the same names.
+        skip_bad: as in `read_case`.
 
     Raises:
         InputError: holds what is wrong with the first batch that is; or nobody answers
             or works there.
         HdcalError: the cluster was lost.
     """
-    about = source.root, source.used, source.case.gear
+    known = source.case.left_out
+    about = source.root, source.used, source.case.gear, known, skip_bad
     tasks = ((place, file, *about) for place, file in enumerate(source.files))
     if scheduler is None:
         found = (file_pool(*task) for task in tasks)
@@ -135,7 +151,7 @@ def pool_of(source: Parquet, scheduler: str | None = None) -> Pool:
         from hdcal.cli.cluster import completed_on_cluster
 
         found = completed_on_cluster(file_pool, tasks, scheduler, _LOST)
-    whole, early, joined = Pool(source.case.gear), {}, 0
+    whole, early, joined = Pool(source.case.gear, left_out={**known}), {}, 0
     for place, pool in found:
         early[place] = pool
         # In the order of the files, so that the answer hangs on no worker.
@@ -146,15 +162,21 @@ def pool_of(source: Parquet, scheduler: str | None = None) -> Pool:
 
 
 def file_pool(
-    place: int, file: str, root: str, used: Mapping[str, Column], gear: Gear
+    place: int,
+    file: str,
+    root: str,
+    used: Mapping[str, Column],
+    gear: Gear,
+    left_out: Mapping[str, Finding],
+    skip_bad: bool | None = None,
 ) -> tuple[int, Pool]:
     """Return what one file comes to, and its place among all.
 
     Raises:
         InputError: holds what is wrong with its first batch that is.
     """
-    pool = Pool(gear)
-    for batch in read_batches(file, root, used):
+    pool = Pool(gear, left_out={**left_out})
+    for batch in read_batches(file, root, used, skip_bad=skip_bad):
         pool.add(batch)
     return place, pool
 

@@ -1,21 +1,17 @@
 """From readings to what each mounting says: seven sums, whatever the number of rows."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hdcal.data.bad_gears import among
 from hdcal.data.case import Case, Gear
-from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows
 from hdcal.fleets.groups import operator_of
 from hdcal.inference.gear_sums import MountingSums
-
-# Fewer gears say next to nothing of how much gears differ.
-FEWEST = 3
-# Share of squares that rounding alone leaves of a deformation that stays.
-_STILL = 1e-24
 
 
 @dataclass(frozen=True)
@@ -28,12 +24,14 @@ class FleetReadings:
         sums: of each gear in each mounting.
         runs: index of each mounting's run, shape (m,).
         largest: deformation, with its sign [mm as read].
+        sizes: of each gear, by column, where a gear file of its own states them.
     """
 
     case: Case
     sums: MountingSums
     runs: np.ndarray
     largest: float
+    sizes: Mapping[str, Sequence] | None = None
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
         """Return the sums as if all gears had the gear file's sizes.
@@ -55,12 +53,29 @@ class FleetReadings:
         Raises:
             InputError: it is no day, no dates are told, or nothing was read then.
         """
-        case, sums = self.case, self.sums
-        of_mounting = _read_since(case, day)[self.runs]
+        of_mounting = _read_since(self.case, day)[self.runs]
         if not of_mounting.any():
             words = f"nothing was read on {quoted(day)} or later"
-            words = words if case.dates else "no dates are told"
+            words = words if self.case.dates else "no dates are told"
             raise InputError([Finding("since", words, "See the dates of the data")])
+        found = self._of(of_mounting)
+        notes = (*self.case.notes, f"What was read before {day} is left out.")
+        return replace(found, case=replace(found.case, notes=notes))
+
+    def without(self, bad: Mapping[str, Finding]) -> "FleetReadings":
+        """Return what was read on other gears.
+
+        Args:
+            bad: gears that are left out, each with what is wrong with it.
+        """
+        gone = among(self.case.specimen_labels, bad)
+        found = self._of(~gone[self.sums.gear]) if gone.any() else self
+        left_out = self.case.left_out | dict(bad)
+        return replace(found, case=replace(found.case, left_out=left_out))
+
+    def _of(self, of_mounting: np.ndarray) -> "FleetReadings":
+        """Return what was read in some of the mountings, a mask of shape (m,)."""
+        case, sums = self.case, self.sums
         gears, gear = np.unique(sums.gear[of_mounting], return_inverse=True)
         runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
         # Groups are told apart anew: some may be gone.
@@ -83,7 +98,6 @@ class FleetReadings:
             lots=_some(case.lots, gears),
             operators=operators,
             dates=_some(case.dates, runs),
-            notes=(*case.notes, f"What was read before {day} is left out."),
         )
         sums = MountingSums(**columns | {"gear": gear, "operator": by})
         return replace(self, case=case, sums=sums, runs=run)
@@ -140,32 +154,3 @@ def row_sums(
     products = (about_x**2, about_x * about_y, about_y**2)
     xx, xy, yy = (np.bincount(of_row, each) for each in products)
     return rows, mean_x, mean_y, xx, xy, yy
-
-
-def check_fleet(readings: FleetReadings) -> None:
-    """Refuse what no population can be told of.
-
-    Raises:
-        InputError: holds a finding for each gear.
-    """
-    case, sums = readings.case, readings.sums
-    gears = case.specimen_labels
-    if len(gears) < FEWEST:
-        many = f"{len(gears)} gears" if len(gears) > 1 else "1 gear"
-        words = f"{many}: how much gears differ takes {FEWEST} or more"
-        remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-        raise InputError([Finding(case.name, words, remedy)])
-    # A run has a zero of its own: only what it was moved by says how stiff a gear is.
-    moved = np.bincount(sums.gear, sums.xx)
-    still = moved <= _STILL * np.bincount(sums.gear, sums.rows * sums.x**2)
-    findings = [
-        Finding(
-            case.name,
-            f"gear '{gears[one]}' was read at one deformation only in each of its runs",
-            "Read it at two or more in one run, or leave it out",
-        )
-        for one in np.flatnonzero(still)
-    ]
-    if findings:
-        raise InputError(findings)
-    require_scatter(case)

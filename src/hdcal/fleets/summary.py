@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from hdcal.data.bad_gears import cause
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
 from hdcal.evidence.prepare import moments
@@ -12,6 +13,7 @@ from hdcal.fleets.answer import (
     FleetAnswer,
     FutureGear,
     GearBounds,
+    GearLeftOut,
     LotAnswer,
     OperatorAnswer,
     PopulationAnswer,
@@ -63,6 +65,23 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     }
 
 
+def _with_left_out(
+    columns: Mapping[str, np.ndarray], left_out: Sequence[GearLeftOut]
+) -> Mapping[str, np.ndarray]:
+    """Return the columns of gears.csv with gears that are left out below the others."""
+    if not left_out:
+        return columns
+    empty = np.full(len(left_out), "", object)
+    own = {
+        "gear": np.array([one.gear for one in left_out], object),
+        "status": np.array([f"left out: {one.why}" for one in left_out], object),
+    }
+    return {
+        name: np.concatenate([column.astype(object), own.get(name, empty)])
+        for name, column in columns.items()
+    }
+
+
 def _influence(found: Fleet) -> np.ndarray:
     """Return draws of K of every gear: data tell its product with the modulus only."""
     mean, sd = moments(found.case.gear.priors["E0"])
@@ -99,6 +118,9 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         next_step=_next_step(called),
         gears=len(found.off),
         rows=int(found.rows.sum()),
+        left_out=tuple(
+            GearLeftOut(gear, cause(why)) for gear, why in found.case.left_out.items()
+        ),
         called_off=tuple(called),
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
@@ -188,7 +210,7 @@ def fleet_report(
         answer,
         "summary.json",
         figures,
-        tables=lambda: {"gears.csv": columns},
+        tables=lambda: {"gears.csv": _with_left_out(columns, answer.left_out)},
         others=lambda: [(FILE_NAME, found.posterior.to_netcdf())],
         charts=charts,
         theory=found.case.gear.theory,

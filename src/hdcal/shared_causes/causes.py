@@ -2,17 +2,22 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
-from hdcal.data.case import Case, require_case
+from hdcal.data.bad_gears import offer
+from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
-from hdcal.errors import Findings
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
-from hdcal.fleets.readings import check_fleet, fleet_readings
+from hdcal.fleets.read_fleet import read_fleet
+from hdcal.fleets.readings import FleetReadings
+from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check, mixing_checks
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.sample import Progress
@@ -20,7 +25,13 @@ from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 from hdcal.shared_causes.frequencies import sample_frequencies
-from hdcal.shared_causes.gear_evidence import SEVERAL, Weight, gears_of, weigh_gear
+from hdcal.shared_causes.gear_evidence import (
+    SEVERAL,
+    Weight,
+    gears_of,
+    saying_little,
+    weigh_gear,
+)
 
 # What is believed of how often causes are counts, before the data, as one gear does.
 _COUNTS = 1.0
@@ -80,11 +91,14 @@ class FleetCauses(Shown):
 
 
 def causes(
-    case: Case,
+    data: Any,
+    gear: Path | str | Mapping[str, Any] | None = None,
     *,
+    columns: Mapping[str, str] | None = None,
     library: Mapping[str, type[Effect]] = EFFECTS,
     jobs: int = 1,
     scheduler: str | None = None,
+    skip_bad: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> FleetCauses:
@@ -94,21 +108,25 @@ def causes(
     frequencies of causes, and from them again what each gear has.
 
     Args:
-        case: from `read_case`, whose rows name their specimen.
+        data: readings of many gears, as `fleet` takes them; of Parquet 50,000 rows at
+            most.
+        gear: as in `read_case`, where no case is given.
+        columns: likewise.
         library: effects to consider, by name.
         jobs: processes that share the gears.
         scheduler: address of a Dask scheduler, whose workers weigh them instead.
+        skip_bad: leave out gears of which a row is wrong, or that say too little.
         seed: of all random numbers.
         progress: called with (gears done, gears in all).
 
     Raises:
         InputError: there are too few gears, or one of them cannot be diagnosed.
     """
-    require_case(case)
     with Findings() as wrong:
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
-    gears = check_gears(case, library)
+    readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
+    case, gears = gears_alone(readings, library, skip_bad=skip_bad)
     # What differs between mountings and between gears is told of the fleet.
     library = {n: e for n, e in library.items() if not e.needs & _OF_FLEETS}
     tasks = [(place, gear, dict(library), seed) for place, gear in enumerate(gears)]
@@ -120,21 +138,35 @@ def causes(
     return _shared(case, weights, library, seed)
 
 
-def check_gears(
-    case: Case, library: Mapping[str, type[Effect]] = EFFECTS
-) -> list[Case]:
-    """Return each gear's rows as a case of its own.
+def gears_alone(
+    readings: FleetReadings,
+    library: Mapping[str, type[Effect]] = EFFECTS,
+    *,
+    skip_bad: bool = False,
+) -> tuple[Case, list[Case]]:
+    """Return the gears that an answer can rest on, together and each by itself.
 
     Args:
-        case: readings of all of them.
+        readings: of all gears.
         library: effects to consider, by name.
+        skip_bad: leave out gears that say too little.
 
     Raises:
         InputError: holds what is wrong with them, with a finding for each gear.
     """
-    check_fleet(fleet_readings(case))
+    readings = usable(readings, skip_bad=skip_bad)[0]
+    case, rows = readings.case, int(readings.sums.rows.sum())
+    if len(case.records.force) < rows:
+        words = (
+            f"of {rows} rows {len(case.records.force)} are kept, and each counts here"
+        )
+        raise InputError([Finding(case.name, words, "Ask it of some of the gears")])
     check_effect_priors(case, {**EFFECTS, **library})
-    return gears_of(case)
+    bad = saying_little(case)
+    if bad and not skip_bad:
+        raise InputError([*bad.values(), offer(bad, len(case.specimen_labels))])
+    case = usable(readings.without(bad), skip_bad=skip_bad)[0].case
+    return case, gears_of(case)
 
 
 def _shared(

@@ -10,9 +10,10 @@ from hdcal.cli.options import (
     folder_options,
     json_option,
     library_option,
-    read_given,
     seed_option,
+    skip_bad_option,
 )
+from hdcal.fleets.command import read_gears
 
 
 @command(short_help="Many gears: which effects they have, and how often each one is.")
@@ -26,11 +27,14 @@ from hdcal.cli.options import (
     metavar="ADDRESS",
     help="Dask scheduler whose workers weigh the gears instead.",
 )
+@skip_bad_option
 @seed_option
 @folder_options("Result folder [default: NAME-causes].")
 @json_option
 @click.pass_obj
-def causes(console: Console, out, force, library, jobs, scheduler, seed, **given):
+def causes(
+    console: Console, out, force, seed, library, jobs, scheduler, skip_bad, **given
+):
     """Say which effects the gears in DATA have, and how often each one is.
 
     DATA names the gear of each row in a column `specimen`, also called gear or serial.
@@ -45,19 +49,20 @@ def causes(console: Console, out, force, library, jobs, scheduler, seed, **given
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
         effects = wrong.attempt(choose_library, library, EFFECTS)
-        case = read_given(console, **given)
-        if case is not None:
-            from hdcal.shared_causes.causes import check_gears
+        readings = read_gears(console, None, given | {"skip_bad": skip_bad})
+        if readings is not None:
+            from hdcal.shared_causes.causes import gears_alone
 
-            wrong.attempt(check_gears, case)
-            out = f"{case.name}-causes" if out is None else out
+            wrong.attempt(gears_alone, readings, skip_bad=skip_bad)
+            out = f"{readings.case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
-    assert case is not None and effects is not None
+    assert readings is not None and effects is not None
     keep_compilations()
     from hdcal.shared_causes.causes import causes as shared_causes
     from hdcal.shared_causes.summary import causes_report
 
-    how = {"jobs": jobs, "scheduler": scheduler, "seed": seed}
+    how = {"library": effects, "jobs": jobs, "scheduler": scheduler, "seed": seed}
+    how |= {"skip_bad": skip_bad}
     with progress_bar("weighing") as progress:
-        found = shared_causes(case, library=effects, progress=progress, **how)
+        found = shared_causes(readings, progress=progress, **how)
     return console.report(causes_report(found, console.command))

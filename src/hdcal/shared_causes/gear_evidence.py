@@ -1,6 +1,6 @@
 """What the readings of one gear alone say of each cause."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from hdcal.data.scatter import require_scatter
 from hdcal.diagnosis.model_posterior import log_priors
 from hdcal.diagnosis.repeats import without_repeats
 from hdcal.diagnosis.weighing import weigh
-from hdcal.errors import Finding, Findings, InputError, quoted
+from hdcal.errors import Finding, Findings, quoted
 from hdcal.evidence.case_evidence import UNKNOWN
 from hdcal.evidence.row_features import take_rows
 from hdcal.physics.effect import Effect
@@ -25,28 +25,23 @@ Weight = Mapping[str, tuple[float, float]]
 
 
 def gears_of(case: Case) -> list[Case]:
-    """Return each gear's rows as a case of its own.
+    """Return each gear's rows as a case of its own, whose mountings have one zero."""
+    return [_one_gear(case, gear) for gear in range(len(case.specimen_labels))]
 
-    Raises:
-        InputError: holds a finding for each gear that says too little.
-    """
-    rows = np.bincount(case.records.specimen, minlength=len(case.specimen_labels))
-    few = list(_with_few(case, rows))
-    if few:
-        raise InputError(few)
-    gears = [_one_gear(case, gear) for gear in range(len(rows))]
-    with Findings() as wrong:
-        for gear in gears:
+
+def saying_little(case: Case) -> dict[str, Finding]:
+    """Return gears whose readings tell no cause, each with why."""
+    bad = {}
+    for label, gear in zip(case.specimen_labels, gears_of(case), strict=True):
+        wrong, rows = Findings(), len(gear.records.force)
+        if rows < FEWEST_ROWS:
+            words = f"has {rows} row{'s' * (rows > 1)}, too few for a cause"
+            remedy = f"Read it {FEWEST_ROWS} times or more, or leave it out"
+            wrong.append(Finding(gear.name, words, remedy))
+        else:
             wrong.attempt(require_scatter, gear)
-    return gears
-
-
-def _with_few(case: Case, rows: np.ndarray) -> Iterator[Finding]:
-    for gear in np.flatnonzero(rows < FEWEST_ROWS):
-        name, many = quoted(case.specimen_labels[gear]), int(rows[gear])
-        words = f"gear {name} has {many} row{'s' * (many > 1)}, too few for a cause"
-        remedy = f"Read it {FEWEST_ROWS} times or more, or leave it out"
-        yield Finding(case.name, words, remedy)
+        bad |= {label: wrong[0]} if wrong else {}
+    return bad
 
 
 def _one_gear(case: Case, gear: int) -> Case:

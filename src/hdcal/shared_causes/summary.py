@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hdcal.data.bad_gears import left_out_words
 from hdcal.data.versions import versions
 from hdcal.diagnosis.naming import naming
 from hdcal.evidence.case_evidence import NONE
@@ -77,6 +78,9 @@ def _next_step(found: FleetCauses) -> str | None:
 
 
 def _notes(found: FleetCauses) -> Iterator[str]:
+    left_out, many = found.case.left_out, len(found.case.specimen_labels)
+    if left_out:
+        yield left_out_words(left_out, many + len(left_out))
     yield from found.case.notes
     told = {own[0] for own in found.of_gears if len(own) == 1}
     counted = naming().called
