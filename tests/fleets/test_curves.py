@@ -26,7 +26,7 @@ def many(gears: int, off: int) -> Fleet:
     called = np.arange(gears) >= gears - off
     some = {
         name: np.resize(getattr(found, name), gears)
-        for name in ("size_ratio", "noise_sd", "zero", "distance", "chance")
+        for name in ("size_ratio", "noise_sd", "zero", "distance")
     }
     return replace(
         found,
@@ -35,7 +35,8 @@ def many(gears: int, off: int) -> Fleet:
         stiffness=np.tile(stiffness, (40, 1)),
         apart=np.zeros((40, gears)),
         off=np.where(called, 0.9 + 0.001 * np.arange(gears), 0.1),
-        called=called,
+        chances={name: np.ones(gears) for name in found.chances},
+        off_in={name: called & (name == "stiffness") for name in found.off_in},
     )
 
 

@@ -13,8 +13,8 @@ from schema_checks import obeys
 import hdcal
 from hdcal.errors import InputError
 from hdcal.fleets.answer import FleetAnswer
-from hdcal.fleets.fleet import FALSE_CALLS, called_off
 from hdcal.fleets.next_gear import next_gear, stiffness_bounds
+from hdcal.fleets.off_in import FALSE_CALLS, called_off
 from hdcal.fleets.summary import fleet_answer, fleet_report, gear_columns
 from hdcal.inference.checks import Check
 
@@ -132,10 +132,16 @@ def test_a_fleet_that_failed_its_checks_says_so(found):
 
 def test_gears_are_called_off_by_how_rare_ordinary_ones_are_there():
     """The k-th smallest chance of n is held against k/n of the share."""
-    chance = np.array([0.009, 0.4, 0.019, 0.8, 0.9])
-    assert called_off(chance).tolist() == [True, False, True, False, False]
-    # By itself neither is far enough out: a fifth of 0.05 is 0.01.
-    assert not called_off(np.array([0.011, 0.4, 0.4, 0.8, 0.9])).any()
+
+    def called(kind: str, *chances: float) -> list[bool]:
+        return called_off({kind: np.array(chances)})[kind].tolist()
+
+    told = called("stiffness", 0.007, 0.4, 0.015, 0.8, 0.9)
+    assert told == [True, False, True, False, False]
+    # By itself neither is far enough out: a fifth of 0.04 is 0.008.
+    assert not any(called("stiffness", 0.009, 0.4, 0.4, 0.8, 0.9))
+    assert called("noise", 0.0009, 0.4, 0.4, 0.8, 0.9)[0]
+    assert not any(called("zero", 0.0011, 0.4, 0.4, 0.8, 0.9))
     assert pytest.approx(0.05) == FALSE_CALLS
 
 

@@ -9,10 +9,13 @@ from commands import Hdcal
 from schema_checks import obeys
 
 import hdcal
+from hdcal.diagnosis.model_posterior import carried, log_priors
+from hdcal.diagnosis.weighing import weigh
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.plain import as_plain
 from hdcal.shared_causes.answer import CausesAnswer
 from hdcal.shared_causes.document import headline
+from hdcal.shared_causes.gear_evidence import gears_of, weigh_gear
 from hdcal.shared_causes.summary import cause_columns, causes_answer
 
 LIBRARY = {
@@ -69,10 +72,47 @@ def test_zeros_of_mountings_are_no_effect_of_a_gear():
     assert causes_answer(found).next_step is None
 
 
+@pytest.mark.parametrize(("runs", "rows"), [(6, 2), (10, 3)])
+def test_short_mountings_are_no_evidence(runs: int, rows: int):
+    """A zero for every two readings leaves little of them, and no more than that."""
+    rng, x = np.random.default_rng(runs), np.linspace(0.05, 0.5, rows)
+    parts = []
+    for gear, run in np.ndindex(8, runs):
+        noise = rng.normal(0.0, 0.3, rows) + rng.normal(0.0, 1.0)
+        told = {"specimen": f"G{gear}", "run": run, "deformation_mm": x}
+        parts.append(pd.DataFrame({**told, "force_N": 200.0 * x + noise}))
+    found = hdcal.causes(pd.concat(parts), library=LIBRARY)
+    assert all(own[0] == "none" for own in found.of_gears)
+    place = found.causes.index("unknown")
+    assert found.log_evidence[:, place].sum() < 0.0
+
+
+def test_evidence_is_that_of_the_hypotheses():
+    """With hypotheses that a cause leads in, weighted as they are before the data."""
+    case = hdcal.read_case(fleet(0.8))
+    gear = gears_of(case)[0]
+    library = {"coulomb_friction": LIBRARY["coulomb_friction"]}
+    evidence = weigh(gear, library, np.random.default_rng(0)).evidence
+    table = {name: np.logaddexp.reduce(v) for name, v in evidence.table.items()}
+    names = list(table)
+    prior = dict(zip(names, np.exp(log_priors(names)), strict=True))
+    beside = "coulomb_friction+unknown"
+    carries = np.clip(carried(evidence)["coulomb_friction"], 1e-3, 1.0 - 1e-3)
+    alone, half = prior["coulomb_friction"], 0.5 * prior[beside]
+    parts = (
+        alone * np.exp(table["coulomb_friction"] - table["none"]),
+        half * np.exp(table[beside] - table["none"]) * 2.0 * carries,
+    )
+    told = weigh_gear(0, gear, library, 0)[1]
+    over = told["coulomb_friction"].log_evidence - told["none"].log_evidence
+    assert over == pytest.approx(np.log(sum(parts) / (alone + half)))
+    assert np.exp(told["coulomb_friction"].log_prior) == pytest.approx(alone + half)
+
+
 def test_two_processes_say_the_same_bytes(with_loop):
     case = hdcal.read_case(fleet(0.8))
     again = hdcal.causes(case, library=LIBRARY, jobs=2)
-    for name in ("share", "number", "chance", "alone", "log_evidence"):
+    for name in ("share", "cause", "chance", "alone", "log_evidence"):
         assert np.array_equal(getattr(again, name), getattr(with_loop, name)), name
 
 
@@ -87,11 +127,11 @@ def test_a_cluster_says_the_same_bytes(with_loop, local):
 
 def test_what_is_told_of_few_gears_names_them():
     two = "relaxation", "coulomb_friction"
-    kinds = [("none",), two, (*two, "none"), ("none",), ("several",)]
+    kinds = [("none",), two, (*two, "none"), ("none",), ("unknown",)]
     assert headline("ABCDE", kinds) == (
-        "Of 5 gears B has relaxation or what looks like coulomb friction, which these "
-        "readings do not tell apart; E has two effects at once; of 1 it is not clear "
-        "whether it has an effect; 2 show none."
+        "Of 5 gears B has relaxation or what looks like coulomb friction, or both, "
+        "which these readings do not tell apart; E has something outside the library; "
+        "of 1 it is not clear whether it has an effect; 2 show none."
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from hdcal.fleets.gauge import GaugeAnswer
+from hdcal.fleets.left_out import GearLeftOut
 from hdcal.fleets.misfit import Misfit
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.over_time import TimeAnswer
@@ -51,14 +52,6 @@ class OperatorAnswer:
 
 
 @dataclass(frozen=True)
-class GearLeftOut:
-    """A gear that is in none of the numbers, and why."""
-
-    gear: Words
-    why: Words
-
-
-@dataclass(frozen=True)
 class GearBounds:
     """What a share `content` of gears to come is stiffer than, and softer than.
 
@@ -88,6 +81,7 @@ class FleetAnswer(Answer):
         rows: of all of them.
         left_out: gears that are in none of the numbers, where they may be left out.
         called_off: gears that are called off, the surest first.
+        off_in: of stiffness, noise and zero those that are called off in it.
         false_calls: share of these that may be ordinary gears, as expected.
         interval: probability that every interval holds.
         at_one_size: whether gears of several sizes were compared at the gear file's,
@@ -111,6 +105,7 @@ class FleetAnswer(Answer):
     rows: Count
     left_out: tuple[GearLeftOut, ...]
     called_off: tuple[Words, ...]
+    off_in: dict[str, tuple[Words, ...]]
     false_calls: float
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
     at_one_size: bool

@@ -16,10 +16,10 @@ def fleet_chart(found: Fleet) -> Chart:
     order = np.argsort(middle, kind="stable")
     if len(order) > MOST_SHOWN:
         # Those called off, and others from the softest to the stiffest.
-        shown = found.called[order]
+        shown = found.off_in["stiffness"][order]
         shown[np.linspace(0, len(order) - 1, MOST_SHOWN).astype(int)] = True
         order = order[shown]
-    place, off = np.arange(1.0, len(order) + 1.0), found.called[order]
+    place, off = np.arange(1.0, len(order) + 1.0), found.off_in["stiffness"][order]
     curves = interval_boxes(place, low[order], high[order])
     odd = [found.case.specimen_labels[gear] for gear in order[off]]
     called = "called off" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)

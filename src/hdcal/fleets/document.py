@@ -1,6 +1,7 @@
 """A fleet in words: the only place of its sentences."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -52,29 +53,51 @@ def headline(
             f"{span} %) about {centre} N/mm"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off([str(far)], columns)).replace("; prob", "; off with prob")
+        odd = next(_off([str(far)], columns, population)).replace(
+            "; prob", "; off with prob"
+        )
         return told + f"; oddest: {odd}." if total < FEW else f"{told}."
-    told = "; ".join(_off(called, columns))
+    told = "; ".join(_off(called, columns, population))
     return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
-def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[str]:
+def _off(
+    called: Sequence[str],
+    columns: Mapping[str, np.ndarray],
+    population: PopulationAnswer,
+) -> Iterator[str]:
     """Yield what is said of the gears that are called off, the surest first."""
-    than = " than its lot" if "lot" in columns else ""
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
-        row = place[name]
-        ends = (float(columns[f"apart_{end}"][row]) for end in ("percent", "lo", "hi"))
-        apart, low, high = ends
-        word = "softer" if apart < 0.0 else "stiffer"
-        size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
-        middle, least, most = (f"{end:.2g}" for end in size)
-        sure = percent(columns["probability_off"][row])
-        sure = f"95 %: {least} … {most} %; probability {sure}"
-        yield f"{name} is {middle} % {word}{than} ({sure})"
+        one = {column: values[place[name]] for column, values in columns.items()}
+        if kinds := [*_apart(one, population)]:
+            yield f"{name} {' and '.join(kinds)}"
     rest = len(called) - _MOST_NAMED
     if rest > 0:
         yield f"{rest} more are off"
+
+
+def _apart(one: Mapping[str, Any], population: PopulationAnswer) -> Iterator[str]:
+    """Yield how far a gear is off in what it is off in; in stiffness where in none."""
+    kinds = str(one["off_in"]).split(", ")
+    if "stiffness" in kinds or kinds == [""]:
+        yield _softer(one)
+    if "noise" in kinds:
+        noise = float(one["noise_sd_N"])
+        times = noise / population.reading_sd_N.median
+        yield f"scatters {times:.2g} times as much as most do ({noise:.2g} N)"
+    if "zero" in kinds:
+        yield f"has its zero at {one['zero_N']:.2g} N"
+
+
+def _softer(one: Mapping[str, Any]) -> str:
+    than = " than its lot" if "lot" in one else ""
+    apart, low, high = (float(one[f"apart_{end}"]) for end in ("percent", "lo", "hi"))
+    word = "softer" if apart < 0.0 else "stiffer"
+    size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
+    middle, least, most = (f"{end:.2g}" for end in size)
+    sure = f"95 %: {least} … {most} %; probability {percent(one['probability_off'])}"
+    return f"is {middle} % {word}{than} ({sure})"
 
 
 def fleet_document(
@@ -133,7 +156,7 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
     sized = " of the gear file's sizes" * answer.at_one_size
     told = f"The next gear{sized}: {middle} N/mm, 95 % predictive interval {span} N/mm"
-    also = "; that it may be an odd one is in it" * bool(answer.called_off)
+    also = "; that it may be an odd one is in it" * bool(answer.off_in["stiffness"])
     yield f"{told}{also}."
     if answer.gears < FEW:
         yield (
@@ -173,8 +196,8 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     more *= answer.gears > _AT_ONCE
     called = (
         "Apart: from the centre, of its lot where lots are told, at one size; in sds: "
-        "counted in the scatter of ordinary gears. Called off are those so far out "
-        "that in the mean at most "
+        "counted in the scatter of ordinary gears. Called off are those so far out, in "
+        "stiffness, noise or zero, that in the mean at most "
         f"{percent(answer.false_calls)} of the gears called are ordinary ones."
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
@@ -208,7 +231,7 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
         f"{one['distance_sd']:+.1f}",
         f"{one['noise_sd_N']:.2g}",
         percent(one["probability_off"]),
-        Tag("off", "caution") if one["called_off"] else "",
+        Tag(f"off: {one['off_in']}", "caution") if one["called_off"] else "",
     ]
 
 

@@ -11,7 +11,6 @@ import jax
 import numpy as np
 import xarray as xr
 from jaxtyping import Key
-from scipy.stats import false_discovery_control
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
@@ -23,6 +22,7 @@ from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.next_gear import next_gear
+from hdcal.fleets.off_in import called_off, noise_chance, zero_chance
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
@@ -38,10 +38,9 @@ from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 from hdcal.report.plain import as_plain
 
-# Share of the gears that are called off which are ordinary ones at most, in the mean.
-FALSE_CALLS = 0.05
-# Draws of the population for which every gear is drawn too.
-_GEAR_DRAWS = 400
+# Draws of the population for which every gear is drawn too: more for few gears, as many
+# as make a million.
+_GEAR_DRAWS, _IN_ALL = 400, 1_000_000
 # Draws of gears at most, whatever their number: they are held in memory.
 _MOST_DRAWN = 20_000_000
 
@@ -65,8 +64,9 @@ class Fleet(Shown):
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
         off: probability of each gear that it is no ordinary one, shape (g,).
-        chance: that an ordinary gear is as far from the centre, shape (g,).
-        called: which gears are called off.
+        chances: of stiffness, noise and zero that an ordinary gear is as far out in
+            it, shape (g,) each.
+        off_in: of stiffness, noise and zero which gears are called off in it.
         next_stiffness: of a gear not yet measured, shape (d,) [N/mm as read].
         unit: stiffness at K = 1 [N/mm as read].
         lots: their names, in the order of lot_1, … of the draws; empty where none are
@@ -87,8 +87,8 @@ class Fleet(Shown):
     zero: np.ndarray
     distance: np.ndarray
     off: np.ndarray
-    chance: np.ndarray
-    called: np.ndarray
+    chances: Mapping[str, np.ndarray]
+    off_in: Mapping[str, np.ndarray]
     next_stiffness: np.ndarray
     unit: float
     lots: Sequence[str]
@@ -113,6 +113,11 @@ class Fleet(Shown):
     def mountings(self) -> np.ndarray:
         """Mountings of each gear, shape (g,)."""
         return np.bincount(self.readings.sums.gear)
+
+    @property
+    def called(self) -> np.ndarray:
+        """Which gears are called off, in whatever, shape (g,)."""
+        return np.any(list(self.off_in.values()), axis=0)
 
     @property
     def at_one_size(self) -> bool:
@@ -225,7 +230,7 @@ def fleet(
         draws=found.values,
         **each,
         size_ratio=ratio,
-        called=called_off(each["chance"]),
+        off_in=called_off(each["chances"]),
         next_stiffness=next_gear(found.values, np.random.default_rng(seed)),
         unit=unit,
         lots=groups(readings.case.lots)[0],
@@ -247,9 +252,10 @@ def _gears(
     readings: FleetReadings,
     draws: Mapping[str, np.ndarray],
     key: Key[Array, ""],
-) -> dict[str, np.ndarray]:
+) -> dict[str, Any]:
     """Return what is known of each gear, as `Fleet` has it."""
-    many = min(_GEAR_DRAWS, _MOST_DRAWN // len(problem.sums.lot))
+    gears = len(problem.sums.lot)
+    many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
     every = -(-len(draws["stiffness"]) // many)
     chosen = {name: v[::every] for name, v in draws.items()}
     drawn = draw_gears(problem, chosen, key)
@@ -258,29 +264,19 @@ def _gears(
     apart = stiffness / centre - 1.0
     sums = readings.sums
     zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
+    noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
+    # About a centre and a scatter that the gear itself has no part in: where it is off.
+    apart_by_chance = np.sum(off * np.asarray(drawn.chance), axis=0) / off.sum(axis=0)
     return {
         "stiffness": stiffness,
         "apart": apart,
-        "noise_sd": np.median(np.asarray(drawn.noise_sd), axis=0),
+        "noise_sd": noise_sd,
         "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
         "distance": np.median(apart / chosen["specimen_sd"][:, None], axis=0),
         "off": off.mean(axis=0),
-        # About a centre and a scatter that the gear itself has no part in: where it is
-        # off.
-        "chance": np.sum(off * np.asarray(drawn.chance), axis=0) / np.sum(off, axis=0),
+        "chances": {
+            "stiffness": apart_by_chance,
+            "noise": noise_chance(problem, chosen),
+            "zero": zero_chance(sums, chosen, stiffness, noise_sd),
+        },
     }
-
-
-def called_off(chance: np.ndarray) -> np.ndarray:
-    """Return which gears are called off: so far out that few of them are ordinary.
-
-    In the mean at most `FALSE_CALLS` of those called are ordinary gears; where none is
-    off, in as many fleets any is called.
-
-    Args:
-        chance: of each gear, that an ordinary one is as far out, shape (g,).
-
-    Source:
-        Benjamini and Hochberg, Journal of the Royal Statistical Society B 57 (1995).
-    """
-    return false_discovery_control(chance) <= FALSE_CALLS

@@ -14,7 +14,12 @@ from hdcal.data.measurements import Labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.errors import Finding
 from hdcal.fleets.groups import operator_of
-from hdcal.fleets.readings import FleetReadings, modulus_left, row_sums
+from hdcal.fleets.readings import (
+    FleetReadings,
+    largest_of,
+    modulus_left,
+    row_sums,
+)
 from hdcal.inference.gear_sums import MountingSums
 
 _LOST = "start again: reading takes a small part of the time"
@@ -28,9 +33,8 @@ class Pool:
         gear: what is known of all gears.
         gears: index of each gear, in order of appearance.
         runs: index of each gear and run, likewise.
-        parts: run, rows, means and sums of each mounting in each batch.
+        parts: run, reach, rows, means and sums of each mounting in each batch.
         told: of each batch, runs, and their lots, operators and dates.
-        largest: deformation, with its sign [mm as read].
         left_out: gears of which something is wrong, each with what that is. Rows of
             those that were known before are not read.
     """
@@ -40,7 +44,6 @@ class Pool:
     runs: dict[tuple[int, str], int] = field(default_factory=dict)
     parts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
     told: list[dict[str, np.ndarray]] = field(default_factory=list)
-    largest: float = 0.0
     left_out: dict[str, Finding] = field(default_factory=dict)
 
     def add(self, batch: Batch) -> None:
@@ -59,8 +62,8 @@ class Pool:
         first, pair = _in_order(gear_of * len(runs) + run_of)
         each = zip(gears[gear_of[first]], runs[run_of[first]], strict=True)
         index = np.array([self._run(str(one), str(run)) for one, run in each])
-        self.parts.append((index, *row_sums(pair, x, batch.values["force"])))
-        self.largest = max(self.largest, float(read[np.argmax(np.abs(read))]), key=abs)
+        reach = largest_of(pair, np.abs(read))
+        self.parts.append((index, reach, *row_sums(pair, x, batch.values["force"])))
         further = {name: one for name, one in batch.labels.items() if name in GROUPINGS}
         code = pair
         for place, texts in further.values():
@@ -75,7 +78,6 @@ class Pool:
         index = np.array([self._run(gears[g], run) for g, run in other.runs], int)
         self.parts += [(index[run], *sums) for run, *sums in other.parts]
         self.told += [told | {"run": index[told["run"]]} for told in other.told]
-        self.largest = max(self.largest, other.largest, key=abs)
         self.left_out = other.left_out | self.left_out
 
     def _run(self, gear: str, run: str) -> int:
@@ -88,7 +90,8 @@ class Pool:
         Args:
             source: where they are from.
         """
-        run, rows, x, y, xx, xy, yy = map(np.concatenate, zip(*self.parts, strict=True))
+        parts = map(np.concatenate, zip(*self.parts, strict=True))
+        run, reach, rows, x, y, xx, xy, yy = parts
 
         def whole(part: np.ndarray) -> np.ndarray:
             return np.bincount(run, part)
@@ -102,28 +105,47 @@ class Pool:
         ]
         gears, gear = tuple(self.gears), np.array([g for g, _ in self.runs])
         names = tuple(f"{gears[g]}/{r}" if r else gears[g] for g, r in self.runs)
-        told = {
-            name: np.concatenate([one[name] for one in self.told])
-            for name in self.told[0]
-        }
-        of = told.pop("run")
-        further, notes = further_labels(
-            told, Labels(gear[of], gears), Labels(of, names)
-        )
         case = replace(
             source.case,
             name=source.name,
             specimen_labels=gears,
             run_labels=names,
             data_sha256=source.sha256,
-            notes=(*source.case.notes, *notes),
-            **further,
         )
-        runs = np.arange(len(gear))
-        by = operator_of(case.operators, runs)
-        sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=by)
-        readings = FleetReadings(case, sums, runs, self.largest)
-        return readings.without(self.left_out)
+        nobody = np.zeros(len(gear), int)
+        sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=nobody)
+        runs, farthest = np.arange(len(gear)), largest_of(run, reach)
+        readings = FleetReadings(case, sums, runs, farthest)
+        left = ~among(gears, self.left_out)[gear]
+        return self._labelled(readings.without(self.left_out), gear, left)
+
+    def _labelled(
+        self, readings: FleetReadings, gear: np.ndarray, left: np.ndarray
+    ) -> FleetReadings:
+        """Return readings with what further labels say of the gears that are left.
+
+        Args:
+            readings: of these.
+            gear: of each run of all gears, shape (r,).
+            left: which runs are of gears that are left, shape (r,).
+        """
+        told = {
+            name: np.concatenate([one[name] for one in self.told])
+            for name in self.told[0]
+        }
+        of = told.pop("run")
+        rows, case = left[of], readings.case
+        run = np.searchsorted(np.flatnonzero(left), of[rows])
+        own = np.searchsorted(np.unique(gear[left]), gear[of[rows]])
+        further, notes = further_labels(
+            {name: labels[rows] for name, labels in told.items()},
+            Labels(own, case.specimen_labels),
+            Labels(run, case.run_labels),
+        )
+        case = replace(case, notes=(*case.notes, *notes), **further)
+        by = operator_of(case.operators, readings.runs)
+        sums = replace(readings.sums, operator=by)
+        return replace(readings, case=case, sums=sums)
 
 
 def pool_of(

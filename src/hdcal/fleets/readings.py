@@ -23,15 +23,21 @@ class FleetReadings:
             first gears where there are very many.
         sums: of each gear in each mounting.
         runs: index of each mounting's run, shape (m,).
-        largest: deformation, with its sign [mm as read].
+        reach: largest deformation of each mounting, its size, shape (m,) [mm as read].
         sizes: of each gear, by column, where a gear file of its own states them.
     """
 
     case: Case
     sums: MountingSums
     runs: np.ndarray
-    largest: float
+    reach: np.ndarray
     sizes: Mapping[str, Sequence] | None = None
+
+    @property
+    def largest(self) -> float:
+        """Largest deformation, with the sign of its mounting's mean [mm as read]."""
+        farthest = int(np.argmax(self.reach))
+        return float(np.copysign(self.reach[farthest], self.sums.x[farthest]))
 
     def at_one_size(self, ratio: np.ndarray) -> "FleetReadings":
         """Return the sums as if all gears had the gear file's sizes.
@@ -100,7 +106,8 @@ class FleetReadings:
             dates=_some(case.dates, runs),
         )
         sums = MountingSums(**columns | {"gear": gear, "operator": by})
-        return replace(self, case=case, sums=sums, runs=run)
+        reach = self.reach[of_mounting]
+        return replace(self, case=case, sums=sums, runs=run, reach=reach)
 
 
 def _read_since(case: Case, day: str) -> np.ndarray:
@@ -129,7 +136,19 @@ def fleet_readings(case: Case) -> FleetReadings:
     x = read * modulus_left(gear, np.asarray(records.temperature))
     by = operator_of(case.operators, runs)
     sums = MountingSums(of_gear, *row_sums(of_row.ravel(), x, y), by)
-    return FleetReadings(case, sums, runs, float(read[np.argmax(np.abs(read))]))
+    return FleetReadings(case, sums, runs, largest_of(of_row.ravel(), np.abs(read)))
+
+
+def largest_of(of_row: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the largest of the values of each mounting, none of which is negative.
+
+    Args:
+        of_row: index of its mounting, shape (n,).
+        values: shape (n,).
+    """
+    found = np.zeros(1 + int(of_row.max()))
+    np.maximum.at(found, of_row, values)
+    return found
 
 
 def modulus_left(gear: Gear, temperature):

@@ -2,10 +2,10 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import compress
 
 import numpy as np
 
-from hdcal.data.bad_gears import cause
 from hdcal.data.theory_names import SPRING
 from hdcal.data.versions import versions
 from hdcal.evidence.prepare import moments
@@ -13,17 +13,18 @@ from hdcal.fleets.answer import (
     FleetAnswer,
     FutureGear,
     GearBounds,
-    GearLeftOut,
     LotAnswer,
     OperatorAnswer,
     PopulationAnswer,
 )
 from hdcal.fleets.document import fleet_document, headline
-from hdcal.fleets.fleet import FALSE_CALLS, Fleet
+from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.gauge import gauge
+from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.fleets.notes import notes_of
+from hdcal.fleets.off_in import FALSE_CALLS
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.inference.groupings import group_offsets
 from hdcal.inference.posterior import FILE_NAME
@@ -59,27 +60,20 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
         "noise_sd_N": found.noise_sd,
         "distance_sd": found.distance,
         "probability_off": found.off,
-        "chance_ordinary": found.chance,
+        "chance_ordinary": found.chances["stiffness"],
+        "chance_noise": found.chances["noise"],
+        "chance_zero": found.chances["zero"],
         "called_off": found.called,
+        "off_in": _kinds(found.off_in),
         "status": np.full(len(middle), "failed" if failed else "ok"),
     }
 
 
-def _with_left_out(
-    columns: Mapping[str, np.ndarray], left_out: Sequence[GearLeftOut]
-) -> Mapping[str, np.ndarray]:
-    """Return the columns of gears.csv with gears that are left out below the others."""
-    if not left_out:
-        return columns
-    empty = np.full(len(left_out), "", object)
-    own = {
-        "gear": np.array([one.gear for one in left_out], object),
-        "status": np.array([f"left out: {one.why}" for one in left_out], object),
-    }
-    return {
-        name: np.concatenate([column.astype(object), own.get(name, empty)])
-        for name, column in columns.items()
-    }
+def _kinds(off_in: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return what each gear is called off in, in words, shape (g,)."""
+    each = zip(*off_in.values(), strict=True)
+    told = (", ".join(compress(off_in, own)) for own in each)
+    return np.array([*told], object)
 
 
 def _influence(found: Fleet) -> np.ndarray:
@@ -118,10 +112,12 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         next_step=_next_step(called),
         gears=len(found.off),
         rows=int(found.rows.sum()),
-        left_out=tuple(
-            GearLeftOut(gear, cause(why)) for gear, why in found.case.left_out.items()
-        ),
+        left_out=left_out_of(found.case),
         called_off=tuple(called),
+        off_in={
+            name: tuple(np.array(found.case.specimen_labels)[own].tolist())
+            for name, own in found.off_in.items()
+        },
         false_calls=FALSE_CALLS,
         interval=INTERVAL,
         at_one_size=found.at_one_size,
@@ -210,7 +206,7 @@ def fleet_report(
         answer,
         "summary.json",
         figures,
-        tables=lambda: {"gears.csv": _with_left_out(columns, answer.left_out)},
+        tables=lambda: {"gears.csv": with_left_out(columns, found.case)},
         others=lambda: [(FILE_NAME, found.posterior.to_netcdf())],
         charts=charts,
         theory=found.case.gear.theory,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from hdcal.fleets.left_out import GearLeftOut
 from hdcal.report.answer import (
     Answer,
     Count,
@@ -38,6 +39,15 @@ class SharedCause:
     name_tested: bool | None
 
 
+@dataclass(frozen=True)
+class LotWithCauses:
+    """A lot, and how many of its gears have any effect, or something unknown."""
+
+    lot: Words
+    gears: Count
+    gears_with_effect: Interval
+
+
 @dataclass(frozen=True, kw_only=True)
 class CausesAnswer(Answer):
     """What `hdcal causes` answers; summary.json. Its gears are in gears.csv.
@@ -45,7 +55,9 @@ class CausesAnswer(Answer):
     Attributes:
         gears: how many there are.
         rows: of all of them.
+        left_out: those that are bad, and in none of the numbers, where this was asked.
         causes: those that were considered, the most frequent first.
+        lots: where they are told.
         not_shown: effects of the library that no readings could show.
         interval: probability that every interval holds.
         notes: from reading, and on what the answer rests.
@@ -57,7 +69,9 @@ class CausesAnswer(Answer):
     schema: Literal["hdcal.causes/1"] = "hdcal.causes/1"
     gears: Count
     rows: Count
+    left_out: tuple[GearLeftOut, ...]
     causes: tuple[SharedCause, ...]
+    lots: tuple[LotWithCauses, ...]
     not_shown: tuple[Words, ...]
     interval: Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
     notes: Sentences

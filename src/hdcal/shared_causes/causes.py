@@ -19,14 +19,13 @@ from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check, mixing_checks
-from hdcal.inference.diagnostics import mixing
+from hdcal.inference.diagnostics import have_mixed, mixing
 from hdcal.inference.sample import Progress
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
-from hdcal.shared_causes.frequencies import sample_frequencies
+from hdcal.shared_causes.frequencies import Frequencies, sample_frequencies
 from hdcal.shared_causes.gear_evidence import (
-    SEVERAL,
     Weight,
     gears_of,
     saying_little,
@@ -35,7 +34,8 @@ from hdcal.shared_causes.gear_evidence import (
 
 # What is believed of how often causes are counts, before the data, as one gear does.
 _COUNTS = 1.0
-_CHAINS = 4
+# Draws of each chain, and the most where lookalikes mix slowly.
+_CHAINS, _DRAWS, _MOST_DRAWS = 4, 1500, 12_000
 # A frequency of less than this says nothing of how chains mix.
 _RARE = 0.01
 # Probability that what is told of a gear holds.
@@ -50,9 +50,9 @@ class FleetCauses(Shown):
 
     Attributes:
         case: their readings.
-        causes: none, effects by name, several at once and unknown; each gear has one.
+        causes: none, effects by name and unknown; in each gear one leads.
         share: draws of how often each one is among gears to come, shape (d, k).
-        number: draws of how many of these gears have each one, shape (d, k).
+        cause: draws of which one each gear has, as its place, shape (d, g).
         chance: of each cause in each gear, given all gears, shape (g, k).
         alone: likewise by its own readings alone, shape (g, k).
         log_evidence: of the readings of each gear by cause, over that of none, shape
@@ -65,7 +65,7 @@ class FleetCauses(Shown):
     case: Case
     causes: tuple[str, ...]
     share: np.ndarray
-    number: np.ndarray
+    cause: np.ndarray
     chance: np.ndarray
     alone: np.ndarray
     log_evidence: np.ndarray
@@ -126,7 +126,7 @@ def causes(
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
     readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
-    case, gears = gears_alone(readings, library, skip_bad=skip_bad)
+    case, gears = gears_alone(readings, library, skip_bad=skip_bad, seed=seed)
     # What differs between mountings and between gears is told of the fleet.
     library = {n: e for n, e in library.items() if not e.needs & _OF_FLEETS}
     tasks = [(place, gear, dict(library), seed) for place, gear in enumerate(gears)]
@@ -143,6 +143,7 @@ def gears_alone(
     library: Mapping[str, type[Effect]] = EFFECTS,
     *,
     skip_bad: bool = False,
+    seed: int = 0,
 ) -> tuple[Case, list[Case]]:
     """Return the gears that an answer can rest on, together and each by itself.
 
@@ -150,6 +151,7 @@ def gears_alone(
         readings: of all gears.
         library: effects to consider, by name.
         skip_bad: leave out gears that say too little.
+        seed: of the errors of their zeros.
 
     Raises:
         InputError: holds what is wrong with them, with a finding for each gear.
@@ -166,37 +168,58 @@ def gears_alone(
     if bad and not skip_bad:
         raise InputError([*bad.values(), offer(bad, len(case.specimen_labels))])
     case = usable(readings.without(bad), skip_bad=skip_bad)[0].case
-    return case, gears_of(case)
+    return case, gears_of(case, seed)
 
 
 def _shared(
-    case: Case, weights: Sequence[Weight], library: Mapping, seed: int
+    case: Case, weights: Sequence[Mapping[str, Weight]], library: Mapping, seed: int
 ) -> FleetCauses:
     """Return what all gears together say, from what each one says by itself."""
     found = {name for weight in weights for name in weight}
-    names = [n for n in (NONE, *library, SEVERAL, UNKNOWN) if n in found]
-    nothing = 0.0, 0.0
-    both = np.array([[one.get(name, nothing) for name in names] for one in weights])
-    alone, prior = both[..., 0], both[..., 1]
-    # What a gear's readings cannot show leaves them as probable as nothing does.
-    shown = prior > 0.0
-    odds = np.log(np.maximum(alone, 1e-300) / np.where(shown, prior, 1.0))
-    gain = np.where(shown, odds - odds[:, :1], 0.0)
-    before = prior.mean(axis=0)
-    counts = _COUNTS * before / before.sum()
-    rng = np.random.default_rng(seed)
-    drawn = sample_frequencies(gain, counts, rng, chains=_CHAINS)
-    common = drawn.share.mean(axis=(0, 1)) >= _RARE
-    told = {n: drawn.share[..., k] for k, n in enumerate(names) if common[k]}
+    names = [n for n in (NONE, *library, UNKNOWN) if n in found]
+    gain, prior = _tables(weights, names)
+    alone = prior * np.exp(gain - gain.max(axis=1, keepdims=True))
+    drawn, told = _sampled(gain, prior.mean(axis=0), names, seed)
     return FleetCauses(
         case=case,
         causes=tuple(names),
         share=drawn.share.reshape(-1, len(names)),
-        number=drawn.number.reshape(-1, len(names)),
+        cause=drawn.cause.reshape(-1, len(weights)),
         chance=drawn.chance,
-        alone=alone,
+        alone=alone / alone.sum(axis=1, keepdims=True),
         log_evidence=gain,
         checks=mixing_checks(mixing(told), _CHAINS),
         library=tuple(library),
         seed=seed,
     )
+
+
+def _sampled(
+    gain: np.ndarray, prior: np.ndarray, names: Sequence[str], seed: int
+) -> tuple[Frequencies, dict[str, np.ndarray]]:
+    """Return draws, as many as lookalikes take to mix, and those that must have."""
+    rng, draws = np.random.default_rng(seed), _DRAWS
+    counts = _COUNTS * prior / prior.sum()
+    while True:
+        drawn = sample_frequencies(gain, counts, rng, chains=_CHAINS, draws=draws)
+        common = drawn.share.mean(axis=(0, 1)) >= _RARE
+        told = {n: drawn.share[..., k] for k, n in enumerate(names) if common[k]}
+        draws *= 2
+        if draws > _MOST_DRAWS or have_mixed(told):
+            return drawn, told
+
+
+def _tables(
+    weights: Sequence[Mapping[str, Weight]], names: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return log evidence over none and prior of each cause, shape (g, k).
+
+    What a gear's readings cannot show leaves them as probable as nothing does.
+    """
+    gain, prior = np.zeros((2, len(weights), len(names)))
+    for gear, weight in enumerate(weights):
+        for cause, told in weight.items():
+            place, over = names.index(cause), weight[NONE].log_evidence
+            gain[gear, place] = told.log_evidence - over
+            prior[gear, place] = np.exp(told.log_prior)
+    return gain, prior

@@ -16,19 +16,18 @@ from hdcal.report.document import (
     Text,
     notices,
 )
+from hdcal.report.parameters import Interval
 from hdcal.report.words import capital, label, percent, percent_span
-from hdcal.shared_causes.answer import CausesAnswer, SharedCause
+from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause
 from hdcal.shared_causes.causes import FleetCauses
-from hdcal.shared_causes.gear_evidence import SEVERAL
 
 _AT_ONCE = 25
-_MOST_NAMED, _MOST_TOLD = 3, 4
+_MOST_NAMED, _MOST_TOLD, _MOST_LOTS = 3, 4, 20
 # Causes of which less than this share of gears is expected to have them are in the
 # JSON answer alone.
 RARE = 0.01
 _WORDS = {
     NONE: "no effect",
-    SEVERAL: "two effects at once",
     UNKNOWN: "something outside the library",
 }
 
@@ -78,7 +77,7 @@ def _of_some(kind: tuple[str, ...], names: Sequence[str]) -> str:
     causes = " or ".join(map(cause_words, kind[:_MOST_NAMED]))
     if len(kind) > _MOST_NAMED:
         causes += f" or {len(kind) - _MOST_NAMED} other causes"
-    alike = ", which these readings do not tell apart" * (len(kind) > 1)
+    alike = ", or both, which these readings do not tell apart" * (len(kind) > 1)
     return f"{who} {has} {causes}{alike}"
 
 
@@ -102,7 +101,7 @@ def causes_document(
         kind="causes",
         subtitle=f"{answer.gears} gears, {answer.rows} readings",
         headline=answer.headline,
-        answers=[] if found.reasons else list(_answers(told)),
+        answers=[] if found.reasons else list(_answers(told, answer.lots)),
         next_steps=[answer.next_step] if answer.next_step else [],
         notices=notices(("To be aware of", answer.notes)),
         sections=[
@@ -115,9 +114,20 @@ def causes_document(
     )
 
 
-def _answers(told: Sequence[SharedCause]) -> Iterator[str]:
+def _answers(
+    told: Sequence[SharedCause], lots: Sequence[LotWithCauses]
+) -> Iterator[str]:
     parts = [f"{cause_words(one.cause)} {percent_span(one.share)}" for one in told]
     yield f"Of gears to come, with 95 % credible intervals: {'; '.join(parts)}."
+    if 1 < len(lots) <= _MOST_LOTS:
+        each = [
+            f"{one.lot} {_span(one.gears_with_effect)} of {one.gears}" for one in lots
+        ]
+        yield f"Gears with an effect, or something unknown, by lot: {'; '.join(each)}."
+
+
+def _span(gears: Interval) -> str:
+    return f"{gears.median:.0f} ({gears.lo:.0f} … {gears.hi:.0f})"
 
 
 def _causes(told: Sequence[SharedCause]) -> Section:
@@ -126,7 +136,7 @@ def _causes(told: Sequence[SharedCause]) -> Section:
         [
             capital(_short(one.cause)),
             str(one.gears_told),
-            f"{one.gears.median:.0f} ({one.gears.lo:.0f} … {one.gears.hi:.0f})",
+            _span(one.gears),
             percent_span(one.share),
             f"{one.log_evidence_nat:.1f}",
         ]
@@ -143,12 +153,14 @@ def _causes(told: Sequence[SharedCause]) -> Section:
 
 
 def _of_gears(columns: Mapping[str, np.ndarray]) -> Section:
-    numbers = ["rows", "probability", "P(no effect)", "alone"]
-    titles = ["gear", "rows", "may have", "probability", "P(no effect)", "by itself"]
+    numbers = ["rows", "probability", "P(no effect)"]
+    lots = ["lot"] if "lot" in columns else []
+    titles = ["gear", *lots, "rows", "may have", *numbers[1:], "by itself"]
     order = np.argsort(columns["probability_none"], kind="stable")
     rows = [
         [
             str(columns["gear"][row]),
+            *(str(columns[name][row]) for name in lots),
             str(columns["rows"][row]),
             " or ".join(map(_short, str(columns["causes"][row]).split(" / "))),
             percent(float(columns["probability"][row])),

@@ -25,12 +25,12 @@ class Frequencies(NamedTuple):
 
     Attributes:
         share: of each cause among gears to come, shape (chain, draw, k).
-        number: of these gears that have each cause, shape (chain, draw, k).
+        cause: of each gear, as its place, shape (chain, draw, g).
         chance: of each cause in each gear, given all gears, shape (g, k).
     """
 
     share: np.ndarray
-    number: np.ndarray
+    cause: np.ndarray
     chance: np.ndarray
 
 
@@ -54,7 +54,8 @@ def sample_frequencies(
     """
     gears, causes = log_likelihood.shape
     cause = _drawn(np.stack([log_likelihood + np.log(counts)] * chains), rng)
-    share, number = np.empty((2, chains, draws, causes))
+    share = np.empty((chains, draws, causes))
+    kept = np.empty((chains, draws, gears), np.int16)
     chance = np.zeros((gears, causes))
     each = np.arange(chains)[:, None]
     for sweep in range(-_FORGOTTEN, draws):
@@ -66,11 +67,11 @@ def sample_frequencies(
         drawn = rng.standard_gamma(counts + seen)
         now = drawn / drawn.sum(axis=1, keepdims=True)
         log_joint = np.log(np.maximum(now, _LEAST))[:, None] + log_likelihood
-        cause = _drawn(log_joint, rng)
+        before, cause = cause, _drawn(log_joint, rng)
         if sweep >= 0:
-            share[:, sweep], number[:, sweep] = now, seen
+            share[:, sweep], kept[:, sweep] = now, before
             chance += softmax(log_joint, axis=-1).mean(axis=0)
-    return Frequencies(share, number, chance / draws)
+    return Frequencies(share, kept, chance / draws)
 
 
 def _drawn(log_weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -9,11 +9,12 @@ from hdcal.data.bad_gears import left_out_words
 from hdcal.data.versions import versions
 from hdcal.diagnosis.naming import naming
 from hdcal.evidence.case_evidence import NONE
+from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.parameters import INTERVAL, credible_interval
 from hdcal.report.words import capital, label, percent
 from hdcal.report.write import Report
-from hdcal.shared_causes.answer import CausesAnswer, SharedCause
+from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause
 from hdcal.shared_causes.causes import TOLD, FleetCauses
 from hdcal.shared_causes.document import causes_document, headline
 
@@ -23,12 +24,14 @@ def cause_columns(found: FleetCauses) -> dict[str, np.ndarray]:
     names = np.array(found.causes)
     return {
         "gear": np.array(found.case.specimen_labels),
+        **({"lot": np.array(found.case.lots)} if found.case.lots else {}),
         "rows": np.bincount(found.case.records.specimen),
         "causes": np.array([" / ".join(own) for own in found.of_gears]),
         "probability": found.chance.max(axis=1),
         "probability_none": found.chance[:, found.causes.index(NONE)],
         "alone": names[found.alone.argmax(axis=1)],
         "probability_alone": found.alone.max(axis=1),
+        "status": np.full(len(found.chance), "failed" if found.reasons else "ok"),
     }
 
 
@@ -44,7 +47,9 @@ def causes_answer(found: FleetCauses) -> CausesAnswer:
         next_step=None if found.reasons else _next_step(found),
         gears=len(labels),
         rows=len(found.case.records.force),
+        left_out=left_out_of(found.case),
         causes=tuple(_shared_cause(found, int(place)) for place in order),
+        lots=tuple(_lots(found)),
         not_shown=tuple(n for n in found.library if n not in found.causes),
         interval=INTERVAL,
         notes=tuple(_notes(found)),
@@ -59,11 +64,19 @@ def _shared_cause(found: FleetCauses, place: int) -> SharedCause:
     return SharedCause(
         cause=name,
         gears_told=int(np.sum(found.chance[:, place] >= TOLD)),
-        gears=credible_interval(found.number[:, place]),
+        gears=credible_interval(np.sum(found.cause == place, axis=1)),
         share=credible_interval(found.share[:, place]),
         log_evidence_nat=float(found.log_evidence[:, place].sum()),
         name_tested=naming().may_be_named(name) if name in EFFECTS else None,
     )
+
+
+def _lots(found: FleetCauses) -> Iterator[LotWithCauses]:
+    lots, something = np.array(found.case.lots), found.cause != found.causes.index(NONE)
+    for lot in sorted({*found.case.lots}):
+        own = lots == lot
+        many = credible_interval(np.sum(something[:, own], axis=1))
+        yield LotWithCauses(lot, int(own.sum()), many)
 
 
 def _next_step(found: FleetCauses) -> str | None:
@@ -119,7 +132,7 @@ def causes_report(found: FleetCauses, command: str = "") -> Report[CausesAnswer]
         answer,
         "summary.json",
         figures,
-        tables=lambda: {"gears.csv": columns},
+        tables=lambda: {"gears.csv": with_left_out(columns, found.case)},
         charts=charts,
         theory=found.case.gear.theory,
     )

@@ -1,0 +1,44 @@
+"""Gears that are left out, in the answers and tables that the others are in."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.bad_gears import cause
+from hdcal.data.case import Case
+from hdcal.report.answer import Words
+
+
+@dataclass(frozen=True)
+class GearLeftOut:
+    """A gear that is in none of the numbers, and why."""
+
+    gear: Words
+    why: Words
+
+
+def left_out_of(case: Case) -> tuple[GearLeftOut, ...]:
+    """Return the gears that are left out of a case."""
+    return tuple(GearLeftOut(gear, cause(why)) for gear, why in case.left_out.items())
+
+
+def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
+    """Return the columns of gears.csv with gears that are left out below the others.
+
+    Args:
+        columns: of these, status among them.
+        case: of which some are left out.
+    """
+    left_out: Sequence[GearLeftOut] = left_out_of(case)
+    if not left_out:
+        return dict(columns)
+    empty = np.full(len(left_out), "", object)
+    own = {
+        "gear": np.array([one.gear for one in left_out], object),
+        "status": np.array([f"left out: {one.why}" for one in left_out], object),
+    }
+    return {
+        name: np.concatenate([column.astype(object), own.get(name, empty)])
+        for name, column in columns.items()
+    }
