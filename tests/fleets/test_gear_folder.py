@@ -9,7 +9,8 @@ import pytest
 from commands import Hdcal
 
 import hdcal as api
-from hdcal.data.gear_folder import gear_files
+from hdcal.data.gear_files import gear_files
+from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.usable import usable
@@ -212,3 +213,36 @@ def test_the_command_reads_such_folders(hdcal: Hdcal, tmp_path):
     assert [one["gear"] for one in answer["left_out"]] == ["G2"]
     # Walls that differ by a fifth are no scatter.
     assert answer["population"]["gear_sd_percent"]["median"] < 3.0
+
+
+def test_what_is_not_read_is_said(tmp_path):
+    folder = as_files(tmp_path / "line")
+    (folder / "G9.txt").write_text("deformation_mm;force_N\n")
+    (folder / "more").mkdir()
+    (note,) = (n for n in read_fleet(folder).case.notes if n.startswith("not read"))
+    assert "G9.txt, more" in note
+    first = folder / "G0.csv"
+    first.rename(folder / "G1.CSV")
+    assert any("'G1' is what several files" in one for one in told(read_fleet, folder))
+
+
+def test_what_some_files_state_is_not_read_and_that_is_said(tmp_path):
+    folder = as_files(tmp_path / "line")
+    one = pd.read_csv(folder / "G0.csv")
+    one.assign(time_s=range(len(one))).to_csv(folder / "G0.csv", index=False)
+    notes = read_fleet(folder).case.notes
+    assert f"time is not read: 1 of {GEARS} files state it" in notes
+
+
+def test_one_gear_of_a_folder_is_a_case_of_its_own(tmp_path):
+    folder = as_files(tmp_path / "line")
+    alone = read_case(folder, specimen="G1")
+    assert np.array_equal(
+        alone.records.force, read_case(folder / "G1.csv").records.force
+    )
+    assert any(
+        "none is called 'G99'" in one for one in told(read_case, folder, specimen="G99")
+    )
+    assert any(
+        "a file for each gear, not one case" in one for one in told(read_case, folder)
+    )

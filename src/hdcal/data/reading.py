@@ -82,6 +82,8 @@ def read_case(
     """
     columns, in_memory = asked_columns(data, columns)
     table, data = data, Path(NAME if in_memory else data)
+    if not in_memory and (alone := _own_file(data, specimen)) != data:
+        data, specimen = alone, None
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
     csv_path = data / DATA_NAME if folder else data
@@ -108,6 +110,13 @@ def read_case(
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
     return case_of(measured, found, told, _name(data, folder, sheet, specimen))
+
+
+def _own_file(data: Path, specimen: str | None) -> Path:
+    # Late: that builds on this.
+    from hdcal.data.gear_files import own_file
+
+    return own_file(data, specimen)
 
 
 def case_of(

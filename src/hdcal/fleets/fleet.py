@@ -276,7 +276,7 @@ def _gears(
         "off": off.mean(axis=0),
         "chances": {
             "stiffness": apart_by_chance,
-            "noise": noise_chance(problem, chosen),
+            "noise": noise_chance(problem),
             "zero": zero_chance(sums, chosen, stiffness, noise_sd),
         },
     }

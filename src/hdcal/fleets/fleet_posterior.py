@@ -190,6 +190,9 @@ def _check_population(found: FleetPosterior) -> None:
         KeyError, ValueError: they are not.
     """
     draws = found.draws
+    chains = found.tree["posterior"].sizes["chain"]
+    if not found.facts.checks or chains != found.facts.settings.chains:
+        raise ValueError("has other chains, or no checks")
     if draws.keys() != found.facts.units.keys():
         raise ValueError("has other sites than a population")
     check_draws(found.tree, dict.fromkeys(draws, ()))

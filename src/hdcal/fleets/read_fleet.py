@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case
-from hdcal.data.gear_folder import gear_files, read_gear_folder
+from hdcal.data.gear_files import gear_files
+from hdcal.data.gear_folder import read_gear_folder
 from hdcal.data.parquet import read_parquet
 from hdcal.data.parquet_table import is_parquet
 from hdcal.data.reading import read_case

@@ -109,7 +109,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
         headline=said,
-        next_step=_next_step(called),
+        next_step=_next_step(found, called),
         gears=len(found.off),
         rows=int(found.rows.sum()),
         left_out=left_out_of(found.case),
@@ -165,11 +165,20 @@ def _operators(found: Fleet) -> Iterator[OperatorAnswer]:
         yield OperatorAnswer(name, many, credible_interval(one))
 
 
-def _next_step(called: Sequence[str]) -> str | None:
-    if not called:
-        return None
-    alone = f"`--specimen {shlex.quote(called[0])}`"
-    return f"Look at {called[0]} by itself: diagnose the same data with {alone}."
+def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
+    parts = []
+    if called:
+        alone = f"`--specimen {shlex.quote(called[0])}`"
+        parts.append(
+            f"Look at {called[0]} by itself: diagnose the same data with {alone}"
+        )
+    misfit = found.misfit
+    if misfit.loop_N or misfit.bend_N or misfit.correlation:
+        parts.append(
+            "Ask which effects these gears have, and what they have in common: "
+            "`hdcal causes` with the same data"
+        )
+    return ". ".join(parts) + "." if parts else None
 
 
 def fleet_report(

@@ -51,6 +51,17 @@ FLEET = Kind(
         "for one gear calibrate it alone, with --specimen",
     ),
 )
+# Answers beside which no posterior lies, and what to name instead.
+_WITHOUT = {
+    "hdcal.compare/1": (
+        "a comparison leaves no posterior",
+        "Name the folders of the results that were compared",
+    ),
+    "hdcal.causes/1": (
+        "causes across gears leave no posterior",
+        "Name the folder of a fleet, or of one gear's calibration",
+    ),
+}
 # The attributes that hold the format, and the digest of everything else.
 _FORMAT, DIGEST = "hdcal_format", "sha256"
 
@@ -169,9 +180,8 @@ def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
     except FileNotFoundError as error:
         words, remedy = "there is no such file", "Name the folder of a calibration"
         beside = _kind_beside(Path(path))
-        if beside == "hdcal.compare/1":
-            words = "a comparison leaves no posterior"
-            remedy = "Name the folders of the results that were compared"
+        if beside in _WITHOUT:
+            words, remedy = _WITHOUT[beside]
         if beside == "hdcal.fleet/1":
             words = "this fleet was left by an older hdcal, without a posterior"
             remedy = FLEET.again

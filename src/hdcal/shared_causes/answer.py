@@ -23,7 +23,7 @@ class SharedCause:
 
     Attributes:
         cause: none, an effect by its name, several at once, or unknown.
-        gears_told: gears that have it with a probability of 0.9 or more.
+        gears_told: gears of which it alone is told, with a probability of 0.9 or more.
         gears: how many of these gears have it.
         share: of gears to come that have it.
         log_evidence_nat: of the readings of all gears, had each one it, over none.

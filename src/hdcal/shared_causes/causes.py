@@ -38,8 +38,12 @@ _COUNTS = 1.0
 _CHAINS, _DRAWS, _MOST_DRAWS = 4, 1500, 12_000
 # A frequency of less than this says nothing of how chains mix.
 _RARE = 0.01
+# No probability is less: it has a logarithm.
+_LEAST = 1e-300
 # Probability that what is told of a gear holds.
 TOLD = 0.9
+# Log odds that are substantial (Jeffreys, Theory of Probability, 1961).
+_CLEARLY = 0.5 * np.log(10.0)
 _OF_FLEETS = {"runs", "specimens"}
 _LOST = "start again"
 
@@ -75,14 +79,38 @@ class FleetCauses(Shown):
 
     @property
     def of_gears(self) -> list[tuple[str, ...]]:
-        """Return the fewest causes of each gear that hold 90 %, the likeliest first."""
+        """Return the fewest causes of each gear that hold 90 %, the likeliest first.
+
+        Something unknown is among them where one gear by itself, in the mean of those
+        alike, leaves it open: as it looks the same in all, many gears make an effect
+        that looks like it no surer.
+        """
         order = np.argsort(-self.chance, axis=1, kind="stable")
         sorted_chance = np.take_along_axis(self.chance, order, axis=1)
         many = 1 + np.sum(np.cumsum(sorted_chance, axis=1) < TOLD, axis=1)
-        return [
+        sets = [
             tuple(self.causes[k] for k in places[:few])
             for places, few in zip(order, many, strict=True)
         ]
+        beside = self.left_open
+        return [
+            (*own, UNKNOWN) if own[0] in beside and UNKNOWN not in own else own
+            for own in sets
+        ]
+
+    @property
+    def left_open(self) -> frozenset[str]:
+        """Return effects beside which gears by themselves leave something unknown."""
+        if UNKNOWN not in self.causes:
+            return frozenset()
+        likeliest = self.chance.argmax(axis=1)
+        unknown = np.log(self.alone[:, self.causes.index(UNKNOWN)])
+        return frozenset(
+            self.causes[k]
+            for k in np.unique(likeliest)
+            if self.causes[k] not in (NONE, UNKNOWN)
+            and np.mean((np.log(self.alone[:, k]) - unknown)[likeliest == k]) < _CLEARLY
+        )
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -186,7 +214,7 @@ def _shared(
         share=drawn.share.reshape(-1, len(names)),
         cause=drawn.cause.reshape(-1, len(weights)),
         chance=drawn.chance,
-        alone=alone / alone.sum(axis=1, keepdims=True),
+        alone=np.maximum(alone / alone.sum(axis=1, keepdims=True), _LEAST),
         log_evidence=gain,
         checks=mixing_checks(mixing(told), _CHAINS),
         library=tuple(library),

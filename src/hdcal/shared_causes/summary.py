@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.data.bad_gears import left_out_words
 from hdcal.data.versions import versions
 from hdcal.diagnosis.naming import naming
-from hdcal.evidence.case_evidence import NONE
+from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.physics.registry import EFFECTS
 from hdcal.report.parameters import INTERVAL, credible_interval
@@ -63,7 +63,7 @@ def _shared_cause(found: FleetCauses, place: int) -> SharedCause:
     name = found.causes[place]
     return SharedCause(
         cause=name,
-        gears_told=int(np.sum(found.chance[:, place] >= TOLD)),
+        gears_told=sum(own == (name,) for own in found.of_gears),
         gears=credible_interval(np.sum(found.cause == place, axis=1)),
         share=credible_interval(found.share[:, place]),
         log_evidence_nat=float(found.log_evidence[:, place].sum()),
@@ -95,13 +95,18 @@ def _notes(found: FleetCauses) -> Iterator[str]:
     if left_out:
         yield left_out_words(left_out, many + len(left_out))
     yield from found.case.notes
-    told = {own[0] for own in found.of_gears if len(own) == 1}
+    told = {own[0] for own in found.of_gears if len({*own} - {UNKNOWN}) == 1}
     counted = naming().called
     for name in sorted(told & counted.keys()):
         yield (
             f"{capital(label(name))} describes these gears best. In blind checks "
             f"{percent(counted[name].rate)} of what it described best was something "
             "else; that many gears look alike makes the name no surer."
+        )
+    for name in sorted(found.left_open):
+        yield (
+            f"Beside {label(name)} something unknown is left open: one gear by "
+            "itself does not tell them apart, and it would look the same in all."
         )
     hidden = [label(n) for n in found.library if n not in found.causes]
     if hidden:

@@ -52,7 +52,9 @@ def _of_fleet(console: Console, run: str, out, force, deformation, **asked):
             how: dict[str, Any] = {"confidence": asked["confidence"]}
             how |= {"content": asked["content"]} if is_given("content") else {}
             limit = asked["limit_force"]
-            found = wrong.attempt(posterior.next_force, deformation, limit, **how)
+            # What is no number was told while the options were read.
+            if deformation is not None:
+                found = wrong.attempt(posterior.next_force, deformation, limit, **how)
     assert posterior is not None and found is not None
     return console.report(force_report(found, posterior.facts, console.command))
 

@@ -1,0 +1,82 @@
+"""Which files of a folder hold a gear each, and whose they are."""
+
+import os
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from hdcal.data.reading import DATA_NAME, GEAR_NAME
+from hdcal.errors import Finding, InputError, quoted
+
+_FIRST_FEW = 3
+
+
+def gear_files(data: Any) -> list[Path]:
+    """Return the files of a folder that has one for each gear; none of other data."""
+    if not isinstance(data, str | Path) or not os.path.isdir(data):
+        return []
+    inside = sorted(Path(data).iterdir())
+    if any(one.name == DATA_NAME for one in inside):
+        return []
+    cases = [one / DATA_NAME for one in inside if (one / DATA_NAME).is_file()]
+    files = [one for one in inside if one.suffix.lower() == ".csv" and one.is_file()]
+    return cases + [one for one in files if not one.name.startswith(".")]
+
+
+def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
+    """Return what each gear is called, and whether each has a folder of its own.
+
+    Raises:
+        InputError: some have one and some not, or two are called alike.
+    """
+    cases = [file for file in files if file.parent != folder]
+    if cases and len(cases) < len(files):
+        words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
+        remedy = f"Keep one of both; {files[-1].name} is such a file"
+        raise InputError([Finding(str(folder), words, remedy)])
+    labels = [file.parent.name if cases else file.stem for file in files]
+    labels = [label.strip() for label in labels]
+    twice = [label for label, many in Counter(labels).items() if many > 1]
+    words, remedy = "is what several files are called after", "Rename all but one"
+    if twice:
+        alike = [
+            Finding(str(folder), f"{quoted(one)} {words}", remedy) for one in twice
+        ]
+        raise InputError(alike)
+    return labels, bool(cases)
+
+
+def own_file(data: Path, label: str | None) -> Path:
+    """Return where one gear lies, of a folder that has a file for each; else the data.
+
+    Args:
+        data: a file or a folder.
+        label: of the gear.
+
+    Raises:
+        InputError: it is such a folder, and no gear of it is called so.
+    """
+    files = gear_files(data)
+    if not files:
+        return data
+    labels, cases = gear_labels(files, data)
+    if label in labels:
+        file = files[labels.index(label)]
+        return file.parent if cases else file
+    words = "holds a file for each gear, not one case"
+    if label is not None:
+        words += f"; none is called {quoted(label)}"
+    remedy = "Read all of them as a fleet, or name one as `specimen`"
+    raise InputError([Finding(str(data), words, remedy)])
+
+
+def not_read(files: Sequence[Path], folder: Path) -> Iterator[str]:
+    """Yield a note on what else the folder holds."""
+    known = {GEAR_NAME, *(file.relative_to(folder).parts[0] for file in files)}
+    inside = sorted(one.name for one in folder.iterdir())
+    others = [one for one in inside if one not in known and not one.startswith(".")]
+    if others:
+        more = len(others) - _FIRST_FEW
+        named = ", ".join(others[:_FIRST_FEW]) + f" and {more} more" * (more > 0)
+        yield f"not read, as it is no .csv and no folder with a {DATA_NAME}: {named}"

@@ -1,0 +1,67 @@
+"""A gear may be off in its noise or in its zero, and ordinary ones seldom are."""
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+import hdcal
+from hdcal.fleets.off_in import FALSE_CALLS, called_off, chance_of
+from hdcal.fleets.summary import fleet_answer, gear_columns
+
+X, GEARS, RUNS = np.linspace(0.05, 0.5, 8), 14, 2
+
+
+def measured(seed: int = 0, noise: float = 1.0, zero: float = 0.0):
+    """Return gears of which the first has other noise and another zero."""
+    rng = np.random.default_rng(seed)
+    gear, run, row = (i.ravel() for i in np.indices((GEARS, RUNS, len(X))))
+    stiffness = 200.0 * (1.0 + 0.01 * rng.standard_normal(GEARS))
+    zeros = 0.8 * rng.standard_normal((GEARS, RUNS))
+    zeros[0] += zero
+    sd = 0.4 * np.where(gear == 0, noise, 1.0)
+    force = stiffness[gear] * X[row] + zeros[gear, run]
+    names = np.array([f"G{one}" for one in range(GEARS)])
+    table = {"specimen": names[gear], "run": run, "deformation_mm": X[row]}
+    table["force_N"] = force + sd * rng.standard_normal(len(force))
+    return hdcal.fleet(hdcal.read_case(table, theory="spring"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "change"),
+    [
+        ("noise", "times as much as most do", {"noise": 4.0}),
+        ("zero", "has its zero at", {"zero": 8.0}),
+    ],
+)
+def test_what_a_gear_is_off_in_is_told(kind: str, words: str, change: dict):
+    found = measured(**change)
+    told = {name: own.nonzero()[0].tolist() for name, own in found.off_in.items()}
+    assert told == {"stiffness": [], "noise": [], "zero": [], kind: [0]}
+    answer, columns = fleet_answer(found), gear_columns(found)
+    assert answer.called_off == ("G0",) and answer.off_in[kind] == ("G0",)
+    assert "G0 " in answer.headline and words in answer.headline
+    assert columns["off_in"][0] == kind and not any(columns["off_in"][1:])
+
+
+@pytest.mark.parametrize("kind", ["noise", "zero"])
+def test_ordinary_gears_are_called_in_few_fleets(kind: str):
+    """Of the whole 5 % a tenth is for each of these two."""
+    rng, fleets, called = np.random.default_rng(3), 4000, 0
+    for _ in range(fleets):
+        apart = rng.standard_normal(12)
+        apart -= np.median(apart)
+        extremes = np.abs(apart) if kind == "zero" else apart
+        chance = chance_of(apart, extremes, np.zeros(12))
+        called += called_off({kind: chance})[kind].any()
+    assert binomtest(int(called), fleets, 0.1 * FALSE_CALLS).pvalue > 0.01
+
+
+def test_gears_that_are_off_do_not_hide_each_other():
+    apart = np.random.default_rng(4).standard_normal(30)
+    apart[:3] = 12.0, 13.0, -14.0
+    chance = chance_of(apart, np.abs(apart), np.zeros(30))
+    assert called_off({"zero": chance})["zero"].nonzero()[0].tolist() == [0, 1, 2]
+    # Less scatter than their own errors make is none.
+    assert not called_off({"zero": chance_of(apart, np.abs(apart), np.full(30, 50.0))})[
+        "zero"
+    ].any()
