@@ -29,7 +29,7 @@ def measured(seed: int = 0, noise: float = 1.0, zero: float = 0.0):
 @pytest.mark.parametrize(
     ("kind", "words", "change"),
     [
-        ("noise", "times as much as most do", {"noise": 4.0}),
+        ("noise", "times the noise of most", {"noise": 4.0}),
         ("zero", "has its zero at", {"zero": 8.0}),
     ],
 )

@@ -46,46 +46,44 @@ def headline(
     total = len(columns["gear"])
     middle, span = estimate(population.gear_sd_percent)
     centre = estimate(population.stiffness_N_per_mm)[0]
-    alike = total - len(called)
-    if alike == total:
+    if not called:
         told = (
             f"None of {total} gears is called off: they scatter by {middle} % (sd, "
             f"{span} %) about {centre} N/mm"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off([str(far)], columns, population)).replace(
-            "; prob", "; off with prob"
-        )
+        odd = next(_off([str(far)], columns)).replace("; prob", "; off with prob")
         return told + f"; oddest: {odd}." if total < FEW else f"{told}."
-    told = "; ".join(_off(called, columns, population))
+    told = "; ".join(_off(called, columns))
+    alike = sum("stiffness" not in kinds for kinds in columns["off_in"])
     return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
-def _off(
-    called: Sequence[str],
-    columns: Mapping[str, np.ndarray],
-    population: PopulationAnswer,
-) -> Iterator[str]:
+def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[str]:
     """Yield what is said of the gears that are called off, the surest first."""
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
         one = {column: values[place[name]] for column, values in columns.items()}
-        if kinds := [*_apart(one, population)]:
-            yield f"{name} {' and '.join(kinds)}"
+        most = float(np.median(columns["noise_sd_N"]))
+        yield f"{name} {' and '.join(_apart(one, most))}"
     rest = len(called) - _MOST_NAMED
     if rest > 0:
         yield f"{rest} more are off"
 
 
-def _apart(one: Mapping[str, Any], population: PopulationAnswer) -> Iterator[str]:
-    """Yield how far a gear is off in what it is off in; in stiffness where in none."""
+def _apart(one: Mapping[str, Any], noise_sd: float) -> Iterator[str]:
+    """Yield how far a gear is off in what it is off in; in stiffness where in none.
+
+    Args:
+        one: its row of gears.csv.
+        noise_sd: that most gears have [N].
+    """
     kinds = str(one["off_in"]).split(", ")
     if "stiffness" in kinds or kinds == [""]:
         yield _softer(one)
     if "noise" in kinds:
         noise = float(one["noise_sd_N"])
-        times = noise / population.reading_sd_N.median
-        yield f"scatters {times:.2g} times as much as most do ({noise:.2g} N)"
+        yield f"has {noise / noise_sd:.2g} times the noise of most ({noise:.2g} N)"
     if "zero" in kinds:
         yield f"has its zero at {one['zero_N']:.2g} N"
 

@@ -173,7 +173,8 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
             f"Look at {called[0]} by itself: diagnose the same data with {alone}"
         )
     misfit = found.misfit
-    if misfit.loop_N or misfit.bend_N or misfit.correlation:
+    beside = misfit.loop_N or misfit.bend_N or misfit.correlation
+    if beside or found.off_in["noise"].any():
         parts.append(
             "Ask which effects these gears have, and what they have in common: "
             "`hdcal causes` with the same data"

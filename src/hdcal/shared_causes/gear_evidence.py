@@ -18,8 +18,9 @@ from hdcal.evidence.row_features import take_rows
 
 # No draws say less of whether an effect carries the gap.
 _LEAST_CHANCE = 1e-3
-# Fewer rows tell a bend from a loop by luck only.
-FEWEST_ROWS = 6
+# Fewer rows than a line with a zero for each mounting leaves tell noise, or causes, by
+# luck only.
+_FEWEST_LEFT = 8
 
 
 class Weight(NamedTuple):
@@ -49,10 +50,13 @@ def saying_little(case: Case) -> dict[str, Finding]:
     """Return gears whose readings tell no cause, each with why."""
     bad = {}
     for label, gear in zip(case.specimen_labels, gears_of(case), strict=True):
-        wrong, rows = Findings(), len(gear.records.force)
-        if rows < FEWEST_ROWS:
-            words = f"has {rows} row{'s' * (rows > 1)}, too few for a cause"
-            remedy = f"Read it {FEWEST_ROWS} times or more, or leave it out"
+        wrong, rows, runs = Findings(), len(gear.records.force), len(gear.run_labels)
+        needed = _FEWEST_LEFT + 1 + runs
+        if rows < needed:
+            words = (
+                f"has {rows} rows in {runs} run{'s' * (runs > 1)}, too few for a cause"
+            )
+            remedy = f"Read it {needed} times or more, or leave it out"
             wrong.append(Finding(gear.name, words, remedy))
         else:
             wrong.attempt(require_scatter, gear)
