@@ -132,8 +132,8 @@ def test_what_is_told_of_few_gears_names_them():
     two = "relaxation", "coulomb_friction"
     kinds = [("none",), two, (*two, "none"), ("none",), ("unknown",)]
     assert headline("ABCDE", kinds) == (
-        "Of 5 gears B has relaxation or what looks like coulomb friction, or both, "
-        "which these readings do not tell apart; E has something outside the library; "
+        "Of 5 gears B has relaxation or what looks like coulomb friction, or both: "
+        "these readings do not tell them apart; E has something outside the library; "
         "of 1 it is not clear whether it has an effect; 2 show none."
     )
 

@@ -77,8 +77,10 @@ def _of_some(kind: tuple[str, ...], names: Sequence[str]) -> str:
     causes = " or ".join(map(cause_words, kind[:_MOST_NAMED]))
     if len(kind) > _MOST_NAMED:
         causes += f" or {len(kind) - _MOST_NAMED} other causes"
-    alike = ", or both, which these readings do not tell apart" * (len(kind) > 1)
-    return f"{who} {has} {causes}{alike}"
+    if len(kind) == 1:
+        return f"{who} {has} {causes}"
+    together = "both" if len(kind) == 2 else "several"
+    return f"{who} {has} {causes}, or {together}: these readings do not tell them apart"
 
 
 def causes_document(
