@@ -107,3 +107,10 @@ def test_the_commands_agree_on_measured_gears(hdcal: Hdcal, tmp_path: Path):
     answer = json.loads(done.stdout)
     assert {name: answer[name] for name in told["next_force"]} == told["next_force"]
     assert answer["seed"] == 5 and answer["data_sha256"] == told["data_sha256"]
+
+
+def test_what_is_no_deformation_is_said_once(here: Hdcal, tmp_path: Path):
+    left(tmp_path / "fleet")
+    done = here("margin", "fleet", "--deformation", "abc")
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert "--deformation" in done.stderr and "abc" in done.stderr

@@ -268,3 +268,26 @@ def test_the_command_says_which_are_left_out(hdcal: Hdcal, spoiled, tmp_path):
     assert out.drop(columns="status").isna().all(axis=None)
     assert "one deformation only" in out["status"]["G3"]
     assert "'abc' is not a number" in out["status"]["G1"]
+
+
+def test_how_far_gears_were_moved_is_that_of_those_that_are_left(saved):
+    frame = measured().infer_objects()
+    still = frame["gear"] == "G3"
+    frame.loc[still, "deformation_mm"] = 5.0
+    found, _ = usable(read_fleet(frame, skip_bad=True), skip_bad=True)
+    assert set(found.case.left_out) == {"G3"} and found.largest == 0.5
+
+
+def test_lots_of_parquet_are_those_of_gears_that_are_left(saved, monkeypatch):
+    folder, frame = saved
+    frame["lot"] = np.where(frame["gear"].isin(["G1", "G2"]), "A", "B")
+    # A bad gear of two lots beyond the first rows.
+    frame.loc[row(6, 5), "lot"] = "A"
+    half = row(4, 0)
+    frame[:half].to_parquet(folder / "a.parquet", index=False)
+    frame[half:].to_parquet(folder / "b.parquet", index=False)
+    monkeypatch.setattr(parquet, "_SHOWN", 40)
+    found = read_fleet(folder, skip_bad=True).case
+    told = dict(zip(found.specimen_labels, found.lots, strict=True))
+    assert told == {g: "A" if g in ("G1", "G2") else "B" for g in found.specimen_labels}
+    assert not any("lots are not used" in note for note in found.notes)
