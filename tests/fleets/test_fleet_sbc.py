@@ -91,7 +91,7 @@ def assert_calibrated(ranks: dict[str, np.ndarray]) -> None:
 
 @pytest.mark.thorough
 def test_a_slice_of_fleets():
-    assert_calibrated(ranks_of(10, 40))
+    assert_calibrated(ranks_of(10, 20))
 
 
 @pytest.mark.slow

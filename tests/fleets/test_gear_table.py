@@ -153,6 +153,7 @@ def test_without_sizes_in_a_gear_file_a_table_says_nothing():
     assert "no gear file has sizes" in wrong(table(), gear=None)
 
 
+@pytest.mark.thorough
 def test_the_command_takes_a_table(hdcal: Hdcal, tmp_path):
     frame, _ = measured(off=4)
     frame.to_csv(tmp_path / "line.csv", index=False)

@@ -223,6 +223,7 @@ def test_without_gears_or_numbers_it_is_refused(frame, tmp_path):
     assert "deformation" in wrong(tmp_path / "line.parquet")
 
 
+@pytest.mark.thorough
 def test_the_command_reads_it(frame, hdcal: Hdcal, tmp_path):
     frame.to_parquet(tmp_path / "line.parquet", index=False)
     done = hdcal("fleet", "line.parquet", "--out", tmp_path / "out", cwd=tmp_path)

@@ -109,6 +109,7 @@ def test_evidence_is_that_of_the_hypotheses():
     assert np.exp(told["coulomb_friction"].log_prior) == pytest.approx(alone + half)
 
 
+@pytest.mark.thorough
 def test_two_processes_say_the_same(with_loop):
     case = hdcal.read_case(fleet(0.8))
     again = hdcal.causes(case, library=LIBRARY, jobs=2)
