@@ -61,6 +61,10 @@ _WITHOUT = {
         "causes across gears leave no posterior",
         "Name the folder of a fleet, or of one gear's calibration",
     ),
+    "hdcal.fleet/1": (
+        "this fleet was left by an older hdcal, without a posterior",
+        FLEET.again,
+    ),
 }
 # The attributes that hold the format, and the digest of everything else.
 _FORMAT, DIGEST = "hdcal_format", "sha256"
@@ -178,13 +182,8 @@ def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             loaded = tree.load()
     except FileNotFoundError as error:
-        words, remedy = "there is no such file", "Name the folder of a calibration"
-        beside = _kind_beside(Path(path))
-        if beside in _WITHOUT:
-            words, remedy = _WITHOUT[beside]
-        if beside == "hdcal.fleet/1":
-            words = "this fleet was left by an older hdcal, without a posterior"
-            remedy = FLEET.again
+        none = "there is no such file", "Name the folder of a calibration"
+        words, remedy = _WITHOUT.get(_kind_beside(Path(path)), none)
         raise InputError([Finding(str(path), words, remedy)]) from error
     except InputError:
         raise
@@ -207,8 +206,8 @@ def kind_of(path: Path) -> Kind | None:
 def _kind(written: str) -> Kind | None:
     """Return of what a format is, whatever its version."""
     name = written.rpartition("/")[0]
-    kinds = (CALIBRATION, FLEET)
-    return next((k for k in kinds if k.format.rpartition("/")[0] == name), None)
+    same = (k for k in (CALIBRATION, FLEET) if k.format.rpartition("/")[0] == name)
+    return next(same, None)
 
 
 def _kind_beside(path: Path) -> str:
