@@ -246,3 +246,10 @@ def test_one_gear_of_a_folder_is_a_case_of_its_own(tmp_path):
     assert any(
         "a file for each gear, not one case" in one for one in told(read_case, folder)
     )
+    # A file called as one of the gears that it names itself.
+    one = read_case(folder / "G1.csv").name
+    assert alone.name == one == "G1"
+    measured().to_csv(folder / "G1.csv", index=False)
+    named = read_case(folder, specimen="G1")
+    assert named.specimen_labels == ("G1",)
+    assert np.array_equal(named.records.force, alone.records.force)

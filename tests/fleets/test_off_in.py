@@ -5,8 +5,9 @@ import pytest
 from scipy.stats import binomtest
 
 import hdcal
-from hdcal.fleets.off_in import FALSE_CALLS, called_off, chance_of
+from hdcal.fleets.off_in import FALSE_CALLS, called_off, chance_of, zero_chance
 from hdcal.fleets.summary import fleet_answer, gear_columns
+from hdcal.inference.gear_sums import MountingSums
 
 X, GEARS, RUNS = np.linspace(0.05, 0.5, 8), 14, 2
 
@@ -54,6 +55,32 @@ def test_ordinary_gears_are_called_in_few_fleets(kind: str):
         chance = chance_of(apart, extremes, np.zeros(12))
         called += called_off({kind: chance})[kind].any()
     assert binomtest(int(called), fleets, 0.1 * FALSE_CALLS).pvalue > 0.01
+
+
+def test_gears_of_which_less_is_known_are_called_no_more():
+    """One of few readings, among gears of many."""
+    rng, fleets, called = np.random.default_rng(6), 4000, 0
+    error = np.array([0.5, *[0.01] * 11])
+    for _ in range(fleets):
+        noise = rng.normal(0.0, np.sqrt(0.1**2 + error))
+        called += called_off({"noise": chance_of(noise, noise, error)})["noise"][0]
+    assert called / fleets < 0.1 * FALSE_CALLS
+
+
+def test_a_gear_that_was_mounted_once_is_called_no_more():
+    """Its zero lies as far from all others as one mounting's does."""
+    rng, fleets, called = np.random.default_rng(7), 4000, 0
+    gear = np.repeat(np.arange(12), [1, *[9] * 11])
+    none = np.zeros(len(gear))
+    draws = {"zero": np.zeros(2)}
+    for _ in range(fleets):
+        zeros = rng.standard_normal(len(gear))
+        sums = MountingSums(
+            gear, 6.0 + none, none, zeros, none, none, none, none.astype(int)
+        )
+        chance = zero_chance(sums, draws, np.ones((2, 12)), np.zeros(12))
+        called += called_off({"zero": chance})["zero"][0]
+    assert called / fleets < 0.1 * FALSE_CALLS
 
 
 def test_gears_that_are_off_do_not_hide_each_other():

@@ -82,8 +82,9 @@ def read_case(
     """
     columns, in_memory = asked_columns(data, columns)
     table, data = data, Path(NAME if in_memory else data)
-    if not in_memory and (alone := _own_file(data, specimen)) != data:
-        data, specimen = alone, None
+    # Of a folder with a file for each gear, the one that is called after it.
+    own = data if in_memory else _own_file(data, specimen)
+    alone, data = own != data, own
     # As `is_dir`, but a path that no system takes is no folder.
     folder = not in_memory and os.path.isdir(data)
     csv_path = data / DATA_NAME if folder else data
@@ -106,10 +107,12 @@ def read_case(
             skip_bad=skip_bad,
         )
         wrong += of_gear
-        if measured is not None and specimen is not None:
+        whole = alone and measured is not None and len(measured.specimen.names) == 1
+        if measured is not None and specimen is not None and not whole:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
-    return case_of(measured, found, told, _name(data, folder, sheet, specimen))
+    label = None if alone else specimen
+    return case_of(measured, found, told, _name(data, folder, sheet, label))
 
 
 def _own_file(data: Path, specimen: str | None) -> Path:

@@ -1,6 +1,6 @@
 """Gears that are left out, in the answers and tables that the others are in."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +30,7 @@ def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
         columns: of these, status among them.
         case: of which some are left out.
     """
-    left_out: Sequence[GearLeftOut] = left_out_of(case)
+    left_out = left_out_of(case)
     if not left_out:
         return dict(columns)
     empty = np.full(len(left_out), "", object)

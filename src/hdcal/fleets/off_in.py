@@ -81,9 +81,10 @@ def zero_chance(
 
     by = np.mean(np.asarray(group_offsets(draws, "operator")), axis=1)
     zero = mean(y - np.median(stiffness, axis=0)[gear] * x - by[sums.operator])
-    of_line = (np.std(stiffness, axis=0) * mean(x)) ** 2
-    of_line += mean(noise_sd[gear] ** 2 / rows) / many
-    apart = zero - np.median(zero)
+    of_line = many * (np.std(stiffness, axis=0) * mean(x)) ** 2
+    of_line += mean(noise_sd[gear] ** 2 / rows)
+    # As far as one mounting is: the mean of many lies nearer to all others.
+    apart = np.sqrt(many) * (zero - np.median(zero))
     return chance_of(apart, np.abs(apart), of_line)
 
 
@@ -98,20 +99,25 @@ def chance_of(
     Args:
         values: of each gear, nearly normal, shape (g,).
         extremes: how far out it is, likewise.
-        variances: of its own error, below which none scatters.
+        variances: of its own error, which is in what scatters; likewise.
 
     Source:
         Rosner, Technometrics 25 (1983), from the inside outwards.
     """
     order = np.argsort(extremes, kind="stable")
     own = values[order] - np.median(values)
-    total, squares = (np.cumsum(v)[_FEWEST - 1 : -1] for v in (own, own**2))
-    many, order, own = np.arange(_FEWEST, len(own)), order[_FEWEST:], own[_FEWEST:]
+    errors = variances[order]
+    total, squares, error = (
+        np.cumsum(v)[_FEWEST - 1 : -1] for v in (own, own**2, errors)
+    )
+    many = np.arange(_FEWEST, len(own))
+    order, own, errors = order[_FEWEST:], own[_FEWEST:], errors[_FEWEST:]
     scatter = (squares - total**2 / many) / (many - 1.0)
-    variance = np.maximum(scatter, variances[order])
+    # What those inside scatter by beside their own errors.
+    spread = np.maximum(scatter - error / many, 0.0)
 
     def chance(inside: np.ndarray) -> np.ndarray:
-        sd = np.sqrt(variance[inside] * (1.0 + 1.0 / many[inside]))
+        sd = np.sqrt(errors + (spread + scatter / many)[inside])
         far = np.abs(own - (total / many)[inside]) / sd
         return 2.0 * t.sf(far, many[inside] - 1.0)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +78,7 @@ class FleetCauses(Shown):
     library: tuple[str, ...]
     seed: int
 
-    @property
+    @cached_property
     def of_gears(self) -> list[tuple[str, ...]]:
         """Return the fewest causes of each gear that hold 90 %, the likeliest first.
 
@@ -192,11 +193,14 @@ def gears_alone(
         )
         raise InputError([Finding(case.name, words, "Ask it of some of the gears")])
     check_effect_priors(case, {**EFFECTS, **library})
-    bad = saying_little(case)
+    gears = gears_of(case, seed)
+    bad = saying_little(gears)
     if bad and not skip_bad:
-        raise InputError([*bad.values(), offer(bad, len(case.specimen_labels))])
-    case = usable(readings.without(bad), skip_bad=skip_bad)[0].case
-    return case, gears_of(case, seed)
+        raise InputError([*bad.values(), offer(bad, len(gears))])
+    if bad:
+        case = usable(readings.without(bad))[0].case
+        gears = gears_of(case, seed)
+    return case, gears
 
 
 def _shared(

@@ -1,6 +1,6 @@
 """What the readings of one gear alone say of each cause."""
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,10 +46,10 @@ def gears_of(case: Case, seed: int = 0) -> list[Case]:
     return [_one_gear(case, one, np.random.default_rng([seed, one])) for one in gears]
 
 
-def saying_little(case: Case) -> dict[str, Finding]:
-    """Return gears whose readings tell no cause, each with why."""
+def saying_little(gears: Sequence[Case]) -> dict[str, Finding]:
+    """Return those of the gears whose readings tell no cause, each with why."""
     bad = {}
-    for label, gear in zip(case.specimen_labels, gears_of(case), strict=True):
+    for gear in gears:
         wrong, rows, runs = Findings(), len(gear.records.force), len(gear.run_labels)
         needed = _FEWEST_LEFT + 1 + runs
         if rows < needed:
@@ -60,7 +60,7 @@ def saying_little(case: Case) -> dict[str, Finding]:
             wrong.append(Finding(gear.name, words, remedy))
         else:
             wrong.attempt(require_scatter, gear)
-        bad |= {label: wrong[0]} if wrong else {}
+        bad |= {gear.specimen_labels[0]: wrong[0]} if wrong else {}
     return bad
 
 
