@@ -116,7 +116,7 @@ def test_it_shows_itself(found):
     axes = fleet.plot(Figure().add_subplot())
     assert axes.get_ylabel() == "stiffness as read [N/mm]"
     chart = fleet_report(fleet).charts()["gears"][0]
-    odd = next(one for one in chart.series if "called off" in one.label)
+    odd = next(one for one in chart.series if "off in stiffness" in one.label)
     assert list(odd.y) == [np.median(fleet.stiffness[:, 6])]
 
 

@@ -22,7 +22,7 @@ def fleet_chart(found: Fleet) -> Chart:
     place, off = np.arange(1.0, len(order) + 1.0), found.off_in["stiffness"][order]
     curves = interval_boxes(place, low[order], high[order])
     odd = [found.case.specimen_labels[gear] for gear in order[off]]
-    called = "called off" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)
+    called = "off in stiffness" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)
     kinds = (("gears", ~off, COLOURS[0]), (called, off, COLOURS[1]))
     points = [
         Series(f"{words} [N/mm]", place[rows], middle[order][rows], hue, points=True)

@@ -66,9 +66,9 @@ def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[s
         one = {column: values[place[name]] for column, values in columns.items()}
         most = float(np.median(columns["noise_sd_N"]))
         yield f"{name} {' and '.join(_apart(one, most))}"
-    rest = len(called) - _MOST_NAMED
-    if rest > 0:
-        yield f"{rest} more are off"
+    if rest := called[_MOST_NAMED:]:
+        kinds = {str(columns["off_in"][place[name]]) for name in rest}
+        yield f"{len(rest)} more are off, in {', '.join(sorted(kinds))}"
 
 
 def _apart(one: Mapping[str, Any], noise_sd: float) -> Iterator[str]:
@@ -194,8 +194,8 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     more *= answer.gears > _AT_ONCE
     called = (
         "Apart: from the centre, of its lot where lots are told, at one size; in sds: "
-        "counted in the scatter of ordinary gears. Called off are those so far out, in "
-        "stiffness, noise or zero, that in the mean at most "
+        "counted in the scatter of ordinary gears; P(off): in stiffness. Called off "
+        "are those so far out, in stiffness, noise or zero, that in the mean at most "
         f"{percent(answer.false_calls)} of the gears called are ordinary ones."
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
