@@ -78,3 +78,11 @@ def few_executables() -> Iterator[None]:
         if mappings_are_scarce():
             jax.clear_caches()
             gc.collect()
+
+
+@pytest.fixture(autouse=True)
+def own_traces(request: pytest.FixtureRequest) -> None:
+    """Keep no trace of code that a test has changed, and read none beside it."""
+    if "monkeypatch" in request.fixturenames and "hdcal.programs" in sys.modules:
+        patch = request.getfixturevalue("monkeypatch")
+        patch.setattr("hdcal.programs._folder", lambda _: None)

@@ -26,9 +26,9 @@ from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
 from hdcal.inference.gauges import with_gains
-from hdcal.inference.model import model
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
+from hdcal.inference.sampled_problem import model
 from hdcal.inference.serial_correlation import CORRELATION
 
 GAUGES = {"force_gain": 0.02, "deformation_gain": -0.013, "temperature_offset": 7.0}

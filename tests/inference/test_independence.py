@@ -16,7 +16,6 @@ from hdcal.fleets.readings import fleet_readings
 from hdcal.inference import independence, laplace
 from hdcal.inference.diagnostics import mixing
 from hdcal.inference.independence import sample_independently
-from hdcal.inference.model import model
 from hdcal.inference.sample import sample
 from hdcal.inference.sampled_problem import Sampled
 
@@ -26,11 +25,20 @@ class Skew(Sampled):
 
     priors: dict[str, Prior]
 
+    def declare(self) -> None:
+        """Declare it."""
+        size = numpyro.sample("size", dist.Gamma(5.0))
+        numpyro.sample("place", dist.Normal(2.0 * size, 1.0))
+
 
 class Tails(Sampled):
     """A site whose tails are those of Cauchy's law."""
 
     priors: dict[str, Prior]
+
+    def declare(self) -> None:
+        """Declare it."""
+        numpyro.sample("place", dist.Cauchy(0.0, 1.0))
 
 
 class Funnel(Sampled):
@@ -38,39 +46,26 @@ class Funnel(Sampled):
 
     priors: dict[str, Prior]
 
+    def declare(self) -> None:
+        """Declare it."""
+        scale = numpyro.sample("scale", dist.HalfNormal(1.0))
+        for place in range(8):
+            numpyro.sample(f"place_{place}", dist.Normal(0.0, scale))
+
 
 class Hills(Sampled):
     """Two modes of one weight, far apart."""
 
     priors: dict[str, Prior]
 
-
-@model.register
-def _(problem: Skew) -> None:
-    size = numpyro.sample("size", dist.Gamma(5.0))
-    numpyro.sample("place", dist.Normal(2.0 * size, 1.0))
-
-
-@model.register
-def _(problem: Tails) -> None:
-    numpyro.sample("place", dist.Cauchy(0.0, 1.0))
-
-
-@model.register
-def _(problem: Funnel) -> None:
-    scale = numpyro.sample("scale", dist.HalfNormal(1.0))
-    for place in range(8):
-        numpyro.sample(f"place_{place}", dist.Normal(0.0, scale))
-
-
-@model.register
-def _(problem: Hills) -> None:
-    mixture = dist.MixtureSameFamily(
-        dist.Categorical(np.array([0.5, 0.5])),
-        dist.Normal(np.array([-20.0, 20.0]), 1.0),
-    )
-    for place in range(3):
-        numpyro.sample(f"place_{place}", mixture)
+    def declare(self) -> None:
+        """Declare it."""
+        mixture = dist.MixtureSameFamily(
+            dist.Categorical(np.array([0.5, 0.5])),
+            dist.Normal(np.array([-20.0, 20.0]), 1.0),
+        )
+        for place in range(3):
+            numpyro.sample(f"place_{place}", mixture)
 
 
 @pytest.fixture(autouse=True)

@@ -23,8 +23,8 @@ from hdcal.inference import values as of_draw
 from hdcal.inference.likelihood import log_probability
 from hdcal.inference.member_counts import check_member_counts, integrated_kinds
 from hdcal.inference.member_offsets import Grouped, Linear, contrasts
-from hdcal.inference.model import model
 from hdcal.inference.problem import build_problem
+from hdcal.inference.sampled_problem import model
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import (
     Base,

@@ -169,7 +169,7 @@ def test_a_ridge_to_an_unknown_zero_leaves_the_calibration_its_row(seed: int):
     of_zero = replace(found.diagnoses["force_offset"], driven_by="prior")
     of_all = {**found.diagnoses, "force_offset": of_zero}
     (force,) = forces_of(replace(found, diagnoses=of_all))
-    exact = float(np.var(np.asarray(force.along().centre())))
+    exact = float(np.var(np.asarray(force.mixture().centre())))
     rows = by_name(averaged_budget([force]))
     # Student's t of few degrees of freedom: what of σ is known beside it is taken off.
     assert rows["calibration"] == pytest.approx(exact, rel=0.2)

@@ -43,10 +43,15 @@ def exact(case, limit: float) -> float:
     return float(known.weight @ tail)
 
 
+def along(force):
+    """Return the mixture of every draw along the sense of loading."""
+    return force.mixture().along(force.sense)
+
+
 def counted(force, limit: float) -> float:
     """Return the mean over the sampler's draws."""
     size = force.cause.values["K"].shape
-    return float(np.mean(np.asarray(force.along().above(np.full(size, limit)))))
+    return float(np.mean(np.asarray(along(force).above(np.full(size, limit)))))
 
 
 @pytest.mark.parametrize("law", slice_of(SIGMAS, ["Student's t"]))
@@ -88,7 +93,7 @@ def test_mountings_and_gaps_are_weighed_as_they_are_sampled():
         calibrate(case, with_gap=True, chains=2, warmup=400, draws=600)
     )
     expected = population_force(cause, AT, "mountings")
-    limit = float(np.quantile(np.asarray(expected.along().centre()), 0.9)) + 2.0
+    limit = float(np.quantile(np.asarray(along(expected).centre()), 0.9)) + 2.0
     found, mean = rare(expected, limit), counted(expected, limit)
     assert 0.005 < mean < 0.2
     assert found.probability == pytest.approx(mean, rel=0.1)
@@ -102,7 +107,7 @@ def test_a_leftover_far_out_is_found_alike_from_every_seed():
     case = make_case(make_records(deformation, force))
     (cause,) = causes_of(calibrate(case, with_gap=True, draws=500))
     expected = population_force(cause, AT, "readings")
-    middle = float(np.median(np.asarray(expected.along().centre())))
+    middle = float(np.median(np.asarray(along(expected).centre())))
     found = [rare(expected, middle + 9.0, seed) for seed in range(4)]
     chances = np.array([one.probability for one in found])
     assert chances.min() > 1e-9 and chances.max() < 1e-3
@@ -126,7 +131,7 @@ def test_where_a_fitted_leftover_has_no_part_a_search_has_its_slope(monkeypatch)
         return height, slope
 
     monkeypatch.setattr(module, "_towards", seen)
-    limit = float(np.max(np.asarray(force.along().centre()))) + 50.0
+    limit = float(np.max(np.asarray(along(force).centre()))) + 50.0
     assert rare(force, limit).probability > 0.0
     assert np.isfinite(slopes).all()
 
@@ -165,7 +170,7 @@ def test_what_is_open_is_weighed_too():
         places = np.tile(scores, (cause.size, 1))
         values = {**warm.cause.values, PLACES: places}
         there = replace(warm, cause=replace(warm.cause, values=values))
-        return np.asarray(there.along().centre())
+        return np.asarray(along(there).centre())
 
     middle = mean_with(0.0, 0.0, 0.0)
     shifts = mean_with(0.0, 1.0, 0.0) - middle, mean_with(0.0, 0.0, 1.0) - middle

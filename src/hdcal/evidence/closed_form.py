@@ -29,6 +29,7 @@ from hdcal.evidence.inner_products import (
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
 from hdcal.inference.padding import bucket_size, repeat_last_row
+from hdcal.programs import program
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 # Gauss–Hermite nodes for log σ: its posterior is close to normal.
@@ -148,7 +149,7 @@ def _noise_of_cells(common: CommonTerms, products: PieceProducts, cells):
     return most_probable_noise(step, start)
 
 
-@jax.jit
+@program
 def _cell_evidence(common, products, cells, sigma: Prior):
     centre = _noise_of_cells(common, products, cells)
 
@@ -187,7 +188,7 @@ def cell_evidence(
     return evidence, mean, sd
 
 
-@jax.jit
+@program
 def _subspace_evidence(common, products, scale, log_weight, sigma: Prior):
     def parts(log_sd):
         loose = (scale**2 * jnp.exp(-2.0 * log_sd))[..., None]

@@ -23,6 +23,7 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
+from hdcal.programs import program
 
 _AMPLITUDES, _SHAPES = 10, 3
 _STEPS = 15
@@ -94,7 +95,7 @@ def _row_precision(point, effect, problem: NoiseProblem):
     return row_precision(error, noise)
 
 
-@jax.jit
+@program
 @partial(jax.vmap, in_axes=(0, None, None, None))
 def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
     """Return log evidence and effective precision of each row, of each effect."""

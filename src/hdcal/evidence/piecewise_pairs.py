@@ -24,6 +24,7 @@ from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.inference.likelihood import log_interval
+from hdcal.programs import program
 
 # Cells of each effect that take part: the most probable ones alone, and some across
 # its prior for what only shows beside another effect.
@@ -89,7 +90,7 @@ def _amplitudes(pairs: CellPairs, log_sd):
     return det, drawn, mean, (cov11, cov12, cov22)
 
 
-@jax.jit
+@program
 def _cell_pair_evidence(constant, rows, pairs: CellPairs, sigma: Prior):
     def step(log_sd):
         mean = jnp.clip(_amplitudes(pairs, log_sd)[2], pairs.low, pairs.high)

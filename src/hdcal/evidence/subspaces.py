@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 from scipy import stats
 
@@ -21,13 +20,14 @@ from hdcal.evidence.parameter_grid import (
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
 from hdcal.physics.scatter import Scatter, scores
+from hdcal.programs import program
 
 # Columns of a subspace; members beyond it are kept by their largest directions.
 WIDTH = 24
 # Steps of the scale of a subspace of unknown size, as factors of its prior sd.
 _STEPS = 2.0 ** np.arange(-5.0, 5.0)
 
-_scores = jax.jit(scores)
+_scores = program(scores)
 
 
 @dataclass(frozen=True)

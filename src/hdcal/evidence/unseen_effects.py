@@ -102,8 +102,11 @@ def _unseen_pieces(
         some = high > low
         ends = np.stack([low, np.where(some, high, cells.high), cells.low, cells.high])
         scaled = (ends - mean) / sd
-        gained = log_interval(scaled[0], scaled[1]) - log_interval(scaled[2], scaled[3])
-        inside = np.where(some, np.exp(np.minimum(np.asarray(gained), 0.0)), 0.0)
+        # What is no interval comes to nothing below.
+        with np.errstate(all="ignore"):
+            within, whole = log_interval(*scaled[:2]), log_interval(*scaled[2:])
+            gained = within - whole
+        inside = np.where(some, np.exp(np.minimum(gained, 0.0)), 0.0)
         found[name] = _share(part.log_evidence[0], np.nan_to_num(inside))
     return found
 

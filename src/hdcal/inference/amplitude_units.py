@@ -1,7 +1,6 @@
 """How finely the data see each amplitude: the unit of its sampling coordinate."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import jax
 import numpy as np
@@ -12,6 +11,7 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
+from hdcal.programs import program
 
 
 def amplitude_units(
@@ -49,7 +49,7 @@ def amplitude_units(
             for field, prior in own.items()
             if prior.family == "half_normal"
         }
-        slopes = _slopes(effect, base, values, widest, padded, reading)
+        slopes = _slopes(base, values, widest, padded, reading, effect=effect)
         for field, column in slopes.items():
             column = np.asarray(column)[: len(columns)]
             unit = finest(column, columns, noise_sd, widest[field])
@@ -74,8 +74,8 @@ def finest(
     return min(widest, unit) or widest
 
 
-@partial(jax.jit, static_argnames="effect")
-def _slopes(effect: type[Effect], base: Base, values, prior_sds, records, reading):
+@program(static=("effect",))
+def _slopes(base: Base, values, prior_sds, records, reading, *, effect):
     """Return the derivative of the reading by each amplitude near its null."""
 
     def slope(field, sd):

@@ -25,6 +25,7 @@ from hdcal.inference.values import (
     with_rounding,
 )
 from hdcal.physics.effect import Noise
+from hdcal.programs import program
 
 
 def pointwise_log_likelihood(
@@ -93,7 +94,7 @@ def densities(problem: Sampled, draws: Values) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(of_prior), np.asarray(of_data)
 
 
-@jax.jit
+@program
 def _densities(problem: Sampled, values):
     def both(one):
         return log_prior(problem, one), log_likelihood(problem, one)

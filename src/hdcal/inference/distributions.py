@@ -1,22 +1,27 @@
 """From a prior table to NumPyro and SciPy distributions."""
 
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
-import numpyro.distributions as dist
 from scipy import stats
 
 from hdcal.data.priors import Prior
 
+if TYPE_CHECKING:
+    import numpyro.distributions as dist
 
-def distribution(prior: Prior, *, positive: bool = False) -> dist.Distribution:
+
+def distribution(prior: Prior, *, positive: bool = False) -> "dist.Distribution":
     """Return the distribution of a prior that is not fixed.
 
     Args:
         prior: family and numbers.
         positive: cut a normal prior at zero (a modulus cannot be negative).
     """
+    # Late: what was traced before needs none.
+    import numpyro.distributions as dist
+
     numbers = prior.numbers
     match prior.family:
         case "normal" if positive:

@@ -10,7 +10,6 @@ from dataclasses import replace
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import numpyro
 from jaxtyping import Float
 
 from hdcal.data.case import Case
@@ -21,12 +20,6 @@ from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.dynamic_priors import FRICTION, SITES
 from hdcal.inference.gauges import where_read, with_gains
-from hdcal.inference.model import (
-    model,
-    sample_amplitude,
-    sample_site,
-    sample_stiffness,
-)
 from hdcal.inference.padding import measured, pad_records
 from hdcal.inference.problem import (
     case_reading,
@@ -72,6 +65,21 @@ class DynamicProblem(Sampled):
     deformation: Float[Array, " n"]
     count: int
     effects: tuple[type[Effect], ...] = eqx.field(static=True, default=())
+
+    def declare(self) -> None:
+        """Declare the joint density of parameters and data to NumPyro."""
+        import numpyro
+
+        from hdcal.inference.model import sample_site, sample_stiffness
+
+        values = sample_stiffness(self.priors)
+        if self.effects:
+            values |= _sample_frictional(self, values)
+        else:
+            values |= {name: sample_site(name, self.priors[name]) for name in SITES}
+        for name, value in oscillation(self, values).items():
+            numpyro.deterministic(name, value)
+        numpyro.factor("deformation", log_likelihood(self, values))
 
     @property
     def bent(self) -> bool:
@@ -215,6 +223,10 @@ def _sample_frictional(problem: DynamicProblem, values: Values) -> dict:
     the deformation there moves on a parabola. The place is sampled instead, and its
     formal law taken off again.
     """
+    import numpyro
+
+    from hdcal.inference.model import sample_amplitude, sample_site
+
     priors, name = problem.priors, "initial_deformation"
     found = {n: sample_site(n, priors[n]) for n in SITES if n != name}
     unit = problem.units.get(FRICTION)
@@ -227,16 +239,3 @@ def _sample_frictional(problem: DynamicProblem, values: Values) -> dict:
     change = jnp.asarray(law.log_prob(begin)) - jnp.asarray(law.log_prob(stop))
     numpyro.factor(f"{STOP}_prior", change)
     return found | {name: numpyro.deterministic(name, begin)}
-
-
-@model.register
-def _(problem: DynamicProblem) -> None:
-    priors = problem.priors
-    values = sample_stiffness(priors)
-    if problem.effects:
-        values |= _sample_frictional(problem, values)
-    else:
-        values |= {name: sample_site(name, priors[name]) for name in SITES}
-    for name, value in oscillation(problem, values).items():
-        numpyro.deterministic(name, value)
-    numpyro.factor("deformation", log_likelihood(problem, values))

@@ -15,8 +15,6 @@ from collections.abc import Mapping
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import numpyro
-import numpyro.distributions as dist
 from jaxtyping import Float
 from scipy.linalg import helmert
 
@@ -51,6 +49,9 @@ def sample_offsets(kind: str, groups: Grouping, sd) -> dict:
         groups: where they seem to be.
         sd: their scatter.
     """
+    import numpyro
+    import numpyro.distributions as dist
+
     weight = sd**2 / (sd**2 + groups.variance)
     scale = jnp.sqrt(weight * groups.variance)
     plain, places = dist.Normal(0.0, 1.0), range(1, len(groups.basis))

@@ -24,6 +24,7 @@ from hdcal.inference.diagnostics import have_mixed
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
+from hdcal.programs import program
 
 # Proposals of a round; rounds end when such a share of the last ones is worth a draw.
 _ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5
@@ -164,7 +165,7 @@ def _log_densities(
     return np.concatenate(found)
 
 
-@jax.jit
+@program
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
@@ -175,7 +176,7 @@ def _potentials(
     return jax.lax.map(one, standard)
 
 
-@jax.jit
+@program
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
     def one(place):
         return values_at(problem, whitening.position(place))

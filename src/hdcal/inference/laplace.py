@@ -9,15 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
-from numpyro.distributions import biject_to
-from numpyro.handlers import substitute, trace
-from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy import optimize
 
 from hdcal.data.records import Array
-from hdcal.inference.model import model
 from hdcal.inference.problem import Problem
-from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.sampled_problem import Sampled, model
+from hdcal.programs import program
 
 Position = dict[str, Any]
 
@@ -45,15 +42,24 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-@jax.jit
+@program
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
+    from numpyro.infer.util import potential_energy
+
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
+
+
+def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
+    """Return every site at an unconstrained position, and what follows from them."""
+    from numpyro.infer.util import constrain_fn
+
+    return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
-    values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
+    values = constrained(problem, position)
     return {name: v for name, v in values.items() if not name.startswith("_")}
 
 
@@ -69,21 +75,21 @@ def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
         return value
     if "discrepancy" in problem.integrated:
         return value
-    values = constrain_fn(model, (problem,), {}, position, return_deterministic=True)
+    values = constrained(problem, position)
     return value - problem.discrepancy.size * jnp.log(values["sigma"])
 
 
-@jax.jit
+@program
 def _flatten(position: Position):
     return ravel_pytree(position)[0]
 
 
-@jax.jit
+@program
 def _unflatten(like: Position, flat):
     return ravel_pytree(like)[1](flat)
 
 
-@jax.jit
+@program
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian.
 
@@ -112,9 +118,12 @@ def _middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@jax.jit
+@program
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
+    from numpyro.distributions import biject_to
+    from numpyro.handlers import substitute, trace
+
     sites = trace(substitute(model, substitute_fn=_middle)).get_trace(problem)
     return {
         name: biject_to(site["fn"].support).inv(site["value"])
@@ -123,9 +132,11 @@ def _prior_middle(problem: Sampled) -> Position:
     }
 
 
-@jax.jit
+@program
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
+    from numpyro.infer.util import constrain_fn, unconstrain_fn
+
     known = constrain_fn(model, (problem,), {}, position) | values
     return unconstrain_fn(model, (problem,), {}, known)
 
@@ -204,6 +215,8 @@ class _Patience:
 
 def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     """Return the value of every sampled site at a position, as `fit` starts from it."""
+    from numpyro.infer.util import constrain_fn
+
     found = constrain_fn(model, (problem,), {}, position)
     return {name: float(value) for name, value in found.items()}
 

@@ -2,20 +2,28 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float, Key
+from scipy import special
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Noise
 
 
 def log_interval(low, high):
-    """Return log(Φ(high) − Φ(low)) without cancellation in either tail."""
+    """Return log(Φ(high) − Φ(low)) without cancellation in either tail.
+
+    In NumPy of NumPy's arrays, whose shapes may be of any kind: nothing is compiled.
+    """
+    xp, log_share = (np, special.log_ndtr)
+    if not isinstance(low, np.ndarray):
+        xp, log_share = (jnp, log_ndtr)
     flip = low > 0.0
-    low, high = jnp.where(flip, -high, low), jnp.where(flip, -low, high)
+    low, high = xp.where(flip, -high, low), xp.where(flip, -low, high)
     # One call: to trace and compile it takes longer than to run it.
-    upper, lower = log_ndtr(jnp.stack([high, low]))
-    return upper + jnp.log(-jnp.expm1(lower - upper))
+    upper, lower = log_share(xp.stack([high, low]))
+    return upper + xp.log(-xp.expm1(lower - upper))
 
 
 def log_probability(

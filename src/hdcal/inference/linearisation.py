@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
@@ -13,6 +12,7 @@ from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import predict_rows
+from hdcal.programs import program
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
 # parameter of an effect on the noise.
@@ -54,7 +54,11 @@ def linearise(
     sd, slopes, stiffening = jax.tree.map(
         lambda part: np.asarray(part)[:rows],
         _derivatives(
-            problem, values, padded, columns, _free_parameters(problem, values)
+            problem,
+            values,
+            padded,
+            columns,
+            names=_free_parameters(problem, values),
         ),
     )
     columns = None if columns is None else columns[:rows]
@@ -74,8 +78,8 @@ def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
     )
 
 
-@partial(jax.jit, static_argnames="names")
-def _derivatives(problem: Problem, values, records: Records, columns, names):
+@program(static=("names",))
+def _derivatives(problem: Problem, values, records: Records, columns, *, names):
     """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
 
     def mean(part):
@@ -111,6 +115,6 @@ def _members(problem: Problem, values, records: Records, columns, stiffening):
     return np.concatenate(table, axis=1), np.concatenate(place)
 
 
-@jax.jit
+@program
 def _prior_sd(discrepancy: Discrepancy, sd, length):
     return discrepancy.prior_sd(sd, length)

@@ -6,7 +6,6 @@ names begin with "_" are coordinates of the sampler, not results.
 """
 
 from collections.abc import Mapping
-from functools import singledispatch
 
 import jax.numpy as jnp
 import numpyro
@@ -20,7 +19,6 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.gauges import with_gains
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
-from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import POSITIVE, stiffness
 from hdcal.physics.effect import Effect, parameters
@@ -228,14 +226,8 @@ def _sample_structure(problem: Problem, values: dict) -> None:
             values["gap_weights"] = numpyro.deterministic("gap_weights", scale * score)
 
 
-@singledispatch
-def model(problem: Sampled) -> None:
-    """Declare the joint density of parameters and data; one for each kind."""
-    raise NotImplementedError(type(problem).__name__)
-
-
-@model.register
-def _(problem: Problem) -> None:
+def declare(problem: Problem) -> None:
+    """Declare the joint density of parameters and data of the force model."""
     priors = problem.priors
     values = sample_stiffness(priors)
     slack = any(effect.name == "seating_slack" for effect in problem.effects)

@@ -1,9 +1,7 @@
 """Effects from outside must bear padded rows: a load that is held at the end."""
 
 from collections.abc import Sequence
-from functools import partial
 
-import jax
 import numpy as np
 
 from hdcal.data.records import Records
@@ -12,6 +10,7 @@ from hdcal.inference.padding import bucket_size, pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
+from hdcal.programs import program
 
 # A gear of ordinary stiffness without noise to hide behind [N/mm, N].
 _BASE = (200.0, 0.0, 0.0, 0.0, 1.0)
@@ -40,7 +39,7 @@ def check_padding(
         if effect in EFFECTS.values():
             continue
         few, many = (
-            np.stack(_reading(effect, padded, reading))[..., :rows]
+            np.stack(_reading(padded, reading, effect=effect))[..., :rows]
             for padded in (short, long)
         )
         scale = np.max(np.abs(few))
@@ -52,8 +51,8 @@ def check_padding(
         raise InputError(findings)
 
 
-@partial(jax.jit, static_argnames="effect")
-def _reading(effect: type[Effect], records: Records, reading: Reading):
+@program(static=("effect",))
+def _reading(records: Records, reading: Reading, *, effect: type[Effect]):
     """Return mean and noise of the rows with the effect at its typical size."""
     sizes = {name: about.typical for name, about in parameters(effect).items()}
     mean, noise = predict_reading(Base(*_BASE), (effect(**sizes),), records, reading)

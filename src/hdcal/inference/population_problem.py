@@ -14,7 +14,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import numpyro
 from jaxtyping import Float
 
 from hdcal.data.prior import Prior
@@ -22,8 +21,8 @@ from hdcal.data.records import Array
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.gear_sums import GearSums
 from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
-from hdcal.inference.model import model, sample_site
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.programs import program
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
 _NODES = 4
@@ -83,6 +82,19 @@ class PopulationProblem(Sampled):
     priors: dict[str, Prior]
     sums: GearSums
     groups: dict[str, Grouping] = eqx.field(default_factory=dict)
+
+    def declare(self) -> None:
+        """Declare the joint density of the population and all readings to NumPyro."""
+        import numpyro
+
+        from hdcal.inference.model import sample_site
+
+        values = {name: sample_site(name, p) for name, p in self.priors.items()}
+        for kind, groups in self.groups.items():
+            spread = values[f"{kind}_ratio"] * values[_MEMBERS[kind]]
+            numpyro.deterministic(f"{kind}_sd", spread)
+            values |= sample_offsets(kind, groups, spread)
+        numpyro.factor("force", log_likelihood(self, values))
 
 
 class GearLaw(NamedTuple):
@@ -190,16 +202,6 @@ def _(problem: PopulationProblem, values: Mapping) -> Float[Array, ""]:
     return jnp.sum(jax.nn.logsumexp(joint, axis=(1, 2)))
 
 
-@model.register
-def _(problem: PopulationProblem) -> None:
-    values = {name: sample_site(name, p) for name, p in problem.priors.items()}
-    for kind, groups in problem.groups.items():
-        spread = values[f"{kind}_ratio"] * values[_MEMBERS[kind]]
-        numpyro.deterministic(f"{kind}_sd", spread)
-        values |= sample_offsets(kind, groups, spread)
-    numpyro.factor("force", log_likelihood(problem, values))
-
-
 def gear_law(problem: PopulationProblem, values: Mapping) -> GearLaw:
     """Return what is known of each gear given one draw of the population."""
     found = _joint(problem, values)
@@ -223,7 +225,7 @@ class DrawnGears(NamedTuple):
     chance: Float[Array, "t g"]
 
 
-@jax.jit
+@program(returns=DrawnGears)
 def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
     """Draw every gear from what is known of it given each draw of the population.
 

@@ -15,6 +15,7 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.serial_correlation import previous_rows
+from hdcal.programs import program
 
 # Above this many numbers the log likelihood of every row and draw is not kept.
 MOST_LOG_LIKELIHOODS = 8_000_000
@@ -89,7 +90,7 @@ def force_log_likelihood(
     return {"force": np.asarray(each)[..., :rows]}
 
 
-@jax.jit
+@program
 def _pointwise(problem, values, records, columns, before):
     def one(value):
         return pointwise_log_likelihood(problem, value, records, columns, before)

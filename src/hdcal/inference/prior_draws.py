@@ -1,7 +1,6 @@
 """Draws of each parameter from its prior."""
 
 from collections.abc import Mapping
-from functools import partial
 
 import jax
 import numpy as np
@@ -10,6 +9,7 @@ from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import without_texts
 from hdcal.inference.values import POSITIVE
+from hdcal.programs import program
 
 _PRIOR_DRAWS = 2000
 
@@ -23,6 +23,6 @@ def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
     }
 
 
-@partial(jax.jit, static_argnames="positive")
+@program(static=("positive",))
 def _draw(prior: Prior, key, *, positive: bool):
     return distribution(prior, positive=positive).sample(key, (_PRIOR_DRAWS,))

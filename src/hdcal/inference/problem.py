@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -31,8 +30,9 @@ from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
+from hdcal.programs import program
 
-_base_columns = jax.jit(linear_columns)
+_base_columns = program(linear_columns)
 
 
 class Problem(Sampled):
@@ -89,6 +89,12 @@ class Problem(Sampled):
         """
         mountings = self.runs if self.zero_stated else 0
         return effective_priors(self.priors, values, mountings)
+
+    def declare(self) -> None:
+        """Declare the joint density of parameters and data to NumPyro."""
+        from hdcal.inference.model import declare
+
+        declare(self)
 
     @property
     def rows(self) -> Records:

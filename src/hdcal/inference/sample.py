@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Key
-from numpyro.infer.hmc import hmc
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
@@ -22,6 +21,7 @@ from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.programs import program
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
@@ -67,6 +67,8 @@ class Draws:
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     """Return NUTS' own init and step functions on standard coordinates."""
+    from numpyro.infer.hmc import hmc
+
     init, step = hmc(
         lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
     )
@@ -80,8 +82,13 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@partial(jax.jit, static_argnames="warmup")
-def _start(problem, whitening, keys, target, warmup):
+@program(static=("warmup",))
+def _start(problem, whitening, keys, target, *, warmup):
+    """Return the states of chains at their start, as the leaves of NUTS' own."""
+    return jax.tree.leaves(_states(problem, whitening, keys, target, warmup))
+
+
+def _states(problem, whitening, keys, target, warmup):
     def one(key):
         place, walk = jax.random.split(key)
         spread = jax.random.normal(place, (len(whitening.factor),))
@@ -91,8 +98,12 @@ def _start(problem, whitening, keys, target, warmup):
     return jax.vmap(one)(keys)
 
 
-@partial(jax.jit, static_argnames=("warmup", "length"))
-def _advance(problem, whitening, states, target, warmup, length):
+@program(static=("warmup", "length"))
+def _advance(problem, whitening, leaves, target, *, warmup, length):
+    """Return the states after so many steps, as leaves, and what is kept of each."""
+    keys = jax.random.split(jax.random.key(0), len(leaves[0]))
+    begun = partial(_states, problem, whitening, target=target, warmup=warmup)
+    structure = jax.tree.structure(jax.eval_shape(begun, keys))
     start, step = _kernel(problem, whitening, warmup, target)
     # The step function takes its settings from the last call of its init.
     start(jnp.zeros(len(whitening.factor)))
@@ -110,10 +121,12 @@ def _advance(problem, whitening, states, target, warmup, length):
         )
         return state, kept
 
-    return jax.lax.scan(one, states, length=length)
+    states = jax.tree.unflatten(structure, leaves)
+    states, kept = jax.lax.scan(one, states, length=length)
+    return jax.tree.leaves(states), kept
 
 
-@jax.jit
+@program
 def _constrain(problem, whitening, standard, keys):
     def one(drawn):
         e, key = drawn
@@ -204,7 +217,7 @@ class _Run:
         self._problem, self._whitening, self._key = problem, whitening, key
         self._warmup, self._progress, self._target = warmup, progress, target
         keys = jax.random.split(key, chains)
-        self._states = _start(problem, whitening, keys, target, warmup)
+        self._states = _start(problem, whitening, keys, target, warmup=warmup)
         self._done, self._kept = 0, []
 
     def advance(self, draws: int) -> None:
@@ -215,7 +228,7 @@ class _Run:
             left = (warmup if self._done < warmup else total) - self._done
             about = self._problem, self._whitening, self._states, self._target
             length = min(_STRETCH, left)
-            self._states, new = _advance(*about, warmup, length)
+            self._states, new = _advance(*about, warmup=warmup, length=length)
             if self._done >= warmup:
                 self._kept.append(jax.device_get(new))
             self._done += length

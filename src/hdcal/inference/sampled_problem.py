@@ -1,4 +1,8 @@
-"""What samplers can take: a problem with priors and a declared density."""
+"""What samplers can take: a problem with priors and a declared density.
+
+Only what declares a density needs NumPyro, and takes it where it does: a program that
+was traced before draws without it.
+"""
 
 from collections.abc import Mapping
 
@@ -8,10 +12,10 @@ from hdcal.data.priors import Prior
 
 
 class Sampled(eqx.Module):
-    """A pytree of data and priors whose density `inference.model.model` declares.
+    """A pytree of data and priors that declares its density.
 
-    Another kind of problem subclasses this and registers its declaration with
-    `model`; sampler, whitening and checks then serve it as they are.
+    Another kind of problem subclasses this; sampler, whitening and checks then serve it
+    as they are.
 
     Attributes:
         priors: by site name, in code units.
@@ -24,6 +28,10 @@ class Sampled(eqx.Module):
         """Whether its density has bends, at which the gradient jumps."""
         return False
 
+    def declare(self) -> None:
+        """Declare the joint density of parameters and data to NumPyro."""
+        raise NotImplementedError(type(self).__name__)
+
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the prior of each parameter given the scales of one draw.
 
@@ -31,3 +39,8 @@ class Sampled(eqx.Module):
             values: parameters of the draw.
         """
         return self.priors
+
+
+def model(problem: Sampled) -> None:
+    """Declare the density of a problem, as NumPyro's handlers take it."""
+    problem.declare()

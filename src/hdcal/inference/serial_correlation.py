@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.records import Array, Records
+from hdcal.programs import program
 
 # Its site in the model.
 CORRELATION = "noise_correlation"
@@ -54,6 +55,7 @@ def worth(rows: int, correlation: float) -> float:
     return (rows - (rows - 2) * correlation) / (1.0 + correlation)
 
 
+@program
 def log_volume(following, correlation) -> Float[Array, ""]:
     """Return log |de/dz|, of as many rows as follow another one."""
     return 0.5 * following * jnp.log1p(-(correlation**2))

@@ -8,6 +8,7 @@ import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
+from hdcal.programs import program
 from hdcal.report.parameters import INTERVAL
 
 # Draws from which the bands of a record are made.
@@ -47,7 +48,7 @@ class MotionBands:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-@jax.jit
+@program
 def _predict(problem: DynamicProblem, values, key):
     keys = jax.random.split(key, len(values["mass"]))
 

@@ -35,6 +35,7 @@ from hdcal.motion.loss import (
     loss_effects,
     noise_probability,
 )
+from hdcal.programs import program
 
 FEWEST_ROWS = 20
 _PEAKS = 3
@@ -186,10 +187,10 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     return best, Check(name, "passed", "the search from several ends in one place")
 
 
-_potential = jax.jit(laplace.potential)
+_potential = program(laplace.potential)
 
 
-@jax.jit
+@program
 def _pointwise(problem: DynamicProblem, values):
     # Chains side by side, draws one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)

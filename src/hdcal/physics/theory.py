@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
+from hdcal.programs import program
 
 Scalar = Float[Array, ""] | float
 Stiffness = Callable[[Geometry, Scalar], Scalar]
@@ -18,6 +19,7 @@ Stiffness = Callable[[Geometry, Scalar], Scalar]
 RING_SERIES = (jnp.pi**2 - 8.0) / 16.0
 
 
+@program
 def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of an inextensible ring: k = π E L δ³ / (24 R³ S).
 
@@ -37,6 +39,7 @@ def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     return jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
 
 
+@program
 def cup(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of a cup with a held base, deforming inextensionally.
 

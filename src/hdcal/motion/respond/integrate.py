@@ -1,7 +1,6 @@
 """The gears of a posterior, each integrated on its own."""
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -28,6 +27,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
+from hdcal.programs import program
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.
@@ -74,9 +74,9 @@ def _with_values(effect: type[Effect], values) -> Effect:
     return effect(**own)
 
 
-@partial(jax.jit, static_argnames=("kept", "with_damping"))
+@program(static=("kept", "with_damping"))
 def _each(
-    kept, with_damping, reading, values, temperature, damping, force, times, leftover
+    reading, values, temperature, damping, force, times, leftover, *, kept, with_damping
 ):
     """Return motion, facts and whether each draw of a batch came through."""
 
@@ -166,8 +166,6 @@ def integrate_all(
         chunk = {name: v[start : start + size] for name, v in values.items()}
         given = 0.0 if damping is None else float(damping)
         moved, *part = _each(
-            kept,
-            damping is not None,
             reading,
             chunk,
             temperature,
@@ -175,6 +173,8 @@ def integrate_all(
             request.force,
             request.times,
             leftover,
+            kept=kept,
+            with_damping=damping is not None,
         )
         motion[start : start + size] = moved
         parts.append(jax.device_get(part))

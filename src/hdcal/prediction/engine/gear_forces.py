@@ -19,6 +19,7 @@ from hdcal.prediction.engine.untested import (
     spread_evenly,
     untested_of,
 )
+from hdcal.programs import program
 
 # Sites of a draw: which of the causes it is of, and its modulus over that of the tested
 # gear where another material was drawn.
@@ -64,7 +65,7 @@ def evenly(total: int, count: int) -> np.ndarray:
     return np.linspace(0, total - 1, min(count, total)).astype(int)
 
 
-@jax.jit
+@program
 def gear_forces(
     problem: Problem,
     values: Values,

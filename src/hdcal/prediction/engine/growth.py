@@ -10,7 +10,6 @@ starts at the far end of the tested range, so that its size at this end is learn
 from dataclasses import dataclass
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -22,6 +21,7 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.prediction.engine.causes import Cause
+from hdcal.programs import program
 
 # Rows nearer to each other than this part of the range are one: the bend is smooth.
 _KNOTS = 48
@@ -201,7 +201,7 @@ def _fitted(end: float, far: float, deformation, weight, error, change) -> Fitte
     return FittedGrowth(growth, pairs, chances)
 
 
-@jax.jit
+@program
 def _left(problem: Problem, values: Values, records: Records):
     """Return what a straight model leaves of each row [N], and its precision."""
     mean, noise = predict_rows(problem, values, records, None)

@@ -38,6 +38,7 @@ from hdcal.prediction.engine.untested import (
     spread_evenly,
     untested_of,
 )
+from hdcal.programs import program
 
 # More draws than this change no digit that is printed.
 MOST_DRAWS = 8000
@@ -94,10 +95,6 @@ class PopulationForce:
         """Sense of loading."""
         return sense_of(float(self.conditions.loading))
 
-    def along(self) -> Mixture:
-        """Return the mixture of every draw along the sense of loading."""
-        return self.mixture().along(self.sense)
-
 
 def population_force(
     cause: Cause,
@@ -153,7 +150,7 @@ def _with_scores(cause: Cause, seed: int) -> tuple[dict[str, np.ndarray], Untest
     return {**values, SCORES: ndtri(levels[:, :2]), **open_sites}, untested
 
 
-@jax.jit
+@program(returns=Mixture)
 def mixtures(
     problem: Problem, values: Values, whose: Whose, conditions: Conditions
 ) -> Mixture:
@@ -249,14 +246,20 @@ def member_force(
 def bend_sd(force: PopulationForce) -> float:
     """Return the sd of the bend that untested deformation may bring [N]."""
     values, where = force.cause.values, force.conditions
-    at = jnp.reshape(jnp.asarray(where.deformation, float), 1)
+    mean, sd = map(np.asarray, _bends(where.untested, values, where.deformation))
+    return float(np.sqrt(np.mean(sd**2) + np.var(mean)))
+
+
+@program
+def _bends(untested: Untested, values: Values, deformation):
+    """Return mean and sd of the bend of each draw [N]."""
+    at = jnp.reshape(deformation, 1)
 
     def one(value):
-        mean, sd, share = where.untested.bends(value).law(at)
+        mean, sd, share = untested.bends(value).law(at)
         return share * mean, share * sd
 
-    mean, sd = map(np.asarray, jax.vmap(one)(values))
-    return float(np.sqrt(np.mean(sd**2) + np.var(mean)))
+    return jax.vmap(one)(values)
 
 
 def leftover(

@@ -102,7 +102,7 @@ def tolerance_strata(
         theory: of the stiffness.
     """
     if not tolerances:
-        return StiffnessStrata(jnp.ones(1), jnp.zeros(1), jnp.ones(1))
+        return StiffnessStrata(np.ones(1), np.zeros(1), np.ones(1))
     points = qmc.Sobol(len(tolerances), scramble=True, rng=0)
     unit = 2.0 * points.random_base2(_LOG2_GEARS) - 1.0
     # In one order, whatever that of the dict: JAX sorts the keys of a traced one.

@@ -24,6 +24,7 @@ from hdcal.physics.effects.thermal_expansion import ThermalExpansion
 from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths
+from hdcal.programs import program
 
 # Sites of a draw beside those of the posterior: size of the bend and its noise beyond
 # each end, and standard normal scores of the bend, the zero and the frame.
@@ -53,8 +54,7 @@ class Untested(eqx.Module):
 
     def kelvins(self, temperature):
         """Return how far temperatures lie outside the tested ones, with sign [K]."""
-        warm = jnp.asarray(temperature, float)
-        return warm - jnp.clip(warm, self.coldest, self.warmest)
+        return _outside(temperature, self.coldest, self.warmest)
 
     def drift(self, value: Values, temperature, loading):
         """Return shifts of the force's zero [N] and of the deformation, radial [mm].
@@ -123,6 +123,11 @@ class Bends(eqx.Module):
         place = deformation, movement
         columns = fitted_columns(problem.discrepancy, ends, place, share)
         return bend, columns @ value["gap_weights"]
+
+
+@program
+def _outside(temperature, coldest, warmest):
+    return temperature - jnp.clip(temperature, coldest, warmest)
 
 
 def fitted_columns(

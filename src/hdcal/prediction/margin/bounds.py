@@ -33,6 +33,7 @@ from hdcal.prediction.margin.result import (
     ModelBound,
     sizes_needed,
 )
+from hdcal.programs import program
 
 # The least probability and the least distance to 1 that a number can hold.
 LEAST, LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
@@ -61,39 +62,47 @@ class PopulationDraws:
     predicted: np.ndarray
 
 
-@jax.jit
-def _each_draw(mixture: Mixture, shares, limit):
-    """Return quantiles [draw] at each share, centre and share above the limit."""
+@program
+def _each_draw(mixture: Mixture, sense, shares, limit):
+    """Return quantiles [draw] at each share, centre and share above the limit.
+
+    Along the sense of loading.
+    """
+    mixture = mixture.along(sense)
     found = [mixture.quantile(share) for share in shares]
     size = mixture.mean.shape[:-1]
     above = mixture.above(jnp.broadcast_to(limit, size))
     return (*found, mixture.centre(), above)
 
 
-@jax.jit
-def _predicted(mixture: Mixture, shares):
-    return jax.lax.map(mixture.quantile, shares)
+@program
+def _predicted(parts, sense, rounding_sd, shown, exact):
+    """Return quantiles of the law of all draws: as shown with rounding, and exact.
+
+    Along the sense of loading, of mixtures with weights of their draws.
+    """
+    whole = pooled([(weight, part.along(sense)) for weight, part in parts])
+    read = jax.lax.map(whole.widened(rounding_sd).quantile, shown)
+    return jnp.concatenate([read, jax.lax.map(whole.quantile, exact)])
 
 
 def population_draws(
     forces: Sequence[PopulationForce], temperatures: np.ndarray, criteria: Criteria
 ) -> PopulationDraws:
     """Return what every draw of every cause says at temperatures [°C]."""
-    wanted = jnp.array([1.0 - criteria.content, criteria.content, criteria.required])
-    tails, required = jnp.array(_TAILS), jnp.array([criteria.required])
-    limit = jnp.asarray(
-        np.inf if criteria.limit_force is None else criteria.limit_force
-    )
+    wanted = np.array([1.0 - criteria.content, criteria.content, criteria.required])
+    tails, required = np.array(_TAILS), np.array([criteria.required])
+    limit = np.inf if criteria.limit_force is None else criteria.limit_force
+    sense, rounding_sd = float(forces[0].sense), forces[0].rounding_sd
     weights = [force.cause.weights for force in forces]
     tables, predicted = [], []
     for warm in temperatures:
-        found = [force.at(warm).along() for force in forces]
-        each = [_each_draw(mixture, wanted, limit) for mixture in found]
+        found = [force.at(warm).mixture() for force in forces]
+        each = [_each_draw(mixture, sense, wanted, limit) for mixture in found]
         tables.append([np.concatenate(c) for c in zip(*each, strict=True)])
-        whole = pooled(list(zip(map(jnp.asarray, weights), found, strict=True)))
-        shown = whole.widened(forces[0].rounding_sd)
-        ahead = _predicted(shown, tails), _predicted(whole, required)
-        predicted.append(np.concatenate(ahead))
+        parts = list(zip(weights, found, strict=True))
+        ahead = _predicted(parts, sense, rounding_sd, tails, required)
+        predicted.append(np.asarray(ahead))
     names = ("lower", "upper", "required", "centre", "above")
     columns = {n: np.stack([t[i] for t in tables]) for i, n in enumerate(names)}
     each = [f.cause.size / independent_draws(f.cause) for f in forces]

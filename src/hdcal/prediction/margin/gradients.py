@@ -30,6 +30,7 @@ from hdcal.prediction.engine.sizes import (
     tolerance_strata,
 )
 from hdcal.prediction.margin.request import Criteria
+from hdcal.programs import program
 
 # What scales the stiffness of every draw: its site, and code units in the unit shown.
 _MODULI = {"E0_GPa": ("E0", 1e3), "K": ("K", 1.0)}
@@ -122,13 +123,13 @@ class Redesign(eqx.Module):
         return mixtures(self.problem, self.values, self.whose, there)
 
 
-@jax.jit
+@program
 def _mean_slopes(gear: Redesign):
     """Return the derivative of the mean force, averaged over the draws, by input."""
     return jax.jacfwd(lambda point: gear.mixture(point).centre().mean())(gear.origin)
 
 
-@jax.jit
+@program
 def _bound_slopes(gear: Redesign, weights, content):
     """Return the derivative of a weighted sum of the draws' quantiles, by input.
 

@@ -39,6 +39,7 @@ from hdcal.prediction.engine.untested import (
     untested_of,
 )
 from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
+from hdcal.programs import program
 
 # Points of a round; rounds whose points shape the laws, and rounds that count.
 _POINTS, _TRIALS, _COUNTED = 4096, 2, 2
@@ -160,7 +161,7 @@ def _heavy(law: tuple[Mixture, np.ndarray], limit: float) -> np.ndarray:
     return total
 
 
-@jax.jit
+@program
 def _towards(target: _Target, point, sizes):
     """Return −log of density times tail, and its gradient."""
 
@@ -170,7 +171,7 @@ def _towards(target: _Target, point, sizes):
     return jax.value_and_grad(height)(point)
 
 
-@jax.jit
+@program
 def _weigh(target: _Target, points, sizes):
     """Return the terms of points, their leading axis."""
 
@@ -217,7 +218,7 @@ def _points(force: PopulationForce, limit: float, seed: int):
     near = spread_evenly(rounds * _POINTS, SITES, seed)
     untested, sites = untested_of(force.cause, 1.0 - near**_TOWARDS_LARGE)
     towards_large = (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
-    blur = 0.1 * float(np.std(np.asarray(force.along().centre())))
+    blur = 0.1 * float(np.std(np.asarray(force.mixture().centre())))
     target = _Target(
         problem=force.cause.problem,
         whitening=force.cause.whitening,

@@ -39,11 +39,11 @@ class PredictiveLaw:
         """Return the law of the forces of all causes."""
         law = cls([], [], [])
         for force in forces:
-            mixture = force.mixture().widened(force.rounding_sd)
+            mixture = force.mixture()
             share = force.cause.weights[:, None] * np.asarray(mixture.weight)
             law.weight.append(np.broadcast_to(share, mixture.mean.shape))
             law.mean.append(np.asarray(mixture.mean))
-            law.sd.append(np.asarray(mixture.sd))
+            law.sd.append(np.hypot(np.asarray(mixture.sd), force.rounding_sd))
         return law
 
     def moments(self) -> tuple[float, float]:

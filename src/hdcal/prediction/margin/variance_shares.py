@@ -23,6 +23,7 @@ from hdcal.prediction.engine.population_force import (
 )
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
 from hdcal.prediction.engine.untested import PLACES
+from hdcal.programs import program
 
 # Points of each input's sample; a power of two.
 _POINTS = 4096
@@ -49,7 +50,7 @@ class VarianceShare:
     driven_by: Driver
 
 
-@jax.jit
+@program
 def _mean_forces(problem, values, conditions):
     """Return the mean reading of every draw along the sense of loading [N].
 
@@ -63,7 +64,7 @@ def _mean_forces(problem, values, conditions):
     return jax.vmap(one)(values)
 
 
-@jax.jit
+@program
 def _member_forces(problem, values, whose, conditions, factor, level):
     """Return forces with their noise, each of draw, factor and level of its own.
 

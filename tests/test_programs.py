@@ -1,0 +1,201 @@
+"""Programs that were traced once start fast, and say the same, to the last bit."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from hdcal import programs
+from hdcal.programs import Program, program
+
+_TWICE = """
+import sys
+from hdcal.cli.compilation_cache import keep_compilations
+keep_compilations()
+import hdcal
+found = hdcal.calibrate(hdcal.read_case(sys.argv[1]), draws=400, chains=2)
+print(found.tree["posterior"]["K"].to_numpy().sum().hex())
+print("numpyro" in sys.modules)
+"""
+
+
+@pytest.fixture
+def cached(tmp_path):
+    """Give a cache of its own for one test."""
+    before = jax.config.jax_compilation_cache_dir
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    yield tmp_path
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def kept(folder: Path) -> list[Path]:
+    """Return the programs that are kept in a cache."""
+    return sorted(p for p in (folder / "programs").rglob("*") if p.is_file())
+
+
+def counted(static=()):
+    """Return a program, and how often it was traced."""
+    traced = []
+
+    def cosine_sum(numbers, *, times=1):
+        traced.append(times)
+        return {"sum": times * jnp.sum(jnp.cos(numbers["x"])) + numbers["y"]}
+
+    return program(cosine_sum, static=("times",)), traced
+
+
+def another(one: Program) -> Program:
+    """Return the program as a later process has it."""
+    return Program(one._function, one._static, one._returns)
+
+
+def test_what_was_traced_is_not_traced_again(cached):
+    one, traced = counted()
+    numbers = {"x": np.linspace(0.0, 1.0, 7), "y": 3}
+    found = one(numbers, times=2)
+    assert traced == [2]
+    assert len(kept(cached)) == 1
+    again = another(one)(numbers, times=2)
+    assert traced == [2]
+    assert float(again["sum"]).hex() == float(found["sum"]).hex()
+    assert float(found["sum"]) == pytest.approx(2 * np.cos(numbers["x"]).sum() + 3)
+
+
+def test_another_shape_setting_or_structure_is_another_program(cached):
+    one, traced = counted()
+    for size, times in ((7, 1), (8, 1), (7, 2)):
+        one({"x": np.zeros(size), "y": 0.0}, times=times)
+    assert len(traced) == len(kept(cached)) == 3
+    assert float(one({"x": np.zeros(7), "y": 1.0}, times=2)["sum"]) == 15.0
+
+
+def test_other_code_is_another_program(cached, tmp_path, monkeypatch):
+    monkeypatch.undo()
+    one, traced = counted()
+    one({"x": np.zeros(3), "y": 0.0}, times=1)
+    folder = kept(cached)[0].parent
+    code = tmp_path / "code"
+    code.mkdir()
+    (code / "one.py").write_text("changed = True")
+    monkeypatch.setattr(programs, "_CODE", code)
+    programs._folder.cache_clear()
+    another(one)({"x": np.zeros(3), "y": 0.0}, times=1)
+    assert len(traced) == 2
+    assert {file.parent for file in kept(cached)} != {folder}
+    programs._folder.cache_clear()
+
+
+@pytest.mark.parametrize("damage", [b"", b"short", b"x" * 4000])
+def test_a_damaged_file_is_thrown_away(cached, damage):
+    one, traced = counted()
+    numbers = {"x": np.linspace(0.0, 1.0, 5), "y": 0.0}
+    found = one(numbers, times=1)
+    (file,) = kept(cached)
+    whole = file.read_bytes()
+    file.write_bytes(damage)
+    assert float(another(one)(numbers, times=1)["sum"]) == float(found["sum"])
+    assert len(traced) == 2
+    assert file.read_bytes()[:32] == whole[:32] or len(file.read_bytes()) > 100
+    changed = bytearray(file.read_bytes())
+    changed[-1] ^= 1
+    file.write_bytes(bytes(changed))
+    assert float(another(one)(numbers, times=1)["sum"]) == float(found["sum"])
+    assert len(traced) == 3
+
+
+def test_a_folder_that_others_may_write_keeps_nothing(cached):
+    one, traced = counted()
+    (cached / "programs").mkdir()
+    (cached / "programs").chmod(0o777)
+    for made in (one, another(one)):
+        made({"x": np.zeros(3), "y": 0.0}, times=1)
+    assert len(traced) == 2
+    assert not kept(cached)
+
+
+def test_its_folder_is_nobody_elses(cached):
+    one, _ = counted()
+    one({"x": np.zeros(3), "y": 0.0}, times=1)
+    assert (cached / "programs").stat().st_mode & 0o777 == 0o700
+
+
+def test_a_full_or_missing_folder_is_no_error(cached, monkeypatch):
+    monkeypatch.undo()
+
+    real = Path.write_bytes
+
+    def full(self, data):
+        if "programs" in self.parts:
+            real(self, data[:40])
+            raise OSError(28, "No space left on device")
+        return real(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    one, traced = counted()
+    assert float(one({"x": np.zeros(3), "y": 0.0}, times=1)["sum"]) == 3.0
+    assert traced == [1]
+    assert not kept(cached)
+
+
+def test_few_versions_of_the_code_stay(cached):
+    whole = cached / "programs"
+    whole.mkdir(0o700)
+    for place in range(6):
+        (whole / f"old{place}").mkdir()
+        os.utime(whole / f"old{place}", (place, place))
+    one, _ = counted()
+    one({"x": np.zeros(3), "y": 0.0}, times=1)
+    names = {folder.name for folder in whole.iterdir()}
+    assert len(names) == 4
+    assert {"old3", "old4", "old5"} < names
+
+
+def test_what_calls_back_works_and_is_not_kept(cached):
+    def back(x):
+        shape = jax.ShapeDtypeStruct(x.shape, x.dtype)
+        return jax.pure_callback(lambda y: np.asarray(y) + 1.0, shape, x)
+
+    np.testing.assert_array_equal(program(back)(np.zeros(2)), np.ones(2))
+    assert not kept(cached)
+
+
+def test_an_argument_told_by_its_address_is_not_kept(cached):
+    one = program(lambda x, *, apply: apply(x), static=("apply",))
+    assert float(one(np.float64(2.0), apply=lambda x: x + 1.0)) == 3.0
+    assert not kept(cached)
+
+
+def test_under_a_transformation_it_is_jit(cached):
+    one, _ = counted()
+    slope = jax.grad(lambda x: one({"x": x, "y": 0.0}, times=1)["sum"])(jnp.ones(3))
+    np.testing.assert_allclose(slope, -np.sin(np.ones(3)))
+    assert not kept(cached)
+
+
+def test_a_class_comes_back(cached):
+    def both(x):
+        return [x, 2.0 * x]
+
+    one = program(both, returns=lambda first, second: {"a": first, "b": second})
+    assert float(one(np.float64(2.0))["b"]) == 4.0
+
+
+def test_a_second_process_says_the_same_without_what_only_tracing_needs(tmp_path):
+    def run(cache):
+        env = os.environ | {"HDCAL_CACHE_DIR": str(cache)}
+        env.pop("JAX_COMPILATION_CACHE_DIR")
+        command = [sys.executable, "-c", _TWICE, "datasets/xb1-100-80"]
+        done = subprocess.run(
+            command, capture_output=True, text=True, check=True, env=env
+        )
+        return done.stdout.split()
+
+    first, second = run(tmp_path), run(tmp_path)
+    without = run(__file__)
+    assert first[0] == second[0] == without[0]
+    assert (first[1], second[1], without[1]) == ("True", "False", "True")
