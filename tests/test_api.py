@@ -36,6 +36,7 @@ PUBLIC = [
     "fleet",
     "force",
     "inverse_design",
+    "keep_compilations",
     "margin",
     "parameter",
     "predict",

@@ -1,4 +1,4 @@
-"""Compiled programs are kept between runs: compiling costs more than sampling."""
+"""Programs are kept between runs: to trace and compile costs more than sampling."""
 
 import os
 import secrets
@@ -15,10 +15,12 @@ def one_thread_for_algebra() -> None:
 
 
 def keep_compilations() -> None:
-    """Point JAX at a cache of compiled programs; without a writable one do nothing.
+    """Keep on disk what was traced and compiled, for later processes.
 
-    The folder is the user's cache folder, or what HDCAL_CACHE_DIR names. To be
-    called before anything compiles.
+    Commands do. A script that calls it first starts in a fraction of the time from its
+    second run on, with the same results. The folder is the user's cache folder, or what
+    the environment variable HDCAL_CACHE_DIR names; where neither can be written,
+    nothing is kept. It sets options of JAX: nothing else does.
     """
     folder = _writable_folder()
     if folder is None:
@@ -38,7 +40,8 @@ def _writable_folder() -> Path | None:
     folder = Path(named or platformdirs.user_cache_dir("hdcal", False)) / "compiled"
     trial = folder / f".trial-{secrets.token_hex(4)}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        # Nobody else may write what is run.
+        folder.mkdir(0o700, parents=True, exist_ok=True)
         trial.touch()
         trial.unlink()
     except (OSError, ValueError, RuntimeError):

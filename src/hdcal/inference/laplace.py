@@ -79,14 +79,19 @@ def _typical(problem: Sampled, position: Position) -> Float[Array, ""]:
     return value - problem.discrepancy.size * jnp.log(values["sigma"])
 
 
-@program
-def _flatten(position: Position):
-    return ravel_pytree(position)[0]
+def _flatten(position: Position) -> np.ndarray:
+    """Return the coordinates of a position, in the order of `ravel_pytree`."""
+    leaves = jax.tree.leaves(position)
+    return np.concatenate([np.ravel(np.asarray(leaf, float)) for leaf in leaves])
 
 
-@program
-def _unflatten(like: Position, flat):
-    return ravel_pytree(like)[1](flat)
+def _unflatten(like: Position, flat: np.ndarray) -> Position:
+    """Return the position with these coordinates."""
+    leaves, structure = jax.tree.flatten(like)
+    ends = np.cumsum([np.size(leaf) for leaf in leaves])[:-1]
+    parts = zip(np.split(flat, ends), leaves, strict=True)
+    shaped = [part.reshape(np.shape(leaf)) for part, leaf in parts]
+    return jax.tree.unflatten(structure, shaped)
 
 
 @program
@@ -161,7 +166,7 @@ def fit(
     place = _prior_middle(problem)
     if start:
         place = _moved(problem, place, dict(start))
-    flat = np.asarray(_flatten(place))
+    flat = _flatten(place)
     cache: dict[bytes, tuple] = {}
     hessian = np.asarray(_expand(problem, place, flat)[2])
     # Parameters differ by many orders in scale: a trust region wants them alike.
@@ -191,7 +196,7 @@ def fit(
     )
     factor = scale[:, None] * _inverse_root(expand(found.x)[2])
     centre = _unflatten(place, flat + scale * found.x)
-    return Whitening({name: np.asarray(v) for name, v in centre.items()}, factor)
+    return Whitening(centre, factor)
 
 
 class _Patience:

@@ -16,13 +16,16 @@ _PRIOR_DRAWS = 2000
 
 def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
     """Return draws of each parameter from its prior, (draw,) each."""
-    keys = jax.random.split(key, len(priors))
+    found = _draws(tuple(without_texts(priors).values()), key, names=tuple(priors))
     return {
-        name: np.asarray(_draw(prior, k, positive=name in POSITIVE))
-        for k, (name, prior) in zip(keys, without_texts(priors).items(), strict=True)
+        name: np.asarray(values) for name, values in zip(priors, found, strict=True)
     }
 
 
-@program(static=("positive",))
-def _draw(prior: Prior, key, *, positive: bool):
-    return distribution(prior, positive=positive).sample(key, (_PRIOR_DRAWS,))
+@program(static=("names",))
+def _draws(priors: tuple[Prior, ...], key, *, names: tuple[str, ...]):
+    keys = jax.random.split(key, len(names))
+    return [
+        distribution(prior, positive=name in POSITIVE).sample(key, (_PRIOR_DRAWS,))
+        for key, name, prior in zip(keys, names, priors, strict=True)
+    ]

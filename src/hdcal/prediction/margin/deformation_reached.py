@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 
 from hdcal.prediction.engine.loading_sense import ends_along, sense_of
 from hdcal.prediction.engine.mixture import Mixture, quantile_weights
@@ -105,6 +104,8 @@ def _solve(problem, values, whose, conditions, given, shares, ends):
     Force, ends and what is returned are along the sense of loading; of the force the
     second is what no larger one is read as it.
     """
+    import optimistix as optx
+
     (low, high), sense, (size, unrounded) = ends, conditions.loading, given
     method = optx.Bisection(rtol=0.0, atol=_CLOSE, flip=False)
     places = jnp.linspace(low, high, _STRETCHES + 1)
