@@ -43,7 +43,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     low, middle, high = np.quantile(own, _ENDS, axis=0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
-        **({"lot": np.array(found.case.lots)} if found.lots else {}),
+        **({"lot": np.array(found.case.lots)} if found.case.lots else {}),
         "rows": found.rows,
         "runs": found.mountings,
         "stiffness_N_per_mm": middle,
