@@ -30,10 +30,10 @@ from hdcal.data.reading import (
     asked_columns,
     case_of,
     gear_of,
-    too_far,
 )
 from hdcal.data.reading_notes import unused_columns
 from hdcal.data.theory_names import SPRING
+from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings
 
 # What may differ between the files of gears of one kind, as dotted keys begin.
