@@ -143,36 +143,6 @@ def test_a_cell_that_is_no_reading_is_named_with_its_row(frame, tmp_path, monkey
     assert "line.parquet" in told
 
 
-@pytest.mark.parametrize("batch", [30, 1 << 18])
-def test_no_row_lies_beyond_the_radius_wherever_it_stands(
-    frame, tmp_path, monkeypatch, batch
-):
-    """As in a table, of which the farthest row of each gear is told."""
-    monkeypatch.setattr(parquet, "_SHOWN", 40)
-    monkeypatch.setattr(parquet, "_BATCH", batch)
-    given = frame.copy()
-    given.loc[[204, 207, 330], "deformation_um"] = [41_000.0, -45_000.0, 40_000.0]
-    given.loc[331, "deformation_um"] = 1e30  # which is wrong with any radius
-    given.to_parquet(tmp_path / "line.parquet", index=False)
-    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
-    with pytest.raises(InputError) as caught:
-        read_fleet(tmp_path / "line.parquet", sizes)
-    words = [str(finding) for finding in caught.value.findings]
-    where = "line.parquet, row 208, column 'deformation_um'"
-    said = "a deformation of 45 mm on a radius of 40 mm"
-    assert any(where in one and said in one for one in words)
-    assert "'G5'" in words[-1] and words[-1].startswith("skip_bad")
-    if batch > len(frame):
-        assert sum("on a radius" in one for one in words) == 2
-        assert sum("row 332" in one for one in words) == 1
-    found = read_fleet(tmp_path / "line.parquet", sizes, skip_bad=True)
-    assert set(found.case.left_out) == {"G5", "G8"}
-    # Of a spring no radius is known.
-    given.loc[331, "deformation_um"] = 0.0
-    given.to_parquet(tmp_path / "line.parquet", index=False)
-    assert not read_fleet(tmp_path / "line.parquet").case.left_out
-
-
 def test_files_of_several_kinds_are_refused(frame, tmp_path):
     frame.to_parquet(tmp_path / "a.parquet", index=False)
     frame.assign(force_N=frame["force_N"].astype(str)).to_parquet(

@@ -105,13 +105,23 @@ def read_parquet(
         dataset = parquet_table(files, root, findings)
         beside = (path if root else path.parent) / GEAR_NAME
         gear = beside if gear is None and beside.exists() else gear
+        how: dict = {"columns": columns, "theory": theory, "reading": reading}
+        how |= {"skip_bad": skip_bad}
         frame = _head(dataset, findings)
         # Lots, operators and dates are told of all rows.
         further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
-        shown = frame.drop(columns=further)
-        how: dict = {"columns": columns, "theory": theory, "reading": reading}
-        how |= {"skip_bad": skip_bad}
-        case = _placed(dataset, findings, lambda: read_case(shown, gear, **how))
+
+        def read(rows: pd.DataFrame) -> Case:
+            return read_case(rows.drop(columns=further), gear, **how)
+
+        try:
+            case = _placed(dataset, frame, read)
+        except InputError:
+            others = _others(dataset, frame, columns) if skip_bad else frame.iloc[:0]
+            if others.empty:
+                raise
+            frame = pd.concat([frame, others])
+            case = _placed(dataset, frame, read)
         used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
@@ -186,10 +196,44 @@ def _head(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
         findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
 
 
+def _others(
+    dataset: "Dataset", frame: pd.DataFrame, columns: Mapping[str, str] | None
+) -> pd.DataFrame:
+    """Return the first rows of other gears where all of a frame are of one.
+
+    Args:
+        dataset: of which the frame is the first rows.
+        frame: indexed by their places there.
+        columns: as in `read_case`.
+    """
+    whose = [name for name in frame if _quantity(str(name), columns) == "specimen"]
+    gears = frame[whose[0]].unique() if len(whose) == 1 else ()
+    if len(gears) != 1:
+        return frame.iloc[:0]
+    found, at = [frame.iloc[:0]], 0
+    for batch in dataset.to_batches(columns=[*frame]):
+        rows = batch.to_pandas()
+        rows.index += at
+        at += len(rows)
+        found.append(rows[rows[whose[0]] != gears[0]])
+        if sum(map(len, found)) >= _SHOWN:
+            break
+    return pd.concat(found).iloc[:_SHOWN]
+
+
 def _placed(
-    dataset: "Dataset", findings: FileFindings, read: Callable[[], Case]
+    dataset: "Dataset", frame: pd.DataFrame, read: Callable[[pd.DataFrame], Case]
 ) -> Case:
-    """Return what is read of the first rows; what is wrong is told by file and row."""
+    """Return what is read of the first rows; what is wrong is told by file and row.
+
+    Args:
+        dataset: the files.
+        frame: some of their rows, indexed by their places there.
+        read: reads it.
+
+    Raises:
+        InputError: holds what is wrong.
+    """
     ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
     names = [str(one.path) for one in dataset.get_fragments()]
 
@@ -197,16 +241,15 @@ def _placed(
         if wrong.row is None:
             return wrong
         # Below a line of headers.
-        at = wrong.row - 2
+        at = frame.index[wrong.row - 2]
         place = int(np.searchsorted(ends, at, side="right"))
         row = at + 1 - (int(ends[place - 1]) if place else 0)
         return replace(wrong, file=names[place], row=row)
 
     try:
-        case = read()
+        case = read(frame)
     except InputError as error:
-        findings += map(placed, error.findings)
-        raise InputError(findings) from None
+        raise InputError(map(placed, error.findings)) from None
     left_out = {gear: placed(wrong) for gear, wrong in case.left_out.items()}
     return replace(case, left_out=left_out)
 
