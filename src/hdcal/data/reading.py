@@ -11,7 +11,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.frames import NAME, is_frame
-from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
@@ -136,10 +136,12 @@ def case_of(
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
     )
-    found = behind_filter(found, measured.columns.values.get("time"))
+    values = measured.columns.values
+    found = behind_filter(found, values.get("time"))
+    scale = scale_of(values["force"], values["deformation"], found.reading)
     return Case(
         name=name,
-        gear=at_full_scale(found, _full_scale(measured, found)),
+        gear=at_full_scale(found, scale),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
@@ -176,17 +178,6 @@ def _name(data: Path, folder: bool, *parts: str | None) -> str:
     told = (str(part).replace("*", "").strip() for part in parts if part is not None)
     named = (_NO_NAME.sub("_", part) for part in told)
     return "-".join([name, *named])
-
-
-def _full_scale(measured: Measurements, gear: Gear) -> FullScale:
-    """Return the largest readings; one in a hundred may be wild."""
-    force, deformation = (
-        float(np.quantile(np.abs(measured.columns.values[name]), 0.99, method="higher"))
-        for name in ("force", "deformation")
-    )
-    radial = deformation * (0.5 if gear.reading == "diametral" else 1.0)
-    # Where nothing was read but zeros, nothing is known of the scale.
-    return FullScale(force or REFERENCE.force, radial or REFERENCE.deformation)
 
 
 def _motion(measured: Measurements) -> Motion:
