@@ -126,7 +126,7 @@ def read_gear_folder(
         wrong += _unread(parts, unread, skip_bad=bool(skip_bad))
     assert found is not None
     whole = _joined(parts, found.reference_temperature)
-    bad = {label: each[0] for label, each in unread.items()}
+    bad = {label: _why(each[0], folder) for label, each in unread.items()}
     for part in parts:
         bad |= part.measured.left_out
     kind = "folder" if cases else "file"
@@ -154,6 +154,13 @@ def _unread(
         bad = {label: each[0] for label, each in unread.items()}
         found.append(offer(bad, len(parts) + len(bad)))
     return found
+
+
+def _why(first: Finding, folder: Path) -> Finding:
+    """Return why a gear is left out; where no row says in which file, the words do."""
+    if first.row is not None:
+        return first
+    return Finding(str(folder), f"{first.where}: {first.problem}", first.remedy)
 
 
 def _measured(
