@@ -123,7 +123,7 @@ def read_gear_folder(
                 unread[label] = each
             elif measured is not None:
                 parts.append(_Part(label, measured, its))
-        wrong += _unread(parts, unread, skip_bad=bool(skip_bad))
+        wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert found is not None
     whole = _joined(parts, found.reference_temperature)
     bad = {label: _why(each[0], folder) for label, each in unread.items()}
@@ -140,7 +140,7 @@ def read_gear_folder(
 
 
 def _unread(
-    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool
+    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool | None
 ) -> list[Finding]:
     """Return what stops all: files that cannot be read, unless they may be left out.
 
@@ -150,7 +150,7 @@ def _unread(
     if skip_bad and known and parts:
         return []
     found = [finding for each in unread.values() for finding in each]
-    if unread and known and parts and not skip_bad:
+    if unread and known and parts and skip_bad is False:
         bad = {label: each[0] for label, each in unread.items()}
         found.append(offer(bad, len(parts) + len(bad)))
     return found
