@@ -9,6 +9,8 @@ from hdcal.data.gear import at_full_scale
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
+from hdcal.fleets.read_fleet import read_fleet
+from hdcal.fleets.usable import usable
 
 GEAR = """\
 [gear]
@@ -66,6 +68,25 @@ def test_a_case_takes_them_from_its_largest_readings(tmp_path):
     assert gear.full_scale.force == pytest.approx(40.0, rel=0.02)
     # What the gear file states stays as it is.
     assert gear.effect_priors["coulomb_friction.force"].numbers == (7.0,)
+
+
+def test_gears_that_are_left_out_have_no_part_in_it():
+    x = np.tile(np.linspace(0.1, 0.5, 5), 6)
+    name = np.repeat(list("ABCDEF"), 5)
+    force = 200.0 * x + np.random.default_rng(1).normal(0.0, 0.2, len(x))
+    frame = {"specimen": name, "deformation_mm": x, "force_N": force}
+    still = frame | {
+        "deformation_mm": np.where(name == "B", 5.0, x),
+        "force_N": np.where(name == "B", 4000.0, force),
+    }
+    others = {header: column[name != "B"] for header, column in frame.items()}
+    sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
+    read = read_fleet(still, sizes)
+    assert read.case.gear.full_scale.force == 4000.0
+    left, alone = usable(read, skip_bad=True)[0], read_fleet(others, sizes)
+    assert left.case.gear == alone.case.gear
+    whole = read_fleet(frame, sizes)
+    assert usable(whole)[0].case.gear == whole.case.gear
 
 
 def test_the_zero_of_the_deformation_keeps_its_size():

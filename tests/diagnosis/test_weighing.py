@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hdcal.diagnosis.library import choose_library
+import hdcal
+from hdcal.diagnosis.library import choose_library, library_of
 from hdcal.diagnosis.model_posterior import (
     ModelPosterior,
     log_priors,
@@ -120,6 +121,28 @@ def test_a_slip_of_the_pen_is_explained(spec, words):
     with pytest.raises(InputError) as raised:
         choose_library(spec)
     assert words in str(raised.value)
+
+
+def test_no_library_is_the_whole_one():
+    assert library_of(None) == EFFECTS
+    part = {"ovality": EFFECTS["ovality"]}
+    assert library_of(part) == part
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["ovality"], "is no mapping"),
+        ({"ovality": 3}, "'ovality' is no class of an effect"),
+        ({"ovality": int}, "'ovality' is no class of an effect"),
+    ],
+)
+@pytest.mark.parametrize("ask", [hdcal.diagnose, hdcal.causes])
+def test_what_is_no_library_is_said(ask, given, words):
+    x = [0.1, 0.2, 0.3, 0.4, 0.5]
+    case = hdcal.read_case({"deformation_mm": x, "force_N": [9.0 * one for one in x]})
+    with pytest.raises(InputError, match=f"library: {words}"):
+        ask(case, library=given)
 
 
 def test_every_wrong_name_is_reported_at_once():

@@ -1,7 +1,7 @@
 """A margin that is asked of a fleet's folder is what the fleet itself tells."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from html import escape
 from pathlib import Path
 
@@ -10,6 +10,9 @@ from commands import Hdcal
 from fleets import handmade
 from schema_checks import obeys
 
+from hdcal.data.typed_json import typed_text
+from hdcal.errors import InputError
+from hdcal.fleets.fleet_facts import FleetFacts
 from hdcal.fleets.force.answer import ForceAnswer
 from hdcal.fleets.summary import fleet_report
 from hdcal.report.write import write_numbers
@@ -107,6 +110,43 @@ def test_the_commands_agree_on_measured_gears(hdcal: Hdcal, tmp_path: Path):
     answer = json.loads(done.stdout)
     assert {name: answer[name] for name in told["next_force"]} == told["next_force"]
     assert answer["seed"] == 5 and answer["data_sha256"] == told["data_sha256"]
+
+
+@pytest.mark.parametrize("asked", [450, -450, 60])
+def test_a_deformation_of_another_unit_is_refused(here: Hdcal, tmp_path, asked):
+    """Read to 0.5 mm on a radius of 40 mm: 450 are µm, and 60 no deformation."""
+    left(tmp_path / "fleet")
+    done = here("margin", "fleet", "--deformation", asked, "--out", "new")
+    words = f"--deformation: {asked} mm, where the readings reach to 0.5 mm. Give it"
+    assert done.returncode == 2 and words in done.stderr
+    assert len(done.stderr.splitlines()) == 1 and not (tmp_path / "new").exists()
+
+
+def test_a_spring_has_no_radius_but_was_read(tmp_path):
+    found = handmade()
+    radius = found.posterior
+    spring = replace(radius, facts=replace(radius.facts, reach_mm=None))
+    assert spring.next_force(49.0).beyond_tested
+    with pytest.raises(InputError, match="51 mm, where the readings reach"):
+        spring.next_force(51.0)
+    with pytest.raises(InputError, match="49 mm, where the readings reach"):
+        radius.next_force(49.0)
+    # As an older hdcal has left it.
+    facts = asdict(radius.facts)
+    del facts["reach_mm"]
+    assert typed_text(FleetFacts, json.dumps(facts)).reach_mm is None
+
+
+def test_the_fleet_refuses_it_before_it_is_fitted(here: Hdcal, tmp_path: Path):
+    records = handmade().case.records
+    rows = zip(records.specimen, records.deformation, records.force, strict=True)
+    lines = [f"{'ABCD'[gear]},{x},{y + 0.1 * (x > 0.3)}" for gear, x, y in rows]
+    text = "\n".join(["specimen,deformation_mm,force_N", *lines])
+    (tmp_path / "line.csv").write_text(text)
+    done = here("fleet", "line.csv", "--deformation", 450, "--seed", -1)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 2
+    assert "--deformation: 450 mm, where the readings reach to 0.5 mm" in done.stderr
+    assert not (tmp_path / "line-fleet").exists()
 
 
 def test_what_is_no_deformation_is_said_once(here: Hdcal, tmp_path: Path):

@@ -12,6 +12,7 @@ import hdcal as api
 from hdcal.data.gear_files import gear_files
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
+from hdcal.fleets.left_out import left_out_of
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.usable import usable
 
@@ -171,6 +172,22 @@ def test_what_is_wrong_with_all_files_is_told_at_once(tmp_path):
     found = read_fleet(folder, skip_bad=True)
     same(found, measured().query("specimen not in ['G1', 'G4', 'G5']"))
     assert found.case.left_out["G1"].row == 4
+
+
+def test_why_a_gear_is_left_out_names_its_file(tmp_path):
+    folder = as_files(tmp_path / "line")
+    still = pd.read_csv(folder / "G2.csv").assign(deformation_mm=0.3)
+    still.to_csv(folder / "G2.csv", index=False)
+    (folder / "G4.csv").write_text("")
+    left_out = left_out_of(read_fleet(folder, skip_bad=True).case)
+    why = {one.gear: one.why for one in left_out}
+    column = f"{folder / 'G2.csv'}, column 'deformation_mm'"
+    assert why["G2"].startswith(f"{column}: the deformation is constant")
+    assert why["G4"].startswith(str(folder / "G4.csv")) and "empty" in why["G4"]
+    for gear in ("G0", "G1"):
+        (folder / f"{gear}.csv").unlink()
+    words = told(api.fleet, folder, skip_bad=True)
+    assert any(f"gear 'G2' {column}: the deformation is" in one for one in words)
 
 
 def test_files_may_have_columns_of_their_own(tmp_path):

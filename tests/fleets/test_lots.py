@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from fleets import handmade
 
 import hdcal
-from hdcal.fleets.summary import fleet_answer, gear_columns
+from hdcal.fleets.summary import fleet_answer, fleet_report, gear_columns
 from hdcal.inference.groupings import group_offsets
+from hdcal.report.document import Table
+from hdcal.report.write import write_numbers
 
 GEARS, LOTS, OPERATORS, FLEETS = 16, 4, 3, 12
 MOVED = np.linspace(0.05, 0.5, 6)
@@ -67,6 +70,36 @@ def test_lots_that_are_not_told_apart_are_spoken_of():
     many = replace(found, readings=replace(found.readings, case=case))
     assert any("4 lots are too many" in note for note in fleet_answer(many).notes)
     assert not any("lots" in note for note in fleet_answer(found).notes)
+
+
+@pytest.mark.parametrize("lots", [("=low", "=low", "high", "high"), tuple("ABCD")])
+def test_the_lot_of_each_gear_stands_in_its_row(lots, tmp_path):
+    """Also of so many lots that they are not told apart."""
+    found = handmade()
+    case = replace(found.case, lots=lots)
+    report = fleet_report(replace(found, readings=replace(found.readings, case=case)))
+    write_numbers(report, tmp_path)
+    for table in (
+        pd.read_csv(tmp_path / "gears.csv").replace("'=low", "=low"),
+        pd.read_parquet(tmp_path / "gears.parquet"),
+    ):
+        assert table["lot"].tolist() == [*lots]
+    # A gear is off from its lot only where lots are told apart.
+    assert "than its lot" not in report.answer.headline
+    (shown,) = (
+        block
+        for section in report.document.sections
+        for block in section.blocks
+        if isinstance(block, Table) and block.columns[0] == "gear"
+    )
+    each = {row[0]: row[1] for row in shown.rows}
+    assert shown.columns[1] == "lot"
+    assert each == dict(zip("ABCD", lots, strict=True))
+
+
+def test_without_lots_no_row_has_one():
+    report = fleet_report(handmade())
+    assert "lot" not in report.tables()["gears.csv"]
 
 
 @pytest.mark.thorough

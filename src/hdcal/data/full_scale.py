@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from hdcal.data.plausible import range_of
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.units import unit_powers
@@ -36,3 +38,20 @@ class FullScale:
 
 
 REFERENCE = FullScale()
+
+
+def scale_of(force: np.ndarray, deformation: np.ndarray, reading: str) -> FullScale:
+    """Return the largest readings; one in a hundred may be wild.
+
+    Args:
+        force: shape (n,) [N].
+        deformation: as read, shape (n,) [mm].
+        reading: of the deformation, `radial` or `diametral`.
+    """
+    largest, far = (
+        float(np.quantile(np.abs(values), 0.99, method="higher"))
+        for values in (force, deformation)
+    )
+    radial = far * (0.5 if reading == "diametral" else 1.0)
+    # Where nothing was read but zeros, nothing is known of the scale.
+    return FullScale(largest or REFERENCE.force, radial or REFERENCE.deformation)

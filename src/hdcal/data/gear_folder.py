@@ -30,10 +30,10 @@ from hdcal.data.reading import (
     asked_columns,
     case_of,
     gear_of,
-    too_far,
 )
 from hdcal.data.reading_notes import unused_columns
 from hdcal.data.theory_names import SPRING
+from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings
 
 # What may differ between the files of gears of one kind, as dotted keys begin.
@@ -123,10 +123,10 @@ def read_gear_folder(
                 unread[label] = each
             elif measured is not None:
                 parts.append(_Part(label, measured, its))
-        wrong += _unread(parts, unread, skip_bad=bool(skip_bad))
+        wrong += _unread(parts, unread, skip_bad=skip_bad)
     assert found is not None
     whole = _joined(parts, found.reference_temperature)
-    bad = {label: each[0] for label, each in unread.items()}
+    bad = {label: _why(each[0], folder) for label, each in unread.items()}
     for part in parts:
         bad |= part.measured.left_out
     kind = "folder" if cases else "file"
@@ -140,7 +140,7 @@ def read_gear_folder(
 
 
 def _unread(
-    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool
+    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool | None
 ) -> list[Finding]:
     """Return what stops all: files that cannot be read, unless they may be left out.
 
@@ -150,10 +150,17 @@ def _unread(
     if skip_bad and known and parts:
         return []
     found = [finding for each in unread.values() for finding in each]
-    if unread and known and parts and not skip_bad:
+    if unread and known and parts and skip_bad is False:
         bad = {label: each[0] for label, each in unread.items()}
         found.append(offer(bad, len(parts) + len(bad)))
     return found
+
+
+def _why(first: Finding, folder: Path) -> Finding:
+    """Return why a gear is left out; where no row says in which file, the words do."""
+    if first.row is not None:
+        return first
+    return Finding(str(folder), f"{first.where}: {first.problem}", first.remedy)
 
 
 def _measured(

@@ -1,7 +1,6 @@
 """Parquet, a file or a folder of them: read in batches, whatever the number of rows."""
 
 import hashlib
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,20 +10,19 @@ import numpy as np
 import pandas as pd
 
 from hdcal.data.bad_gears import bad_gears, offer
-from hdcal.data.case import Case
+from hdcal.data.case import Case, Gear
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Column
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import GROUPINGS, guess_header
 from hdcal.data.measurements import read_measurements
+from hdcal.data.parquet_cells import label_cells, number_cells
 from hdcal.data.parquet_table import parquet_files, parquet_table
-from hdcal.data.plausible import RANGES
 from hdcal.data.reading import GEAR_NAME, read_case
-from hdcal.data.units import column_to_code
-from hdcal.errors import Finding, InputError, quoted
+from hdcal.data.too_far import beyond_radius
+from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
-    from pyarrow import RecordBatch
     from pyarrow.dataset import Dataset
 
 # Rows that are looked at one by one, and of a batch.
@@ -107,20 +105,35 @@ def read_parquet(
         dataset = parquet_table(files, root, findings)
         beside = (path if root else path.parent) / GEAR_NAME
         gear = beside if gear is None and beside.exists() else gear
+        how: dict = {"columns": columns, "theory": theory, "reading": reading}
+        how |= {"skip_bad": skip_bad}
         frame = _head(dataset, findings)
         # Lots, operators and dates are told of all rows.
         further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
-        shown = frame.drop(columns=further)
-        how: dict = {"columns": columns, "theory": theory, "reading": reading}
-        how |= {"skip_bad": skip_bad}
-        case = _placed(dataset, findings, lambda: read_case(shown, gear, **how))
+
+        def read(rows: pd.DataFrame) -> Case:
+            return read_case(rows.drop(columns=further), gear, **how)
+
+        try:
+            case = _placed(dataset, frame, read)
+        except InputError:
+            others = _others(dataset, frame, columns) if skip_bad else frame.iloc[:0]
+            if others.empty:
+                raise
+            frame = pd.concat([frame, others])
+            case = _placed(dataset, frame, read)
         used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
 
 
 def read_batches(
-    file: str, root: str, used: Mapping[str, Column], *, skip_bad: bool | None = None
+    file: str,
+    root: str,
+    used: Mapping[str, Column],
+    gear: Gear,
+    *,
+    skip_bad: bool | None = None,
 ) -> Iterator[Batch]:
     """Yield the rows of one file, in their order.
 
@@ -128,6 +141,7 @@ def read_batches(
         file: one of those of a `Parquet`.
         root: likewise.
         used: likewise.
+        gear: what is known of all gears.
         skip_bad: as in `read_case`.
 
     Raises:
@@ -141,10 +155,14 @@ def read_batches(
         with FileFindings(file) as findings:
             for quantity, column in used.items():
                 if quantity in LABELS:
-                    labels[quantity] = _labels(batch, column, row, findings)
+                    labels[quantity] = label_cells(batch, column, row, findings)
                 else:
-                    values[quantity] = _numbers(batch, column, row, findings)
+                    values[quantity] = number_cells(batch, column, row, findings)
             rows = np.arange(row, row + batch.num_rows)
+            fine = ~np.isin(rows, [*findings.rows])
+            read, of = values["deformation"][fine], labels["specimen"][0][fine]
+            beyond = beyond_radius(read, of, rows[fine], gear)
+            findings.add_rows(beyond, used["deformation"].header)
             found = _batch(values, labels, rows, findings, skip_bad=skip_bad)
         row += batch.num_rows
         if batch.num_rows:
@@ -178,10 +196,44 @@ def _head(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
         findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
 
 
+def _others(
+    dataset: "Dataset", frame: pd.DataFrame, columns: Mapping[str, str] | None
+) -> pd.DataFrame:
+    """Return the first rows of other gears where all of a frame are of one.
+
+    Args:
+        dataset: of which the frame is the first rows.
+        frame: indexed by their places there.
+        columns: as in `read_case`.
+    """
+    whose = [name for name in frame if _quantity(str(name), columns) == "specimen"]
+    gears = frame[whose[0]].unique() if len(whose) == 1 else ()
+    if len(gears) != 1:
+        return frame.iloc[:0]
+    found, at = [frame.iloc[:0]], 0
+    for batch in dataset.to_batches(columns=[*frame]):
+        rows = batch.to_pandas()
+        rows.index += at
+        at += len(rows)
+        found.append(rows[rows[whose[0]] != gears[0]])
+        if sum(map(len, found)) >= _SHOWN:
+            break
+    return pd.concat(found).iloc[:_SHOWN]
+
+
 def _placed(
-    dataset: "Dataset", findings: FileFindings, read: Callable[[], Case]
+    dataset: "Dataset", frame: pd.DataFrame, read: Callable[[pd.DataFrame], Case]
 ) -> Case:
-    """Return what is read of the first rows; what is wrong is told by file and row."""
+    """Return what is read of the first rows; what is wrong is told by file and row.
+
+    Args:
+        dataset: the files.
+        frame: some of their rows, indexed by their places there.
+        read: reads it.
+
+    Raises:
+        InputError: holds what is wrong.
+    """
     ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
     names = [str(one.path) for one in dataset.get_fragments()]
 
@@ -189,16 +241,15 @@ def _placed(
         if wrong.row is None:
             return wrong
         # Below a line of headers.
-        at = wrong.row - 2
+        at = frame.index[wrong.row - 2]
         place = int(np.searchsorted(ends, at, side="right"))
         row = at + 1 - (int(ends[place - 1]) if place else 0)
         return replace(wrong, file=names[place], row=row)
 
     try:
-        case = read()
+        case = read(frame)
     except InputError as error:
-        findings += map(placed, error.findings)
-        raise InputError(findings) from None
+        raise InputError(map(placed, error.findings)) from None
     left_out = {gear: placed(wrong) for gear, wrong in case.left_out.items()}
     return replace(case, left_out=left_out)
 
@@ -208,71 +259,6 @@ def _quantity(header: str, columns: Mapping[str, str] | None) -> str:
     said = {name: quantity for quantity, name in (columns or {}).items()}
     guess = guess_header(header)
     return said.get(header, guess.quantity if guess is not None else "")
-
-
-def _numbers(
-    batch: "RecordBatch", column: Column, row: int, findings: FileFindings
-) -> np.ndarray:
-    """Return a column in code units."""
-    cells = batch.column(column.header)
-    try:
-        read = cells.to_numpy(zero_copy_only=False).astype(float)
-    except (TypeError, ValueError):
-        words = f"{quoted(column.header)} is {cells.type}, no numbers"
-        findings.refuse(words, "Save it as numbers")
-    values, known = (
-        column_to_code(read, column.quantity, column.unit),
-        RANGES[column.quantity],
-    )
-    wrong = np.flatnonzero(~((values >= known.low) & (values <= known.high)))
-    words = known.problem()
-    each = (
-        (
-            row + int(place),
-            "the cell is empty" if np.isnan(values[place]) else words,
-            "Check the number and its unit",
-        )
-        for place in wrong
-    )
-    findings.add_rows(each, column.header, "cells like these")
-    return values
-
-
-def _labels(
-    batch: "RecordBatch", column: Column, row: int, findings: FileFindings
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index of each row's label, and the labels."""
-    from pyarrow import compute, types
-
-    cells = batch.column(column.header)
-    if types.is_timestamp(cells.type):
-        # A day is told, as clocks there showed it, not when each reading was taken.
-        zoned = cells.type.tz is not None
-        # Functions that no stubs know of.
-        known: Any = compute
-        cells = known.local_timestamp(cells) if zoned else cells
-        cells = known.floor_temporal(cells, unit="day")
-    if not types.is_dictionary(cells.type):
-        cells = cells.dictionary_encode()
-    named = [_text(label) for label in cells.dictionary.to_pylist()]
-    if column.quantity == "date":
-        named = [re.split("[T ]", text)[0] if text else text for text in named]
-    texts, place = np.unique([*named, ""], return_inverse=True)
-    index = np.where(cells.is_null(), len(named), cells.indices.fill_null(0))
-    index = place.ravel()[index]
-    empty = index == int(np.flatnonzero(texts == "")[0])
-    if column.quantity not in GROUPINGS:
-        words, remedy = f"the {column.quantity} label is empty", "Name it"
-        each = ((row + int(at), words, remedy) for at in np.flatnonzero(empty))
-        findings.add_rows(each, column.header, "empty labels")
-    return index, np.where(texts == "", NOT_STATED, texts).astype(object)
-
-
-def _text(label: Any) -> str:
-    """Return a label as text: a number is one, whatever kind it has in a file."""
-    if isinstance(label, float) and label.is_integer():
-        label = int(label)
-    return "" if label is None else " ".join(str(label).split())
 
 
 def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:

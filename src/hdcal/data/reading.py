@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.columns import Columns
 from hdcal.data.frames import NAME, is_frame
-from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
 from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
-    Labels,
     Measurements,
     of_specimen,
     read_measurements,
@@ -26,6 +24,7 @@ from hdcal.data.measurements import (
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
 from hdcal.data.theory_names import SPRING
+from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
@@ -137,10 +136,12 @@ def case_of(
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
     )
-    found = behind_filter(found, measured.columns.values.get("time"))
+    values = measured.columns.values
+    found = behind_filter(found, values.get("time"))
+    scale = scale_of(values["force"], values["deformation"], found.reading)
     return Case(
         name=name,
-        gear=at_full_scale(found, _full_scale(measured, found)),
+        gear=at_full_scale(found, scale),
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
@@ -179,17 +180,6 @@ def _name(data: Path, folder: bool, *parts: str | None) -> str:
     return "-".join([name, *named])
 
 
-def _full_scale(measured: Measurements, gear: Gear) -> FullScale:
-    """Return the largest readings; one in a hundred may be wild."""
-    force, deformation = (
-        float(np.quantile(np.abs(measured.columns.values[name]), 0.99, method="higher"))
-        for name in ("force", "deformation")
-    )
-    radial = deformation * (0.5 if gear.reading == "diametral" else 1.0)
-    # Where nothing was read but zeros, nothing is known of the scale.
-    return FullScale(force or REFERENCE.force, radial or REFERENCE.deformation)
-
-
 def _motion(measured: Measurements) -> Motion:
     values = measured.columns.values
     return derive_motion(values["deformation"], measured.run.index, values.get("time"))
@@ -226,25 +216,6 @@ def _known(measured: Measurements) -> frozenset[str]:
         if len(labels.names) >= MANY:
             known.add(name + "s")
     return frozenset(known)
-
-
-def too_far(columns: Columns, specimen: Labels, gear: Gear) -> None:
-    """Find the farthest row of each specimen that no gear of this radius reaches."""
-    # Where something else is wrong, numbers may be missing or wild.
-    if columns.findings or "deformation" not in columns.used:
-        return
-    size = np.abs(columns.values["deformation"])
-    beyond = np.flatnonzero(size >= gear.reach)
-    rising = beyond[np.argsort(size[beyond], kind="stable")]
-    farthest = {int(specimen.index[row]): int(row) for row in rising}
-    radius = f"on a radius of {gear.geometry.radius:g} mm"
-    remedy = "Check the unit of the column and the radius in the gear file"
-    found = (
-        (int(columns.table.rows[row]), f"a deformation of {size[row]:g} mm {radius}")
-        for row in sorted(farthest.values())
-    )
-    header = columns.used["deformation"].header
-    columns.findings.add_rows(((*one, remedy) for one in found), header)
 
 
 def gear_of(

@@ -11,6 +11,7 @@ from hdcal.data.plausible import implausible
 from hdcal.data.scatter import require_scatter
 from hdcal.diagnosis.closure import closure
 from hdcal.diagnosis.detection import Detection, detect_gap
+from hdcal.diagnosis.library import library_of
 from hdcal.diagnosis.next_run import rank_runs
 from hdcal.diagnosis.refit import (
     MOST_LEFT_OUT,
@@ -43,7 +44,7 @@ _NO_CAUSE = "that nothing is missing remains the most probable hypothesis"
 def diagnose(
     case: Case,
     *,
-    library: Mapping[str, type[Effect]] = EFFECTS,
+    library: Mapping[str, type[Effect]] | None = None,
     quick: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
@@ -52,7 +53,7 @@ def diagnose(
 
     Args:
         case: from `read_case`.
-        library: effects to consider, by name.
+        library: effects to consider, by name; by default all of them.
         quick: without calibrating the corrected model by NUTS.
         seed: of all random numbers.
         progress: called with (iterations done, iterations in all) while sampling.
@@ -61,6 +62,7 @@ def diagnose(
         InputError: an effect, a prior or the data cannot be used, see `_check`.
     """
     require_case(case)
+    library = library_of(library)
     _check(case, library, seed)
     require_scatter(case)
     case, repeated = without_repeats(case)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from hdcal.calibration.calibrate import check_names
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, InputError, quoted
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
 
@@ -31,3 +31,25 @@ def choose_library(
     names = [name.strip() for name in spec.removeprefix(_MINUS).split(",")]
     check_names(names, registry, "library")
     return {name: effect for name, effect in registry.items() if name not in names}
+
+
+def library_of(given: Mapping[str, type[Effect]] | None) -> dict[str, type[Effect]]:
+    """Return effects to consider, by name; None are all of the library.
+
+    Raises:
+        InputError: they are no effects by name.
+    """
+    if given is None:
+        return dict(EFFECTS)
+    remedy = "Give effects by name, such as hdcal.EFFECTS or a part of it"
+    if not isinstance(given, Mapping):
+        raise InputError([Finding("library", "is no mapping", remedy)])
+    wrong = [n for n, e in given.items() if not _is_effect(e)]
+    if wrong:
+        words = f"{quoted(str(wrong[0]))} is no class of an effect"
+        raise InputError([Finding("library", words, remedy)])
+    return dict(given)
+
+
+def _is_effect(given: object) -> bool:
+    return isinstance(given, type) and issubclass(given, Effect)

@@ -88,9 +88,13 @@ def fleet(
         if readings is not None and since is not None:
             readings = wrong.attempt(readings.since, since)
         if readings is not None:
+            from hdcal.fleets.next_force import deformation_findings
             from hdcal.fleets.usable import usable
 
-            wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
+            kept = wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
+            if kept is not None and deformation is not None:
+                tested, reach = kept[0].largest, kept[0].case.gear.reach
+                wrong += deformation_findings(deformation, tested, reach)
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None

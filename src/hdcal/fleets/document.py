@@ -44,6 +44,7 @@ def headline(
         columns: of gears.csv.
     """
     total = len(columns["gear"])
+    than = "" if population.lot_sd_percent is None else " than its lot"
     middle, span = estimate(population.gear_sd_percent)
     centre = estimate(population.stiffness_N_per_mm)[0]
     if not called:
@@ -52,35 +53,45 @@ def headline(
             f"{span} %) about {centre} N/mm"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off([str(far)], columns)).replace("; prob", "; off with prob")
+        odd = next(_off([str(far)], columns, than))
+        odd = odd.replace("; prob", "; off with prob")
         return told + f"; oddest: {odd}." if total < FEW else f"{told}."
-    told = "; ".join(_off(called, columns))
+    told = "; ".join(_off(called, columns, than))
     alike = sum("stiffness" not in kinds for kinds in columns["off_in"])
     return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
 
 
-def _off(called: Sequence[str], columns: Mapping[str, np.ndarray]) -> Iterator[str]:
-    """Yield what is said of the gears that are called off, the surest first."""
+def _off(
+    called: Sequence[str], columns: Mapping[str, np.ndarray], than: str
+) -> Iterator[str]:
+    """Yield what is said of the gears that are called off, the surest first.
+
+    Args:
+        called: their names.
+        columns: of gears.csv.
+        than: what they are softer than, where lots are told apart.
+    """
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
     for name in called[:_MOST_NAMED]:
         one = {column: values[place[name]] for column, values in columns.items()}
         most = float(np.median(columns["noise_sd_N"]))
-        yield f"{name} {' and '.join(_apart(one, most))}"
+        yield f"{name} {' and '.join(_apart(one, most, than))}"
     if rest := called[_MOST_NAMED:]:
         kinds = {str(columns["off_in"][place[name]]) for name in rest}
         yield f"{len(rest)} more are off, in {', '.join(sorted(kinds))}"
 
 
-def _apart(one: Mapping[str, Any], noise_sd: float) -> Iterator[str]:
+def _apart(one: Mapping[str, Any], noise_sd: float, than: str) -> Iterator[str]:
     """Yield how far a gear is off in what it is off in; in stiffness where in none.
 
     Args:
         one: its row of gears.csv.
         noise_sd: that most gears have [N].
+        than: what it is softer than, where lots are told apart.
     """
     kinds = str(one["off_in"]).split(", ")
     if "stiffness" in kinds or kinds == [""]:
-        yield _softer(one)
+        yield _softer(one, than)
     if "noise" in kinds:
         noise = float(one["noise_sd_N"])
         yield f"has {noise / noise_sd:.2g} times the noise of most ({noise:.2g} N)"
@@ -88,8 +99,7 @@ def _apart(one: Mapping[str, Any], noise_sd: float) -> Iterator[str]:
         yield f"has its zero at {one['zero_N']:.2g} N"
 
 
-def _softer(one: Mapping[str, Any]) -> str:
-    than = " than its lot" if "lot" in one else ""
+def _softer(one: Mapping[str, Any], than: str) -> str:
     apart, low, high = (float(one[f"apart_{end}"]) for end in ("percent", "lo", "hi"))
     word = "softer" if apart < 0.0 else "stiffer"
     size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
@@ -181,7 +191,7 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     numbers = ["rows", "N/mm", "95 % interval", "apart [%]", "in sds", "noise [N]"]
     numbers += ["P(off)"]
     rows = [_gear(columns, int(row)) for row in far]
-    titles = ["gear", *numbers, ""]
+    titles = ["gear", *(["lot"] if "lot" in columns else []), *numbers, ""]
     table = Table(titles, rows, frozenset(numbers), page=_AT_ONCE)
     shown = Picture(
         "gears",
@@ -222,6 +232,7 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
     width = high - low
     return [
         str(one["gear"]),
+        *([str(one["lot"])] if "lot" in one else []),
         str(one["rows"]),
         number(one["stiffness_N_per_mm"], width),
         f"{number(low, width)} … {number(high, width)}",

@@ -1,5 +1,6 @@
 """What the draws of a fleet's population rest on, typed: whoever wrote the file."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -56,6 +57,8 @@ class FleetFacts:
         checks: of the sampler.
         settings: of the run.
         versions: of the packages that made them.
+        reach_mm: deformation as read that no gear of this radius reaches; None where
+            no radius is known.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -73,6 +76,7 @@ class FleetFacts:
     checks: tuple[Check, ...]
     settings: FleetSettings
     versions: dict[str, str]
+    reach_mm: Size | None = None
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
@@ -118,4 +122,5 @@ def facts_of(found: "Fleet") -> FleetFacts:
         checks=found.checks,
         settings=typed(FleetSettings, how),
         versions=versions(),
+        reach_mm=case.gear.reach if math.isfinite(case.gear.reach) else None,
     )

@@ -4,6 +4,7 @@ It is `posterior.nc` in the folder of a fleet.
 """
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -16,7 +17,12 @@ from hdcal.data.plausible import implausible
 from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.fleets.fleet_facts import POSITIVE, FleetFacts, facts_of
-from hdcal.fleets.next_force import CONTENTS, NextForce, next_force
+from hdcal.fleets.next_force import (
+    CONTENTS,
+    NextForce,
+    deformation_findings,
+    next_force,
+)
 from hdcal.fleets.next_gear import CONFIDENCE
 from hdcal.inference import posterior_file
 from hdcal.inference.posterior import FILE_NAME
@@ -80,27 +86,28 @@ class FleetPosterior:
             confidence: of each bound.
 
         Raises:
-            InputError: a number is impossible.
+            InputError: a number is impossible, or of another unit.
             NotUsable: the fleet failed its checks.
         """
-        draws = self.draws
+        draws, facts = self.draws, self.facts
+        reach = math.inf if facts.reach_mm is None else facts.reach_mm
         shares = {"confidence": confidence}
         shares |= {} if content is None else {"content": content}
         with Findings() as wrong:
-            wrong += implausible("deformation", deformation)
+            wrong += deformation_findings(deformation, facts.largest_mm, reach)
             wrong += implausible("limit_force", limit_force, "sigma")
             wrong += _share_findings(shares, len(draws["stiffness"]))
         if self.reasons:
             raise NotUsable("this fleet failed its checks: " + "; ".join(self.reasons))
         contents = CONTENTS if content is None else (content,)
         about = {"contents": contents, "confidence": confidence}
-        seed = self.facts.settings.seed
+        seed = facts.settings.seed
         found = next_force(draws, deformation, limit_force, seed, **about)
-        reach = abs(self.facts.largest_mm) * (1.0 + _ROUNDING)
+        tested = abs(facts.largest_mm) * (1.0 + _ROUNDING)
         return replace(
             found,
-            at_one_size=self.facts.at_one_size,
-            beyond_tested=abs(deformation) > reach,
+            at_one_size=facts.at_one_size,
+            beyond_tested=abs(deformation) > tested,
         )
 
     def save(self, path: Path | str) -> None:

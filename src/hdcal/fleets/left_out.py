@@ -26,6 +26,8 @@ def left_out_of(case: Case) -> tuple[GearLeftOut, ...]:
 def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
     """Return the columns of gears.csv with gears that are left out below the others.
 
+    What they lack is None.
+
     Args:
         columns: of these, status among them.
         case: of which some are left out.
@@ -33,7 +35,7 @@ def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
     left_out = left_out_of(case)
     if not left_out:
         return dict(columns)
-    empty = np.full(len(left_out), "", object)
+    empty = np.full(len(left_out), None, object)
     own = {
         "gear": np.array([one.gear for one in left_out], object),
         "status": np.array([f"left out: {one.why}" for one in left_out], object),

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from hdcal.data.plausible import implausible
+from hdcal.errors import Finding
 from hdcal.fleets.next_gear import CONFIDENCE, new_group_sd, quantile_of_mixture
 from hdcal.notebook import Shown
 from hdcal.report.answer import Probability, Real
@@ -94,6 +96,23 @@ def next_force(
         exceeded = credible_interval((1.0 - share) * usual + share * odd)
     told = credible_interval(one)
     return NextForce(deformation, told, tuple(bounds), limit_force, exceeded)
+
+
+def deformation_findings(
+    deformation: float, largest: float, reach: float
+) -> list[Finding]:
+    """Return what is wrong with the deformation that is asked about.
+
+    Args:
+        deformation: as read [mm].
+        largest: that was read [mm].
+        reach: what no gear of this radius reaches [mm].
+    """
+    # Late: it is not needed to fit a fleet.
+    from hdcal.prediction.engine.conditions import far_findings
+
+    wrong = implausible("deformation", deformation)
+    return wrong or far_findings(deformation, abs(largest), reach)
 
 
 def _sds(draws: Mapping[str, np.ndarray], size: float) -> tuple[np.ndarray, np.ndarray]:

@@ -198,7 +198,7 @@ def file_pool(
         InputError: holds what is wrong with its first batch that is.
     """
     pool = Pool(gear, left_out={**left_out})
-    for batch in read_batches(file, root, used, skip_bad=skip_bad):
+    for batch in read_batches(file, root, used, gear, skip_bad=skip_bad):
         pool.add(batch)
     return place, pool
 

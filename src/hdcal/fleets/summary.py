@@ -33,6 +33,8 @@ from hdcal.report.write import Report
 
 # Ends and middle of an interval.
 _ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
+# Files of one table.
+_TABLES = ("gears.csv", "gears.parquet")
 
 
 def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
@@ -41,7 +43,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     low, middle, high = np.quantile(own, _ENDS, axis=0)
     columns = {
         "gear": np.array(found.case.specimen_labels),
-        **({"lot": np.array(found.case.lots)} if found.lots else {}),
+        **({"lot": np.array(found.case.lots)} if found.case.lots else {}),
         "rows": found.rows,
         "runs": found.mountings,
         "stiffness_N_per_mm": middle,
@@ -216,7 +218,7 @@ def fleet_report(
         answer,
         "summary.json",
         figures,
-        tables=lambda: {"gears.csv": with_left_out(columns, found.case)},
+        tables=lambda: dict.fromkeys(_TABLES, with_left_out(columns, found.case)),
         others=lambda: [(FILE_NAME, found.posterior.to_netcdf())],
         charts=charts,
         theory=found.case.gear.theory,

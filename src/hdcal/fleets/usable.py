@@ -8,6 +8,8 @@ import numpy as np
 
 from hdcal.data.bad_gears import among, offer
 from hdcal.data.findings import LISTED
+from hdcal.data.full_scale import scale_of
+from hdcal.data.gear import at_full_scale
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, quoted
 from hdcal.fleets.gear_table import GearSizes, gear_sizes
@@ -56,9 +58,20 @@ def usable(
         wrong += _too_few(left, left_out, case.name)
         if bad and not skip_bad and len(bad) < len(labels):
             wrong.append(offer(bad, len(labels)))
-    readings = readings.without(bad)
+    readings = _at_own_scale(readings.without(bad))
     require_scatter(readings.case)
     return readings, sizes.ratio[~among(labels, bad)]
+
+
+def _at_own_scale(readings: FleetReadings) -> FleetReadings:
+    """Return readings whose shipped priors are shares of the largest that are left."""
+    case, records = readings.case, readings.case.records
+    # Of many gears the first rows alone are at hand, or none of those that are left.
+    if not len(records.force):
+        return readings
+    force, read = np.asarray(records.force), np.asarray(records.deformation)
+    gear = at_full_scale(case.gear, scale_of(force, read, case.gear.reading))
+    return replace(readings, case=replace(case, gear=gear))
 
 
 def _still(readings: FleetReadings) -> dict[str, Finding]:

@@ -22,6 +22,8 @@ def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
 
 
 def _cell(value) -> str:
+    if value is None:
+        return ""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):

@@ -11,6 +11,7 @@ from hdcal.report.chart import Chart
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document, answer_spoken_of, spoken_of
 from hdcal.report.html import html_page
+from hdcal.report.parquet_columns import columns_parquet
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
 from hdcal.report.saving.target import TargetFolder
@@ -35,7 +36,8 @@ class Report(Generic[A]):
         figures: draws the document's pictures, by name.
         kept: figures that become files of their own too, as SVG and PNG; by default
             all of them.
-        tables: makes the columns of the CSV files, by the names of the files.
+        tables: makes the columns of tables, by the names of their files: .csv, or
+            .parquet, which is written where pyarrow is installed.
         others: makes the content of other files, each with its name.
         charts: the document's pictures that can be touched, by name.
         theory: of the model; of a spring no gear need be meant.
@@ -83,7 +85,10 @@ def write_numbers(report: Report, folder: Path) -> None:
     """Write all of a report but page and figures into a folder that is there."""
     write_file(folder / report.file, as_json(report.answer).encode())
     for name, columns in report.tables().items():
-        write_file(folder / name, columns_csv(columns).encode())
+        parquet = name.endswith(".parquet")
+        content = columns_parquet(columns) if parquet else columns_csv(columns).encode()
+        if content is not None:
+            write_file(folder / name, content)
     for name, content in report.others():
         write_file(folder / name, content)
 

@@ -14,6 +14,7 @@ from hdcal.cli.processes import run_all
 from hdcal.data.bad_gears import offer
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
+from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.fleets.read_fleet import read_fleet
@@ -124,7 +125,7 @@ def causes(
     gear: Path | str | Mapping[str, Any] | None = None,
     *,
     columns: Mapping[str, str] | None = None,
-    library: Mapping[str, type[Effect]] = EFFECTS,
+    library: Mapping[str, type[Effect]] | None = None,
     jobs: int = 1,
     scheduler: str | None = None,
     skip_bad: bool = False,
@@ -141,7 +142,7 @@ def causes(
             most.
         gear: as in `read_case`, where no case is given.
         columns: likewise.
-        library: effects to consider, by name.
+        library: effects to consider, by name; by default all of them.
         jobs: processes that share the gears.
         scheduler: address of a Dask scheduler, whose workers weigh them instead.
         skip_bad: leave out gears of which a row is wrong, or that say too little.
@@ -154,17 +155,19 @@ def causes(
     with Findings() as wrong:
         wrong += implausible("jobs", jobs)
         wrong += implausible("seed", seed)
+        effects = wrong.attempt(library_of, library)
+    assert effects is not None
     readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
-    case, gears = gears_alone(readings, library, skip_bad=skip_bad, seed=seed)
+    case, gears = gears_alone(readings, effects, skip_bad=skip_bad, seed=seed)
     # What differs between mountings and between gears is told of the fleet.
-    library = {n: e for n, e in library.items() if not e.needs & _OF_FLEETS}
-    tasks = [(place, gear, dict(library), seed) for place, gear in enumerate(gears)]
+    effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}
+    tasks = [(place, gear, effects, seed) for place, gear in enumerate(gears)]
     if scheduler is None:
         weighed = run_all(weigh_gear, tasks, jobs, progress)
     else:
         weighed = list(completed_on_cluster(weigh_gear, iter(tasks), scheduler, _LOST))
     weights = [weight for _, weight in sorted(weighed, key=lambda one: one[0])]
-    return _shared(case, weights, library, seed)
+    return _shared(case, weights, effects, seed)
 
 
 def gears_alone(

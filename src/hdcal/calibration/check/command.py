@@ -5,9 +5,10 @@ from functools import partial
 
 import click
 
+from hdcal.calibration.check.gears import read_whole
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import case_options, force_option, json_option, read_given
+from hdcal.cli.options import case_options, force_option, json_option
 from hdcal.errors import Finding, InputError
 
 # By these letters --force knows an older gear file, and an older picture.
@@ -31,12 +32,15 @@ _GEAR, _PNG, _SVG = b"[gear]\n", b"\x89PNG", b"<?xml"
 @json_option
 @click.pass_obj
 def check(console: Console, effects, write_gear, plot, force, **given):
-    """Read DATA and its gear file, and say what was understood."""
+    """Read DATA and its gear file, and say what was understood.
+
+    DATA may be a folder with a file, or a folder, for each gear too.
+    """
     from hdcal.data.reading import UNSIZED
     from hdcal.report.saving.reserve import reserve_file
 
     with console.wrong:
-        case = read_given(console, **given)
+        case = read_whole(console, given)
         if write_gear and case is not None and UNSIZED not in case.notes:
             words = "writes a gear file where there is none, and one was read here"
             raise InputError([Finding("write_gear", words, "Edit that one")])

@@ -20,6 +20,7 @@ from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
     SENSE,
     Direction,
+    far_findings,
     is_tested,
     temperature_findings,
     turning_point,
@@ -37,8 +38,6 @@ _BLOCK = 1000
 _MOST_TEMPERATURES = 6
 # A room that is logged: bands at its temperatures are one band [K].
 _SAME_TEMPERATURE = 3.0
-# So many times the largest tested deformation are another unit.
-_SLIP = 100.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -234,9 +233,8 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
     elif (worst := float(np.max(np.abs(deformation)))) >= gear.reach:
         problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
         find("deformation", problem, "Give it in mm")
-    elif worst > _SLIP * (most := float(np.max(np.abs(tested)))):
-        problem = f"{worst:g} mm, where the readings reach to {most:g} mm"
-        find("deformation", problem, "Give it in mm")
+    else:
+        findings += far_findings(worst, float(np.max(np.abs(tested))))
     if temperature.size == 0:
         find("temperature", "is empty", "give numbers in °C")
     else:

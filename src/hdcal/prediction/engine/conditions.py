@@ -1,5 +1,6 @@
 """The conditions of a force: where, how warm, which way, and what was tested of it."""
 
+import math
 from typing import Literal, get_args
 
 import equinox as eqx
@@ -23,7 +24,8 @@ SENSE = {"up": 1.0, "down": -1.0}
 NEAR_K, NEAR_MM = 1.0, 1e-9
 # Temperatures of one answer, at each of which every draw has a force.
 MOST_LEVELS = 1_000
-# A force this many times larger or smaller than the usual is a slip of the unit.
+# A force this many times larger or smaller than the usual is a slip of the unit; so is
+# a deformation this many times the largest that was read.
 _OFF = 100.0
 # More than this loss of Young's modulus is a slip of the unit [-].
 _MOST_LOSS = 0.5
@@ -146,6 +148,22 @@ def slip_findings(
         return []
     words = f"{force:g} N, where {deformation:g} mm takes about {usual:.3g} N"
     return [Finding(name, words, "Give it in N")]
+
+
+def far_findings(
+    deformation: float, tested: float, reach: float = math.inf
+) -> list[Finding]:
+    """Return a finding where a deformation can only be a slip of the unit.
+
+    Args:
+        deformation: as given, of either sign [mm].
+        tested: the largest that was read, a size [mm].
+        reach: what no gear of this radius reaches [mm].
+    """
+    if abs(deformation) < reach and abs(deformation) <= tested * _OFF:
+        return []
+    words = f"{deformation:g} mm, where the readings reach to {tested:g} mm"
+    return [Finding("deformation", words, "Give it in mm")]
 
 
 def level_findings(

@@ -1,0 +1,29 @@
+"""What a check reads: a case, or a folder with a file for each gear as one."""
+
+from typing import TYPE_CHECKING, Any
+
+from hdcal.cli.console import Console
+from hdcal.cli.options import read_given, without_meaning
+
+if TYPE_CHECKING:
+    from hdcal.data.case import Case
+
+
+def read_whole(console: Console, given: dict[str, Any]) -> "Case | None":
+    """Read what `case_options` named; what is wrong is kept by the console.
+
+    Args:
+        console: of the command.
+        given: values of these options.
+    """
+    from hdcal.data.gear_files import gear_files
+    from hdcal.data.gear_folder import read_gear_folder
+
+    one = given["specimen"] is not None or given["columns"] is None
+    if one or not gear_files(given["data"]):
+        return read_given(console, **given)
+    console.wrong += without_meaning(["sheet"], "a folder of gears")
+    names = "data", "gear", "columns", "theory", "reading", "encoding"
+    how = {name: given[name] for name in names}
+    found = console.wrong.attempt(read_gear_folder, **how)
+    return None if found is None else found[0]
