@@ -6,6 +6,7 @@ import hashlib
 import numpy as np
 import pytest
 
+from hdcal.data.header_words import guess_header
 from hdcal.data.reading import read_case
 
 ROWS = [(0.0, 1.5), (0.1, 20.0), (0.2, 41.25), (0.3, 60.5), (0.4, 82.0), (0.5, 101.0)]
@@ -271,6 +272,18 @@ def test_lots_of_which_a_gear_has_several_are_not_used(folder):
     assert (case.lots, case.operators) == ((), ())
     assert "lots are not used: specimen 'A' has several" in case.notes
     assert "operators are not used: run 'A/2' has several" in case.notes
+
+
+def test_rigs_are_those_of_mountings(folder):
+    """Whatever their column is called; a rig that warms up is none."""
+    for header in ("rig", "Bench", "Prüfstand Nr"):
+        case = read(folder, LOTS.replace("Bediener", header))
+        assert (case.rigs, case.operators) == (("Kern", "Moss", "Kern"), ())
+    mixed = LOTS.replace("Bediener", "rig").replace("Moss,2,0.2", "Kern,2,0.2")
+    case = read(folder, mixed)
+    assert case.rigs == ()
+    assert "rigs are not used: run 'A/2' has several" in case.notes
+    assert guess_header("Rig temperature [C]") == ("temperature", "C", False)
 
 
 def test_who_tested_may_stand_above_the_table_too(folder):

@@ -35,10 +35,14 @@ def test_shares_are_those_of_the_standard_deviations():
     assert of(-0.5).gears_N == found.gears_N
 
 
-def test_lots_count_with_the_gears_and_operators_with_the_gauge():
+def test_lots_count_with_the_gears_operators_and_rigs_with_the_gauge():
     found = of(lot_sd=0.04, operator_sd=0.8)
     assert found.gears_N.median == pytest.approx(0.05 * 200.0 * 0.5)
     assert found.reproducibility_N.median == pytest.approx(1.0)
+    # A gain is a share of the force.
+    rigs = of(operator_sd=0.8, rig_sd=0.02)
+    assert rigs.reproducibility_N.median == pytest.approx(math.hypot(1.0, 2.0))
+    assert rigs.gears_N == of().gears_N
     # Noise that differs from gear to gear counts by its mean square.
     noisy = of(noise_spread=0.5)
     assert noisy.repeatability_N.median == pytest.approx(0.5 * math.exp(0.25))

@@ -30,6 +30,7 @@ def measured() -> pd.DataFrame:
                 "specimen": f"G{gear}",
                 "lot": "AB"[gear % 2],
                 "operator": "KM"[run],
+                "rig": "12"[run],
                 "date": f"2026-04-{gear + 1:02d}",
                 "run": run,
                 "deformation_mm": x,
@@ -82,7 +83,7 @@ def told(make, *args, **kwargs) -> list[str]:
 def same(found, frame: pd.DataFrame) -> None:
     """Check that readings are those of one table that names its gears."""
     whole = read_fleet(frame, SIZES)
-    for name in ("specimen_labels", "run_labels", "lots", "operators", "dates"):
+    for name in ("specimen_labels", "run_labels", "lots", "operators", "rigs", "dates"):
         assert getattr(found.case, name) == getattr(whole.case, name), name
     for name, column in vars(found.sums).items():
         assert np.array_equal(column, getattr(whole.sums, name)), name

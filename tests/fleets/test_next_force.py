@@ -20,7 +20,8 @@ DRAWS = {
     "off_ratio": 5.0,
     "lot_sd": 0.01,
     "operator_sd": 0.4,
-    **{f"{kind}_{k}": 0.0 for kind in ("lot", "operator") for k in (1, 2)},
+    "rig_sd": 0.015,
+    **{f"{kind}_{k}": 0.0 for kind in ("lot", "operator", "rig") for k in (1, 2)},
     "lot_ratio": 0.5,
 }
 
@@ -34,11 +35,12 @@ def gears_to_come(count=400_000):
     rng = np.random.default_rng(5)
     normal = rng.standard_normal((6, count))
     odd = rng.random(count) < DRAWS["off_share"]
-    # A lot, and an operator, from the mean of those measured, which are two each.
+    # A lot, an operator and a rig, from the mean of those measured, which are two each.
     own = 0.02 * np.where(odd, np.sqrt(26.0), 1.0) * normal[0]
     stiffness = 200.0 * (1.0 + own + 0.01 * np.sqrt(1.5) * normal[1])
     zero = 0.7 + 0.6 * normal[2] + 0.4 * np.sqrt(1.5) * normal[3]
-    return stiffness * 0.4 + zero + 0.5 * normal[4]
+    gain = 1.0 + 0.015 * np.sqrt(1.5) * normal[5]
+    return stiffness * gain * 0.4 + zero + 0.5 * normal[4]
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])

@@ -75,8 +75,9 @@ def test_a_gear_that_was_mounted_once_is_called_no_more():
     draws = {"zero": np.zeros(2)}
     for _ in range(fleets):
         zeros = rng.standard_normal(len(gear))
+        nobody = none.astype(int)
         sums = MountingSums(
-            gear, 6.0 + none, none, zeros, none, none, none, none.astype(int)
+            gear, 6.0 + none, none, zeros, none, none, none, nobody, nobody
         )
         chance = zero_chance(sums, draws, np.ones((2, 12)), np.zeros(12))
         called += called_off({"zero": chance})["zero"][0]

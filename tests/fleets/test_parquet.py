@@ -33,6 +33,7 @@ def frame():
                 "run": run,
                 "lot": "AB"[gear % 2],
                 "operator": ["Kim", "Ada", "Bo"][(gear + run) % 3],
+                "rig": f"R{run}",
                 "date": f"2026-04-{gear + 1:02d}",
                 "deformation_um": 1000.0 * x,
                 "force_N": 200.0 * x * (1 + 0.01 * rng.standard_normal())
@@ -56,13 +57,13 @@ def same(found, whole):
     for mounting, gear in enumerate(found.sums.gear):
         label = found.case.run_labels[found.runs[mounting]]
         order.append(each[gears[gear], names.index(label)])
-    for name in ("rows", "x", "y", "xx", "xy", "yy"):
+    for name in ("rows", "x", "y", "xx", "xy", "yy", "operator", "rig"):
         one, other = getattr(found.sums, name), getattr(whole.sums, name)[order]
         assert one == pytest.approx(other, rel=1e-12), name
     assert [found.case.lots[g] for g in range(len(gears))] == [
         whole.case.lots[g] for g in gears
     ]
-    for one, other in (("operators", 0), ("dates", 10)):
+    for one, other in (("operators", 0), ("rigs", 0), ("dates", 10)):
         mine = [getattr(found.case, one)[r][: other or None] for r in found.runs]
         theirs = [
             getattr(whole.case, one)[whole.runs[m]][: other or None] for m in order

@@ -40,7 +40,7 @@ SILICON = [
 BETWEEN, WITHIN = 5.11462616e-2, 2.16636560e-1
 
 
-def sums_of(mountings, operators=None):
+def sums_of(mountings, operators=None, rigs=None):
     """Return the sums of (gear, x, y) for each mounting."""
     rows = []
     for gear, x, y in mountings:
@@ -48,13 +48,14 @@ def sums_of(mountings, operators=None):
         products = about_x @ about_x, about_x @ about_y, about_y @ about_y
         rows.append((gear, len(x), x.mean(), y.mean(), *products))
     columns = np.array(rows).T
-    by = np.zeros(len(rows), int) if operators is None else np.array(operators)
-    return MountingSums(columns[0].astype(int), *columns[1:], by)
+    nobody = np.zeros(len(rows), int)
+    by = (nobody if told is None else np.array(told) for told in (operators, rigs))
+    return MountingSums(columns[0].astype(int), *columns[1:], *by)
 
 
-def problem_of(mountings, gears, lots=None, operators=None):
+def problem_of(mountings, gears, lots=None, operators=None, rigs=None):
     lot = np.zeros(gears, int) if lots is None else np.array(lots)
-    return PopulationProblem({}, gear_sums(sums_of(mountings, operators), lot))
+    return PopulationProblem({}, gear_sums(sums_of(mountings, operators, rigs), lot))
 
 
 VALUES = {
@@ -82,7 +83,7 @@ def fleet(seed=0, gears=3):
     return found
 
 
-def dense(mountings, values, lot=0.0, operators=None):
+def dense(mountings, values, lot=0.0, operators=None, rigs=None):
     """Return log p and the mean stiffness of one gear, for both kinds of gears.
 
     Args:
@@ -90,8 +91,11 @@ def dense(mountings, values, lot=0.0, operators=None):
         values: of the population.
         lot: by which share its lot is stiffer.
         operators: by how much the zero of each mounting's operator is higher [N].
+        rigs: by which share the rig of each mounting reads more.
     """
-    x = np.concatenate([x for _, x, _ in mountings])
+    gains = np.zeros(len(mountings)) if rigs is None else np.array(rigs)
+    read = zip(gains, mountings, strict=True)
+    x = np.concatenate([(1.0 + gain) * x for gain, (_, x, _) in read])
     y = np.concatenate([y for _, _, y in mountings])
     run = np.repeat(np.arange(len(mountings)), [len(x) for _, x, _ in mountings])
     noise = values["sigma"] ** 2 * np.eye(len(x))
@@ -112,27 +116,32 @@ def dense(mountings, values, lot=0.0, operators=None):
 @pytest.mark.parametrize("groups", [False, True])
 def test_the_likelihood_is_that_of_all_rows_with_their_covariance(groups):
     mountings = fleet()
-    lots, operators = np.zeros(3, int), np.zeros(6, int)
+    lots, operators, rigs = np.zeros(3, int), np.zeros(6, int), np.zeros(6, int)
     values = dict(VALUES)
     if groups:
         lots, operators = np.array([0, 1, 1]), np.array([0, 1, 0, 1, 1, 0])
+        # One gear is read on one rig only, the others on several.
+        rigs = np.array([2, 0, 1, 1, 1, 0])
+        values |= {"rig_1": 0.03, "rig_2": -0.05, "rig_3": 0.02, "rig_sd": 0.02}
         values |= {"lot_1": 0.02, "lot_2": -0.02, "lot_sd": 0.01}
         values |= {"operator_1": 0.7, "operator_2": -0.7, "operator_sd": 1.0}
     of_lot = np.array([values.get("lot_1", 0.0), values.get("lot_2", 0.0)])
     by = np.array([values.get("operator_1", 0.0), values.get("operator_2", 0.0)])
+    gains = np.array([values.get(f"rig_{k}", 0.0) for k in (1, 2, 3)])
     shares = np.log([1.0 - VALUES["off_share"], VALUES["off_share"]])
     expected, means, chances = 0.0, [], []
     for gear in range(3):
         here = np.array([m[0] == gear for m in mountings])
         own = [m for m, inside in zip(mountings, here, strict=True) if inside]
-        logs, mean = dense(own, values, of_lot[lots[gear]], by[operators[here]]).T
+        beside = by[operators[here]], gains[rigs[here]]
+        logs, mean = dense(own, values, of_lot[lots[gear]], *beside).T
         whole = np.logaddexp.reduce(logs + shares)
         # The sums leave out what does not depend on the parameters.
         rows = [len(x) for one, x, _ in mountings if one == gear]
         expected += whole + 0.5 * sum(n * np.log(2.0 * np.pi) + np.log(n) for n in rows)
         means.append(mean)
         chances.append(np.exp(logs + shares - whole))
-    problem = problem_of(mountings, 3, lots, operators)
+    problem = problem_of(mountings, 3, lots, operators, rigs)
     assert log_likelihood(problem, values) == pytest.approx(expected, abs=1e-9)
     law = gear_law(problem, values)
     np.testing.assert_allclose(law.mean[:, 0], means, rtol=1e-10)
@@ -157,6 +166,21 @@ def test_noise_that_differs_is_integrated(rows, spread, off):
     expected = np.logaddexp.reduce(np.log(weight) + fine)
     found = log_likelihood(problem, {**VALUES, "noise_spread": spread})
     assert found == pytest.approx(expected, abs=_CLOSE)
+
+
+def test_noise_is_integrated_where_it_is_at_the_gain_of_a_rig():
+    """Beside its lines on two rigs a gear scatters by less than beside one line.
+
+    Nodes where lines on each rig have the noise would miss nearly all there is.
+    """
+    rng = np.random.default_rng(8)
+    x = np.linspace(0.0, 0.5, 20)
+    noise = (0.2 * rng.standard_normal(20) for _ in range(2))
+    read = [(0, x, s * x + e) for s, e in zip((200.0, 206.0), noise, strict=True)]
+    gains = {"rig_1": 0.0, "rig_2": 0.0, "rig_sd": 0.02, "noise_spread": 0.3}
+    two = problem_of(read, 1, rigs=[0, 1])
+    one = float(log_likelihood(problem_of(read, 1), VALUES | {"noise_spread": 0.3}))
+    assert float(log_likelihood(two, VALUES | gains)) == pytest.approx(one, abs=1e-9)
 
 
 def test_draws_of_gears_follow_their_law():

@@ -55,6 +55,7 @@ def handmade() -> Fleet:
         misfit=Misfit(0.0, 0.0, 0.0),
         lots=[],
         operators=[],
+        rigs=[],
         force_tolerance=None,
         checks=(Check("chains agree (R-hat)", "passed", "the largest R-hat is 1.0"),),
         settings={

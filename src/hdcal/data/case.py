@@ -88,6 +88,7 @@ class Case(Shown):
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
         lots: lot of each specimen index; empty where none is told.
         operators: who mounted each run index; empty where none is told.
+        rigs: which rig read each run index; empty where none is told.
         dates: when each run index was measured first, in ISO 8601; an empty one of a
             run that does not say, and empty where none is told.
         left_out: specimens of which no row is here, as one of theirs is wrong, each
@@ -104,6 +105,7 @@ class Case(Shown):
     columns: dict[str, str] = field(default_factory=dict)
     lots: tuple[str, ...] = ()
     operators: tuple[str, ...] = ()
+    rigs: tuple[str, ...] = ()
     dates: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
 

@@ -1,4 +1,4 @@
-"""Labels that say more of a gear or a mounting: its lot, its operator, its date."""
+"""Labels that say more of a gear or a mounting: its lot, operator, rig, date."""
 
 from collections.abc import Mapping
 
@@ -14,7 +14,7 @@ from hdcal.errors import quoted
 def further_labels(
     values: Mapping[str, np.ndarray], specimen: Labels, run: Labels
 ) -> tuple[dict[str, tuple[str, ...]], list[str]]:
-    """Return lots of specimens, operators and dates of runs, as `Case` has them.
+    """Return lots of specimens, operators, rigs and dates of runs, as `Case` has them.
 
     Args:
         values: by quantity, of each row; those that are not there are not told.
@@ -26,13 +26,15 @@ def further_labels(
     """
     lots, of_lots = _one_each(values.get("lot"), specimen, "lot")
     operators, of_operators = _one_each(values.get("operator"), run, "operator")
+    rigs, of_rigs = _one_each(values.get("rig"), run, "rig")
     dates, of_dates = dates_of(values.get("date", ()), run.index)
-    told = {"lots": lots, "operators": operators, "dates": dates}
-    return told, [note for note in (of_lots, of_operators, of_dates) if note]
+    told = {"lots": lots, "operators": operators, "rigs": rigs, "dates": dates}
+    notes = of_lots, of_operators, of_rigs, of_dates
+    return told, [note for note in notes if note]
 
 
 def _one_each(labels, of: Labels, quantity: str) -> tuple[tuple[str, ...], str]:
-    """Return the lot of each specimen, or the operator of each run, and a note.
+    """Return the lot of each specimen, or who or what read each run, and a note.
 
     Nothing is returned where the file does not tell them or one has several, which the
     note says.
@@ -40,7 +42,7 @@ def _one_each(labels, of: Labels, quantity: str) -> tuple[tuple[str, ...], str]:
     Args:
         labels: of each row; None where the file has none.
         of: the specimen, or the run, of each row.
-        quantity: lot or operator.
+        quantity: lot, operator or rig.
     """
     if labels is None:
         return (), ""

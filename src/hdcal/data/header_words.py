@@ -52,10 +52,11 @@ WORDS: dict[str, tuple[str, ...]] = {
     ),
     "lot": ("lot", "batch", "los"),
     "operator": ("operator", "inspector", "bediener", "prüfer", "opérateur"),
+    "rig": ("rig", "testrig", "bench", "testbench", "prüfstand", "banc", "试验台"),
     "date": ("date", "datum", "prüfdatum"),
 }
 # Labels that say more of a gear or a mounting, and that no answer has to have.
-GROUPINGS = ("lot", "operator", "date")
+GROUPINGS = ("lot", "operator", "rig", "date")
 # What says that a column is something else about the quantity.
 _OTHERWISE = {
     *("setpoint", "set", "target", "command", "soll", "sollwert", "consigne"),

@@ -37,8 +37,8 @@ class Batch(NamedTuple):
     Attributes:
         values: deformation [mm], force [N] and temperature [°C], as far as they are
             read; shape (n,).
-        labels: of specimen, run, lot, operator and date, likewise: the index of each
-            row's, and the labels.
+        labels: of specimen, run, lot, operator, rig and date, likewise: the index of
+            each row's, and the labels.
         bad: gears of which a row is wrong, each with what that is.
     """
 
@@ -108,7 +108,7 @@ def read_parquet(
         how: dict = {"columns": columns, "theory": theory, "reading": reading}
         how |= {"skip_bad": skip_bad}
         frame = _head(dataset, findings)
-        # Lots, operators and dates are told of all rows.
+        # Lots, operators, rigs and dates are told of all rows.
         further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
 
         def read(rows: pd.DataFrame) -> Case:

@@ -21,6 +21,7 @@ class PopulationAnswer:
         gear_sd_percent: between ordinary gears of a lot.
         lot_sd_percent: between lots; None where none are told apart.
         operator_sd_N: of the zero between operators, likewise.
+        rig_sd_percent: of the gain between rigs, likewise.
         mounting_sd_N: of the zero from mounting to mounting.
         reading_sd_N: of single readings.
     """
@@ -29,6 +30,7 @@ class PopulationAnswer:
     gear_sd_percent: Interval
     lot_sd_percent: Interval | None
     operator_sd_N: Interval | None
+    rig_sd_percent: Interval | None
     mounting_sd_N: Interval
     reading_sd_N: Interval
 
@@ -49,6 +51,15 @@ class OperatorAnswer:
     operator: Words
     mountings: Count
     zero_apart_N: Interval
+
+
+@dataclass(frozen=True)
+class RigAnswer:
+    """A rig, with how much higher forces it reads than the mean of all rigs."""
+
+    rig: Words
+    mountings: Count
+    gain_apart_percent: Interval
 
 
 @dataclass(frozen=True)
@@ -89,6 +100,7 @@ class FleetAnswer(Answer):
         population: what they come from.
         lots: where they are told.
         operators: likewise.
+        rigs: likewise.
         next_gear: one more of them, of another lot.
         next_force: that it needs at a deformation; None where none was asked for.
         gauge_rr: how well one reading of the force tells gears apart.
@@ -112,6 +124,7 @@ class FleetAnswer(Answer):
     population: PopulationAnswer
     lots: tuple[LotAnswer, ...]
     operators: tuple[OperatorAnswer, ...]
+    rigs: tuple[RigAnswer, ...]
     next_gear: FutureGear
     next_force: NextForce | None
     gauge_rr: GaugeAnswer

@@ -249,6 +249,7 @@ def _scatter(answer: FleetAnswer) -> Section:
     rows = [
         ("between lots", population.lot_sd_percent, "%"),
         ("between ordinary gears", population.gear_sd_percent, "%"),
+        ("gain, between rigs", population.rig_sd_percent, "%"),
         ("zero, between operators", population.operator_sd_N, "N"),
         ("zero, between mountings", population.mounting_sd_N, "N"),
         ("single readings", population.reading_sd_N, "N"),
@@ -263,7 +264,7 @@ def _scatter(answer: FleetAnswer) -> Section:
 
 
 def _groups(answer: FleetAnswer) -> Iterator[Table]:
-    """Yield what is known of each lot and each operator."""
+    """Yield what is known of each lot, operator and rig."""
     lots = [
         [one.lot, str(one.gears), *estimate(one.stiffness_N_per_mm)]
         for one in answer.lots
@@ -272,9 +273,14 @@ def _groups(answer: FleetAnswer) -> Iterator[Table]:
         [one.operator, str(one.mountings), *estimate(one.zero_apart_N)]
         for one in answer.operators
     ]
+    rigs = [
+        [one.rig, str(one.mountings), *estimate(one.gain_apart_percent)]
+        for one in answer.rigs
+    ]
     for title, many, what, rows in (
         ("lot", "gears", "N/mm", lots),
         ("operator", "mountings", "zero over the mean [N]", operators),
+        ("rig", "mountings", "gain over the mean [%]", rigs),
     ):
         numbers = (many, what, "95 % interval")
         if rows:

@@ -29,6 +29,7 @@ from hdcal.fleets.sampling import sample_population
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
+from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.population_problem import (
     PopulationProblem,
     draw_gears,
@@ -53,9 +54,9 @@ class Fleet(Shown):
         readings: of all of them, at the sizes of the gear file.
         draws: of the population by site, shape (d,): stiffness [N/mm as read],
             specimen_sd (relative), zero and run_offset_sd [N], sigma [N], noise_spread,
-            off_share and off_ratio; where they are told lot_sd (relative) and
-            operator_sd [N], and how far each lies from the mean of all, lot_1, …
-            (relative) and operator_1, … [N].
+            off_share and off_ratio; where they are told lot_sd and rig_sd (relative)
+            and operator_sd [N], and how far each lies from the mean of all, lot_1, …
+            and rig_1, … (relative) and operator_1, … [N].
         stiffness: of each gear, of as many draws, had it the gear file's sizes, shape
             (t, g) [N/mm as read].
         apart: of each gear from the centre of its lot, likewise, as a share of it.
@@ -72,6 +73,7 @@ class Fleet(Shown):
         lots: their names, in the order of lot_1, … of the draws; empty where none are
             told apart.
         operators: likewise of operator_1, ….
+        rigs: likewise of rig_1, ….
         misfit: what the readings have beside straight lines.
         force_tolerance: width that a force may lie in [N]; None where none is stated.
         checks: of the sampler.
@@ -93,6 +95,7 @@ class Fleet(Shown):
     unit: float
     lots: Sequence[str]
     operators: Sequence[str]
+    rigs: Sequence[str]
     misfit: Misfit
     force_tolerance: float | None
     checks: tuple[Check, ...]
@@ -223,7 +226,8 @@ def fleet(
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = rough_values(problem, readings.sums)
     found = sample_population(problem, start, of_draws, progress=progress, **size)
-    each = _gears(problem, readings, found.values, of_gears)
+    on_one_rig = readings.on_one_rig(found.values)
+    each = _gears(problem, on_one_rig.sums, found.values, of_gears)
     median = ratio * np.median(each["stiffness"], axis=0)
     return Fleet(
         readings=readings,
@@ -235,7 +239,8 @@ def fleet(
         unit=unit,
         lots=groups(readings.case.lots)[0],
         operators=groups(readings.case.operators)[0],
-        misfit=misfit(readings.case, median, each["noise_sd"]),
+        rigs=groups(readings.case.rigs)[0],
+        misfit=misfit(on_one_rig.case, median, each["noise_sd"]),
         force_tolerance=force_tolerance,
         checks=found.checks,
         settings={
@@ -249,11 +254,18 @@ def fleet(
 
 def _gears(
     problem: PopulationProblem,
-    readings: FleetReadings,
+    sums: MountingSums,
     draws: Mapping[str, np.ndarray],
     key: Key[Array, ""],
 ) -> dict[str, Any]:
-    """Return what is known of each gear, as `Fleet` has it."""
+    """Return what is known of each gear, as `Fleet` has it.
+
+    Args:
+        problem: the gears.
+        sums: of each mounting, as if one rig had read them all.
+        draws: of the population by site, shape (d,).
+        key: source of randomness.
+    """
     gears = len(problem.sums.lot)
     many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
     every = -(-len(draws["stiffness"]) // many)
@@ -262,7 +274,6 @@ def _gears(
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
     centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
     apart = stiffness / centre - 1.0
-    sums = readings.sums
     zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
     noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
     # About a centre and a scatter that the gear itself has no part in: where it is off.

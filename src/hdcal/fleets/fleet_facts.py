@@ -53,6 +53,7 @@ class FleetFacts:
         at_one_size: whether gears of several sizes were compared at the gear file's.
         lots: their names, in the order of lot_1, … of the draws.
         operators: likewise of operator_1, ….
+        rigs: likewise of rig_1, ….
         notes: what the reader of the fleet was told.
         checks: of the sampler.
         settings: of the run.
@@ -72,6 +73,7 @@ class FleetFacts:
     at_one_size: bool
     lots: tuple[str, ...]
     operators: tuple[str, ...]
+    rigs: tuple[str, ...]
     notes: tuple[str, ...]
     checks: tuple[Check, ...]
     settings: FleetSettings
@@ -80,8 +82,8 @@ class FleetFacts:
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
-        """Lots and operators, where they are told."""
-        told = {"lot": self.lots, "operator": self.operators}
+        """Lots, operators and rigs, where they are told."""
+        told = {"lot": self.lots, "operator": self.operators, "rig": self.rigs}
         return {kind: names for kind, names in told.items() if names}
 
     @property
@@ -118,6 +120,7 @@ def facts_of(found: "Fleet") -> FleetFacts:
         at_one_size=found.at_one_size,
         lots=tuple(found.lots),
         operators=tuple(found.operators),
+        rigs=tuple(found.rigs),
         notes=(*changes, *notes_of(found)),
         checks=found.checks,
         settings=typed(FleetSettings, how),

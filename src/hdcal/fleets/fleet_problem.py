@@ -1,5 +1,7 @@
 """From what mountings say to the problem that is sampled."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from hdcal.data.case import Case
@@ -11,11 +13,13 @@ from hdcal.fleets.groups import (
     groups,
     lot_grouping,
     operator_grouping,
+    rig_grouping,
     slopes,
     zeros,
 )
 from hdcal.fleets.readings import FleetReadings
-from hdcal.inference.gear_sums import MountingSums, gear_sums
+from hdcal.inference.gear_sums import GearSums, MountingSums, gear_sums, stretched
+from hdcal.inference.groupings import Grouping
 from hdcal.inference.population_problem import (
     GROUP_RATIO,
     POPULATION_PRIORS,
@@ -29,12 +33,30 @@ def fleet_problem(readings: FleetReadings) -> tuple[PopulationProblem, float]:
     case, sums = readings.case, readings.sums
     lots, lot = groups(case.lots)
     lot = lot if lots else np.zeros(len(case.specimen_labels), int)
-    told = {"lot": lot_grouping(sums, lot)} if lots else {}
+    of_gears = gear_sums(sums, lot, reading_step(case))
+    told: dict[str, Grouping] = {}
+    if groups(case.rigs)[0]:
+        least = _LEAST * float(np.max(np.abs(sums.y)))
+        told["rig"] = rig_grouping(sums, max(_noise_sd(of_gears), least))
+        sums = _levelled(sums, told)
+    told |= {"lot": lot_grouping(sums, lot)} if lots else {}
     told |= {"operator": operator_grouping(sums)} if groups(case.operators)[0] else {}
     unit, priors = _priors(case)
     priors |= {f"{kind}_ratio": GROUP_RATIO for kind in told}
-    problem = PopulationProblem(priors, gear_sums(sums, lot, reading_step(case)), told)
-    return problem, unit
+    return PopulationProblem(priors, of_gears, told), unit
+
+
+def _levelled(sums: MountingSums, told: Mapping[str, Grouping]) -> MountingSums:
+    """Return sums as if rigs had one gain, as far as it seems to differ."""
+    if "rig" not in told:
+        return sums
+    return stretched(sums, 1.0 + told["rig"].offsets[sums.rig])
+
+
+def _noise_sd(of_gears: GearSums) -> float:
+    """Return about how much readings scatter [N]; nought where none do."""
+    log_noise = of_gears.log_noise_sd[of_gears.noise_free > 0.0]
+    return float(np.exp(np.median(log_noise))) if len(log_noise) else 0.0
 
 
 # Sds from the centre at which few ordinary gears are.
@@ -45,11 +67,11 @@ _LEAST = 1e-4
 
 def rough_values(problem: PopulationProblem, sums: MountingSums) -> dict[str, float]:
     """Return about where the population is: a search from there is a short one."""
+    sums = _levelled(sums, problem.groups)
     slope, zero = slopes(sums), zeros(sums)
     apart = slope / np.median(slope) - 1.0
     spread, mounted = middle_sd(apart), middle_sd(zero - np.median(zero))
-    log_noise = problem.sums.log_noise_sd[problem.sums.noise_free > 0.0]
-    noise = float(np.exp(np.median(log_noise))) if len(log_noise) else 0.0
+    noise = _noise_sd(problem.sums)
     values = {
         "zero": np.median(zero),
         # With what is believed of it, one in ten, as if of ten more gears.

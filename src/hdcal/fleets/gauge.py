@@ -26,7 +26,8 @@ class GaugeAnswer:
     Attributes:
         deformation_mm: at which it is read, as read.
         repeatability_N: sd of readings on one mounting.
-        reproducibility_N: sd between mountings, and operators where they are told.
+        reproducibility_N: sd between mountings, and operators and rigs where they are
+            told.
         gears_N: sd between ordinary gears, and lots where they are told.
         percent_study_variation: gauge over all that scatters, by sds.
         percent_tolerance: six sds of the gauge over the tolerance; None without one.
@@ -55,9 +56,10 @@ def gauge(
     none = np.zeros(1)
     # The mean square over gears, whose noise is lognormal.
     repeat = draws["sigma"] * np.exp(draws["noise_spread"] ** 2)
+    force = draws["stiffness"] * abs(deformation)
     mounted = np.hypot(draws["run_offset_sd"], draws.get("operator_sd", none))
-    spread = np.hypot(draws["specimen_sd"], draws.get("lot_sd", none))
-    gears = spread * draws["stiffness"] * abs(deformation)
+    mounted = np.hypot(mounted, force * draws.get("rig_sd", none))
+    gears = force * np.hypot(draws["specimen_sd"], draws.get("lot_sd", none))
     of_gauge = np.hypot(repeat, mounted)
     share = 100.0 * of_gauge / np.hypot(of_gauge, gears)
     told = credible_interval(_CATEGORIES * gears / of_gauge)

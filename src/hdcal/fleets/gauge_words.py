@@ -11,7 +11,7 @@ def gauge_section(found: GaugeAnswer) -> Section:
     """Return how well one reading tells gears apart, as quality people read it."""
     rows = [
         ("repeatability: readings", found.repeatability_N, "N"),
-        ("reproducibility: mountings and operators", found.reproducibility_N, "N"),
+        ("reproducibility: mountings, operators, rigs", found.reproducibility_N, "N"),
         ("gears and lots", found.gears_N, "N"),
         (
             "gauge, of all that scatters (study variation)",

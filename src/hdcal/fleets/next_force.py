@@ -34,7 +34,8 @@ class ForceBounds:
 class NextForce(Shown):
     """The force that a gear not yet measured needs, in size.
 
-    Of one reading in a new mounting at the reference temperature; an odd gear is in it.
+    Of one reading in a new mounting, by another operator on another rig where these are
+    told, at the reference temperature; an odd gear is in it.
 
     Attributes:
         deformation_mm: that is asked for, as read.
@@ -122,6 +123,7 @@ def _sds(draws: Mapping[str, np.ndarray], size: float) -> tuple[np.ndarray, np.n
     rest = np.hypot(reading, mounted)
     own, lots = draws["specimen_sd"], new_group_sd(draws, "lot")
     force = draws["stiffness"] * size
+    rest = np.hypot(rest, force * new_group_sd(draws, "rig"))
     ratio = np.sqrt(1.0 + draws["off_ratio"] ** 2)
     return (
         np.hypot(rest, force * np.hypot(own, lots)),

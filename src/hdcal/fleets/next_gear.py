@@ -24,14 +24,14 @@ def next_gear(draws: Mapping[str, np.ndarray], rng: np.random.Generator) -> np.n
 
 
 def new_group_sd(draws: Mapping[str, np.ndarray], kind: str) -> np.ndarray:
-    """Return how far a new lot, or operator, lies from the mean of those measured.
+    """Return how far a new lot, operator or rig lies from the mean of those told.
 
     Their mean lies as far from that of all as one of them, over the root of their
     number. Zero where none are told.
 
     Args:
         draws: of the population by site, shape (d,).
-        kind: lot or operator.
+        kind: lot, operator or rig.
     """
     if f"{kind}_sd" not in draws:
         return np.zeros(1)

@@ -2,10 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from hdcal.data.bad_gears import left_out_words
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.groups import linked_rigs
 from hdcal.fleets.misfit import misfit_words
 
 RESTS_ON = (
@@ -30,6 +33,11 @@ FEW_GEARS = (
     "So few gears say little of how much ordinary ones scatter: only a gear very far "
     "out can be called off. Ten tell clearly more."
 )
+RIGS_APART = (
+    "Not all rigs are linked by gears that several of them read: how far their gains "
+    "lie apart is told by assuming that the gears of each are alike in the mean. A few "
+    "gears that are read on every rig would tell it."
+)
 # Fewer gears than the first, and fewer groups than the second, say little of scatter.
 FEW, _FEW_GROUPS = 8, 5
 
@@ -39,7 +47,7 @@ def notes_of(found: Fleet) -> Sequence[str]:
     scarce = [
         f"{len(names)} {kind} say little of how much {kind} scatter: its interval is "
         "mostly what was believed before."
-        for kind, names in (("lots", found.lots), ("operators", found.operators))
+        for kind, _, names in _kinds(found)
         if 0 < len(names) < _FEW_GROUPS
     ]
     once = [ONE_MOUNTING] if found.mountings.max() == 1 else []
@@ -55,12 +63,8 @@ def notes_of(found: Fleet) -> Sequence[str]:
 
 
 def _untold(found: Fleet) -> Iterator[str]:
-    """Yield which lots and operators were read but not told apart."""
-    case = found.case
-    for kind, read, used in (
-        ("lots", case.lots, found.lots),
-        ("operators", case.operators, found.operators),
-    ):
+    """Yield which lots, operators and rigs were read but not told apart, or hardly."""
+    for kind, read, used in _kinds(found):
         if len(set(read)) > 1 and not used:
             yield (
                 f"{len(set(read))} {kind} are too many to be told apart: they are "
@@ -68,3 +72,13 @@ def _untold(found: Fleet) -> Iterator[str]:
             )
         if NOT_STATED in used:
             yield f"What names none of the {kind} is taken to be of one more."
+    if found.rigs and len(np.unique(linked_rigs(found.readings.sums))) > 1:
+        yield RIGS_APART
+
+
+def _kinds(found: Fleet) -> Iterator[tuple[str, Sequence[str], Sequence[str]]]:
+    """Yield kinds of groups, the labels that were read, and the names told apart."""
+    case = found.case
+    yield "lots", case.lots, found.lots
+    yield "operators", case.operators, found.operators
+    yield "rigs", case.rigs, found.rigs

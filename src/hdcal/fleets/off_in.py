@@ -68,7 +68,7 @@ def zero_chance(
     It is the mean over the gear's mountings, beside what their operators have.
 
     Args:
-        sums: of each mounting.
+        sums: of each mounting, as if one rig had read them all.
         draws: of the population by site, shape (t,).
         stiffness: of each gear, shape (t, g) [N/mm].
         noise_sd: of each gear, shape (g,) [N].

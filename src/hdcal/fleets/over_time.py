@@ -185,7 +185,8 @@ def _by_day(gears, dates, zero, sums, noise, own_xx, labels):
 
 def _measured(found: Fleet):
     """Yield what goes with the date: what, unit, date, name, value and sd."""
-    case, sums, runs = found.case, found.readings.sums, found.readings.runs
+    case, runs = found.case, found.readings.runs
+    sums = found.readings.on_one_rig(found.draws).sums
     gears = np.asarray(sums.gear)
     dates = np.array([date or "NaT" for date in case.dates], "datetime64[s]")[runs]
     # A gear has the date of the first of its mountings that has one.

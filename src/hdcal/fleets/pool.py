@@ -13,7 +13,7 @@ from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.errors import Finding
-from hdcal.fleets.groups import operator_of
+from hdcal.fleets.groups import read_by
 from hdcal.fleets.readings import (
     FleetReadings,
     largest_of,
@@ -34,7 +34,7 @@ class Pool:
         gears: index of each gear, in order of appearance.
         runs: index of each gear and run, likewise.
         parts: run, reach, rows, means and sums of each mounting in each batch.
-        told: of each batch, runs, and their lots, operators and dates.
+        told: of each batch, runs, and their lots, operators, rigs and dates.
         left_out: gears of which something is wrong, each with what that is. Rows of
             those that were known before are not read.
     """
@@ -113,7 +113,9 @@ class Pool:
             data_sha256=source.sha256,
         )
         nobody = np.zeros(len(gear), int)
-        sums = MountingSums(gear, total, mean_x, mean_y, *squares, operator=nobody)
+        sums = MountingSums(
+            gear, total, mean_x, mean_y, *squares, operator=nobody, rig=nobody
+        )
         runs, farthest = np.arange(len(gear)), largest_of(run, reach)
         readings = FleetReadings(case, sums, runs, farthest)
         left = ~among(gears, self.left_out)[gear]
@@ -143,8 +145,7 @@ class Pool:
             Labels(run, case.run_labels),
         )
         case = replace(case, notes=(*case.notes, *notes), **further)
-        by = operator_of(case.operators, readings.runs)
-        sums = replace(readings.sums, operator=by)
+        sums = replace(readings.sums, **read_by(case, readings.runs))
         return replace(readings, case=case, sums=sums)
 
 

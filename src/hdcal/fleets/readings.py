@@ -10,8 +10,9 @@ from hdcal.data.case import Case, Gear
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows
-from hdcal.fleets.groups import operator_of
-from hdcal.inference.gear_sums import MountingSums
+from hdcal.fleets.groups import group_of, read_by
+from hdcal.inference.gear_sums import MountingSums, stretched
+from hdcal.inference.groupings import group_offsets
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,20 @@ class FleetReadings:
             ratio: stiffness of each gear's sizes over that of these, by which its
                 deformations count; shape (g,).
         """
-        one, r = self.sums, ratio[self.sums.gear]
-        sized = {"x": r * one.x, "xx": r**2 * one.xx, "xy": r * one.xy}
-        return replace(self, sums=replace(one, **sized))
+        return replace(self, sums=stretched(self.sums, ratio[self.sums.gear]))
+
+    def on_one_rig(self, draws: Mapping[str, np.ndarray]) -> "FleetReadings":
+        """Return sums and records as if a rig of the mean gain had read them all.
+
+        Args:
+            draws: of the population by site, shape (t,).
+        """
+        gain = 1.0 + np.median(np.asarray(group_offsets(draws, "rig")), axis=1)
+        case, sums = self.case, stretched(self.sums, gain[self.sums.rig])
+        records = case.records
+        rig = group_of(case.rigs, np.asarray(records.run))
+        records = replace(records, deformation=gain[rig] * records.deformation)
+        return replace(self, case=replace(case, records=records), sums=sums)
 
     def since(self, day: str) -> "FleetReadings":
         """Return what was read on a day or later; mountings without a date are not.
@@ -84,9 +96,6 @@ class FleetReadings:
         case, sums = self.case, self.sums
         gears, gear = np.unique(sums.gear[of_mounting], return_inverse=True)
         runs, run = np.unique(self.runs[of_mounting], return_inverse=True)
-        # Groups are told apart anew: some may be gone.
-        operators = _some(case.operators, runs)
-        by = operator_of(operators, run)
         columns = {name: value[of_mounting] for name, value in vars(sums).items()}
         records = case.records
         rows = np.isin(records.run, runs) & np.isin(records.specimen, gears)
@@ -102,10 +111,12 @@ class FleetReadings:
             specimen_labels=_some(case.specimen_labels, gears),
             run_labels=_some(case.run_labels, runs),
             lots=_some(case.lots, gears),
-            operators=operators,
+            operators=_some(case.operators, runs),
+            rigs=_some(case.rigs, runs),
             dates=_some(case.dates, runs),
         )
-        sums = MountingSums(**columns | {"gear": gear, "operator": by})
+        # Groups are told apart anew: some may be gone.
+        sums = MountingSums(**columns | {"gear": gear} | read_by(case, run))
         reach = self.reach[of_mounting]
         return replace(self, case=case, sums=sums, runs=run, reach=reach)
 
@@ -134,8 +145,8 @@ def fleet_readings(case: Case) -> FleetReadings:
     (of_gear, runs), of_row = np.unique(labels, axis=1, return_inverse=True)
     read, y = np.asarray(records.deformation), np.asarray(records.force)
     x = read * modulus_left(gear, np.asarray(records.temperature))
-    by = operator_of(case.operators, runs)
-    sums = MountingSums(of_gear, *row_sums(of_row.ravel(), x, y), by)
+    each = row_sums(of_row.ravel(), x, y)
+    sums = MountingSums(of_gear, *each, **read_by(case, runs))
     return FleetReadings(case, sums, runs, largest_of(of_row.ravel(), np.abs(read)))
 
 

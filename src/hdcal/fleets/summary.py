@@ -16,6 +16,7 @@ from hdcal.fleets.answer import (
     LotAnswer,
     OperatorAnswer,
     PopulationAnswer,
+    RigAnswer,
 )
 from hdcal.fleets.document import fleet_document, headline
 from hdcal.fleets.fleet import Fleet
@@ -101,6 +102,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         gear_sd_percent=credible_interval(100.0 * draws["specimen_sd"]),
         lot_sd_percent=_spread(draws, "lot_sd", 100.0),
         operator_sd_N=_spread(draws, "operator_sd"),
+        rig_sd_percent=_spread(draws, "rig_sd", 100.0),
         mounting_sd_N=credible_interval(draws["run_offset_sd"]),
         reading_sd_N=credible_interval(draws["sigma"]),
     )
@@ -126,6 +128,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         population=population,
         lots=lots,
         operators=tuple(_operators(found)),
+        rigs=tuple(_rigs(found)),
         gauge_rr=gauge(draws, found.readings.largest, found.force_tolerance),
         over_time=tuple(map(time_answer, time_series(found))),
         misfit=found.misfit,
@@ -165,6 +168,15 @@ def _operators(found: Fleet) -> Iterator[OperatorAnswer]:
     for name, one in zip(found.operators, zeros, strict=True):
         many = found.case.operators.count(name)
         yield OperatorAnswer(name, many, credible_interval(one))
+
+
+def _rigs(found: Fleet) -> Iterator[RigAnswer]:
+    if not found.rigs:
+        return
+    gains = 100.0 * np.asarray(group_offsets(found.draws, "rig"))
+    for name, one in zip(found.rigs, gains, strict=True):
+        many = found.case.rigs.count(name)
+        yield RigAnswer(name, many, credible_interval(one))
 
 
 def _next_step(found: Fleet, called: Sequence[str]) -> str | None:

@@ -60,7 +60,8 @@ def time_section(answers: Sequence[TimeAnswer]) -> Section:
         "Stiffness of gears, zeros of mountings and noise of gears in the order of "
         "their date, with limits at three standard deviations; then the cumulative "
         "sums of the stiffness, with limits at five. Stiffness is about the centre of "
-        "the gear's lot, zeros are about that of the operator, where they are told.",
+        "the gear's lot, zeros are about that of the operator, where they are told; "
+        "what gains of rigs differ by is taken out.",
     )
     out = [
         f"{one.what} of {name}"

@@ -1,4 +1,4 @@
-"""Lots of gears, operators of mountings: groups that scatter about their mean.
+"""Lots of gears, operators and rigs of mountings: groups that scatter about their mean.
 
 How k groups lie about the mean of these k is told by k − 1 contrasts c ~ N(0, sd²).
 They are sampled as what the data alone would say of them, drawn towards zero by the
@@ -34,11 +34,16 @@ class Grouping(eqx.Module):
     estimate: Float[Array, " c"]
     variance: Float[Array, " c"]
 
+    @property
+    def offsets(self) -> np.ndarray:
+        """How far each group seems to lie from the mean of all, shape (k,)."""
+        return np.asarray(self.basis @ self.estimate)
 
-def grouping(means: np.ndarray, variances: np.ndarray) -> Grouping:
-    """Return groups from the mean of each and its variance, shape (k,)."""
+
+def grouping(means: np.ndarray, covariance: np.ndarray) -> Grouping:
+    """Return groups from the mean of each, shape (k,), and their covariance."""
     basis = helmert(len(means)).T
-    return Grouping(basis, basis.T @ means, (basis**2).T @ variances)
+    return Grouping(basis, basis.T @ means, np.diag(basis.T @ covariance @ basis))
 
 
 def sample_offsets(kind: str, groups: Grouping, sd) -> dict:

@@ -4,7 +4,8 @@ A mounting's readings are y = s x + z + e, with s of its gear, z = zero + N(0,
 mounting_sd²) its own, and e ~ N(0, σ²) with a σ of its gear. About a gear's σ and its
 kind (ordinary or off) all is Gaussian in s: readings say no more than sums. σ is
 integrated by Gauss and Hermite's rule, the kind by its two cases. Where lots are told,
-each has a centre of its own, and where operators are, each a zero of its own.
+each has a centre of its own, where operators are, each a zero of its own, and where
+rigs are, each a gain of its own: on it a gear's s is larger by that share.
 """
 
 from collections.abc import Mapping
@@ -19,7 +20,7 @@ from jaxtyping import Float
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.gear_sums import GearSums
+from hdcal.inference.gear_sums import GearSums, line_noise, stretched
 from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.programs import program
@@ -63,9 +64,10 @@ GROUP_RATIO = Prior(
     (0.7, 1.2),
     "1",
     "engineering judgement: lots scatter about as gears of one lot do, seldom a tenth "
-    "of it or seven times as far, and operators' zeros as those of mountings",
+    "of it or seven times as far; operators' zeros as those of mountings, and rigs' "
+    "gains as gears",
 )
-_MEMBERS = {"lot": "specimen_sd", "operator": "run_offset_sd"}
+_MEMBERS = {"lot": "specimen_sd", "operator": "run_offset_sd", "rig": "specimen_sd"}
 
 
 class PopulationProblem(Sampled):
@@ -74,9 +76,9 @@ class PopulationProblem(Sampled):
     Attributes:
         priors: by site: stiffness [N/mm as read], specimen_sd, zero [N],
             run_offset_sd [N], sigma [N] and those of `POPULATION_PRIORS`; where they
-            are told lot_ratio and operator_ratio.
+            are told lot_ratio, operator_ratio and rig_ratio.
         sums: of every gear.
-        groups: lots and operators, where they are told.
+        groups: lots, operators and rigs, where they are told.
     """
 
     priors: dict[str, Prior]
@@ -118,11 +120,13 @@ class GearLaw(NamedTuple):
 
 def _joint(problem: PopulationProblem, values: Mapping) -> GearLaw:
     """Return log p(readings of a gear, noise, kind), and its stiffness given these."""
-    sums = jax.tree.map(lambda column: column[..., None], problem.sums)
+    gain = 1.0 + group_offsets(values, "rig")[problem.sums.rig]
+    sums = stretched(problem.sums, gain)
+    sigma, log_weight = _noise_nodes(sums, values)
+    sums = jax.tree.map(lambda column: column[..., None], sums)
     centre = gear_centres(values, problem.sums.lot)[:, None, None]
     by = group_offsets(values, "operator")[problem.sums.operator]
     zero = values["zero"] + by[..., None]
-    sigma, log_weight = _noise_nodes(problem.sums, values)
     noise = sigma[:, None] ** 2
     of_mean = values["run_offset_sd"] ** 2 + noise / sums.rows
     # Sums about a gear of the population's centre, whose zeros are in the middle.
@@ -179,8 +183,8 @@ def _noise_nodes(sums: GearSums, values: Mapping):
     and as far apart as it is wide: those of the law of all would miss what many
     readings say.
     """
-    spread, pull = values["noise_spread"], sums.noise_free * values["noise_spread"]
-    own = sums.log_noise_sd - jnp.log(values["sigma"])
+    spread, (free, log_sd) = values["noise_spread"], line_noise(sums)
+    pull, own = free * spread, log_sd - jnp.log(values["sigma"])
     # In sds of the law of all, about its centre.
     mode = 2.0 * pull * own / (1.0 + 2.0 * pull * spread)
     for _ in range(_NEWTON):

@@ -87,6 +87,7 @@ def _one_gear(case: Case, gear: int, rng: np.random.Generator) -> Case:
         specimen_labels=(label,),
         lots=(),
         operators=(),
+        rigs=(),
         dates=(),
     )
 
