@@ -34,6 +34,8 @@ def many(gears: int, off: int) -> Fleet:
         readings=fleet_readings(case),
         stiffness=np.tile(stiffness, (40, 1)),
         apart=np.zeros((40, gears)),
+        loop=np.zeros(gears),
+        bend=np.zeros(gears),
         off=np.where(called, 0.9 + 0.001 * np.arange(gears), 0.1),
         chances={name: np.ones(gears) for name in found.chances},
         off_in={name: called & (name == "stiffness") for name in found.off_in},

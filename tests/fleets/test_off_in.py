@@ -1,4 +1,6 @@
-"""A gear may be off in its noise or in its zero, and ordinary ones seldom are."""
+"""A gear may be off in noise, zero or shape, and ordinary ones seldom are."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -6,14 +8,29 @@ from scipy.stats import binomtest
 
 import hdcal
 from hdcal.fleets.off_in import FALSE_CALLS, called_off, chance_of, zero_chance
+from hdcal.fleets.own_shapes import own_shapes
 from hdcal.fleets.summary import fleet_answer, gear_columns
 from hdcal.inference.gear_sums import MountingSums
 
-X, GEARS, RUNS = np.linspace(0.05, 0.5, 8), 14, 2
+UP = np.linspace(0.05, 0.5, 8)
+X, GEARS, RUNS = np.concatenate([UP, UP[-2::-1]]), 14, 2
+# Shapes of a loop, and of a bend whose middle lies under its ends.
+WAY = np.repeat([1.0, -1.0], [len(UP), len(UP) - 1])
+CURVE = 4.0 * (X - UP.mean()) ** 2 / np.ptp(UP) ** 2
 
 
-def measured(seed: int = 0, noise: float = 1.0, zero: float = 0.0):
-    """Return gears of which the first has other noise and another zero."""
+def measured(
+    seed: int = 0,
+    noise: float = 1.0,
+    zero: float = 0.0,
+    loop: float = 0.0,
+    bend: float = 0.0,
+    shared: float = 0.0,
+):
+    """Return gears of which the first has another noise, zero, loop and bend.
+
+    All of them have a loop and a bend that they share.
+    """
     rng = np.random.default_rng(seed)
     gear, run, row = (i.ravel() for i in np.indices((GEARS, RUNS, len(X))))
     stiffness = 200.0 * (1.0 + 0.01 * rng.standard_normal(GEARS))
@@ -21,6 +38,8 @@ def measured(seed: int = 0, noise: float = 1.0, zero: float = 0.0):
     zeros[0] += zero
     sd = 0.4 * np.where(gear == 0, noise, 1.0)
     force = stiffness[gear] * X[row] + zeros[gear, run]
+    own = (gear == 0) * (0.5 * loop * WAY + bend * CURVE)[row]
+    force += own + shared * (0.5 * WAY + CURVE)[row]
     names = np.array([f"G{one}" for one in range(GEARS)])
     table = {"specimen": names[gear], "run": run, "deformation_mm": X[row]}
     table["force_N"] = force + sd * rng.standard_normal(len(force))
@@ -32,16 +51,54 @@ def measured(seed: int = 0, noise: float = 1.0, zero: float = 0.0):
     [
         ("noise", "times the noise of most", {"noise": 4.0}),
         ("zero", "has its zero at", {"zero": 8.0}),
+        ("shape", "has a loop of ", {"loop": 1.5}),
+        ("shape", "has a bend of ", {"bend": 2.2}),
     ],
 )
 def test_what_a_gear_is_off_in_is_told(kind: str, words: str, change: dict):
     found = measured(**change)
     told = {name: own.nonzero()[0].tolist() for name, own in found.off_in.items()}
-    assert told == {"stiffness": [], "noise": [], "zero": [], kind: [0]}
+    if kind == "shape":
+        # What is no line's counts as noise too, and may be called that.
+        told["noise"] = []
+    assert told == {"stiffness": [], "noise": [], "zero": [], "shape": [], kind: [0]}
     answer, columns = fleet_answer(found), gear_columns(found)
     assert answer.called_off == ("G0",) and answer.off_in[kind] == ("G0",)
     assert "G0 " in answer.headline and words in answer.headline
-    assert columns["off_in"][0] == kind and not any(columns["off_in"][1:])
+    assert kind in columns["off_in"][0].split(", ") and not any(columns["off_in"][1:])
+
+
+def test_the_size_of_loop_and_bend_is_told():
+    found = measured(loop=2.0, bend=3.0)
+    assert found.loop[0] == pytest.approx(2.0, abs=0.4)
+    assert found.bend[0] == pytest.approx(3.0, abs=0.6)
+    assert np.all(np.abs(found.loop[1:]) < 0.6)
+    assert np.all(np.abs(found.bend[1:]) < 0.6)
+
+
+def test_a_shape_that_all_gears_have_is_no_gears_own():
+    found = measured(seed=1, shared=2.0)
+    assert np.median(found.loop) == pytest.approx(2.0, abs=0.3)
+    assert not found.off_in["shape"].any()
+    assert measured(seed=1, shared=2.0, loop=2.0).off_in["shape"].tolist() == (
+        [True] + [False] * (GEARS - 1)
+    )
+
+
+def test_ordinary_gears_are_seldom_called_for_their_shape():
+    """Of the whole 5 % a tenth, as noise and zero."""
+    rng, fleets, called = np.random.default_rng(5), 1500, 0
+    gear, run, row = (i.ravel() for i in np.indices((12, 2, len(X))))
+    names = {"specimen": np.array([f"G{one}" for one in range(12)])[gear], "run": run}
+    table = names | {"deformation_mm": X[row], "force_N": 200.0 * X[row]}
+    case = hdcal.read_case(table, theory="spring")
+    line = np.asarray(case.records.force)
+    for _ in range(fleets):
+        force = line + rng.standard_normal(len(line))
+        one = replace(case, records=replace(case.records, force=force))
+        found = own_shapes(one, np.full(12, 200.0))
+        called += called_off({"shape": found.chance})["shape"].any()
+    assert called / fleets < 0.1 * FALSE_CALLS
 
 
 @pytest.mark.parametrize("kind", ["noise", "zero"])

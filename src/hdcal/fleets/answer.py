@@ -92,7 +92,7 @@ class FleetAnswer(Answer):
         rows: of all of them.
         left_out: gears that are in none of the numbers, where they may be left out.
         called_off: gears that are called off, the surest first.
-        off_in: of stiffness, noise and zero those that are called off in it.
+        off_in: of stiffness, noise, zero and shape those that are called off in it.
         false_calls: share of these that may be ordinary gears, as expected.
         interval: probability that every interval holds.
         at_one_size: whether gears of several sizes were compared at the gear file's,

@@ -1,11 +1,10 @@
 """A fleet in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from hdcal.fleets.answer import FleetAnswer, PopulationAnswer
+from hdcal.fleets.answer import FleetAnswer
 from hdcal.fleets.curves import shown_gears
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.force.document import BEYOND, force_words
@@ -28,84 +27,6 @@ from hdcal.report.words import estimate, number, percent
 # Gears in the table of a page, and of those that are shown at once; all of them are in
 # gears.csv.
 MOST_LISTED, _AT_ONCE = 10_000, 25
-_MOST_NAMED = 3
-
-
-def headline(
-    population: PopulationAnswer,
-    called: Sequence[str],
-    columns: Mapping[str, np.ndarray],
-) -> str:
-    """Return how many gears are alike, and which ones are off, in one sentence.
-
-    Args:
-        population: of the gears.
-        called: off, the surest first.
-        columns: of gears.csv.
-    """
-    total = len(columns["gear"])
-    than = "" if population.lot_sd_percent is None else " than its lot"
-    middle, span = estimate(population.gear_sd_percent)
-    centre = estimate(population.stiffness_N_per_mm)[0]
-    if not called:
-        told = (
-            f"None of {total} gears is called off: they scatter by {middle} % (sd, "
-            f"{span} %) about {centre} N/mm"
-        )
-        far = columns["gear"][int(np.argmax(columns["probability_off"]))]
-        odd = next(_off([str(far)], columns, than))
-        odd = odd.replace("; prob", "; off with prob")
-        return told + f"; oddest: {odd}." if total < FEW else f"{told}."
-    told = "; ".join(_off(called, columns, than))
-    alike = sum("stiffness" not in kinds for kinds in columns["off_in"])
-    return f"{alike} of {total} gears scatter by {middle} % (sd, {span} %); {told}."
-
-
-def _off(
-    called: Sequence[str], columns: Mapping[str, np.ndarray], than: str
-) -> Iterator[str]:
-    """Yield what is said of the gears that are called off, the surest first.
-
-    Args:
-        called: their names.
-        columns: of gears.csv.
-        than: what they are softer than, where lots are told apart.
-    """
-    place = {name: row for row, name in enumerate(columns["gear"].tolist())}
-    for name in called[:_MOST_NAMED]:
-        one = {column: values[place[name]] for column, values in columns.items()}
-        most = float(np.median(columns["noise_sd_N"]))
-        yield f"{name} {' and '.join(_apart(one, most, than))}"
-    if rest := called[_MOST_NAMED:]:
-        kinds = {str(columns["off_in"][place[name]]) for name in rest}
-        yield f"{len(rest)} more are off, in {', '.join(sorted(kinds))}"
-
-
-def _apart(one: Mapping[str, Any], noise_sd: float, than: str) -> Iterator[str]:
-    """Yield how far a gear is off in what it is off in; in stiffness where in none.
-
-    Args:
-        one: its row of gears.csv.
-        noise_sd: that most gears have [N].
-        than: what it is softer than, where lots are told apart.
-    """
-    kinds = str(one["off_in"]).split(", ")
-    if "stiffness" in kinds or kinds == [""]:
-        yield _softer(one, than)
-    if "noise" in kinds:
-        noise = float(one["noise_sd_N"])
-        yield f"has {noise / noise_sd:.2g} times the noise of most ({noise:.2g} N)"
-    if "zero" in kinds:
-        yield f"has its zero at {one['zero_N']:.2g} N"
-
-
-def _softer(one: Mapping[str, Any], than: str) -> str:
-    apart, low, high = (float(one[f"apart_{end}"]) for end in ("percent", "lo", "hi"))
-    word = "softer" if apart < 0.0 else "stiffer"
-    size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
-    middle, least, most = (f"{end:.2g}" for end in size)
-    sure = f"95 %: {least} … {most} %; probability {percent(one['probability_off'])}"
-    return f"is {middle} % {word}{than} ({sure})"
 
 
 def fleet_document(

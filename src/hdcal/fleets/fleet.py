@@ -10,40 +10,28 @@ from typing import Any
 import jax
 import numpy as np
 import xarray as xr
-from jaxtyping import Key
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
-from hdcal.data.records import Array
 from hdcal.errors import Findings
+from hdcal.fleets.each_gear import each_gear
 from hdcal.fleets.fleet_posterior import FleetPosterior
 from hdcal.fleets.fleet_problem import fleet_problem, rough_values
 from hdcal.fleets.groups import groups
 from hdcal.fleets.misfit import Misfit, misfit
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.next_gear import next_gear
-from hdcal.fleets.off_in import called_off, noise_chance, zero_chance
+from hdcal.fleets.off_in import called_off
+from hdcal.fleets.own_shapes import own_shapes
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
-from hdcal.inference.gear_sums import MountingSums
-from hdcal.inference.population_problem import (
-    PopulationProblem,
-    draw_gears,
-    gear_centres,
-)
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 from hdcal.report.plain import as_plain
-
-# Draws of the population for which every gear is drawn too: more for few gears, as many
-# as make a million.
-_GEAR_DRAWS, _IN_ALL = 400, 1_000_000
-# Draws of gears at most, whatever their number: they are held in memory.
-_MOST_DRAWN = 20_000_000
 
 
 @dataclass(frozen=True, repr=False)
@@ -65,9 +53,12 @@ class Fleet(Shown):
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
         off: probability of each gear that it is no ordinary one, shape (g,).
-        chances: of stiffness, noise and zero that an ordinary gear is as far out in
-            it, shape (g,) each.
-        off_in: of stiffness, noise and zero which gears are called off in it.
+        loop: of each gear, of loading above unloading; NaN where no reading tells it,
+            shape (g,) [N].
+        bend: of each gear, of the middle of its curve under the ends; likewise [N].
+        chances: of stiffness, noise, zero and shape that an ordinary gear is as far
+            out in it, shape (g,) each.
+        off_in: of stiffness, noise, zero and shape which gears are called off in it.
         next_stiffness: of a gear not yet measured, shape (d,) [N/mm as read].
         unit: stiffness at K = 1 [N/mm as read].
         lots: their names, in the order of lot_1, … of the draws; empty where none are
@@ -89,6 +80,8 @@ class Fleet(Shown):
     zero: np.ndarray
     distance: np.ndarray
     off: np.ndarray
+    loop: np.ndarray
+    bend: np.ndarray
     chances: Mapping[str, np.ndarray]
     off_in: Mapping[str, np.ndarray]
     next_stiffness: np.ndarray
@@ -227,20 +220,24 @@ def fleet(
     start = rough_values(problem, readings.sums)
     found = sample_population(problem, start, of_draws, progress=progress, **size)
     on_one_rig = readings.on_one_rig(found.values)
-    each = _gears(problem, on_one_rig.sums, found.values, of_gears)
-    median = ratio * np.median(each["stiffness"], axis=0)
+    each = each_gear(problem, on_one_rig.sums, found.values, of_gears)
+    read = on_one_rig.case, ratio * np.median(each["stiffness"], axis=0)
+    shapes = own_shapes(*read)
+    each["chances"]["shape"] = shapes.chance
     return Fleet(
         readings=readings,
         draws=found.values,
         **each,
         size_ratio=ratio,
+        loop=shapes.loop,
+        bend=shapes.bend,
         off_in=called_off(each["chances"]),
         next_stiffness=next_gear(found.values, np.random.default_rng(seed)),
         unit=unit,
         lots=groups(readings.case.lots)[0],
         operators=groups(readings.case.operators)[0],
         rigs=groups(readings.case.rigs)[0],
-        misfit=misfit(on_one_rig.case, median, each["noise_sd"]),
+        misfit=misfit(*read, each["noise_sd"]),
         force_tolerance=force_tolerance,
         checks=found.checks,
         settings={
@@ -250,44 +247,3 @@ def fleet(
             "seconds": time.perf_counter() - began,
         },
     )
-
-
-def _gears(
-    problem: PopulationProblem,
-    sums: MountingSums,
-    draws: Mapping[str, np.ndarray],
-    key: Key[Array, ""],
-) -> dict[str, Any]:
-    """Return what is known of each gear, as `Fleet` has it.
-
-    Args:
-        problem: the gears.
-        sums: of each mounting, as if one rig had read them all.
-        draws: of the population by site, shape (d,).
-        key: source of randomness.
-    """
-    gears = len(problem.sums.lot)
-    many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
-    every = -(-len(draws["stiffness"]) // many)
-    chosen = {name: v[::every] for name, v in draws.items()}
-    drawn = draw_gears(problem, chosen, key)
-    stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
-    centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
-    apart = stiffness / centre - 1.0
-    zeros = sums.y - np.median(stiffness, axis=0)[sums.gear] * sums.x
-    noise_sd = np.median(np.asarray(drawn.noise_sd), axis=0)
-    # About a centre and a scatter that the gear itself has no part in: where it is off.
-    apart_by_chance = np.sum(off * np.asarray(drawn.chance), axis=0) / off.sum(axis=0)
-    return {
-        "stiffness": stiffness,
-        "apart": apart,
-        "noise_sd": noise_sd,
-        "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
-        "distance": np.median(apart / chosen["specimen_sd"][:, None], axis=0),
-        "off": off.mean(axis=0),
-        "chances": {
-            "stiffness": apart_by_chance,
-            "noise": noise_chance(problem),
-            "zero": zero_chance(sums, chosen, stiffness, noise_sd),
-        },
-    }

@@ -26,7 +26,7 @@ def left_out_of(case: Case) -> tuple[GearLeftOut, ...]:
 def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
     """Return the columns of gears.csv with gears that are left out below the others.
 
-    What they lack is None.
+    What they lack is NaN among numbers with a point, None elsewhere.
 
     Args:
         columns: of these, status among them.
@@ -40,7 +40,12 @@ def with_left_out(columns: Mapping[str, np.ndarray], case: Case) -> dict:
         "gear": np.array([one.gear for one in left_out], object),
         "status": np.array([f"left out: {one.why}" for one in left_out], object),
     }
+    unknown = np.full(len(left_out), np.nan)
     return {
-        name: np.concatenate([column.astype(object), own.get(name, empty)])
+        name: np.concatenate(
+            [column, unknown]
+            if column.dtype.kind == "f"
+            else [column.astype(object), own.get(name, empty)]
+        )
         for name, column in columns.items()
     }

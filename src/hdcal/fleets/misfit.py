@@ -55,19 +55,39 @@ def misfit(case: Case, stiffness: np.ndarray, noise_sd: np.ndarray) -> Misfit:
     if not len(records.force):
         return Misfit(0.0, 0.0, 0.0)
     gear, sd = np.asarray(records.specimen), noise_sd[records.specimen]
-    # Of gears that are pulled, what is said is said of the size of their force.
-    side = float(loading_side(np.asarray(records.deformation)) or 1)
-    x, y = side * np.asarray(records.deformation), side * np.asarray(records.force)
-    ways = _beside_lines(records, side * np.asarray(records.sense))
-    scaled = x / np.max(np.abs(x))
-    curve = _beside_lines(records, scaled * np.abs(scaled))
-    error = _beside_lines(records, y - stiffness[gear] * x) / sd
-    sizes, clear, left = _fitted(np.stack([ways, curve], axis=1), error, sd)
+    error, shapes = beside_lines(records, stiffness)
+    sizes, clear, left = _fitted(shapes.T, error / sd, sd)
     correlation = _correlation(left, previous_rows(records))
     scatter = Misfit(correlation, 0.0, 0.0).widening
     seen = np.abs(clear) > np.maximum(_CLEAR * scatter, _SMALL * np.sqrt(len(error)))
     loop, bend = np.where(seen, sizes, 0.0)
-    return Misfit(correlation, 2.0 * float(loop), _swing(curve, gear) * float(bend))
+    swing = float(np.nanmedian(swings(shapes[1], gear)))
+    return Misfit(correlation, 2.0 * float(loop), swing * float(bend))
+
+
+def beside_lines(
+    records: Records, stiffness: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what lines leave of the forces [N], and the shapes of a loop and a bend.
+
+    Of gears that are pulled it is that of the size of their force. Where the sizes of
+    the shapes are l and b [N], the force is 2 l higher while loading, and b times
+    `swings` of the second off its line.
+
+    Args:
+        records: the readings, shape (n,).
+        stiffness: of each gear, shape (g,) [N/mm as read].
+
+    Returns:
+        Errors, shape (n,), and shapes, (2, n).
+    """
+    side = float(loading_side(np.asarray(records.deformation)) or 1)
+    x, y = side * np.asarray(records.deformation), side * np.asarray(records.force)
+    scaled = x / np.max(np.abs(x))
+    shapes = side * np.asarray(records.sense), scaled * np.abs(scaled)
+    shapes = [_beside_lines(records, each) for each in shapes]
+    error = _beside_lines(records, y - stiffness[records.specimen] * x)
+    return error, np.stack(shapes)
 
 
 def _beside_lines(records: Records, values: np.ndarray) -> np.ndarray:
@@ -101,10 +121,13 @@ def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):
     return sizes, clear, error - shapes @ sizes
 
 
-def _swing(curve: np.ndarray, gear: np.ndarray) -> float:
-    """Return from where to where a curve goes, in the median over all gears."""
-    each = [float(np.ptp(curve[gear == one])) for one in np.unique(gear)]
-    return float(np.median(each))
+def swings(curve: np.ndarray, gear: np.ndarray) -> np.ndarray:
+    """Return from where to where a curve goes for each gear; NaN without readings."""
+    low = np.full(1 + int(gear.max()), np.inf)
+    high = -low
+    np.minimum.at(low, gear, curve)
+    np.maximum.at(high, gear, curve)
+    return np.where(high >= low, high - low, np.nan)
 
 
 def _correlation(error: np.ndarray, before: np.ndarray) -> float:

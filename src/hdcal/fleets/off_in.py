@@ -1,4 +1,4 @@
-"""What gears are off in: stiffness, noise or zero, each with few false calls."""
+"""What gears are off in: stiffness, noise, zero or shape, with few false calls."""
 
 from collections.abc import Mapping
 
@@ -12,9 +12,9 @@ from hdcal.inference.population_problem import PopulationProblem
 
 # Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05
-# Of it, what each may take. Held against those inside on both sides, zeros are called
-# twice as often as their chances say (tests/fleets/test_off_in.py).
-_LEVELS = {"stiffness": 0.04, "noise": 0.005, "zero": 0.0025}
+# Of it, what each may take. Held against those inside on both sides, zeros and shapes
+# are called twice as often as their chances say (tests/fleets/test_off_in.py).
+_LEVELS = {"stiffness": 0.035, "noise": 0.005, "zero": 0.0025, "shape": 0.0025}
 # Others that a gear is held against, at least; of all gears, the chance below which one
 # is off whatever the others are.
 _FEWEST, _CLEARLY = 3, 0.001

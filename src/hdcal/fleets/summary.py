@@ -18,9 +18,10 @@ from hdcal.fleets.answer import (
     PopulationAnswer,
     RigAnswer,
 )
-from hdcal.fleets.document import fleet_document, headline
+from hdcal.fleets.document import fleet_document
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.gauge import gauge
+from hdcal.fleets.headline import headline
 from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
@@ -61,11 +62,14 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     return columns | {
         "zero_N": found.zero,
         "noise_sd_N": found.noise_sd,
+        "loop_N": found.loop,
+        "bend_N": found.bend,
         "distance_sd": found.distance,
         "probability_off": found.off,
         "chance_ordinary": found.chances["stiffness"],
         "chance_noise": found.chances["noise"],
         "chance_zero": found.chances["zero"],
+        "chance_shape": found.chances["shape"],
         "called_off": found.called,
         "off_in": _kinds(found.off_in),
         "status": np.full(len(middle), "failed" if failed else "ok"),
@@ -188,7 +192,7 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
         )
     misfit = found.misfit
     beside = misfit.loop_N or misfit.bend_N or misfit.correlation
-    if beside or found.off_in["noise"].any():
+    if beside or found.off_in["noise"].any() or found.off_in["shape"].any():
         parts.append(
             "Ask which effects these gears have, and what they have in common: "
             "`hdcal causes` with the same data"
