@@ -99,12 +99,14 @@ def test_a_loop_that_the_model_lacks_is_said_in_the_headline(width: float):
         assert beside["lo"] < STIFFNESS < beside["hi"]
 
 
+@pytest.mark.thorough
 def test_a_loop_that_is_in_the_model_is_not_asked_about():
     case = rig(_jenkins, runs=1)
     found = calibrated(case, effects=["hysteresis"])
     assert hdcal.summarise(found)["beside_a_loop"] is None
 
 
+@pytest.mark.thorough
 def test_the_stiffness_of_several_specimens_is_said_to_be_their_mean():
     labels, factors = np.repeat([*"abc"], 2 * len(PATH)), np.array([1.0, 1.1, 0.95])
     case = rig(_dahl, width=0.0, runs=6, specimen=labels)

@@ -30,12 +30,14 @@ def test_a_fleet_of_exact_lines_is_refused():
         fleet(_case(x * (100 + gear), x, specimen=gear))
 
 
+@pytest.mark.thorough
 def test_noise_of_the_last_digit_is_none_to_refuse():
     force = 100 * _LINE + 2 + 1e-4 * np.resize([1, -1, -1], 10)
     found = np.median(calibrate(_case(force), draws=200).draws["stiffness"])
     assert abs(found - 100.0) < 1e-3
 
 
+@pytest.mark.thorough
 def test_a_display_that_shows_a_line_is_answered_by_its_step():
     case = _case(np.round(100 * _LINE + 2), step=1.0)
     found = calibrate(case, draws=400)

@@ -56,6 +56,7 @@ def test_where_the_time_was_read_a_repeated_reading_may_be_a_hold():
     assert without_repeats(hdcal.read_case(rows))[1] == 0
 
 
+@pytest.mark.thorough
 def test_friction_is_named_whichever_side_the_repeated_top_was_read_on():
     verdict = hdcal.diagnose(_case(), quick=True)
     assert "coulomb_friction" in verdict.which.named

@@ -194,6 +194,7 @@ def test_one_in_thirty_is_found_and_none_is_called_falsely():
     assert wrong <= 0.05 * fleets + 2.0 * np.sqrt(0.05 * fleets)
 
 
+@pytest.mark.thorough
 def test_a_few_readings_that_the_display_shows_on_a_line_scatter_by_its_steps():
     rng = np.random.default_rng(3)
     gears, x = 40, np.array([0.1, 0.2, 0.3, 0.4, 0.5])

@@ -69,6 +69,7 @@ def test_draws_are_those_of_their_chain_with_their_unit(fleet: Fleet):
     assert group["lot_2"].attrs["long_name"] == "low"
 
 
+@pytest.mark.thorough
 def test_chains_of_the_sampler_come_back_as_they_were():
     rng = np.random.default_rng(4)
     x = np.tile(np.linspace(0.0, 0.5, 9), 5)

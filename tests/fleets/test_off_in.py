@@ -124,6 +124,7 @@ def test_gears_of_which_less_is_known_are_called_no_more():
     assert called / fleets < 0.1 * FALSE_CALLS
 
 
+@pytest.mark.thorough
 def test_a_gear_that_was_mounted_once_is_called_no_more():
     """Its zero lies as far from all others as one mounting's does."""
     rng, fleets, called = np.random.default_rng(7), 4000, 0

@@ -188,6 +188,7 @@ def test_what_was_read_badly_is_not_far():
     assert found.sum() <= 1
 
 
+@pytest.mark.thorough
 def test_zeros_of_one_gear_that_share_its_slope_are_no_change():
     """Far from zero all zeros of a gear are off alike: days would seem to differ."""
     x, rng, told = np.linspace(0.3, 0.5, 8), np.random.default_rng(1), []

@@ -156,6 +156,7 @@ def kept(answer, cases: int, seed: int) -> tuple[float, float]:
     return mixture, name
 
 
+@pytest.mark.thorough
 def test_a_mixture_holds_what_the_single_name_does_not():
     mixture, name = kept(of_study, 24, seed=31)
     assert mixture >= 0.8 and name <= 0.75, (mixture, name)

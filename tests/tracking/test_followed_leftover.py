@@ -137,6 +137,7 @@ def halves():
     return mixed_posterior({"none": (0.5, plain), "unknown": (0.5, other)}), other
 
 
+@pytest.mark.thorough
 def test_of_several_causes_the_one_that_a_stream_shows_is_followed_as_if_alone():
     mixture, other = halves()
     chances, odds = np.random.default_rng(5), []
