@@ -4,12 +4,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import hdcal
 from hdcal import programs
 from hdcal.programs import Program, program
 
@@ -72,6 +74,17 @@ def test_another_shape_setting_or_structure_is_another_program(cached):
         one({"x": np.zeros(size), "y": 0.0}, times=times)
     assert len(traced) == len(kept(cached)) == 3
     assert float(one({"x": np.zeros(7), "y": 1.0}, times=2)["sum"]) == 15.0
+
+
+def test_another_setting_of_jax_is_another_program(cached):
+    one, traced = counted()
+    numbers = {"x": np.zeros(3), "y": 0.0}
+    one(numbers, times=1)
+    before = jax.config.values["jax_default_matmul_precision"]
+    jax.config.update("jax_default_matmul_precision", "highest")
+    another(one)(numbers, times=1)
+    jax.config.update("jax_default_matmul_precision", before)
+    assert len(traced) == len(kept(cached)) == 2
 
 
 def test_other_code_is_another_program(cached, tmp_path, monkeypatch):
@@ -167,6 +180,43 @@ def test_what_calls_back_works_and_is_not_kept(cached):
 def test_an_argument_told_by_its_address_is_not_kept(cached):
     one = program(lambda x, *, apply: apply(x), static=("apply",))
     assert float(one(np.float64(2.0), apply=lambda x: x + 1.0)) == 3.0
+    assert not kept(cached)
+
+
+def own_effect(factor: float):
+    """Return an effect of a user's own, as a script that was edited has it."""
+
+    class Own(hdcal.Effect):
+        name: ClassVar[str] = "own"
+        stage: ClassVar[str] = "deformation"
+        groups: ClassVar[tuple[str, ...]] = ("curve up",)
+        symmetry: ClassVar[str] = "even"
+        error: float = hdcal.parameter("1", "", typical=1.0, null=0.0)
+
+        def apply(self, signal, rows):
+            return factor * self.error * signal
+
+    return Own
+
+
+@pytest.mark.parametrize("as_class", [True, False])
+def test_a_class_of_the_users_own_is_traced_anew(cached, as_class):
+    """Its name and its fields may be the same, and its code another."""
+
+    def run(effect, x):
+        return effect.apply(x, None)
+
+    def of_class(x, *, effect):
+        return effect(3.0).apply(x, None)
+
+    found = []
+    for factor in (1.0, 2.0):
+        effect, x = own_effect(factor), np.float64(5.0)
+        if as_class:
+            found.append(float(program(of_class, static=("effect",))(x, effect=effect)))
+        else:
+            found.append(float(program(run)(effect(3.0), x)))
+    assert found == [15.0, 30.0]
     assert not kept(cached)
 
 

@@ -10,7 +10,7 @@ import hashlib
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, update_wrapper
 from importlib.metadata import PackageNotFoundError, version
@@ -26,6 +26,8 @@ from jax.core import Tracer
 _VERSIONS_KEPT = 4
 # Libraries of which a trace has code.
 _TRACED = ("jax", "jaxlib", "numpyro", "equinox", "diffrax", "optimistix", "lineax")
+# Whose classes may be in it: their code, or version, is in its name.
+_KNOWN = {*_TRACED, "hdcal", "builtins", "collections", "numpy"}
 _CODE = Path(__file__).parent
 _DIGEST_SIZE = hashlib.sha256().digest_size
 # Nobody else may write what is run.
@@ -106,9 +108,10 @@ class Program:
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        told = repr((name, *kind[:-1], jax.default_backend()))
+        settings = sorted(item for item in jax.config.values.items() if _matters(item))
+        told = repr((name, *kind[:-1], settings, jax.default_backend()))
         # What is told by its place in this process' memory is no name elsewhere.
-        if kind.folder is None or " at 0x" in told:
+        if kind.folder is None or " at 0x" in told or _is_foreign(kind):
             return None
         return kind.folder / hashlib.sha256(told.encode()).hexdigest()
 
@@ -130,6 +133,39 @@ def program(
     if function is None:
         return lambda function: Program(function, static, returns)
     return Program(function, static, returns)
+
+
+def _matters(setting: tuple[str, Any]) -> bool:
+    """Tell whether a setting of JAX may be in a trace: where things are kept is not."""
+    return "cache" not in setting[0]
+
+
+def _is_foreign(kind: _Kind) -> bool:
+    """Tell whether a trace has code of classes that no digest is of: a user's own."""
+    classes = {*_classes_of(kind.structure), *_classes_in(kind.fixed)}
+    return any(one.__module__.partition(".")[0] not in _KNOWN for one in classes)
+
+
+def _classes_of(structure: Any) -> Iterator[type]:
+    node = structure.node_data()
+    if node is not None:
+        yield node[0]
+        yield from _classes_in(node[1])
+    for child in structure.children():
+        yield from _classes_of(child)
+
+
+def _classes_in(held: Any) -> Iterator[type]:
+    """Yield the classes in what is no array: themselves, and those of instances."""
+    if isinstance(held, type):
+        yield held
+    elif isinstance(held, tuple | list | set | frozenset):
+        for one in held:
+            yield from _classes_in(one)
+    elif isinstance(held, Mapping):
+        yield from _classes_in([*held.items()])
+    else:
+        yield type(held)
 
 
 def _cached() -> str | None:
