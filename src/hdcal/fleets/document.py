@@ -126,8 +126,8 @@ def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     called = (
         "Apart: from the centre, of its lot where lots are told, at one size; in sds: "
         "counted in the scatter of ordinary gears; P(off): in stiffness. Called off "
-        "are those so far out, in stiffness, noise or zero, that in the mean at most "
-        f"{percent(answer.false_calls)} of the gears called are ordinary ones."
+        "are those so far out, in stiffness, noise, zero or shape, that in the mean at "
+        f"most {percent(answer.false_calls)} of the gears called are ordinary ones."
     )
     blocks = [shown, table, *more, Text(called, soft=True)]
     return Section("The gears, the oddest first", blocks, brief=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.fleets.answer import PopulationAnswer
 from hdcal.fleets.notes import FEW
-from hdcal.report.words import estimate, percent
+from hdcal.report.words import estimate, number, percent
 
 _MOST_NAMED = 3
 
@@ -92,7 +92,9 @@ def _shaped(one: Mapping[str, Any], usual: Mapping[str, float]) -> str:
     told = [name for name in ("loop_N", "bend_N") if np.isfinite(one[name])]
     name = max(told, key=lambda name: abs(float(one[name]) - usual[name]))
     what = {"loop_N": "a loop", "bend_N": "a bend"}[name]
-    return f"has {what} of {one[name]:.2g} N (most: {usual[name]:.2g} N)"
+    size, most = float(one[name]), usual[name]
+    # As many digits of the others' as of its own: theirs may be next to nothing.
+    return f"has {what} of {size:.2g} N (most: {number(most, 10.0 * size)} N)"
 
 
 def _softer(one: Mapping[str, Any], than: str) -> str:

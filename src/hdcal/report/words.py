@@ -57,7 +57,8 @@ def number(value: float | None, width: float | None = None) -> str:
     if abs(value) >= 1e6 or place < -8:
         digits = max(2, _place(value) - place + 2)
         return f"{value:.{digits}e}"
-    return f"{value:.{max(0, 2 - place)}f}"
+    # What rounds to nought has no sign.
+    return f"{value:z.{max(0, 2 - place)}f}"
 
 
 def _place(value: float) -> int:
