@@ -40,15 +40,45 @@ def kept(folder: Path) -> list[Path]:
     return sorted(p for p in (folder / "programs").rglob("*") if p.is_file())
 
 
-def counted(static=()):
+TRACED = []
+
+
+def cosine_sum(numbers, *, times=1):
+    """Return a number, and count how often it was traced."""
+    TRACED.append(times)
+    return {"sum": times * jnp.sum(jnp.cos(numbers["x"])) + numbers["y"]}
+
+
+def called_back(x):
+    """Return what this process itself has to say."""
+    shape = jax.ShapeDtypeStruct(x.shape, x.dtype)
+    return jax.pure_callback(lambda y: np.asarray(y) + 1.0, shape, x)
+
+
+def applied(x, *, apply):
+    """Return what a function makes of it."""
+    return apply(x)
+
+
+def doubled(x):
+    """Return two arrays."""
+    return [x, 2.0 * x]
+
+
+def of_instance(effect, x):
+    """Return what an effect makes of it."""
+    return effect.apply(x, None)
+
+
+def of_class(x, *, effect):
+    """Return what an effect of that class makes of it."""
+    return effect(3.0).apply(x, None)
+
+
+def counted():
     """Return a program, and how often it was traced."""
-    traced = []
-
-    def cosine_sum(numbers, *, times=1):
-        traced.append(times)
-        return {"sum": times * jnp.sum(jnp.cos(numbers["x"])) + numbers["y"]}
-
-    return program(cosine_sum, static=("times",)), traced
+    TRACED.clear()
+    return program(cosine_sum, static=("times",)), TRACED
 
 
 def another(one: Program) -> Program:
@@ -80,10 +110,10 @@ def test_another_setting_of_jax_is_another_program(cached):
     one, traced = counted()
     numbers = {"x": np.zeros(3), "y": 0.0}
     one(numbers, times=1)
-    before = jax.config.values["jax_default_matmul_precision"]
-    jax.config.update("jax_default_matmul_precision", "highest")
-    another(one)(numbers, times=1)
-    jax.config.update("jax_default_matmul_precision", before)
+    with jax.default_matmul_precision("highest"):
+        # In the same process and in a later one.
+        one(numbers, times=1)
+        another(one)(numbers, times=1)
     assert len(traced) == len(kept(cached)) == 2
 
 
@@ -169,16 +199,12 @@ def test_few_versions_of_the_code_stay(cached):
 
 
 def test_what_calls_back_works_and_is_not_kept(cached):
-    def back(x):
-        shape = jax.ShapeDtypeStruct(x.shape, x.dtype)
-        return jax.pure_callback(lambda y: np.asarray(y) + 1.0, shape, x)
-
-    np.testing.assert_array_equal(program(back)(np.zeros(2)), np.ones(2))
+    np.testing.assert_array_equal(program(called_back)(np.zeros(2)), np.ones(2))
     assert not kept(cached)
 
 
 def test_an_argument_told_by_its_address_is_not_kept(cached):
-    one = program(lambda x, *, apply: apply(x), static=("apply",))
+    one = program(applied, static=("apply",))
     assert float(one(np.float64(2.0), apply=lambda x: x + 1.0)) == 3.0
     assert not kept(cached)
 
@@ -203,21 +229,76 @@ def own_effect(factor: float):
 def test_a_class_of_the_users_own_is_traced_anew(cached, as_class):
     """Its name and its fields may be the same, and its code another."""
 
-    def run(effect, x):
-        return effect.apply(x, None)
-
-    def of_class(x, *, effect):
-        return effect(3.0).apply(x, None)
-
     found = []
     for factor in (1.0, 2.0):
         effect, x = own_effect(factor), np.float64(5.0)
         if as_class:
             found.append(float(program(of_class, static=("effect",))(x, effect=effect)))
         else:
-            found.append(float(program(run)(effect(3.0), x)))
+            found.append(float(program(of_instance)(effect(3.0), x)))
     assert found == [15.0, 30.0]
     assert not kept(cached)
+
+
+def test_a_class_that_executed_text_makes_is_the_users_own(cached):
+    for factor in (1.0, 2.0):
+        made = {}
+        exec(f"class Own:\n def apply(self, x, _):\n  return {factor} * x", made)
+        jax.tree_util.register_pytree_node(
+            made["Own"], lambda _: ((), None), lambda *_, own=made["Own"]: own()
+        )
+        assert made["Own"].__module__ == "builtins"
+        found = program(of_instance)(made["Own"](), np.float64(5.0))
+        assert float(found) == factor * 5.0
+    assert not kept(cached)
+
+
+def test_functions_that_others_made_have_no_name(cached):
+    def adder(more):
+        return program(lambda x: x + more)
+
+    assert [float(adder(more)(np.float64(1.0))) for more in (2.0, 3.0)] == [3.0, 4.0]
+    assert not kept(cached)
+
+
+def test_settings_that_are_equal_and_of_another_type_are_told_apart(cached):
+    times, traced = counted()
+    for setting in (1, True, 1.0):
+        times({"x": np.zeros(3), "y": 0.0}, times=setting)
+    assert [type(one) for one in traced] == [int, bool, float]
+
+
+def test_what_lies_on_another_device_is_jit(tmp_path):
+    script = f"""
+import jax, numpy as np
+from hdcal.programs import program
+jax.config.update("jax_compilation_cache_dir", {str(tmp_path)!r})
+from pathlib import Path
+from test_programs import kept, doubled
+one = program(doubled)
+first, second = jax.devices()
+both = jax.sharding.Mesh(np.array([first, second]), "x")
+split = jax.sharding.NamedSharding(both, jax.sharding.PartitionSpec("x"))
+x = np.arange(4.0)
+for place in (second, split):
+    assert np.array_equal(one(jax.device_put(x, place))[1], 2.0 * x)
+assert not kept(Path({str(tmp_path)!r}))
+assert np.array_equal(one(x)[1], 2.0 * x)
+assert len(kept(Path({str(tmp_path)!r}))) == 1
+with jax.default_device(second):
+    assert np.array_equal(one(x)[1], 2.0 * x)
+"""
+    env = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=2"}
+    env["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=env, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_setting_may_be_left_out(cached):
+    one, _ = counted()
+    assert float(one({"x": np.zeros(3), "y": 0.0})["sum"]) == 3.0
+    assert len(kept(cached)) == 1
 
 
 def test_under_a_transformation_it_is_jit(cached):
@@ -228,10 +309,7 @@ def test_under_a_transformation_it_is_jit(cached):
 
 
 def test_a_class_comes_back(cached):
-    def both(x):
-        return [x, 2.0 * x]
-
-    one = program(both, returns=lambda first, second: {"a": first, "b": second})
+    one = program(doubled, returns=lambda first, second: {"a": first, "b": second})
     assert float(one(np.float64(2.0))["b"]) == 4.0
 
 

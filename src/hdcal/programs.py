@@ -6,6 +6,7 @@ for each kind of arguments: structure, shapes and types. A later process reads t
 instead of tracing anew, and imports none of what only tracing needs.
 """
 
+import builtins
 import hashlib
 import os
 import secrets
@@ -27,7 +28,17 @@ _VERSIONS_KEPT = 4
 # Libraries of which a trace has code.
 _TRACED = ("jax", "jaxlib", "numpyro", "equinox", "diffrax", "optimistix", "lineax")
 # Whose classes may be in it: their code, or version, is in its name.
-_KNOWN = {*_TRACED, "hdcal", "builtins", "collections", "numpy"}
+_KNOWN = {*_TRACED, "hdcal", "collections", "numpy"}
+# Settings of JAX that change what is traced; the last one is a device.
+_SETTINGS = (
+    "jax_enable_x64",
+    "jax_default_matmul_precision",
+    "jax_numpy_dtype_promotion",
+    "jax_default_prng_impl",
+    "jax_threefry_partitionable",
+    "jax_debug_nans",
+    "jax_default_device",
+)
 _CODE = Path(__file__).parent
 _DIGEST_SIZE = hashlib.sha256().digest_size
 # Nobody else may write what is run.
@@ -40,7 +51,7 @@ class _Kind(NamedTuple):
     structure: Any
     fixed: tuple
     arrays: tuple
-    double: bool
+    settings: tuple
     folder: Path | None
 
 
@@ -65,16 +76,16 @@ class Program:
 
     def __call__(self, *args, **named):
         """Return what the function returns; static arguments are named."""
-        fixed = {name: named.pop(name) for name in self._static}
+        fixed = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
-        if any(isinstance(leaf, Tracer) for leaf in leaves):
+        if any(map(_is_placed, leaves)):
             return self._jitted(*args, **named, **fixed)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         kind = _Kind(
             structure,
-            tuple(fixed.items()),
+            tuple((name, type(value), value) for name, value in fixed.items()),
             tuple((leaf.shape, leaf.dtype) for leaf in leaves),
-            jax.config.read("jax_enable_x64"),
+            tuple(getattr(jax.config, name) for name in _SETTINGS),
             _folder(_cached()),
         )
         if kind not in self._ready:
@@ -93,7 +104,8 @@ class Program:
 
         def flat(*leaves):
             args, named = jax.tree.unflatten(kind.structure, leaves)
-            found = self._function(*args, **named, **dict(kind.fixed))
+            fixed = {name: value for name, _, value in kind.fixed}
+            found = self._function(*args, **named, **fixed)
             return found if self._returns is None else jax.tree.leaves(found)
 
         file = self._file(kind)
@@ -108,10 +120,12 @@ class Program:
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        settings = sorted(item for item in jax.config.values.items() if _matters(item))
-        told = repr((name, *kind[:-1], settings, jax.default_backend()))
-        # What is told by its place in this process' memory is no name elsewhere.
-        if kind.folder is None or " at 0x" in told or _is_foreign(kind):
+        told = repr((name, *kind[:-1], jax.default_backend()))
+        # A function that another one made, or what is told by its place in this
+        # process' memory, has no name elsewhere.
+        nameless = "<" in name or " at 0x" in told
+        on_another = kind.settings[-1] is not None
+        if kind.folder is None or nameless or on_another or _is_foreign(kind):
             return None
         return kind.folder / hashlib.sha256(told.encode()).hexdigest()
 
@@ -135,15 +149,24 @@ def program(
     return Program(function, static, returns)
 
 
-def _matters(setting: tuple[str, Any]) -> bool:
-    """Tell whether a setting of JAX may be in a trace: where things are kept is not."""
-    return "cache" not in setting[0]
+def _is_placed(leaf: Any) -> bool:
+    """Tell whether an argument is traced already, or bound to another device."""
+    if isinstance(leaf, Tracer):
+        return True
+    return getattr(leaf, "committed", False) and leaf.devices() != {jax.devices()[0]}
 
 
 def _is_foreign(kind: _Kind) -> bool:
     """Tell whether a trace has code of classes that no digest is of: a user's own."""
     classes = {*_classes_of(kind.structure), *_classes_in(kind.fixed)}
-    return any(one.__module__.partition(".")[0] not in _KNOWN for one in classes)
+    return not all(map(_is_known, classes))
+
+
+def _is_known(one: type) -> bool:
+    # What text that was executed defines is said to be built in.
+    if one.__module__ == "builtins":
+        return getattr(builtins, one.__name__, None) is one or one is type(None)
+    return one.__module__.partition(".")[0] in _KNOWN
 
 
 def _classes_of(structure: Any) -> Iterator[type]:

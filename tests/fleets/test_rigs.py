@@ -214,3 +214,13 @@ def test_many_rigs_are_taken_for_one():
     case = replace(found.case, rigs=tuple("ABCD"))
     many = replace(found, readings=replace(found.readings, case=case))
     assert any("4 rigs are too many" in note for note in fleet_answer(many).notes)
+
+
+def test_a_single_reading_on_a_rig_takes_no_slope():
+    frame = measured(["A", "A", "A"], {"A": 0.0})
+    once = frame.iloc[[0]].assign(run="once", rig="B")
+    sums = read_fleet(pd.concat([frame, once], ignore_index=True)).sums
+    alone = gear_sums(read_fleet(frame).sums, np.zeros(3, int))
+    found = gear_sums(sums, np.zeros(3, int))
+    np.testing.assert_array_equal(found.noise_free, alone.noise_free)
+    np.testing.assert_allclose(found.log_noise_sd, alone.log_noise_sd)

@@ -17,10 +17,12 @@ def one_thread_for_algebra() -> None:
 def keep_compilations() -> None:
     """Keep on disk what was traced and compiled, for later processes.
 
-    Commands do. A script that calls it first starts in a fraction of the time from its
-    second run on, with the same results. The folder is the user's cache folder, or what
-    the environment variable HDCAL_CACHE_DIR names; where neither can be written,
-    nothing is kept. It sets options of JAX: nothing else does.
+    Commands do. A script that calls it first starts faster from its second run on, with
+    the same results. What has code of a user's own effects is traced anew.
+
+    The folder is the user's cache folder, or what the environment variable
+    HDCAL_CACHE_DIR names; where neither can be written, nothing is kept. It sets
+    options of JAX, as nothing else does.
     """
     folder = _writable_folder()
     if folder is None:

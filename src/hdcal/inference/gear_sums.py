@@ -160,7 +160,8 @@ def _noise(count: np.ndarray, rows: np.ndarray, own, rig: np.ndarray, step: floa
         here = (rig == one) & (count > 0.0)
         xx, xy = (np.sum(values * here, axis=1) for values in own[:2])
         square -= xy**2 / np.where(xx > 0.0, xx, 1.0)
-        free -= np.any(here, axis=1)
+        # Single readings on a rig take no slope.
+        free -= xx > 0.0
     exact = (free > 0.0) & (square <= _NOTHING * yy)
     added = np.where(exact, free * step**2 / 12.0, 0.0)
     own[2][:, 0] += added
