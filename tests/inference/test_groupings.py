@@ -14,7 +14,7 @@ from hdcal.inference.groupings import group_offsets, grouping, sample_offsets
 @pytest.mark.parametrize("means", [(1.0, 2.0), (0.1, -0.3, 4.0)])
 def test_the_density_is_that_of_normal_offsets(sd, means):
     """p(u) = N(c; 0, sd²) |dc/du| in the contrasts c of the offsets."""
-    groups = grouping(np.array(means), np.linspace(0.01, 0.5, len(means)))
+    groups = grouping(np.array(means), np.diag(np.linspace(0.01, 0.5, len(means))))
     u = np.linspace(-0.7, 1.1, len(means) - 1)
     data = {f"_lot_{k + 1}": value for k, value in enumerate(u)}
     found, trace = log_density(seed(sample_offsets, 0), ("lot", groups, sd), {}, data)
