@@ -1,5 +1,6 @@
 """Groups about their mean: the law of their contrasts is exact in any coordinates."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,6 +9,11 @@ from numpyro.infer.util import log_density
 from scipy.stats import multivariate_normal
 
 from hdcal.inference.groupings import group_offsets, grouping, sample_offsets
+
+
+@pytest.fixture(autouse=True)
+def in_double_precision():
+    jax.config.update("jax_enable_x64", True)
 
 
 @pytest.mark.parametrize("sd", [1e-4, 0.3, 20.0])
