@@ -113,8 +113,10 @@ class Program:
         if exported is None and file is not None:
             # What calls back into this process, say, cannot be kept.
             with suppress(Exception):
-                exported = export.export(jax.jit(flat))(*leaves)
-                _write(file, bytes(exported.serialize()))
+                kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
+                # As later processes have it: to the last bit the same.
+                exported = export.deserialize(bytearray(kept))
+                _write(file, kept)
         return jax.jit(flat if exported is None else exported.call)
 
     def _file(self, kind: _Kind) -> Path | None:

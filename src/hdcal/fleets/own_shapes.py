@@ -66,8 +66,8 @@ def own_shapes(case: Case, stiffness: np.ndarray) -> OwnShapes:
 
 
 def _square(shape: np.ndarray, gear: np.ndarray, gears: int) -> np.ndarray:
-    """Return the sum of squares of each gear, positive."""
-    return np.bincount(gear, shape**2, gears) + np.finfo(float).tiny
+    """Return the sum of squares of each gear, no less than rounding leaves."""
+    return np.maximum(np.bincount(gear, shape**2, gears), _NOTHING)
 
 
 def _slope(
