@@ -4,6 +4,8 @@ Units inside hdcal are mm, N, MPa, degrees Celsius, seconds and radians; they
 are consistent, so nothing below the reading edge converts.
 """
 
+from typing import Any
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -23,7 +25,7 @@ def _use_double_precision(made: eqx.Module) -> None:
     begins with a `Geometry` or `Records`, and making one of those calls this.
 
     Args:
-        made: the object that is being made.
+        made: the object that is being made, or that another process has sent.
 
     Raises:
         RuntimeError: it is made within what JAX compiles or differentiates, whose
@@ -61,6 +63,10 @@ class Geometry(eqx.Module):
     poisson: Float[Array, ""] | float
 
     def __check_init__(self) -> None:
+        _use_double_precision(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
         _use_double_precision(self)
 
 
@@ -101,4 +107,8 @@ class Records(eqx.Module):
     known: frozenset[str] = eqx.field(static=True)
 
     def __check_init__(self) -> None:
+        _use_double_precision(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
         _use_double_precision(self)

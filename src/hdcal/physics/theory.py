@@ -19,7 +19,6 @@ Stiffness = Callable[[Geometry, Scalar], Scalar]
 RING_SERIES = (jnp.pi**2 - 8.0) / 16.0
 
 
-@program
 def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of an inextensible ring: k = π E L δ³ / (24 R³ S).
 
