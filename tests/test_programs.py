@@ -139,11 +139,12 @@ def test_a_damaged_file_is_thrown_away(cached, damage):
     numbers = {"x": np.linspace(0.0, 1.0, 5), "y": 0.0}
     found = one(numbers, times=1)
     (file,) = kept(cached)
-    whole = file.read_bytes()
     file.write_bytes(damage)
     assert float(another(one)(numbers, times=1)["sum"]) == float(found["sum"])
     assert len(traced) == 2
-    assert file.read_bytes()[:32] == whole[:32] or len(file.read_bytes()) > 100
+    # It was written anew, and is read again.
+    another(one)(numbers, times=1)
+    assert len(traced) == 2
     changed = bytearray(file.read_bytes())
     changed[-1] ^= 1
     file.write_bytes(bytes(changed))

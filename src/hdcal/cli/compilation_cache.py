@@ -21,8 +21,8 @@ def keep_compilations() -> None:
     the same results. What has code of a user's own effects is traced anew.
 
     The folder is the user's cache folder, or what the environment variable
-    HDCAL_CACHE_DIR names; where neither can be written, nothing is kept. It sets
-    options of JAX, as nothing else does.
+    HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept. It sets options
+    of JAX for the whole process.
     """
     folder = _writable_folder()
     if folder is None:

@@ -43,7 +43,18 @@ def _use_double_precision(made: eqx.Module) -> None:
     jax.config.update("jax_enable_x64", True)
 
 
-class Geometry(eqx.Module):
+class _InDoublePrecision(eqx.Module):
+    """What computations begin with, made here or sent by another process."""
+
+    def __check_init__(self) -> None:
+        _use_double_precision(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        _use_double_precision(self)
+
+
+class Geometry(_InDoublePrecision):
     """Size of the flexspline; every leaf may be differentiated.
 
     A spring has none: all are NaN. Making one switches JAX to double precision.
@@ -62,15 +73,8 @@ class Geometry(eqx.Module):
     load_height: Float[Array, ""] | float
     poisson: Float[Array, ""] | float
 
-    def __check_init__(self) -> None:
-        _use_double_precision(self)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        _use_double_precision(self)
-
-
-class Records(eqx.Module):
+class Records(_InDoublePrecision):
     """Rows in the order they were taken; absent covariates hold neutral values.
 
     Making one switches JAX to double precision.
@@ -105,10 +109,3 @@ class Records(eqx.Module):
     force: Float[Array, " n"]
     force_sd: Float[Array, " n"]
     known: frozenset[str] = eqx.field(static=True)
-
-    def __check_init__(self) -> None:
-        _use_double_precision(self)
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state)
-        _use_double_precision(self)

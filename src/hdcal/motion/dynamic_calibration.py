@@ -171,7 +171,7 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     """
     fits = [laplace.fit(problem, start) for start in scan(problem, _PEAKS)]
     fits = fits or [laplace.fit(problem)]
-    level = [float(_potential(problem, fit.centre)) for fit in fits]
+    level = [float(laplace.potential(problem, fit.centre)) for fit in fits]
     order = np.argsort(level)
     best = fits[order[0]]
     name = "one natural frequency explains the data"
@@ -185,9 +185,6 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
         good = drop >= _RIVAL
         return best, Check(name, "passed" if good else "failed", words)
     return best, Check(name, "passed", "the search from several ends in one place")
-
-
-_potential = program(laplace.potential)
 
 
 @program
