@@ -21,9 +21,9 @@ class Run:
     output: str
 
 
-def run(*arguments, **environment) -> Run:
-    """Run this Python with arguments; what goes wrong there goes wrong here."""
-    command = [sys.executable, *map(str, arguments)]
+def run(*arguments, program=(sys.executable,), stdin=None, **environment) -> Run:
+    """Run this Python, or another program; what goes wrong there goes wrong here."""
+    command = [*program, *map(str, arguments)]
     settings = os.environ | {name: str(v) for name, v in environment.items()}
     began = time.perf_counter()
     with subprocess.Popen(
@@ -31,6 +31,7 @@ def run(*arguments, **environment) -> Run:
         env=settings,
         cwd=ROOT,
         text=True,
+        stdin=stdin,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
     ) as child:

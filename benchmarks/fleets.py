@@ -47,8 +47,8 @@ HEADING += ("gear sd [%] (1)", "mounting sd [N] (0.6)", "reading sd [N] (0.4)")
 
 def main(repeats: int, *variant: str) -> None:
     print(" ".join([f"{GEARS} gears", *variant]) + "; in brackets the truth\n")
-    # Arrays of a fixed shape are what NUTS is given.
-    names = [n for n in CONTENDERS if "uneven" not in variant or "NUTS" not in n]
+    # Arrays of a fixed shape are what NumPyro is given.
+    names = [n for n in CONTENDERS if "uneven" not in variant or "NumPyro" not in n]
     found = {n: [] for n in names if find_spec(CONTENDERS[n][1])}
     with tempfile.TemporaryDirectory() as folder:
         kept = {"JAX_COMPILATION_CACHE_DIR": folder}
@@ -145,6 +145,31 @@ def numpyro(data: Data, centred=False):
     return fit
 
 
+def nutpie(data: Data):
+    import nutpie as sampler  # pyright: ignore[reportMissingImports]
+    import pymc as pm  # pyright: ignore[reportMissingImports]
+
+    gear, mounting = data["gear"], data["mounting"]
+    with pm.Model() as model:
+        p = {
+            name: getattr(pm, family)(name, *numbers)
+            for name, (family, *numbers) in PRIORS.items()
+        }
+        own = p["stiffness"] * (1.0 + p["specimen_sd"] * pm.Normal("own", shape=GEARS))
+        mounted = pm.Normal("zeros", shape=GEARS * MOUNTINGS)
+        line = own[gear] * data["x"]
+        line += (p["zero"] + p["run_offset_sd"] * mounted)[mounting]
+        pm.Normal("force", line, p["sigma"], observed=data["force"])
+    compiled = sampler.compile_pymc_model(model)
+    size = {"tune": WARMUP, "draws": DRAWS, "chains": CHAINS, "progress_bar": False}
+
+    def fit(seed):
+        drawn = sampler.sample(compiled, seed=seed, **size).posterior
+        return _summary({name: drawn[name].to_numpy() for name in PRIORS})
+
+    return fit
+
+
 def statsmodels(data: Data):
     import pandas as pd
     from statsmodels.api import MixedLM  # pyright: ignore[reportMissingImports]
@@ -187,6 +212,7 @@ CONTENDERS = {
     "hdcal.fleet": (hdcal, "hdcal"),
     "NumPyro NUTS, non-centred": (numpyro, "numpyro"),
     "NumPyro NUTS, centred": (partial(numpyro, centred=True), "numpyro"),
+    "PyMC with nutpie, NUTS, non-centred": (nutpie, "nutpie"),
     "statsmodels MixedLM, REML": (statsmodels, "statsmodels"),
 }
 

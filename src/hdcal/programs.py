@@ -108,6 +108,8 @@ class Program:
             found = self._function(*args, **named, **fixed)
             return found if self._returns is None else jax.tree.leaves(found)
 
+        # By which logs and profiles name it.
+        flat.__name__ = self._function.__name__
         file = self._file(kind)
         exported = None if file is None else _read(file)
         if exported is None and file is not None:

@@ -41,7 +41,7 @@ def looped(*, told: bool = True) -> Posterior:
         with_gap=True,
         adapt_noise=False,
         warmup=400,
-        draws=400,
+        draws=800,
         chains=2,
         seed=1,
     )
