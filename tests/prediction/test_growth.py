@@ -74,15 +74,20 @@ def test_it_has_no_part_in_what_was_tested_and_begins_without_a_step():
 
 @pytest.mark.parametrize("make", [single, with_leftover])
 def test_bands_and_margin_say_the_same(make):
+    """In the mean of some seeds: one moves an end by three percent of the width."""
     posterior = make()
     for at in (0.6, 0.8):
-        bands = hdcal.predict(posterior, [at])
-        found = hdcal.margin(posterior, at, **QUICK).worst.force_N
-        kind = "physics" if np.isnan(bands.with_gap_lo_N[0]) else "with_gap"
-        width = found.hi - found.lo
-        for end in ("lo", "median", "hi"):
-            (got,) = getattr(bands, f"{kind}_{end}_N")
-            assert got == pytest.approx(getattr(found, end), abs=0.03 * width)
+        bands, found = [], []
+        for seed in range(6):
+            whole = hdcal.predict(posterior, [at], seed=seed)
+            kind = "physics" if np.isnan(whole.with_gap_lo_N[0]) else "with_gap"
+            ends = [f"{kind}_{end}_N" for end in ("lo", "median", "hi")]
+            bands.append([getattr(whole, end)[0] for end in ends])
+            force = hdcal.margin(posterior, at, seed=seed, **QUICK).worst.force_N
+            found.append([force.lo, force.median, force.hi])
+        low, _, high = np.mean(found, axis=0)
+        expected = pytest.approx(np.mean(found, axis=0), abs=0.03 * (high - low))
+        assert np.mean(bands, axis=0) == expected
 
 
 @pytest.mark.thorough

@@ -7,7 +7,8 @@ log σ, log τ and ρ: all but τ/σ and ρ are integrated exactly, these by a g
 """
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
+from scipy.special import stdtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
@@ -106,8 +107,8 @@ def _quantile(level: float, weight, mean, scale, free: int) -> float:
     """Return a quantile of a mixture of Student-t distributions."""
 
     def excess(value: float) -> float:
-        below = stats.t.cdf((value - mean) / scale, free)
+        below = stdtr(free, (value - mean) / scale)
         return float(np.average(below, weights=weight)) - level
 
     ends = mean.min() - 50.0 * scale.max(), mean.max() + 50.0 * scale.max()
-    return optimize.root_scalar(excess, bracket=ends).root
+    return scipy.optimize.root_scalar(excess, bracket=ends).root

@@ -8,7 +8,7 @@ steps do.
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 # A limit counts as kept when it is exceeded by less than this share of itself.
 CLOSE = 1e-6
@@ -70,7 +70,7 @@ def _least_excess(excess: Excess, slopes: Excess, start, bounds) -> np.ndarray:
 
 def _minimise(objective, start, bounds, room, room_slopes, close) -> np.ndarray:
     """Return where an objective with its gradient is least and all room ≥ 0."""
-    return minimize(
+    return scipy.optimize.minimize(
         objective,
         start,
         jac=True,

@@ -8,7 +8,7 @@ differ as far as evidence allows. It moves no probability.
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
@@ -67,7 +67,7 @@ def chance_of_so_few_runs(wild: np.ndarray) -> float:
     runs = int(wild[0]) + int(np.sum(wild[1:] & ~wild[:-1]))
     # Of the gaps between other readings, and both ends, those that hold a run.
     gaps = int(np.sum(~wild)) + 1
-    return float(stats.hypergeom.cdf(runs, len(wild), gaps, int(wild.sum())))
+    return float(scipy.stats.hypergeom.cdf(runs, len(wild), gaps, int(wild.sum())))
 
 
 def leaves_more_than_noise(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-from scipy import stats
+import scipy
 
 # An effect whose name other causes get more often than this is not named.
 _MOST_OTHERS = 0.15
@@ -35,7 +35,7 @@ class Tally:
     @property
     def at_most(self) -> float:
         """Share that is wrong at most, with a confidence of 95 % (Clopper, Pearson)."""
-        test = stats.binomtest(self.wrong, self.said, alternative="less")
+        test = scipy.stats.binomtest(self.wrong, self.said, alternative="less")
         return float(test.proportion_ci(_CONFIDENCE).high)
 
 

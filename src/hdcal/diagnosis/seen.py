@@ -9,7 +9,7 @@ lowest to the highest place.
 from dataclasses import replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri
 
 from hdcal.data.case import Case
 from hdcal.data.loading import loading_side
@@ -57,7 +57,7 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     data = _whitened(prepared, tried, sd, sign, own=own)
     found = _found(data, sd, noise, np.asarray(turned.run))
     scale = float(np.max(np.abs(prepared.records.force)))
-    quantile = float(stats.norm.isf((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
+    quantile = float(-ndtri((1.0 - INTERVAL) / (2.0 * max(len(tried), 1))))
     # A loop is told once, by the shape that shows it best.
     once: dict[str, Structure] = {}
     for each in found:

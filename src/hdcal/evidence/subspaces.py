@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import erf
 
 from hdcal.data.priors import Prior
 from hdcal.evidence.closed_form import subspace_evidence
@@ -159,7 +159,7 @@ def _member_effect(effect: type[Scatter], case: PreparedCase) -> SubspaceEffect:
     sd = make_grid(effect, case.priors).sd
     edges = np.concatenate([[0.0], np.sqrt(_STEPS[1:] * _STEPS[:-1]), [np.inf]])
     mass = sum(
-        weight * np.diff(stats.halfnorm.cdf(edges / scale))
+        weight * np.diff(erf(edges / (np.sqrt(2.0) * scale)))
         for scale, weight in zip(SCALES, SCALE_WEIGHTS, strict=True)
     )
     log_weight = np.log(np.maximum(mass, 1e-300))

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy import stats
+from scipy.special import gammainc
 
 from hdcal.evidence.case_evidence import (
     LEAST_SEEN,
@@ -129,7 +129,7 @@ def _small(spread, pull, variance, noise: float, least: float):
     mean = np.sum(spread * (centre**2 + own), axis=-1)
     squared = 2.0 * np.sum(spread**2 * (own**2 + 2.0 * own * centre**2), axis=-1)
     mean, squared = np.maximum(mean, 1e-300), np.maximum(squared, 1e-300)
-    return stats.gamma.cdf(least, mean**2 / squared, scale=squared / mean)
+    return gammainc(mean**2 / squared, least * mean / squared)
 
 
 def _share(log_weight: Float[np.ndarray, "*m"], part: Float[np.ndarray, "*m"]) -> float:

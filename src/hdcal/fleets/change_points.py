@@ -13,8 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp, ndtri, softmax
 
 # Prior probability of each way.
 WAYS = {"none": 1 / 2, "steps": 1 / 6, "drift": 1 / 6, "days": 1 / 6}
@@ -126,7 +125,7 @@ def changes(
 
 def middle_sd(value: np.ndarray) -> float:
     """Return the sd of a normal law by its median absolute deviation from nought."""
-    return float(np.median(np.abs(value)) / stats.norm.ppf(0.75))
+    return float(np.median(np.abs(value)) / ndtri(0.75))
 
 
 def _sums(day: np.ndarray, value: np.ndarray, variance: np.ndarray) -> _Sums:
@@ -232,5 +231,6 @@ def _interval(share, mean, variance) -> tuple[float, float, float]:
     """Return the interval of a mixture of normals by its mean and its variance."""
     middle = float(np.sum(share * mean))
     sd = np.sqrt(np.sum(share * (variance + (mean - middle) ** 2)))
-    low, high = stats.norm.interval(_SURE, middle, sd)
+    half = ndtri(0.5 + 0.5 * _SURE) * sd
+    low, high = middle - half, middle + half
     return middle, float(low), float(high)

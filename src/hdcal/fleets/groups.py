@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from hdcal.data.case import Case
 from hdcal.fleets.change_points import middle_sd
@@ -102,8 +101,8 @@ def linked_rigs(sums: MountingSums) -> np.ndarray:
     """Return of each rig which others gears link it to: equal numbers, shape (k,)."""
     gears, rigs = (1 + int(np.max(index)) for index in (sums.gear, sums.rig))
     read, ends = np.ones(len(sums.gear)), (sums.gear, gears + sums.rig)
-    links = coo_array((read, ends), shape=(gears + rigs, gears + rigs))
-    return connected_components(links, directed=False)[1][gears:]
+    links = scipy.sparse.coo_array((read, ends), shape=(gears + rigs, gears + rigs))
+    return scipy.sparse.csgraph.connected_components(links, directed=False)[1][gears:]
 
 
 def slopes(sums: MountingSums) -> np.ndarray:

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtr
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding
@@ -92,7 +92,7 @@ def next_force(
         bounds.append(ForceBounds(content, confidence, max(low, 0.0), high))
     exceeded = None
     if limit_force is not None:
-        beyond = (stats.norm.sf((limit_force - mean) / sd) for sd in (ordinary, far))
+        beyond = (ndtr((mean - limit_force) / sd) for sd in (ordinary, far))
         usual, odd = beyond
         exceeded = credible_interval((1.0 - share) * usual + share * odd)
     told = credible_interval(one)

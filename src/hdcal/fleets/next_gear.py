@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtr, ndtri
 
 # Of bounds on many gears; halvings that find a quantile to a millionth of an sd.
 CONFIDENCE, _BISECTIONS = 0.95, 40
@@ -76,11 +76,11 @@ def quantile_of_mixture(
         share: of members that are off.
         wide: their sd in that of ordinary ones.
     """
-    low, high = np.zeros_like(share), stats.norm.ppf(content) * wide
+    low, high = np.zeros_like(share), ndtri(content) * wide
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        below = (1.0 - share) * stats.norm.cdf(middle)
-        below += share * stats.norm.cdf(middle / wide)
+        below = (1.0 - share) * ndtr(middle)
+        below += share * ndtr(middle / wide)
         low = np.where(below < content, middle, low)
         high = np.where(below < content, high, middle)
     return high

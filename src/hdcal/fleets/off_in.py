@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.special import digamma, polygamma
-from scipy.stats import false_discovery_control, t
+import scipy
+from scipy.special import digamma, polygamma, stdtr
 
 from hdcal.inference.gear_sums import MountingSums
 from hdcal.inference.groupings import group_offsets
@@ -33,7 +33,7 @@ def called_off(chances: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         Benjamini and Hochberg, Journal of the Royal Statistical Society B 57 (1995).
     """
     return {
-        name: false_discovery_control(chance) <= _LEVELS[name]
+        name: scipy.stats.false_discovery_control(chance) <= _LEVELS[name]
         for name, chance in chances.items()
     }
 
@@ -119,7 +119,7 @@ def chance_of(
     def chance(inside: np.ndarray) -> np.ndarray:
         sd = np.sqrt(errors + (spread + scatter / many)[inside])
         far = np.abs(own - (total / many)[inside]) / sd
-        return 2.0 * t.sf(far, many[inside] - 1.0)
+        return 2.0 * stdtr(many[inside] - 1.0, -far)
 
     inside = np.arange(len(own))
     # Beyond the first that is clearly off none is an ordinary one to be held against.

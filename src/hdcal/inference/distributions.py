@@ -4,7 +4,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
-from scipy import stats
+import scipy
 
 from hdcal.data.priors import Prior
 
@@ -49,15 +49,15 @@ def frozen(prior: Prior) -> Any:
 def _law(family: str, numbers: tuple[float, ...]) -> Any:
     match family:
         case "normal":
-            return stats.norm(*numbers)
+            return scipy.stats.norm(*numbers)
         case "lognormal":
-            return stats.lognorm(numbers[1], scale=numbers[0])
+            return scipy.stats.lognorm(numbers[1], scale=numbers[0])
         case "half_normal":
-            return stats.halfnorm(scale=numbers[0])
+            return scipy.stats.halfnorm(scale=numbers[0])
         case "uniform":
-            return stats.uniform(numbers[0], numbers[1] - numbers[0])
+            return scipy.stats.uniform(numbers[0], numbers[1] - numbers[0])
         case "beta":
-            return stats.beta(*numbers)
+            return scipy.stats.beta(*numbers)
     raise ValueError(f"no distribution for the prior family {family!r}")
 
 

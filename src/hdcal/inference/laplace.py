@@ -7,9 +7,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
-from scipy import optimize
 
 from hdcal.data.records import Array
 from hdcal.inference.problem import Problem
@@ -184,7 +184,7 @@ def fit(
                 cache[point] = np.inf, np.zeros(len(u)), np.eye(len(u))
         return cache[point]
 
-    found = optimize.minimize(
+    found = scipy.optimize.minimize(
         lambda u: expand(u)[0],
         np.zeros(len(flat)),
         method="trust-exact",
@@ -205,7 +205,7 @@ class _Patience:
     def __init__(self):
         self._levels: list[float] = []
 
-    def __call__(self, *, intermediate_result: optimize.OptimizeResult) -> None:
+    def __call__(self, *, intermediate_result: "scipy.optimize.OptimizeResult") -> None:
         """Look at one more step.
 
         Raises:

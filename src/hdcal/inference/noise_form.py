@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import fdtrc, ndtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
@@ -122,7 +122,7 @@ def _is_better(larger: Pilot, smaller: Pilot) -> bool:
         return False
     one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
     ratio = (one - two) / more * larger.free / max(two, 1e-300)
-    return float(stats.f.sf(ratio, more, larger.free)) < _FALSE_ALARM
+    return float(fdtrc(more, larger.free, ratio)) < _FALSE_ALARM
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -160,7 +160,7 @@ def growth_p_value(square, deformation) -> float:
     off, left = far - far.mean(), square - square.mean()
     scale = np.sqrt((off @ off) * (left @ left))
     tied = float(off @ left) / scale if scale > 0.0 else 0.0
-    return float(stats.norm.sf(np.sqrt(len(far)) * tied))
+    return float(ndtr(-np.sqrt(len(far)) * tied))
 
 
 def correlates(

@@ -6,7 +6,7 @@ Tested on what the model and every shape that was found leave.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtr, stdtr
 
 from hdcal.data.records import Records
 from hdcal.data.scatter import least_step
@@ -132,7 +132,7 @@ def _neighbours(rest: _Left, before, sd: np.ndarray, correlation: float) -> _Tes
     ratio /= float(rest.error @ rest.error)
     mean = trace / free
     variance = 2.0 * (free * square - trace**2) / (free**2 * (free + 2.0))
-    p = float(stats.norm.sf((ratio - mean) / np.sqrt(variance)))
+    p = float(ndtr((mean - ratio) / np.sqrt(variance)))
     alike = float(np.clip((ratio - mean) * free / pairs, 0.0, 0.95))
     times = np.sqrt((1.0 + alike) / (1.0 - alike))
     rms = float(np.sqrt(np.mean((rest.error[:size] * sd) ** 2)))
@@ -161,7 +161,7 @@ def _wild(rest: _Left, records: Records, sd: np.ndarray) -> _Test:
     rounding = least_step(records.force) / np.sqrt(12.0)
     scale = np.maximum(_NORMAL * float(np.median(far)), rounding / sd)
     times = far / np.maximum(scale, 1e-300)
-    chance = 2.0 * size * stats.t.sf(times, _WORTH * rest.free)
+    chance = 2.0 * size * stdtr(_WORTH * rest.free, -times)
     row = int(np.argmax(far))
     wild = np.flatnonzero((chance <= FALSE_ALARM) & (times >= _WILD))
     # What comes after one errs beside it.

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special, stats
+from scipy import special
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Records
@@ -209,7 +209,7 @@ def _tests(
         log_chance = log_weight - 0.5 * (np.log(own) + free * np.log(rest))
         chance = special.softmax(log_chance)
         error = np.sqrt(rest / (free * own))
-        p = chance @ (2.0 * stats.t.sf(np.abs(tied) / (own * error), free))
+        p = chance @ (2.0 * special.stdtr(free, -np.abs(tied) / (own * error)))
         part = chance @ (tied / own)
         tests.append((float(p), float(part), float(chance @ error), unit, name))
     return tests

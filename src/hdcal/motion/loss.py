@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from hdcal.data.case import Case, Theory
 from hdcal.data.prior import Prior
@@ -166,7 +166,7 @@ def noise_probability(problem: DynamicProblem, values) -> float:
     power = max(float(left @ left), np.finfo(float).tiny)
     share = np.array([left[lag:] @ left[:-lag] for lag in lags]) / power
     statistic = rows * (rows + 2) * np.sum(share**2 / (rows - lags))
-    return float(stats.chi2.sf(statistic, len(lags)))
+    return float(chdtrc(len(lags), statistic))
 
 
 def _left_over(name: str, p: float) -> Check:

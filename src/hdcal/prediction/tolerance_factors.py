@@ -8,7 +8,7 @@ bounds of `margin`, which agree with them where both exist.
 from collections.abc import Mapping
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
@@ -72,7 +72,8 @@ def k_factor(size: int, content: float = 0.99, confidence: float = 0.95) -> floa
         raise InputError(findings)
     root = np.sqrt(size)
     return float(
-        stats.nct.ppf(confidence, size - 1, stats.norm.ppf(content) * root) / root
+        scipy.stats.nct.ppf(confidence, size - 1, scipy.stats.norm.ppf(content) * root)
+        / root
     )
 
 
@@ -103,7 +104,7 @@ def wilks_size(
 
     def short(size: int) -> bool:
         # Beyond the bound lie at most `sides − 1` of the sample.
-        chance = float(stats.binom.cdf(sides - 1, size, 1.0 - content))
+        chance = float(scipy.stats.binom.cdf(sides - 1, size, 1.0 - content))
         return chance > 1.0 - confidence
 
     low, high = 0, 1

@@ -8,8 +8,8 @@ number of rows between false alarms.
 from functools import cache
 
 import numpy as np
-from scipy.optimize import root_scalar
-from scipy.stats import norm
+import scipy
+from scipy.special import ndtr
 
 # Half the shift, in noise sds, that the sums are quickest to find.
 ALLOWANCE = 0.5
@@ -35,8 +35,9 @@ def run_length(threshold: float, shift: float = 0.0, k: float = ALLOWANCE) -> fl
     at = np.append(0.0, 0.5 * threshold * (nodes + 1.0))
     weight = np.append(0.0, 0.5 * threshold * weights)
     moved = k - shift
-    table = norm.pdf(at[None, :] + moved - at[:, None]) * weight
-    table[:, 0] = norm.cdf(moved - at)
+    table = np.exp(-0.5 * (at[None, :] + moved - at[:, None]) ** 2)
+    table *= weight / np.sqrt(2.0 * np.pi)
+    table[:, 0] = ndtr(moved - at)
     return float(np.linalg.solve(np.eye(len(at)) - table, np.ones(len(at)))[0])
 
 
@@ -54,7 +55,9 @@ def threshold_for(rows: float) -> float:
     def excess(h: float) -> float:
         return np.log(run_length(h)) - np.log(2.0 * rows)
 
-    return float(root_scalar(excess, bracket=(0.01, _MOST_THRESHOLD)).root)
+    return float(
+        scipy.optimize.root_scalar(excess, bracket=(0.01, _MOST_THRESHOLD)).root
+    )
 
 
 class ChangeAlarm:

@@ -6,7 +6,7 @@ false alarms is then simulated on many streams without a change.
 """
 
 import numpy as np
-from scipy.optimize import nnls, root_scalar
+import scipy
 
 from hdcal.tracking.change_alarm import ALLOWANCE, threshold_for
 from hdcal.tracking.linear_core import LinearCore
@@ -55,14 +55,16 @@ def forgetting_threshold(
     target = np.log(scores.size / called[use])
     # Growing, and bent upwards if at all.
     terms = np.stack([-np.ones_like(level), np.ones_like(level), level, level**2], 1)
-    below, above, linear, bent = nnls(terms * weight[:, None], target * weight)[0]
+    below, above, linear, bent = scipy.optimize.nnls(
+        terms * weight[:, None], target * weight
+    )[0]
 
     def excess(h: float) -> float:
         return above - below + (linear + bent * h) * h - np.log(rows)
 
     if excess(0.0) > 0.0:
         return float(levels[0])
-    found = root_scalar(excess, bracket=(0.0, 10.0 * usual)).root
+    found = scipy.optimize.root_scalar(excess, bracket=(0.0, 10.0 * usual)).root
     return float(min(found, usual))
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import copysign, inf, sqrt
 
 import numpy as np
-from scipy.optimize import root_scalar
+import scipy
 from scipy.special import digamma, ndtri, polygamma, stdtr, stdtrit
 
 # Directions of relative variance below this were never free, as with a fixed prior.
@@ -96,7 +96,7 @@ def _shape(log_variance: float) -> float:
     if log_variance <= 1.0 / MOST_SHAPE:
         return MOST_SHAPE
     ends = (np.log(1e-6), np.log(10.0 * MOST_SHAPE))
-    return float(np.exp(root_scalar(excess, bracket=ends).root))
+    return float(np.exp(scipy.optimize.root_scalar(excess, bracket=ends).root))
 
 
 def normal_score(t: float, freedom: float) -> float:

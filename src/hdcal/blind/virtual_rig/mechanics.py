@@ -8,7 +8,7 @@ from functools import cache
 from importlib.resources import files
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from hdcal.blind.virtual_rig.history import FULL
 from hdcal.blind.virtual_rig.mechanism import (
@@ -80,7 +80,7 @@ def _screw(rng) -> Shape:
 
 
 @cache
-def _curve(table: str) -> PchipInterpolator:
+def _curve(table: str) -> "scipy.interpolate.PchipInterpolator":
     """Return the curve through a table of finite-element results.
 
     The first lines of a table say what it holds. `python -m
@@ -88,7 +88,7 @@ def _curve(table: str) -> PchipInterpolator:
     """
     text = (files("hdcal.blind.virtual_rig") / table).read_text("utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
-    return PchipInterpolator(*np.loadtxt(lines[1:], delimiter=",").T)
+    return scipy.interpolate.PchipInterpolator(*np.loadtxt(lines[1:], delimiter=",").T)
 
 
 def contact_line(force, state: RigState, size: float, shape: Shape):

@@ -6,7 +6,7 @@ so that a mechanism falls inside the record whatever its size.
 """
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from hdcal.blind.virtual_rig.curves import bell, beyond, drawn_place, to_one
 from hdcal.blind.virtual_rig.history import Flags, Floats, History, last_true
@@ -78,7 +78,7 @@ def stick_slip(history: History, rng: np.random.Generator) -> Floats:
     """
     period = rng.uniform(0.07, 0.2)
     phase = 2 * np.pi * (history.travel / period + rng.random())
-    return history.sense * signal.sawtooth(phase)
+    return history.sense * scipy.signal.sawtooth(phase)
 
 
 def crushed_chip(history: History, rng: np.random.Generator) -> Floats:

@@ -6,8 +6,8 @@ so that a mechanism falls inside the record whatever its size.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from hdcal.blind.virtual_rig.curves import to_one
 from hdcal.blind.virtual_rig.history import Floats, History, last_true
@@ -185,7 +185,7 @@ def smoothed_record(history: History, rng: np.random.Generator) -> Floats:
     smooth, width = history.force.copy(), rng.uniform(0.8, 3.0)
     for run in np.unique(history.run):
         rows = np.flatnonzero(history.run == run)
-        smooth[rows] = ndimage.gaussian_filter1d(
+        smooth[rows] = scipy.ndimage.gaussian_filter1d(
             history.force[rows], width, mode="nearest"
         )
     return to_one(smooth - history.force)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from hdcal.blind.virtual_rig.history import Floats, History
 from hdcal.blind.virtual_rig.mechanics import MECHANICS
@@ -120,7 +120,7 @@ class VirtualRig:
 
         if excess(high) < 0.0 or excess(low) > 0.0:
             return None
-        return sized(float(brentq(excess, low, high, xtol=1e-4)))  # type: ignore[arg-type]
+        return sized(float(scipy.optimize.brentq(excess, low, high, xtol=1e-4)))  # type: ignore[arg-type]
 
 
 def draw_rig(history: History, rng: np.random.Generator) -> VirtualRig:

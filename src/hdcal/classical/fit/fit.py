@@ -11,8 +11,7 @@ from typing import Literal
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.stats import f as f_law
-from scipy.stats import t as t_law
+from scipy.special import fdtrc, stdtrit
 
 from hdcal.data.case import Case, require_case
 from hdcal.data.plausible import implausible
@@ -94,7 +93,7 @@ class PolynomialFit:
 
     @property
     def _quantile(self) -> float:
-        return float(t_law.ppf(0.5 + LEVEL / 2.0, self.dof))
+        return float(stdtrit(self.dof, 0.5 + LEVEL / 2.0))
 
     def at(self, deformation: float) -> dict[str, float]:
         """Return the fitted force at a deformation, with 95 % intervals [N].
@@ -288,5 +287,5 @@ def _ratio(against, squares, below, extra: int, free: int) -> LackOfFit | None:
     if extra < 1 or below <= 0.0:
         return None
     ratio = max(squares - below, 0.0) / extra / (below / free)
-    chance = float(f_law.sf(ratio, extra, free))
+    chance = float(fdtrc(extra, free, ratio))
     return LackOfFit(against, float(ratio), (extra, free), chance, chance < DOUBT)

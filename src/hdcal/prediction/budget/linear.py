@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import equinox as eqx
 import jax
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri, stdtrit
 
 from hdcal.prediction.budget.inputs import InputGroup
 
@@ -68,7 +68,7 @@ class LinearBudget:
 def coverage_factor(dof: float, coverage: float = 0.95) -> float:
     """Return the two-sided quantile of Student's t."""
     share = 0.5 * (1.0 + coverage)
-    return float(stats.t.ppf(share, dof) if dof < 1e9 else stats.norm.ppf(share))
+    return float(stdtrit(dof, share) if dof < 1e9 else ndtri(share))
 
 
 @eqx.filter_jit

@@ -4,8 +4,8 @@ JCGM 106:2012, clauses 7 and 9.
 """
 
 import numpy as np
-from scipy.integrate import quad
-from scipy.stats import norm
+import scipy
+from scipy.special import ndtr
 
 # Beyond so many sds of the production there is nothing.
 _REACH = 12.0
@@ -29,17 +29,17 @@ def global_false_accept(
     if not production_sd > 0.0:
         known = float(mean <= most)
         accepted = (
-            norm.cdf(most, mean, measurement_sd) if measurement_sd > 0.0 else known
+            ndtr((most - mean) / measurement_sd) if measurement_sd > 0.0 else known
         )
         return float(accepted) if mean > limit else 0.0
 
     def density(score: float) -> float:
         room = most - mean - production_sd * score
         sure = np.heaviside(room, 1.0) if not measurement_sd > 0.0 else None
-        accepted = norm.cdf(room / measurement_sd) if sure is None else sure
-        return float(norm.pdf(score) * accepted)
+        accepted = ndtr(room / measurement_sd) if sure is None else sure
+        return float(np.exp(-0.5 * score**2) / np.sqrt(2.0 * np.pi) * accepted)
 
     start = max((limit - mean) / production_sd, -_REACH)
     if start >= _REACH:
         return 0.0
-    return float(quad(density, start, _REACH, limit=200)[0])
+    return float(scipy.integrate.quad(density, start, _REACH, limit=200)[0])

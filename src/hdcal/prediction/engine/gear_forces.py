@@ -11,12 +11,12 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.causes import causes_of
+from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.untested import (
     SITES,
     Bends,
     Untested,
-    spread_evenly,
     untested_of,
 )
 from hdcal.programs import program

@@ -23,6 +23,7 @@ from hdcal.prediction.engine.conditions import (
     usual_sd,
     usual_temperature,
 )
+from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.forces import Quantity, force_of, grid_records
 from hdcal.prediction.engine.loading_sense import (
     LoadingSense,
@@ -35,7 +36,6 @@ from hdcal.prediction.engine.sizes import tolerance_strata
 from hdcal.prediction.engine.untested import (
     SITES,
     Untested,
-    spread_evenly,
     untested_of,
 )
 from hdcal.programs import program

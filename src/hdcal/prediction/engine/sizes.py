@@ -10,13 +10,13 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import qmc
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array, Geometry
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.engine.even_points import spread_evenly
 
 # The sizes that may change or have a tolerance, as people name them, and their field.
 SIZES = {
@@ -103,8 +103,7 @@ def tolerance_strata(
     """
     if not tolerances:
         return StiffnessStrata(np.ones(1), np.zeros(1), np.ones(1))
-    points = qmc.Sobol(len(tolerances), scramble=True, rng=0)
-    unit = 2.0 * points.random_base2(_LOG2_GEARS) - 1.0
+    unit = 2.0 * spread_evenly(1 << _LOG2_GEARS, len(tolerances), seed=0) - 1.0
     # In one order, whatever that of the dict: JAX sorts the keys of a traced one.
     fields = [field for field in SIZES.values() if field in tolerances]
     shifts = {n: tolerances[n] * unit[:, i] for i, n in enumerate(fields)}

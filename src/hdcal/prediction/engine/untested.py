@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
@@ -23,6 +22,7 @@ from hdcal.inference.values import Values
 from hdcal.physics.effects.thermal_expansion import ThermalExpansion
 from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
+from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths
 from hdcal.programs import program
 
@@ -145,18 +145,6 @@ def fitted_columns(
     deformation, movement = place
     columns = discrepancy.columns(jnp.clip(deformation, *ends), movement)
     return (1.0 - share)[:, None] * columns
-
-
-def spread_evenly(count: int, columns: int, seed: int) -> np.ndarray:
-    """Return points that fill the unit cube evenly, (count, columns), none at 0 or 1.
-
-    Args:
-        count: of the points.
-        columns: dimensions.
-        seed: of the scrambling.
-    """
-    points = qmc.Sobol(columns, rng=seed).random(1 << int(np.ceil(np.log2(count))))
-    return np.clip(points[:count], 1e-9, 1.0 - 1e-9)
 
 
 def with_untested(cause: Cause, seed: int) -> tuple[Values, Untested]:

@@ -16,14 +16,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
-from scipy import optimize, special
+from scipy import special
 
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
+from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
     SCORES,
@@ -35,7 +37,6 @@ from hdcal.prediction.engine.untested import (
     BENDS,
     PLACES,
     SITES,
-    spread_evenly,
     untested_of,
 )
 from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
@@ -138,26 +139,27 @@ class _Target(eqx.Module):
             law = distribution(prior, positive=True)
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
         whole = Mixture(found.weight, found.mean, jnp.sqrt(found.sd**2 + free))
-        law = found, jnp.asarray(free)
+        # Plain arrays: what is traced of them can be kept.
+        law = found.weight, found.mean, found.sd, jnp.asarray(free)
         return whole.above(self.limit), law, of_sigma, self.log_density(point)
 
 
-def _heavy(law: tuple[Mixture, np.ndarray], limit: float) -> np.ndarray:
+def _heavy(law: tuple[np.ndarray, ...], limit: float) -> np.ndarray:
     """Return the shares beyond, were the scatter Student's t of the same variance.
 
     Args:
-        law: of the next member at each point, parts of shape (point, component), and
-            the variance that a leftover adds [N²], (point,).
+        law: of the next member at each point, weight, mean and sd of shape (point,
+            component), and the variance that a leftover adds [N²], (point,).
         limit: along the sense of loading [N].
     """
-    found, free = law
-    scale, total = found.sd * np.sqrt((_HEAVY - 2.0) / _HEAVY), np.zeros(len(free))
+    weight, mean, sd, free = law
+    scale, total = sd * np.sqrt((_HEAVY - 2.0) / _HEAVY), np.zeros(len(free))
     # What is open of a leftover is no scatter: its law stays normal.
     nodes = zip(_NODES, _SHARES, strict=True) if free.any() else [(0.0, 1.0)]
     for node, share in nodes:
-        shifted = found.mean + node * np.sqrt(free)[:, None]
+        shifted = mean + node * np.sqrt(free)[:, None]
         beyond = special.stdtr(_HEAVY, (shifted - limit) / scale)
-        total += share * np.sum(found.weight * beyond, axis=1)
+        total += share * np.sum(weight * beyond, axis=1)
     return total
 
 
@@ -254,7 +256,9 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
         return tuple(map(np.asarray, _towards(target, point, sizes)))
 
     options = {"maxiter": 200, "gtol": 1e-3}
-    found = optimize.minimize(towards, start, jac=True, method="BFGS", options=options)
+    found = scipy.optimize.minimize(
+        towards, start, jac=True, method="BFGS", options=options
+    )
     shape, place = found.hess_inv, found.x
     if not (np.isfinite(shape).all() and np.isfinite(place).all()):
         shape, place = np.eye(size), start

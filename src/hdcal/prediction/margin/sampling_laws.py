@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 from scipy.special import softmax
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
@@ -37,7 +37,7 @@ class SamplingLaws:
             rng: source of randomness.
         """
         laws: list[Any] = [
-            stats.multivariate_t(centre, _SPREAD**2 * _wide(shape), df=_FREE)  # pyright: ignore
+            scipy.stats.multivariate_t(centre, _SPREAD**2 * _wide(shape), df=_FREE)  # pyright: ignore
             for centre, shape in self.places
         ]
         each = count // len(laws)
@@ -45,7 +45,7 @@ class SamplingLaws:
             np.reshape(law.rvs(each, random_state=rng), (each, -1)) for law in laws
         ]
         points = rng.normal(size=(count, len(self.counts)))
-        log_law = stats.norm.logpdf(points[:, ~self.counts]).sum(axis=1)
+        log_law = scipy.stats.norm.logpdf(points[:, ~self.counts]).sum(axis=1)
         # What has an order of its own is spread evenly over both places.
         points[:, self.counts] = rng.permutation(np.concatenate(drawn))
         near = [np.atleast_1d(law.logpdf(points[:, self.counts])) for law in laws]
@@ -96,7 +96,7 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
 
     if short(1.0) >= 0.0:
         return powered(1.0)
-    return powered(optimize.root_scalar(short, bracket=(1e-12, 1.0)).root)
+    return powered(scipy.optimize.root_scalar(short, bracket=(1e-12, 1.0)).root)
 
 
 def pareto_shape(weight: np.ndarray) -> float:

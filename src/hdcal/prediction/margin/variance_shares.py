@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from scipy import stats
+import scipy
 from scipy.special import ndtri
 
 from hdcal.prediction.engine.causes import Cause, Driver
@@ -113,8 +113,8 @@ def variance_shares(
         ]
         return np.stack(each)[model, np.arange(len(model))]
 
-    uniform = [stats.uniform() for _ in names]
-    index = stats.sobol_indices(func=force_of, n=_POINTS, dists=uniform, rng=seed)
+    uniform = [scipy.stats.uniform() for _ in names]
+    index = scipy.stats.sobol_indices(func=force_of, n=_POINTS, dists=uniform, rng=seed)
     first, total = np.ravel(index.first_order), np.ravel(index.total_order)
     return tuple(
         VarianceShare(name, float(first[i]), float(total[i]), inputs[name])
