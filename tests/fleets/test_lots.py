@@ -92,8 +92,8 @@ def test_the_lot_of_each_gear_stands_in_its_row(lots, tmp_path):
         for block in section.blocks
         if isinstance(block, Table) and block.columns[0] == "gear"
     )
-    each = {row[0]: row[1] for row in shown.rows}
-    assert shown.columns[1] == "lot"
+    each = {row[0]: row[2] for row in shown.rows}
+    assert shown.columns[2] == "lot"
     assert each == dict(zip("ABCD", lots, strict=True))
 
 

@@ -108,11 +108,12 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
 
 
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
-    far = np.argsort(-columns["probability_off"], kind="stable")[:MOST_LISTED]
-    numbers = ["rows", "N/mm", "95 % interval", "apart [%]", "in sds", "noise [N]"]
-    numbers += ["P(off)"]
+    far = np.lexsort([-columns["probability_off"], ~columns["called_off"]])
+    far = far[:MOST_LISTED]
+    numbers = ["N/mm", "95 % interval", "apart [%]", "P(off)", "in sds", "noise [N]"]
+    numbers += ["rows"]
     rows = [_gear(columns, int(row)) for row in far]
-    titles = ["gear", *(["lot"] if "lot" in columns else []), *numbers, ""]
+    titles = ["gear", "", *(["lot"] if "lot" in columns else []), *numbers]
     table = Table(titles, rows, frozenset(numbers), page=_AT_ONCE)
     shown = Picture(
         "gears",
@@ -153,15 +154,15 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
     width = high - low
     return [
         str(one["gear"]),
+        Tag(f"off: {one['off_in']}", "caution") if one["called_off"] else "",
         *([str(one["lot"])] if "lot" in one else []),
-        str(one["rows"]),
         number(one["stiffness_N_per_mm"], width),
         f"{number(low, width)} … {number(high, width)}",
         f"{one['apart_percent']:+.2g}",
+        percent(one["probability_off"]),
         f"{one['distance_sd']:+.1f}",
         f"{one['noise_sd_N']:.2g}",
-        percent(one["probability_off"]),
-        Tag(f"off: {one['off_in']}", "caution") if one["called_off"] else "",
+        str(one["rows"]),
     ]
 
 

@@ -41,7 +41,7 @@ def fleet_problem(readings: FleetReadings) -> tuple[PopulationProblem, float]:
         sums = _levelled(sums, told)
     told |= {"lot": lot_grouping(sums, lot)} if lots else {}
     told |= {"operator": operator_grouping(sums)} if groups(case.operators)[0] else {}
-    unit, priors = _priors(case)
+    unit, priors = population_priors(case)
     priors |= {f"{kind}_ratio": GROUP_RATIO for kind in told}
     return PopulationProblem(priors, of_gears, told), unit
 
@@ -89,7 +89,7 @@ def rough_values(problem: PopulationProblem, sums: MountingSums) -> dict[str, fl
     return {name: float(value) for name, value in values.items() if name in free}
 
 
-def _priors(case: Case) -> tuple[float, dict[str, Prior]]:
+def population_priors(case: Case) -> tuple[float, dict[str, Prior]]:
     """Return the stiffness at K = 1 [N/mm as read], and the priors of all sites."""
     own = problem_priors(case, (), {}, case.gear.theory)
     half = 0.5 if case.gear.reading == "diametral" else 1.0

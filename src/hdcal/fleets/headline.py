@@ -61,7 +61,8 @@ def _off(
         yield f"{name} {' and '.join(_apart(one, usual, than))}"
     if rest := called[_MOST_NAMED:]:
         kinds = {str(columns["off_in"][place[name]]) for name in rest}
-        yield f"{len(rest)} more are off, in {', '.join(sorted(kinds))}"
+        are = "is" if len(rest) == 1 else "are"
+        yield f"{len(rest)} more {are} off, in {', '.join(sorted(kinds))}"
 
 
 def _apart(

@@ -6,10 +6,15 @@ import numpy as np
 
 from hdcal.data.bad_gears import left_out_words
 from hdcal.data.cells import NOT_STATED
+from hdcal.data.certificates import GAINS
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.fleet_problem import population_priors
 from hdcal.fleets.groups import linked_rigs
 from hdcal.fleets.misfit import misfit_words
+from hdcal.inference.groupings import group_offsets
+from hdcal.report.parameters import credible_interval
+from hdcal.report.words import estimate
 
 RESTS_ON = (
     "Of each mounting a straight line is taken, with a zero of its own and noise that "
@@ -38,8 +43,14 @@ RIGS_APART = (
     "lie apart is told by assuming that the gears of each are alike in the mean. A few "
     "gears that are read on every rig would tell it."
 )
+CERTIFICATES = (
+    "What the gauges' certificates leave open is in none of these numbers: it is the "
+    "same for all gears. `calibrate` and `margin` of one gear count it."
+)
 # Fewer gears than the first, and fewer groups than the second, say little of scatter.
 FEW, _FEW_GROUPS = 8, 5
+# Sds of what is believed beyond which a stiffness is not believed.
+_FAR = 3.0
 
 
 def notes_of(found: Fleet) -> Sequence[str]:
@@ -54,12 +65,56 @@ def notes_of(found: Fleet) -> Sequence[str]:
     sized = [OF_SIZES] if found.at_one_size else [ONE_SIZE]
     sized = sized if found.case.gear.theory != SPRING else []
     few = [FEW_GEARS] if len(found.off) < FEW else []
-    beside = misfit_words(found.misfit)
+    beside = [*_far_from_theory(found), *misfit_words(found.misfit)]
+    certified = [CERTIFICATES] if {*GAINS} & found.case.gear.priors.keys() else []
     untold = [*_untold(found)]
     why = found.case.left_out
     left_out = [left_out_words(why, len(why) + len(found.off))] if why else []
     of_data = [*left_out, *beside, *found.case.notes]
-    return [*of_data, RESTS_ON, *sized, *few, *scarce, *untold, *once]
+    rigs = [*_between_rigs(found)]
+    return [
+        *of_data,
+        *rigs,
+        RESTS_ON,
+        *sized,
+        *few,
+        *scarce,
+        *untold,
+        *once,
+        *certified,
+    ]
+
+
+def _far_from_theory(found: Fleet) -> Iterator[str]:
+    """Yield that gears are far stiffer or softer than the gear file lets expect."""
+    expected = population_priors(found.case)[1]["stiffness"]
+    if found.case.gear.theory == SPRING or expected.family != "lognormal":
+        return
+    middle, log_sd = expected.numbers
+    ratio = float(np.median(found.draws["stiffness"])) / middle
+    if abs(np.log(ratio)) > _FAR * log_sd:
+        times, way = (ratio, "stiffer") if ratio > 1.0 else (1.0 / ratio, "softer")
+        yield (
+            f"These gears are {times:.2g} times {way} than their theory lets expect of "
+            f"their sizes ({middle:.3g} N/mm): are units, sizes and the way the "
+            "deformation is read right?"
+        )
+
+
+def _between_rigs(found: Fleet) -> Iterator[str]:
+    """Yield how far apart rigs read, and that nobody knows which is right."""
+    if not found.rigs:
+        return
+    gains = 100.0 * np.asarray(group_offsets(found.draws, "rig"))
+    order = np.argsort(np.median(gains, axis=1))
+    low, high = order[0], order[-1]
+    middle, span = estimate(credible_interval(gains[high] - gains[low]))
+    yield (
+        f"Rig {found.rigs[high]} reads {middle} % ({span} %) more force of the same "
+        f"gear than rig {found.rigs[low]}. Stiffness is told as the mean of the rigs "
+        "reads it: which of them is right these readings do not tell; a gear of known "
+        "stiffness, read on each, would."
+    )
 
 
 def _untold(found: Fleet) -> Iterator[str]:

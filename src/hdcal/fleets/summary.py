@@ -185,14 +185,22 @@ def _rigs(found: Fleet) -> Iterator[RigAnswer]:
 
 def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
     parts = []
-    if called:
-        alone = f"`--specimen {shlex.quote(called[0])}`"
+    # A softer gear by itself is as good a line as any: no diagnosis sees it.
+    bent = found.off_in["noise"] | found.off_in["shape"]
+    odd = [name for name in called if bent[found.case.specimen_labels.index(name)]]
+    if odd:
+        alone = f"`--specimen {shlex.quote(odd[0])}`"
         parts.append(
-            f"Look at {called[0]} by itself: diagnose the same data with {alone}"
+            f"See what {odd[0]} has by itself: `hdcal diagnose` with the same data and "
+            f"{alone}"
+        )
+    elif called:
+        parts.append(
+            f"Mount {called[0]} anew and measure it again before you act on this"
         )
     misfit = found.misfit
     beside = misfit.loop_N or misfit.bend_N or misfit.correlation
-    if beside or found.off_in["noise"].any() or found.off_in["shape"].any():
+    if beside or bent.any():
         parts.append(
             "Ask which effects these gears have, and what they have in common: "
             "`hdcal causes` with the same data"

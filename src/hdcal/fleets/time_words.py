@@ -19,6 +19,11 @@ def time_words(answer: TimeAnswer) -> str:
     """Return in one sentence whether a quantity changes, how and when."""
     what, sure = _OF[answer.what], percent(answer.probability_changed)
     if not answer.changed:
+        if answer.probability_changed > 0.5:
+            needed = percent(_SURE)
+            return (
+                f"{what}: that it changes is not sure ({sure}; told from {needed} on)."
+            )
         return f"{what}: no change is told (probability that there is one: {sure})."
     told = f"{what} changes with the date (probability {sure})"
     way = answer.ways[answer.likeliest] / answer.probability_changed

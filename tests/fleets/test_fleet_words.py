@@ -1,0 +1,83 @@
+"""What the words of a fleet say of rigs, units, certificates and what to do next."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fleets import handmade
+from rigs import make_gear
+
+from hdcal.data.prior import Prior
+from hdcal.fleets.notes import CERTIFICATES
+from hdcal.fleets.over_time import TimeAnswer
+from hdcal.fleets.summary import fleet_answer, fleet_report
+from hdcal.fleets.time_words import time_words
+from hdcal.report.document import Table
+
+
+def off_in(**kinds: list[bool]):
+    """Return the fleet with other gears off."""
+    found = handmade()
+    told = {name: np.array(kinds.get(name, [False] * 4)) for name in found.off_in}
+    return replace(found, off_in=told)
+
+
+def with_gear(found, **changes):
+    case = replace(found.case, gear=replace(found.case.gear, **changes))
+    return replace(found, readings=replace(found.readings, case=case))
+
+
+def test_a_gear_that_is_soft_is_measured_again_and_one_with_a_loop_diagnosed():
+    soft = fleet_answer(off_in(stiffness=[False, False, False, True])).next_step
+    assert soft == "Mount D anew and measure it again before you act on this."
+    both = {"stiffness": [False, False, False, True], "shape": [True] + [False] * 3}
+    assert "`--specimen A`" in str(fleet_answer(off_in(**both)).next_step)
+
+
+def test_gears_that_are_called_off_stand_first():
+    document = fleet_report(off_in(noise=[True, False, False, False])).document
+    (table,) = (
+        block
+        for section in document.sections
+        for block in section.blocks
+        if isinstance(block, Table) and block.columns[0] == "gear"
+    )
+    assert [row[0] for row in table.rows] == ["A", "D", "B", "C"]
+
+
+def test_how_far_rigs_are_apart_is_said_and_that_nobody_knows_which_is_right():
+    found = handmade()
+    draws = dict(found.draws) | {"rig_sd": np.full(400, 0.01)}
+    draws |= {"rig_1": np.full(400, 0.012), "rig_2": np.full(400, -0.012)}
+    told = replace(found, draws=draws, rigs=["north", "south"])
+    (said,) = (note for note in fleet_answer(told).notes if "more force" in note)
+    assert said.startswith("Rig north reads 2.4 % (2.4 … 2.4 %) more force")
+    assert "than rig south" in said and "which of them is right" in said
+    assert not any("more force" in note for note in fleet_answer(found).notes)
+
+
+@pytest.mark.parametrize(("times", "way"), [(25.4, "stiffer"), (1 / 25.4, "softer")])
+def test_gears_far_from_their_theory_are_spoken_of(times: float, way: str):
+    found = with_gear(handmade(), theory="ring")
+    draws = found.draws | {"stiffness": found.draws["stiffness"] * times}
+    words = f"times {way} than their theory"
+    said = fleet_answer(replace(found, draws=draws)).notes
+    assert any(words in note and "units" in note for note in said)
+    assert not any("than their theory" in note for note in fleet_answer(found).notes)
+
+
+def test_certificates_are_said_to_be_left_out():
+    gain = Prior("normal", (0.0, 0.002))
+    found = handmade()
+    priors = {**found.case.gear.priors, "force_gain": gain}
+    assert CERTIFICATES in fleet_answer(with_gear(found, priors=priors)).notes
+    assert CERTIFICATES not in fleet_answer(found).notes
+    assert "force_gain" not in make_gear().priors
+
+
+def test_a_change_that_is_likely_but_not_sure_is_no_change_and_no_lack_of_one():
+    about = {"what": "zero", "changed": False}
+    blank = {name: None for name in TimeAnswer.__dataclass_fields__} | about
+    for sure, words in ((0.76, "not sure (76 %"), (0.2, "no change is told")):
+        answer = TimeAnswer(**blank | {"probability_changed": sure})
+        assert words in time_words(answer)
