@@ -5,7 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from hdcal.data.units import COLUMN_UNITS, UnitError, column_to_code, to_code
+from hdcal.data.units import (
+    _ATOMS,
+    COLUMN_UNITS,
+    UnitError,
+    _of_pint,
+    column_to_code,
+    to_code,
+)
 
 # By definition: the kilogram-force by standard gravity, pound and inch by the
 # international agreement of 1959. A degree is a difference here.
@@ -90,3 +97,9 @@ def test_units_of_priors(text, factor, name):
 def test_what_is_no_unit(text):
     with pytest.raises(UnitError):
         to_code(text)
+
+
+@pytest.mark.parametrize("name", _ATOMS)
+def test_what_is_known_without_pint_is_what_pint_says(name):
+    scale, powers = _of_pint(name)
+    assert (scale, powers.tolist()) == (_ATOMS[name][0], [*map(int, _ATOMS[name][1])])

@@ -35,6 +35,15 @@ _ALIASES = {
 _PINT_NAMES = {"C": "degC", "F": "degF"}  # coulomb and farad to Pint
 
 _CODE_UNITS = ("N", "mm", "s", "K")
+# Scale and powers of what shipped priors are written in: Pint's definitions take longer
+# to read than a posterior.
+_ATOMS = {
+    **{u: (1.0, [u == one for one in _CODE_UNITS]) for u in _CODE_UNITS},
+    "m": (1e3, [0, 1, 0, 0]),
+    "kg": (1e-3, [1, -1, 2, 0]),
+    "MPa": (1.0, [1, -2, 0, 0]),
+    "GPa": (1e3, [1, -2, 0, 0]),
+}
 _DIMENSIONS = ("[mass]", "[length]", "[time]", "[temperature]")
 _NUMBER = re.compile(r"\d+(\.\d*)?([eE][+-]?\d{1,2})?", re.ASCII)
 _FACTOR = re.compile(r"(?P<name>[^\W\d]+|°C|%)((\^|\*\*)(?P<power>-?[1-9]))?")
@@ -140,9 +149,13 @@ def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
 
 @cache
 def _atom(name: str) -> tuple[float, np.ndarray]:
-    # Without Pint, whose definitions take longer to read than a posterior.
-    if name in _CODE_UNITS:
-        return 1.0, np.array([name == unit for unit in _CODE_UNITS], int)
+    if name in _ATOMS:
+        scale, powers = _ATOMS[name]
+        return scale, np.array(powers, int)
+    return _of_pint(name)
+
+
+def _of_pint(name: str) -> tuple[float, np.ndarray]:
     import pint
 
     quantity = _registry().Quantity
