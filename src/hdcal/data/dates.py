@@ -53,7 +53,34 @@ def dates_of(
     return tuple("" if np.isnat(one) else str(one) for one in first), note
 
 
-def _readings(texts: Sequence[str]) -> list[np.ndarray]:
+def days_of(labels: np.ndarray) -> np.ndarray:
+    """Return the day that each label states, whatever the time.
+
+    Args:
+        labels: dates, shape (n,).
+
+    Returns:
+        Days as ISO 8601 has them, as they are written where that can be read in two
+        ways, and as not stated where they cannot be read.
+    """
+    place, texts = pd.factorize(labels)
+    days = np.full(len(texts), NOT_STATED, object)
+    told = np.flatnonzero(texts != NOT_STATED)
+    readings = _readings(texts[told]) if len(told) else []
+    if len(readings) > 1:
+        days[told] = [day_text(text) for text in texts[told]]
+    elif readings:
+        read = ~np.isnat(readings[0])
+        days[told[read]] = readings[0][read].astype("datetime64[D]").astype(str)
+    return days[place]
+
+
+def day_text(text: str) -> str:
+    """Return a date as it is written, without its time."""
+    return re.split("[T ]", text)[0]
+
+
+def _readings(texts: Sequence[str] | np.ndarray) -> list[np.ndarray]:
     """Return in how many ways texts can be read, most of them at least, as times."""
     found: list[np.ndarray] = []
     # What clocks there showed counts, not what they showed elsewhere.

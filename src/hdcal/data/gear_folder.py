@@ -25,13 +25,9 @@ from hdcal.data.measurements import (
     read_measurements,
     runs_of,
 )
-from hdcal.data.reading import (
-    GEAR_NAME,
-    asked_columns,
-    case_of,
-    gear_of,
-)
-from hdcal.data.reading_notes import unused_columns
+from hdcal.data.mountings import run_labels
+from hdcal.data.reading import GEAR_NAME, asked_columns, case_of, gear_of
+from hdcal.data.reading_notes import mountings_note, unused_columns
 from hdcal.data.theory_names import SPRING
 from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings
@@ -134,6 +130,9 @@ def read_gear_folder(
     compared = f"the gear file, with sizes at which gears are compared, is {whose}"
     notes += [compared] if own else []
     notes += [*not_read(files, folder), *_untold(parts)]
+    if any(part.measured.mounted for part in parts):
+        many = len(whole.run.names), len(whole.specimen.names)
+        notes.append(mountings_note(whole.columns.values, *many))
     whole = replace(whole, left_out=bad)
     case = case_of(whole, found, (*notes, *told), folder.resolve().name)
     return case, _sizes(parts) if own and found.theory != SPRING else None
@@ -269,13 +268,12 @@ def _rows(part: _Part) -> dict[str, np.ndarray]:
     values = dict(measured.columns.values)
     index = measured.specimen.index if part.named else np.zeros_like(measured.run.index)
     values["specimen"] = np.array(part.gears, object)[index]
+    runs = run_labels(values, index)
     if part.named:
         # A gear of two files was mounted for each of them.
-        runs = values.get("run", np.full(len(index), ""))
-        values["run"] = np.array(
-            [f"{part.label} {run}".strip() for run in runs], object
-        )
-    return values
+        runs = np.full(len(index), "") if runs is None else runs
+        runs = np.array([f"{part.label} {run}".strip() for run in runs], object)
+    return values if runs is None else values | {"run": runs}
 
 
 def _places(parts: Sequence[_Part]) -> np.ndarray:

@@ -21,6 +21,7 @@ from hdcal.data.columns import (
 from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
 from hdcal.data.frames import NAME, frame_text, is_frame
+from hdcal.data.mountings import run_labels
 from hdcal.data.text_file import read_text
 from hdcal.data.units import column_to_code
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
@@ -60,6 +61,12 @@ class Measurements:
     run: Labels
     specimen: Labels
     left_out: dict[str, Finding] = field(default_factory=dict)
+
+    @property
+    def mounted(self) -> bool:
+        """Tell whether it was guessed that gears were mounted several times."""
+        guessed = "run" not in self.columns.values
+        return guessed and len(self.run.names) > len(self.specimen.names)
 
 
 def read_measurements(
@@ -114,7 +121,7 @@ def _measured(found: Columns) -> Measurements:
     columns = _with_values(found, FEWEST_ROWS)
     rows = len(columns.table.rows)
     specimen = labels_of(columns.values.get("specimen"), rows)
-    run = runs_of(columns.values.get("run"), specimen, rows)
+    run = runs_of(run_labels(columns.values, specimen.index), specimen, rows)
     check_time(columns, run.index)
     return Measurements(columns, run, specimen)
 

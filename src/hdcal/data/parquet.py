@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from hdcal.data.bad_gears import bad_gears, offer
+from hdcal.data.bad_gears import among, bad_gears, offer
 from hdcal.data.case import Case, Gear
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Column
@@ -122,7 +122,7 @@ def read_parquet(
                 raise
             frame = pd.concat([frame, others])
             case = _placed(dataset, frame, read)
-        used = _columns(frame, case, columns, findings)
+        case, used = _with_runs(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
 
@@ -261,15 +261,28 @@ def _quantity(header: str, columns: Mapping[str, str] | None) -> str:
     return said.get(header, guess.quantity if guess is not None else "")
 
 
-def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:
-    """Return the columns that are used, by quantity."""
+def _with_runs(
+    frame, case: Case, columns, findings: FileFindings
+) -> tuple[Case, dict[str, Column]]:
+    """Return a case with its runs as all columns tell them, and which of them are used.
+
+    Args:
+        frame: the rows that the case was read from.
+        case: in which lots, operators, rigs and dates are not told.
+        columns: as in `read_case`.
+        findings: of the files.
+    """
     named = dict(case.gear.source.get("columns", {})) | dict(columns or {})
     # What is wrong with rows was told, or is left out.
-    used = read_measurements(frame, named, skip_bad=True).columns.used
+    measured = read_measurements(frame, named, skip_bad=True)
+    used, gears = measured.columns.used, measured.specimen
     if "specimen" not in used:
         remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
         findings.refuse("no column says which gear a row is of", remedy)
-    return {quantity: used[quantity] for quantity in _USED if quantity in used}
+    kept = ~among(gears.names, case.left_out)[gears.index]
+    records = replace(case.records, run=pd.factorize(measured.run.index[kept])[0])
+    found = {quantity: used[quantity] for quantity in _USED if quantity in used}
+    return replace(case, records=records), found
 
 
 def _sha256(files: Sequence[str]) -> str:

@@ -1,12 +1,12 @@
 """Cells of a Parquet file as numbers and labels."""
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import Column
+from hdcal.data.dates import day_text
 from hdcal.data.findings import FileFindings
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.plausible import RANGES
@@ -63,7 +63,7 @@ def label_cells(
         cells = cells.dictionary_encode()
     named = [_text(label) for label in cells.dictionary.to_pylist()]
     if column.quantity == "date":
-        named = [re.split("[T ]", text)[0] if text else text for text in named]
+        named = [day_text(text) for text in named]
     texts, place = np.unique([*named, ""], return_inverse=True)
     index = np.where(cells.is_null(), len(named), cells.indices.fill_null(0))
     index = place.ravel()[index]

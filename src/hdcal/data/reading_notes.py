@@ -1,6 +1,6 @@
 """What is told of a case that was read, beside what was guessed of its file."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from hdcal.data.columns import LABELS, Columns
 from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion
 from hdcal.data.measurements import ASSUMED, Measurements
+from hdcal.data.mountings import TELLING
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted
 
@@ -24,6 +25,26 @@ def reading_notes(measured: Measurements, gear: Gear, motion: Motion) -> Iterato
     yield from unused_columns(measured.columns)
     yield from _off_scale(measured, gear)
     yield from _resets(measured, motion)
+    if measured.mounted:
+        runs, gears = (len(of.names) for of in (measured.run, measured.specimen))
+        yield mountings_note(measured.columns.values, runs, gears)
+
+
+def mountings_note(told: Container[str], runs: int, gears: int) -> str:
+    """Return by what mountings are told apart, where no column `run` tells them.
+
+    Args:
+        told: quantities, those that tell them among them.
+        runs: how many mountings there are.
+        gears: of how many gears.
+    """
+    telling = ", ".join(name for name in TELLING if name in told)
+    telling = " or ".join(telling.rsplit(", ", 1))
+    return (
+        f"{ASSUMED}without a column `run`, rows of a gear that differ in {telling} are "
+        f"of different mountings: {runs} mountings of {gears} gear{'s' * (gears > 1)}. "
+        "If not, name the mountings in a column `run`"
+    )
 
 
 def _thick_wall(gear: Gear) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Rows that come in batches: of each mounting sums are kept, whatever their number."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,9 @@ from hdcal.data.columns import Column
 from hdcal.data.further_labels import further_labels
 from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
+from hdcal.data.mountings import TELLING, run_labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
+from hdcal.data.reading_notes import mountings_note
 from hdcal.errors import Finding
 from hdcal.fleets.groups import read_by
 from hdcal.fleets.readings import (
@@ -22,6 +24,8 @@ from hdcal.fleets.readings import (
 )
 from hdcal.inference.gear_sums import MountingSums
 
+# Stands in no label.
+_BETWEEN = "\n"
 _LOST = "start again: reading takes a small part of the time"
 
 
@@ -56,26 +60,29 @@ class Pool:
         gear, read = self.gear, batch.values["deformation"]
         warm = batch.values.get("temperature", gear.reference_temperature)
         x = read * modulus_left(gear, warm)
-        alone = np.zeros(len(read), int), np.array([""], object)
         gear_of, gears = batch.labels["specimen"]
-        run_of, runs = batch.labels.get("run", alone)
+        run_of, runs = batch.labels.get("run") or _told(batch)
         first, pair = _in_order(gear_of * len(runs) + run_of)
         each = zip(gears[gear_of[first]], runs[run_of[first]], strict=True)
         index = np.array([self._run(str(one), str(run)) for one, run in each])
         reach = largest_of(pair, np.abs(read))
         self.parts.append((index, reach, *row_sums(pair, x, batch.values["force"])))
         further = {name: one for name, one in batch.labels.items() if name in GROUPINGS}
-        code = pair
-        for place, texts in further.values():
-            code = _in_order(code * len(texts) + place)[1]
-        first = _in_order(code)[0]
+        first = _apart(pair, further.values())[0]
         told = {name: texts[place[first]] for name, (place, texts) in further.items()}
         self.told.append({"run": index[pair[first]], **told})
 
-    def join(self, other: "Pool") -> None:
-        """Add what another one has, whose rows come after those of this one."""
-        gears = [*other.gears]
-        index = np.array([self._run(gears[g], run) for g, run in other.runs], int)
+    def join(self, other: "Pool", labels: Iterable[str] | None = None) -> None:
+        """Add what another one has, whose rows come after those of this one.
+
+        Args:
+            other: the other one.
+            labels: of each of its runs; by default its own.
+        """
+        gears, of = [*other.gears], [gear for gear, _ in other.runs]
+        labels = [run for _, run in other.runs] if labels is None else labels
+        each = zip(of, labels, strict=True)
+        index = np.array([self._run(gears[g], run) for g, run in each], int)
         self.parts += [(index[run], *sums) for run, *sums in other.parts]
         self.told += [told | {"run": index[told["run"]]} for told in other.told]
         self.left_out = other.left_out | self.left_out
@@ -83,6 +90,20 @@ class Pool:
     def _run(self, gear: str, run: str) -> int:
         known = self.gears.setdefault(gear, len(self.gears))
         return self.runs.setdefault((known, run), len(self.runs))
+
+    def mounted(self, told: Sequence[str]) -> "Pool":
+        """Return the same, its runs told by their dates, rigs and operators.
+
+        Args:
+            told: those of these that the runs are labelled by, so far.
+        """
+        of = np.array([gear for gear, _ in self.runs])
+        cells = np.array([run.split(_BETWEEN) for _, run in self.runs], object)
+        columns = cells.reshape(-1, len(told)).T
+        labels = run_labels(dict(zip(told, columns, strict=True)), of)
+        whole = Pool(self.gear)
+        whole.join(self, [""] * len(of) if labels is None else labels)
+        return whole
 
     def readings(self, source: Parquet) -> FleetReadings:
         """Return what all of them come to, without the gears that are left out.
@@ -119,7 +140,13 @@ class Pool:
         runs, farthest = np.arange(len(gear)), largest_of(run, reach)
         readings = FleetReadings(case, sums, runs, farthest)
         left = ~among(gears, self.left_out)[gear]
-        return self._labelled(readings.without(self.left_out), gear, left)
+        found = self._labelled(readings.without(self.left_out), gear, left)
+        case = found.case
+        many = len(case.run_labels), len(case.specimen_labels)
+        if "run" in source.used or many[0] == many[1]:
+            return found
+        notes = (*case.notes, mountings_note(source.used, *many))
+        return replace(found, case=replace(case, notes=notes))
 
     def _labelled(
         self, readings: FleetReadings, gear: np.ndarray, left: np.ndarray
@@ -181,7 +208,8 @@ def pool_of(
         while joined in early:
             whole.join(early.pop(joined))
             joined += 1
-    return whole
+    told = [name for name in TELLING if name in source.used]
+    return whole.mounted(told) if told and "run" not in source.used else whole
 
 
 def file_pool(
@@ -202,6 +230,23 @@ def file_pool(
     for batch in read_batches(file, root, used, gear, skip_bad=skip_bad):
         pool.add(batch)
     return place, pool
+
+
+def _told(batch: Batch) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index of each row's date, rig and operator, and these as one label."""
+    told = [batch.labels[name] for name in TELLING if name in batch.labels]
+    first, index = _apart(np.zeros(len(batch.values["deformation"]), int), told)
+    cells = zip(*(texts[place[first]] for place, texts in told), strict=True)
+    return index, np.array([_BETWEEN.join(each) for each in cells] or [""], object)
+
+
+def _apart(
+    code: np.ndarray, labels: Iterable[tuple[np.ndarray, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return as `_in_order`, of values that also differ where one of labels does."""
+    for place, texts in labels:
+        code = _in_order(code * len(texts) + place)[1]
+    return _in_order(code)
 
 
 def _in_order(code: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

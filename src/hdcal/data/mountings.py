@@ -1,0 +1,63 @@
+"""Which mounting each row was taken on, where no column `run` says so."""
+
+from collections.abc import Mapping
+from itertools import compress
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.cells import NOT_STATED
+from hdcal.data.dates import days_of
+
+# What is the same all through a mounting.
+TELLING = ("date", "rig", "operator")
+
+
+def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray | None:
+    """Return the label of each row's run; None where nothing tells runs apart.
+
+    Without a column `run`, rows of a gear on another day or rig, or by another
+    operator, are of another mounting.
+
+    Args:
+        values: by quantity, of each row, shape (n,).
+        gear: index of each row's, shape (n,).
+    """
+    if "run" in values:
+        return values["run"]
+    told = {name: values[name] for name in TELLING if name in values}
+    if not told:
+        return None
+    if "date" in told:
+        told["date"] = days_of(told["date"])
+    table = pd.DataFrame({"gear": gear} | told)
+    index = table.groupby([*table], sort=False).ngroup()
+    mountings: dict[int, list[list[str]]] = {}
+    each = [
+        _mounting(mountings.setdefault(one, []), cells)
+        for one, *cells in table.drop_duplicates().itertuples(index=False)
+    ]
+    known = mountings.values()
+    # Not what was the same for all mountings of each gear.
+    telling = [
+        any(len({cells[at] for cells in of} - {NOT_STATED}) > 1 for of in known)
+        for at in range(len(told))
+    ]
+    if not any(telling):
+        return None
+    labels = [" ".join(compress(cells, telling)) for cells in each]
+    return np.array(labels, object)[index]
+
+
+def _mounting(known: list[list[str]], cells: list[str]) -> list[str]:
+    """Return the mounting of a gear that cells tell; a new one is added to the known.
+
+    An empty cell tells none: of those that the others fit it is the latest.
+    """
+    for mounting in reversed(known):
+        pairs = [*zip(mounting, cells, strict=True)]
+        if all(one == other or NOT_STATED in (one, other) for one, other in pairs):
+            mounting[:] = [b if a == NOT_STATED else a for a, b in pairs]
+            return mounting
+    known.append(cells)
+    return cells
