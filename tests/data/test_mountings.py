@@ -156,3 +156,12 @@ def test_dates_that_cannot_be_read_tell_none_apart():
     # One that is misspelt is that of the rows above.
     days = [*rows["date"][:9], "2026-1o-12"]
     assert read_case(rows.assign(date=days)).records.run.tolist() == [0] * 5 + [1] * 5
+
+
+def test_several_rigs_of_one_gear_are_warned_of():
+    """What calibrates or diagnoses it has no gains of rigs; a fleet has."""
+    rows = table()
+    alone = read_case(rows[rows["specimen"] == "A"])
+    assert sum("2 rigs read this gear" in note for note in alone.notes) == 1
+    for other in (rows, rows[rows["specimen"] == "B"]):
+        assert not any("rigs read this gear" in n for n in read_case(other).notes)

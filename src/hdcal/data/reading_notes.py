@@ -5,6 +5,7 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from hdcal.data.case import Gear
+from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Columns
 from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion
@@ -28,6 +29,7 @@ def reading_notes(measured: Measurements, gear: Gear, motion: Motion) -> Iterato
     if measured.mounted:
         runs, gears = (len(of.names) for of in (measured.run, measured.specimen))
         yield mountings_note(measured.columns.values, runs, gears)
+    yield from _several_rigs(measured)
 
 
 def mountings_note(told: Container[str], runs: int, gears: int) -> str:
@@ -45,6 +47,17 @@ def mountings_note(told: Container[str], runs: int, gears: int) -> str:
         f"of different mountings: {runs} mountings of {gears} gear{'s' * (gears > 1)}. "
         "If not, name the mountings in a column `run`"
     )
+
+
+def _several_rigs(measured: Measurements) -> Iterator[str]:
+    rigs = {*measured.columns.values.get("rig", ())} - {NOT_STATED}
+    if len(measured.specimen.names) == 1 and len(rigs) > 1:
+        yield (
+            f"{len(rigs)} rigs read this gear, and a calibration or a diagnosis takes "
+            "them for one: where their gains differ it sees a change of the gear. "
+            "Leave the rows of one rig at a time; `hdcal fleet` tells rigs apart by "
+            "the gears that several of them read"
+        )
 
 
 def _thick_wall(gear: Gear) -> Iterator[str]:
