@@ -138,6 +138,8 @@ def test_rows_of_mountings_need_not_stand_together():
         ({"rig": "sn  ", "gear": "AAAB"}, ["s", "n", "n", NOT_STATED]),
         # One below tells it too.
         ({"rig": " sn", "gear": "AAA"}, ["s", "s", "n"]),
+        # Two halves are a whole, which a third row fits.
+        ({"rig": "s s", "operator": " KK", "gear": "AAA"}, None),
         # What one column leaves open another tells.
         ({"rig": "sn ", "operator": "KMK", "gear": "AAA"}, ["s K", "n M", "s K"]),
         ({"rig": "ss ", "operator": "KMB", "gear": "AAA"}, ["K", "M", "B"]),
@@ -165,3 +167,21 @@ def test_several_rigs_of_one_gear_are_warned_of():
     assert sum("2 rigs read this gear" in note for note in alone.notes) == 1
     for other in (rows, rows[rows["specimen"] == "B"]):
         assert not any("rigs read this gear" in n for n in read_case(other).notes)
+
+
+def test_labels_that_join_alike_are_of_two_mountings():
+    labels = [("A", "A B", "C"), ("A", "A", "B C")]
+    names = ("specimen", "rig", "operator")
+    case = read_case(table(labels, names))
+    assert case.run_labels == ("A B C", "A B C (2)")
+    assert (case.rigs, case.operators) == (("A B", "A"), ("C", "B C"))
+
+
+def test_days_of_other_clocks():
+    """AM and PM are read; what means another day whenever it is read is none."""
+    rows = table(MOUNTED[:2]).assign(rig="south")
+    days = np.repeat(["10/13/2026 8:00 AM", "10/14/2026 1:30 PM"], 5)
+    case = read_case(rows.assign(date=days))
+    assert case.run_labels == ("2026-10-13", "2026-10-14")
+    assert case.dates == ("2026-10-13T08:00:00", "2026-10-14T13:30:00")
+    assert len(read_case(rows.assign(date=["today", "now"] * 5)).run_labels) == 1

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import hdcal as api
-from hdcal.data import parquet
+from hdcal.data import parquet, parquet_head
 from hdcal.fleets.read_fleet import read_fleet
 
 GEARS, ROWS = 8, 8
@@ -66,7 +66,7 @@ def test_batches_of_parquet_tell_the_same(frame, tmp_path, monkeypatch, batch):
 
 
 def test_the_first_rows_of_parquet_have_their_runs(frame, tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 3 * ROWS)
+    monkeypatch.setattr(parquet_head, "_SHOWN", 3 * ROWS)
     bad = frame.copy()
     bad.loc[bad["specimen"] == "G1", "force_N"] = np.nan
     bad.to_parquet(tmp_path / "line.parquet", index=False)
@@ -113,3 +113,16 @@ def test_inches_and_pounds_in_parquet_are_converted(frame, tmp_path):
     assert found.sums.x == pytest.approx(25.4 * told.sums.x, rel=1e-12)
     assert found.sums.y == pytest.approx(4.4482216152605 * told.sums.y, rel=1e-12)
     assert found.largest == pytest.approx(12.7)
+
+
+@pytest.mark.parametrize("bad", [False, True])
+def test_clocks_may_restart_in_each_mounting_of_a_parquet_file(frame, tmp_path, bad):
+    """Also beside a gear that is left out; and nothing goes back within a run."""
+    rows = frame.assign(time_s=np.tile(np.arange(float(ROWS)), len(frame) // ROWS))
+    rows.loc[3, "force_N"] = np.nan if bad else rows.loc[3, "force_N"]
+    rows.to_parquet(tmp_path / "line.parquet")
+    found = read_fleet(tmp_path / "line.parquet", skip_bad=True)
+    told = read_fleet(rows, skip_bad=True)
+    assert [*found.case.left_out] == ["G0"] * bad
+    assert len(found.sums.gear) == len(told.sums.gear) == 12 - 2 * bad
+    assert not any("goes back" in note for note in found.case.notes)

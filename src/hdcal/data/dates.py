@@ -11,7 +11,9 @@ from hdcal.errors import quoted
 
 # How days are written; behind points the month stands second, behind slashes anywhere.
 _DAYS = ("ISO8601", "%Y/%m/%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y")
-_TIMES = ("", " %H:%M", " %H:%M:%S")
+_TIMES = ("", " %H:%M", " %H:%M:%S", " %I:%M %p", " %I:%M:%S %p")
+_CLOCK = re.compile(r"[T ]+\d{1,2}:\d{2}.*$")
+_DIGIT = re.compile(r"\d")
 _ZONE = re.compile(r"(?<=:\d{2})(\.\d+)?(Z|[+-]\d{2}:?\d{2})$")
 # Before and after these nobody measured: a plain number is no date.
 _EARLIEST, _LATEST = np.datetime64("1950-01-01"), np.datetime64("2100-01-01")
@@ -63,33 +65,40 @@ def days_of(labels: np.ndarray) -> np.ndarray:
         Days as ISO 8601 has them, as they are written where that can be read in two
         ways, and as not stated where they cannot be read.
     """
-    place, texts = pd.factorize(labels)
+    place, stamps = pd.factorize(labels)
+    # Few days have many times.
+    day, texts = pd.factorize(np.array([day_text(text) for text in stamps], object))
     days = np.full(len(texts), NOT_STATED, object)
     told = np.flatnonzero(texts != NOT_STATED)
     readings = _readings(texts[told]) if len(told) else []
     if len(readings) > 1:
-        days[told] = [day_text(text) for text in texts[told]]
+        days[told] = texts[told]
     elif readings:
         read = ~np.isnat(readings[0])
         days[told[read]] = readings[0][read].astype("datetime64[D]").astype(str)
-    return days[place]
+    return days[day][place]
 
 
 def day_text(text: str) -> str:
     """Return a date as it is written, without its time."""
-    return re.split("[T ]", text)[0]
+    return _CLOCK.sub("", text)
 
 
 def _readings(texts: Sequence[str] | np.ndarray) -> list[np.ndarray]:
     """Return in how many ways texts can be read, most of them at least, as times."""
     found: list[np.ndarray] = []
-    # What clocks there showed counts, not what they showed elsewhere.
-    plain = pd.Series([_ZONE.sub("", text) for text in texts])
+    # What clocks there showed counts, not what they showed elsewhere; and what is said
+    # without a number is another day whenever it is read.
+    plain = pd.Series(
+        [_ZONE.sub("", text) * bool(_DIGIT.search(text)) for text in texts]
+    )
     for day in _DAYS:
         times = pd.Series(pd.NaT, index=plain.index, dtype="datetime64[s]")
         for time in _TIMES if "%" in day else ("",):
-            read = pd.to_datetime(plain, format=day + time, errors="coerce")
-            times = times.fillna(read.astype("datetime64[s]"))
+            if not (rest := times.isna()).any():
+                break
+            read = pd.to_datetime(plain[rest], format=day + time, errors="coerce")
+            times[rest] = read.astype("datetime64[s]")
         each = times.to_numpy().astype("datetime64[s]")
         each[~((each > _EARLIEST) & (each < _LATEST))] = np.datetime64("NaT")
         found.append(each)

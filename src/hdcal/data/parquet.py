@@ -1,34 +1,40 @@
 """Parquet, a file or a folder of them: read in batches, whatever the number of rows."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
-from hdcal.data.bad_gears import among, bad_gears, offer
+from hdcal.data.bad_gears import bad_gears, offer
 from hdcal.data.case import Case, Gear
 from hdcal.data.cells import NOT_STATED
 from hdcal.data.columns import LABELS, Column
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import GROUPINGS, guess_header
+from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import read_measurements
 from hdcal.data.parquet_cells import label_cells, number_cells
+from hdcal.data.parquet_head import (
+    first_rows,
+    placed,
+    quantity_of,
+    rows_of_others,
+    runs_told,
+)
 from hdcal.data.parquet_table import parquet_files, parquet_table
 from hdcal.data.reading import GEAR_NAME, read_case
 from hdcal.data.too_far import beyond_radius
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
-    from pyarrow.dataset import Dataset
+    pass
 
-# Rows that are looked at one by one, and of a batch.
-_SHOWN, _BATCH = 50_000, 1 << 18
+# Rows of a batch.
+_BATCH = 1 << 18
 _USED = ("deformation", "force", "temperature", "specimen", "run", *GROUPINGS)
-_REMEDY = "Save it anew"
 
 
 class Batch(NamedTuple):
@@ -107,22 +113,27 @@ def read_parquet(
         gear = beside if gear is None and beside.exists() else gear
         how: dict = {"columns": columns, "theory": theory, "reading": reading}
         how |= {"skip_bad": skip_bad}
-        frame = _head(dataset, findings)
+        frame = first_rows(dataset, findings)
         # Lots, operators, rigs and dates are told of all rows.
-        further = [name for name in frame if _quantity(str(name), columns) in GROUPINGS]
+        further = [
+            name for name in frame if quantity_of(str(name), columns) in GROUPINGS
+        ]
 
         def read(rows: pd.DataFrame) -> Case:
-            return read_case(rows.drop(columns=further), gear, **how)
+            runs = runs_told(rows, gear, columns, (theory, None, reading))
+            return read_case(rows.drop(columns=further).assign(**runs), gear, **how)
 
         try:
-            case = _placed(dataset, frame, read)
+            case = placed(dataset, frame, read)
         except InputError:
-            others = _others(dataset, frame, columns) if skip_bad else frame.iloc[:0]
+            others = (
+                rows_of_others(dataset, frame, columns) if skip_bad else frame.iloc[:0]
+            )
             if others.empty:
                 raise
             frame = pd.concat([frame, others])
-            case = _placed(dataset, frame, read)
-        case, used = _with_runs(frame, case, columns, findings)
+            case = placed(dataset, frame, read)
+        used = _columns(frame, case, columns, findings)
     name = path.resolve().name if root else path.stem
     return Parquet(name, case, _sha256(files), files, root, used)
 
@@ -185,104 +196,15 @@ def _batch(
     return Batch(values, labels, bad).where(~wrong)
 
 
-def _head(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
-    """Return the first rows of all files, without columns that hold no plain cells."""
-    from pyarrow import types
-
-    plain = [f.name for f in dataset.schema if not types.is_nested(f.type)]
-    try:
-        return dataset.head(_SHOWN, columns=plain).to_pandas()
-    except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
-
-
-def _others(
-    dataset: "Dataset", frame: pd.DataFrame, columns: Mapping[str, str] | None
-) -> pd.DataFrame:
-    """Return the first rows of other gears where all of a frame are of one.
-
-    Args:
-        dataset: of which the frame is the first rows.
-        frame: indexed by their places there.
-        columns: as in `read_case`.
-    """
-    whose = [name for name in frame if _quantity(str(name), columns) == "specimen"]
-    gears = frame[whose[0]].unique() if len(whose) == 1 else ()
-    if len(gears) != 1:
-        return frame.iloc[:0]
-    found, at = [frame.iloc[:0]], 0
-    for batch in dataset.to_batches(columns=[*frame]):
-        rows = batch.to_pandas()
-        rows.index += at
-        at += len(rows)
-        found.append(rows[rows[whose[0]] != gears[0]])
-        if sum(map(len, found)) >= _SHOWN:
-            break
-    return pd.concat(found).iloc[:_SHOWN]
-
-
-def _placed(
-    dataset: "Dataset", frame: pd.DataFrame, read: Callable[[pd.DataFrame], Case]
-) -> Case:
-    """Return what is read of the first rows; what is wrong is told by file and row.
-
-    Args:
-        dataset: the files.
-        frame: some of their rows, indexed by their places there.
-        read: reads it.
-
-    Raises:
-        InputError: holds what is wrong.
-    """
-    ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
-    names = [str(one.path) for one in dataset.get_fragments()]
-
-    def placed(wrong: Finding) -> Finding:
-        if wrong.row is None:
-            return wrong
-        # Below a line of headers.
-        at = frame.index[wrong.row - 2]
-        place = int(np.searchsorted(ends, at, side="right"))
-        row = at + 1 - (int(ends[place - 1]) if place else 0)
-        return replace(wrong, file=names[place], row=row)
-
-    try:
-        case = read(frame)
-    except InputError as error:
-        raise InputError(map(placed, error.findings)) from None
-    left_out = {gear: placed(wrong) for gear, wrong in case.left_out.items()}
-    return replace(case, left_out=left_out)
-
-
-def _quantity(header: str, columns: Mapping[str, str] | None) -> str:
-    """Return which quantity a header is taken for, or said to be."""
-    said = {name: quantity for quantity, name in (columns or {}).items()}
-    guess = guess_header(header)
-    return said.get(header, guess.quantity if guess is not None else "")
-
-
-def _with_runs(
-    frame, case: Case, columns, findings: FileFindings
-) -> tuple[Case, dict[str, Column]]:
-    """Return a case with its runs as all columns tell them, and which of them are used.
-
-    Args:
-        frame: the rows that the case was read from.
-        case: in which lots, operators, rigs and dates are not told.
-        columns: as in `read_case`.
-        findings: of the files.
-    """
+def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:
+    """Return the columns that are used, by quantity."""
     named = dict(case.gear.source.get("columns", {})) | dict(columns or {})
     # What is wrong with rows was told, or is left out.
-    measured = read_measurements(frame, named, skip_bad=True)
-    used, gears = measured.columns.used, measured.specimen
+    used = read_measurements(frame, named, skip_bad=True).columns.used
     if "specimen" not in used:
         remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
         findings.refuse("no column says which gear a row is of", remedy)
-    kept = ~among(gears.names, case.left_out)[gears.index]
-    records = replace(case.records, run=pd.factorize(measured.run.index[kept])[0])
-    found = {quantity: used[quantity] for quantity in _USED if quantity in used}
-    return replace(case, records=records), found
+    return {quantity: used[quantity] for quantity in _USED if quantity in used}
 
 
 def _sha256(files: Sequence[str]) -> str:
