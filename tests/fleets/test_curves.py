@@ -26,7 +26,7 @@ def many(gears: int, off: int) -> Fleet:
     called = np.arange(gears) >= gears - off
     some = {
         name: np.resize(getattr(found, name), gears)
-        for name in ("size_ratio", "noise_sd", "zero", "distance")
+        for name in ("size_ratio", "noise_sd", "own_noise_sd", "zero", "distance")
     }
     return replace(
         found,

@@ -7,6 +7,7 @@ import pytest
 from fleets import handmade
 from rigs import make_gear
 
+from hdcal import fleet, read_case
 from hdcal.data.prior import Prior
 from hdcal.fleets.notes import CERTIFICATES
 from hdcal.fleets.over_time import TimeAnswer
@@ -29,9 +30,14 @@ def with_gear(found, **changes):
 
 def test_a_gear_that_is_soft_is_measured_again_and_one_with_a_loop_diagnosed():
     soft = fleet_answer(off_in(stiffness=[False, False, False, True])).next_step
-    assert soft == "Mount D anew and measure it again before you act on this."
+    again = "Mount D anew and measure again before you act on this."
+    assert soft == again
     both = {"stiffness": [False, False, False, True], "shape": [True] + [False] * 3}
-    assert "`--specimen A`" in str(fleet_answer(off_in(**both)).next_step)
+    said = str(fleet_answer(off_in(**both)).next_step)
+    assert said.startswith("See what A has by itself") and "`--specimen A`" in said
+    assert again in said
+    many = {"stiffness": [False, True, True, True]}
+    assert " and 2 more anew" in str(fleet_answer(off_in(**many)).next_step)
 
 
 def test_gears_that_are_called_off_stand_first():
@@ -43,17 +49,6 @@ def test_gears_that_are_called_off_stand_first():
         if isinstance(block, Table) and block.columns[0] == "gear"
     )
     assert [row[0] for row in table.rows] == ["A", "D", "B", "C"]
-
-
-def test_how_far_rigs_are_apart_is_said_and_that_nobody_knows_which_is_right():
-    found = handmade()
-    draws = dict(found.draws) | {"rig_sd": np.full(400, 0.01)}
-    draws |= {"rig_1": np.full(400, 0.012), "rig_2": np.full(400, -0.012)}
-    told = replace(found, draws=draws, rigs=["north", "south"])
-    (said,) = (note for note in fleet_answer(told).notes if "more force" in note)
-    assert said.startswith("Rig north reads 2.4 % (2.4 … 2.4 %) more force")
-    assert "than rig south" in said and "which of them is right" in said
-    assert not any("more force" in note for note in fleet_answer(found).notes)
 
 
 @pytest.mark.parametrize(("times", "way"), [(25.4, "stiffer"), (1 / 25.4, "softer")])
@@ -81,3 +76,22 @@ def test_a_change_that_is_likely_but_not_sure_is_no_change_and_no_lack_of_one():
     for sure, words in ((0.76, "not sure (76 %"), (0.2, "no change is told")):
         answer = TimeAnswer(**blank | {"probability_changed": sure})
         assert words in time_words(answer)
+
+
+def test_the_noise_of_a_gear_that_is_off_in_it_is_its_own():
+    """The law of all, whose scatter is small, draws it in."""
+    found = off_in(noise=[True, False, False, False])
+    own = np.array([1.5, 0.5, 0.5, 0.5])
+    said = fleet_answer(replace(found, own_noise_sd=own)).headline
+    assert "A has 3 times the noise of most (1.5 N)" in said
+
+
+def test_three_times_the_noise_is_said_to_be_three_times():
+    rng, x = np.random.default_rng(3), np.linspace(0.05, 0.5, 60)
+    noise = np.array([0.9, *[0.3] * 11])
+    force = 200.0 * x + noise[:, None] * rng.standard_normal((12, 60))
+    table = {"specimen": np.repeat([f"G{i}" for i in range(12)], 60)}
+    table |= {"deformation_mm": np.tile(x, 12), "force_N": force.ravel()}
+    found = fleet(read_case(table))
+    assert found.off_in["noise"].tolist() == [True] + [False] * 11
+    assert found.own_noise_sd == pytest.approx(noise, rel=0.3)

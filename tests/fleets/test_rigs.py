@@ -102,6 +102,9 @@ def test_answer_page_and_file_name_the_rigs(told, tmp_path):
     assert answer.population.rig_sd_percent is not None
     assert any("2 rigs say little of how much rigs scatter" in n for n in answer.notes)
     assert RIGS_APART not in answer.notes
+    (said,) = (note for note in answer.notes if "more force" in note)
+    assert said.startswith("Rig A reads 4.") and "than rig B" in said
+    assert "which of them is right these readings do not tell" in said
     page = told._repr_html_()
     assert "gain, between rigs" in page and "gain over the mean [%]" in page
     told.posterior.save(tmp_path / "posterior.nc")
@@ -138,7 +141,8 @@ def test_of_gears_with_a_rig_each_the_reader_knows_what_is_assumed():
     )
     low, _, high = gains_of(found)
     assert np.all((low < [0.02, -0.02]) & (high > [0.02, -0.02]))
-    assert RIGS_APART in fleet_answer(found).notes
+    notes = fleet_answer(found).notes
+    assert RIGS_APART in notes and not any("more force" in note for note in notes)
     # Eight gears of 1 % each: half the difference of two means.
     sd = np.std(found.draws["rig_1"])
     assert sd == pytest.approx(0.01 / np.sqrt(16.0), rel=0.5)

@@ -37,6 +37,7 @@ def handmade() -> Fleet:
         size_ratio=np.ones(4),
         apart=(truth + rng.normal(0.0, 0.3, (40, 4))) / 200.0 - 1.0,
         noise_sd=np.full(4, 0.5),
+        own_noise_sd=np.full(4, 0.5),
         zero=np.zeros(4),
         distance=np.array([-0.7, 0.0, 0.7, -14.0]),
         off=np.array([0.01, 0.01, 0.01, 0.999]),

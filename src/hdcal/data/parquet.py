@@ -126,9 +126,9 @@ def read_parquet(
         try:
             case = placed(dataset, frame, read)
         except InputError:
-            others = (
-                rows_of_others(dataset, frame, columns) if skip_bad else frame.iloc[:0]
-            )
+            if not skip_bad:
+                raise
+            others = rows_of_others(dataset, frame, columns)
             if others.empty:
                 raise
             frame = pd.concat([frame, others])

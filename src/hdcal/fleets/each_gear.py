@@ -52,6 +52,7 @@ def each_gear(
         "stiffness": stiffness,
         "apart": apart,
         "noise_sd": noise_sd,
+        "own_noise_sd": _own_noise(problem, noise_sd),
         "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
         "distance": np.median(apart / chosen["specimen_sd"][:, None], axis=0),
         "off": off.mean(axis=0),
@@ -61,3 +62,12 @@ def each_gear(
             "zero": zero_chance(sums, chosen, stiffness, noise_sd),
         },
     }
+
+
+def _own_noise(problem: PopulationProblem, noise_sd: np.ndarray) -> np.ndarray:
+    """Return what each gear's own line leaves [N], or what the law of all says.
+
+    A gear whose noise is off is no draw of the law of all, which pulls it in.
+    """
+    free, log_sd = problem.sums.noise_free, problem.sums.log_noise_sd
+    return np.where(np.asarray(free) > 0.0, np.exp(log_sd), noise_sd)

@@ -50,6 +50,7 @@ class Fleet(Shown):
         apart: of each gear from the centre of its lot, likewise, as a share of it.
         size_ratio: of each gear, by which its own sizes make it stiffer, shape (g,).
         noise_sd: of each gear, shape (g,) [N].
+        own_noise_sd: likewise, by its own line and drawn towards no other gear.
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
         off: probability of each gear that it is no ordinary one, shape (g,).
@@ -77,6 +78,7 @@ class Fleet(Shown):
     apart: np.ndarray
     size_ratio: np.ndarray
     noise_sd: np.ndarray
+    own_noise_sd: np.ndarray
     zero: np.ndarray
     distance: np.ndarray
     off: np.ndarray

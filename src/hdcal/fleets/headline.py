@@ -53,7 +53,7 @@ def _off(
         than: what they are softer than, where lots are told apart.
     """
     place = {name: row for row, name in enumerate(columns["gear"].tolist())}
-    sizes = "noise_sd_N", "loop_N", "bend_N"
+    sizes = "own_noise_sd_N", "loop_N", "bend_N"
     told = {name: columns[name][np.isfinite(columns[name])] for name in sizes}
     usual = {name: float(np.median(v)) for name, v in told.items() if len(v)}
     for name in called[:_MOST_NAMED]:
@@ -79,8 +79,9 @@ def _apart(
     if "stiffness" in kinds or kinds == [""]:
         yield _softer(one, than)
     if "noise" in kinds:
-        noise = float(one["noise_sd_N"])
-        times = noise / usual["noise_sd_N"]
+        # By its own readings: the law of all, which pulls it in, is not its own.
+        noise = float(one["own_noise_sd_N"])
+        times = noise / usual["own_noise_sd_N"]
         yield f"has {times:.2g} times the noise of most ({noise:.2g} N)"
     if "zero" in kinds:
         yield f"has its zero at {one['zero_N']:.2g} N"

@@ -102,17 +102,22 @@ def _far_from_theory(found: Fleet) -> Iterator[str]:
 
 
 def _between_rigs(found: Fleet) -> Iterator[str]:
-    """Yield how far apart rigs read, and that nobody knows which is right."""
+    """Yield how far apart rigs surely read, and that nobody knows which is right."""
     if not found.rigs:
         return
     gains = 100.0 * np.asarray(group_offsets(found.draws, "rig"))
-    order = np.argsort(np.median(gains, axis=1))
+    named = [rig for rig, name in enumerate(found.rigs) if name != NOT_STATED]
+    order = sorted(named, key=lambda rig: np.median(gains[rig]))
     low, high = order[0], order[-1]
-    middle, span = estimate(credible_interval(gains[high] - gains[low]))
+    linked = linked_rigs(found.readings.sums)
+    apart = credible_interval(gains[high] - gains[low])
+    if linked[low] != linked[high] or not apart.lo > 0.0:
+        return
+    middle, span = estimate(apart)
     yield (
         f"Rig {found.rigs[high]} reads {middle} % ({span} %) more force of the same "
-        f"gear than rig {found.rigs[low]}. Stiffness is told as the mean of the rigs "
-        "reads it: which of them is right these readings do not tell; a gear of known "
+        f"gear than rig {found.rigs[low]}. Stiffness is told as they read it in the "
+        "mean: which of them is right these readings do not tell; a gear of known "
         "stiffness, read on each, would."
     )
 

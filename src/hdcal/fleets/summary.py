@@ -62,6 +62,7 @@ def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
     return columns | {
         "zero_N": found.zero,
         "noise_sd_N": found.noise_sd,
+        "own_noise_sd_N": found.own_noise_sd,
         "loop_N": found.loop,
         "bend_N": found.bend,
         "distance_sd": found.distance,
@@ -194,9 +195,10 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
             f"See what {odd[0]} has by itself: `hdcal diagnose` with the same data and "
             f"{alone}"
         )
-    elif called:
+    if again := [name for name in called if name not in odd]:
+        more = f" and {len(again) - 1} more" * (len(again) > 1)
         parts.append(
-            f"Mount {called[0]} anew and measure it again before you act on this"
+            f"Mount {again[0]}{more} anew and measure again before you act on this"
         )
     misfit = found.misfit
     beside = misfit.loop_N or misfit.bend_N or misfit.correlation

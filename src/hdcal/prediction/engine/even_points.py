@@ -5,9 +5,11 @@ compute; tests hold these against them.
 
 Source:
     Bratley and Fox, ACM TOMS 14 (1988), 88; Joe and Kuo, SIAM J. Sci. Comput. 30
-    (2008), 2635, table new-joe-kuo-6.21201; Owen, J. Complexity 14 (1998), 466,
-    digital shifts.
+    (2008), 2635, table new-joe-kuo-6.21201; Matoušek, J. Complexity 14 (1998), 527,
+    linear scrambling and digital shifts.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,21 +26,41 @@ def spread_evenly(count: int, columns: int, seed: int) -> np.ndarray:
     Args:
         count: of the points.
         columns: dimensions, at most `MOST_COLUMNS`.
-        seed: of the shift of all of them.
+        seed: of their scrambling.
     """
-    shift = np.random.default_rng(seed).integers(1 << _BITS, size=columns)
-    points = sobol_integers(count, columns) ^ shift
-    return (points + 0.5) / (1 << _BITS)
+    rng = np.random.default_rng(seed)
+    directions = [_scrambled(_directions(column), rng) for column in range(columns)]
+    shift = rng.integers(1 << _BITS, size=columns)
+    return ((_combined(count, directions) ^ shift) + 0.5) / (1 << _BITS)
 
 
 def sobol_integers(count: int, columns: int) -> np.ndarray:
-    """Return Sobol's points times 2³², unshifted, (count, columns)."""
+    """Return Sobol's points times 2³² as they are, (count, columns)."""
+    return _combined(count, [_directions(column) for column in range(columns)])
+
+
+def _combined(count: int, directions: Sequence[Sequence[int]]) -> np.ndarray:
+    """Return points times 2³² from what each bit of their index adds."""
     index = np.arange(count)
     gray = index ^ (index >> 1)
-    found = np.zeros((count, columns), np.int64)
-    for column in range(columns):
-        for bit, direction in enumerate(_directions(column)):
+    found = np.zeros((count, len(directions)), np.int64)
+    for column, each in enumerate(directions):
+        for bit, direction in enumerate(each):
             found[:, column] ^= (gray >> bit & 1) * direction
+    return found
+
+
+def _scrambled(directions: Sequence[int], rng: np.random.Generator) -> list[int]:
+    """Return directions of which each digit has a random part of those above added.
+
+    Points stay as even, and what they have in common within their cells is gone.
+    """
+    found = [0] * len(directions)
+    for digit in range(_BITS):
+        own = 1 << (_BITS - 1 - digit)
+        taken = own | int(rng.integers(1 << digit)) << (_BITS - digit)
+        for place, direction in enumerate(directions):
+            found[place] |= own * ((direction & taken).bit_count() & 1)
     return found
 
 
