@@ -120,6 +120,14 @@ def test_a_case_is_begun(here: Hdcal, log: Path):
     assert again.returncode == 2 and "holds gear.toml already" in again.stderr
 
 
+def test_several_gears_are_a_fleet(here: Hdcal, log: Path):
+    header, *rows = log.read_text("utf-8").splitlines()
+    one, other = ([f"{row};{name}" for row in rows] for name in "AB")
+    log.write_text("\n".join([f"{header};gear", *one, *other]), "utf-8")
+    done = here("init", "rig", *BEGUN, "--data", log)
+    assert "Next: hdcal fleet rig --out result" in " ".join(done.stderr.split())
+
+
 def test_sheets_of_a_workbook_become_a_text_that_is_read_without_it(
     here: Hdcal, tmp_path: Path
 ):

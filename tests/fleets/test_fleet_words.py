@@ -9,11 +9,13 @@ from rigs import make_gear
 
 from hdcal import fleet, read_case
 from hdcal.data.prior import Prior
+from hdcal.fleets.force.document import force_words
 from hdcal.fleets.notes import CERTIFICATES
 from hdcal.fleets.over_time import TimeAnswer
 from hdcal.fleets.summary import fleet_answer, fleet_report
 from hdcal.fleets.time_words import time_words
 from hdcal.report.document import Table
+from hdcal.report.parameters import Interval
 
 
 def off_in(**kinds: list[bool]):
@@ -95,3 +97,21 @@ def test_three_times_the_noise_is_said_to_be_three_times():
     found = fleet(read_case(table))
     assert found.off_in["noise"].tolist() == [True] + [False] * 11
     assert found.own_noise_sd == pytest.approx(noise, rel=0.3)
+
+
+def test_the_gauge_is_told_where_a_force_is_asked_for():
+    found = handmade()
+    alone = fleet_answer(found).gauge_rr
+    asked = fleet_answer(found, found.next_force(0.2)).gauge_rr
+    assert (alone.deformation_mm, asked.deformation_mm) == (0.5, 0.2)
+    assert asked.gears_N.median == pytest.approx(0.4 * alone.gears_N.median)
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(0.24, "24 %"), (0.0019, "0.2 %"), (3e-4, "0.03 %"), (1e-7, "< 0.01 %")],
+)
+def test_a_small_share_of_gears_is_said_as_one(share: float, said: str):
+    force = handmade().next_force(0.4, 90.0)
+    told = replace(force, probability_exceeded=Interval(share, 0.0, 1.0))
+    assert next(force_words(told)).startswith(f"{said} of gears to come need more")

@@ -114,6 +114,8 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
     lots = tuple(_lots(found))
     failed = f"This result failed its checks: {'; '.join(found.reasons)}."
     said = failed if found.reasons else headline(population, called, columns)
+    # Where a force is asked for its tolerance is meant; else the largest force.
+    read_at = found.readings.largest if force is None else force.deformation_mm
     return FleetAnswer(
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
@@ -134,7 +136,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         lots=lots,
         operators=tuple(_operators(found)),
         rigs=tuple(_rigs(found)),
-        gauge_rr=gauge(draws, found.readings.largest, found.force_tolerance),
+        gauge_rr=gauge(draws, read_at, found.force_tolerance),
         over_time=tuple(map(time_answer, time_series(found))),
         misfit=found.misfit,
         next_gear=FutureGear(

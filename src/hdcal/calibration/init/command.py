@@ -116,7 +116,8 @@ def init(console: Console, folder, data, columns, sheet, **given):
     if data is not None:
         files[DATA_NAME] = text_of(Path(data), sheet)
     _write(Path(folder), files)
-    next_step = f"hdcal calibrate {folder} --out result"
+    several = case is not None and len(case.specimen_labels) > 1
+    next_step = f"hdcal {'fleet' if several else 'calibrate'} {folder} --out result"
     if data is None:
         next_step = f"put your readings there as {DATA_NAME}, then {next_step}"
     console.words(f"{', '.join(files)} written into {folder}. Next: {next_step}")

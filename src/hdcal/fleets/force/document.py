@@ -27,7 +27,7 @@ def force_words(found: NextForce) -> Iterator[str]:
     sized = " of the gear file's sizes" * found.at_one_size
     limit, beyond = found.limit_force_N, found.probability_exceeded
     if limit is not None and beyond is not None:
-        middle_, low, high = (percent(p) for p in vars(beyond).values())
+        middle_, low, high = map(_few, vars(beyond).values())
         yield (
             f"{middle_} of gears to come{sized} need more than {limit:g} N at "
             f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
@@ -42,6 +42,13 @@ def force_words(found: NextForce) -> Iterator[str]:
         f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
         f"confidence {many}."
     )
+
+
+def _few(share: float) -> str:
+    """Return a share of gears: of thousands of them less than a hundredth counts."""
+    if share >= 0.01:
+        return percent(share)
+    return f"{100.0 * share:.1g} %" if share >= 1e-4 else "< 0.01 %"
 
 
 def force_document(found: NextForce) -> Document:
