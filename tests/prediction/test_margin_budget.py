@@ -40,8 +40,10 @@ def by_name(found: ForceBudget) -> dict[str, float]:
     return {part.name: part.variance for part in found.components}
 
 
-def check_total(found: ForceBudget, forces: Sequence[PopulationForce]) -> None:
-    """Require a budget to hold the variance that Monte Carlo has.
+def totals(
+    found: ForceBudget, forces: Sequence[PopulationForce]
+) -> tuple[float, float]:
+    """Return the variance that a budget holds, and the one that Monte Carlo has.
 
     Those of Student's t are scales: a part each of ν/(ν − 2) of the sd's square.
     """
@@ -50,7 +52,13 @@ def check_total(found: ForceBudget, forces: Sequence[PopulationForce]) -> None:
         part.variance * (part.dof / (part.dof - 2.0) if np.isfinite(part.dof) else 1.0)
         for part in found.components
     ]
-    assert sum(wide) == pytest.approx(sd**2, rel=0.03)
+    return sum(wide), sd**2
+
+
+def check_total(found: ForceBudget, forces: Sequence[PopulationForce]) -> None:
+    """Require a budget to hold the variance that Monte Carlo has."""
+    held, expected = totals(found, forces)
+    assert held == pytest.approx(expected, rel=0.03)
 
 
 def known_parts(gear) -> tuple[Posterior, dict]:
@@ -100,9 +108,13 @@ EVERYTHING = {
 
 @pytest.mark.parametrize("name", EVERYTHING)
 def test_the_variance_is_that_of_monte_carlo(name: str):
+    """In the mean of some seeds: one moves what is beyond the tested by a percent."""
     make, asked = EVERYTHING[name]
-    forces = forces_of(make(), **asked)
-    check_total(averaged_budget(forces), forces)
+    model, seeds = make(), range(4)
+    drawn = [forces_of(model, seed=seed, **asked) for seed in seeds]
+    each = [totals(averaged_budget(forces), forces) for forces in drawn]
+    held, expected = np.mean(each, axis=0)
+    assert held == pytest.approx(expected, rel=0.03)
 
 
 def test_a_budget_that_ignores_the_covariance_is_told_from_the_true_one():

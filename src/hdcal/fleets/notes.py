@@ -66,29 +66,20 @@ def notes_of(found: Fleet) -> Sequence[str]:
     sized = sized if found.case.gear.theory != SPRING else []
     few = [FEW_GEARS] if len(found.off) < FEW else []
     beside = [*_far_from_theory(found), *misfit_words(found.misfit)]
+    beside += _between_rigs(found)
     certified = [CERTIFICATES] if {*GAINS} & found.case.gear.priors.keys() else []
     untold = [*_untold(found)]
     why = found.case.left_out
     left_out = [left_out_words(why, len(why) + len(found.off))] if why else []
     of_data = [*left_out, *beside, *found.case.notes]
-    rigs = [*_between_rigs(found)]
-    return [
-        *of_data,
-        *rigs,
-        RESTS_ON,
-        *sized,
-        *few,
-        *scarce,
-        *untold,
-        *once,
-        *certified,
-    ]
+    of_model = [RESTS_ON, *sized, *few, *scarce, *untold, *once, *certified]
+    return [*of_data, *of_model]
 
 
 def _far_from_theory(found: Fleet) -> Iterator[str]:
     """Yield that gears are far stiffer or softer than the gear file lets expect."""
     expected = population_priors(found.case)[1]["stiffness"]
-    if found.case.gear.theory == SPRING or expected.family != "lognormal":
+    if found.case.gear.theory == SPRING:
         return
     middle, log_sd = expected.numbers
     ratio = float(np.median(found.draws["stiffness"])) / middle

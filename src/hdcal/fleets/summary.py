@@ -190,14 +190,15 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
     parts = []
     # A softer gear by itself is as good a line as any: no diagnosis sees it.
     bent = found.off_in["noise"] | found.off_in["shape"]
-    odd = [name for name in called if bent[found.case.specimen_labels.index(name)]]
+    with_more = {*np.array(found.case.specimen_labels)[bent].tolist()}
+    odd = [name for name in called if name in with_more]
     if odd:
         alone = f"`--specimen {shlex.quote(odd[0])}`"
         parts.append(
             f"See what {odd[0]} has by itself: `hdcal diagnose` with the same data and "
             f"{alone}"
         )
-    if again := [name for name in called if name not in odd]:
+    if again := [name for name in called if name not in with_more]:
         more = f" and {len(again) - 1} more" * (len(again) > 1)
         parts.append(
             f"Mount {again[0]}{more} anew and measure again before you act on this"

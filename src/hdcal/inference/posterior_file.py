@@ -48,7 +48,7 @@ FLEET = Kind(
     (
         "is of a fleet, which models no gear by itself",
         "The force of a gear to come is told by margin and fleet, with --deformation; "
-        "for one gear calibrate it alone, with --specimen",
+        "lines compare as lots of one fleet, a gear is calibrated with --specimen",
     ),
 )
 # Answers beside which no posterior lies, and what to name instead.
