@@ -18,7 +18,7 @@ from hdcal.diagnosis.contrasts import Contrast, contrasts
 from hdcal.diagnosis.gap import Seen
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.prepare import MODULUS_LOSS, PreparedCase
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import moments
 from hdcal.inference.residual_shapes import (
     Correlated,
     Structure,
@@ -48,7 +48,7 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     # Of a gear that is pulled, what is said is said of the size of its force.
     side = loading_side(np.asarray(prepared.records.deformation))
     sign = float(side or 1)
-    own = frozen(prepared.priors["alpha"]).std() < _ANY_MATERIAL
+    own = moments(prepared.priors["alpha"])[1] < _ANY_MATERIAL
     turned = _turned(prepared.records, sign)
     every = list(contrasts(turned, case, both=side == 0, own=own))
     tried = {str(i): c for i, c in enumerate(every) if c.swing > _NOTHING}

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import frozen, moments
 from hdcal.physics.effect import Effect, parameters
 
 # Quantiles of a shape parameter; with several, the number of each. An effect that is
@@ -109,7 +109,7 @@ def make_grid(
         shapes=_shape_points(free, SHAPE_POINTS[kind]),
         edges=edges,
         mean=float(prior.numbers[0]) if prior.family == "normal" else 0.0,
-        sd=float(frozen(prior).std()) if not normal else float(prior.numbers[-1]),
+        sd=moments(prior)[1] if not normal else float(prior.numbers[-1]),
         normal=normal,
         one_sided=prior.family == "half_normal",
         mass=mass,

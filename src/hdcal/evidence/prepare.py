@@ -19,7 +19,7 @@ from hdcal.evidence.row_features import (
     scale_to_unit,
     take_rows,
 )
-from hdcal.inference.distributions import frozen
+from hdcal.inference import distributions
 from hdcal.inference.noise_form import pilot_noise
 from hdcal.inference.problem import case_reading, problem_priors
 from hdcal.inference.serial_correlation import previous_rows
@@ -137,11 +137,9 @@ def log_moments(prior: Prior) -> tuple[float, float]:
 
 
 def moments(prior: Prior) -> tuple[float, float]:
-    """Return mean and sd of a parameter."""
-    if prior.family == "fixed":
-        return float(prior.numbers[0]), 1e-9
-    law = frozen(prior)
-    return float(law.mean()), float(law.std())
+    """Return mean and sd of a parameter; one that is fixed has a very small sd."""
+    mean, sd = distributions.moments(prior)
+    return mean, 1e-9 if prior.family == "fixed" else sd
 
 
 def stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:

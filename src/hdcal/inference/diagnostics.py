@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.priors import Prior
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import moments
 
 # Part of the prior variance that must be gone before the data, not the prior, drive;
 # from the second value on also where power-scaling calls the likelihood weak.
@@ -111,7 +111,7 @@ def _contraction(draws: np.ndarray, prior: Prior) -> float:
     if prior.family == "lognormal":
         logarithm, sd = np.log(np.maximum(draws, _TINY)), float(prior.numbers[1])
         return float(1.0 - logarithm.var() / sd**2)
-    return float(1.0 - draws.var() / frozen(prior).var())
+    return float(1.0 - draws.var() / moments(prior)[1] ** 2)
 
 
 def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:

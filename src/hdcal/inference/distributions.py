@@ -1,5 +1,6 @@
 """From a prior table to NumPyro and SciPy distributions."""
 
+import math
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -63,13 +64,35 @@ def _law(family: str, numbers: tuple[float, ...]) -> Any:
 
 def bounds(prior: Prior) -> tuple[float, float]:
     """Return the ends of the prior's support."""
-    low, high = frozen(prior).support()
-    return float(low), float(high)
+    match prior.family:
+        case "normal":
+            return -math.inf, math.inf
+        case "lognormal" | "half_normal":
+            return 0.0, math.inf
+        case "uniform":
+            return float(prior.numbers[0]), float(prior.numbers[1])
+        case "beta":
+            return 0.0, 1.0
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
 
 
 def moments(prior: Prior) -> tuple[float, float]:
     """Return mean and sd of a prior, in its own unit."""
-    if prior.family == "fixed":
-        return float(prior.numbers[0]), 0.0
-    law = frozen(prior)
-    return float(law.mean()), float(law.std())
+    first, *others = (float(number) for number in prior.numbers)
+    second = others[0] if others else 0.0
+    match prior.family:
+        case "fixed" | "normal":
+            return first, second
+        case "lognormal":
+            mean = first * math.exp(0.5 * second**2)
+            return mean, mean * math.sqrt(math.expm1(second**2))
+        case "half_normal":
+            return first * math.sqrt(2.0 / math.pi), first * math.sqrt(
+                1.0 - 2.0 / math.pi
+            )
+        case "uniform":
+            return 0.5 * (first + second), (second - first) / math.sqrt(12.0)
+        case "beta":
+            both = first + second
+            return first / both, math.sqrt(first * second / (both + 1.0)) / both
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
