@@ -287,12 +287,6 @@ def test_a_falling_force_is_refused():
 
 
 @pytest.mark.thorough
-def test_computed_readings_without_noise_do_not_stop_it():
-    records = ramp(40)
-    judged(make_case(replace(records, force=400.0 * records.deformation)))
-
-
-@pytest.mark.thorough
 def test_a_weak_effect_is_not_one_that_looks_alike():
     """Friction and fatigue share almost nothing in a cyclic test."""
     pairs = judged(simulated(rich())).which.inseparable

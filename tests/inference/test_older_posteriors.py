@@ -25,7 +25,9 @@ def written(resolution: float = 0.0) -> Posterior:
 
 def looped() -> Posterior:
     """Return a quick calibration with a leftover of a rig that unloads too."""
-    case = make_case(cycles(96))
+    records = cycles(96)
+    noise = np.random.default_rng(0).normal(0.0, 0.3, 96)
+    case = make_case(replace(records, force=records.force + noise))
     size = {"warmup": 100, "draws": 20, "chains": 2}
     return hdcal.calibrate(case, with_gap=True, **size)
 

@@ -194,7 +194,9 @@ def test_the_gap_is_the_same_at_every_temperature():
     force = force + np.random.default_rng(1).normal(0.0, 0.3, 60)
     warm = np.full(60, 60.06)
     records = make_records(deformation, force, temperature=warm, known={"temperature"})
-    posterior = calibrate(make_case(records), with_gap=True, **SHORT)
+    # So few draws do not always settle how long the leftover's waves are.
+    size = SHORT | {"draws": 2 * SHORT["draws"]}
+    posterior = calibrate(make_case(records), with_gap=True, **size)
     found = predict(posterior, [0.1, 0.28, 0.5], [60.06, 20.0, 100.0])
     leftover = (found.with_gap_median_N - found.physics_median_N).reshape(3, 3)
     assert leftover[1] == pytest.approx(leftover[0], abs=0.2)
