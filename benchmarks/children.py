@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -54,5 +55,6 @@ def ask(module: str, *arguments, **environment) -> dict:
 
 def table(heading: tuple[str, ...], rows) -> None:
     """Print a Markdown table."""
-    for row in (heading, ["---"] * len(heading), *rows):
+    # Each as soon as it is measured.
+    for row in chain((heading, ["---"] * len(heading)), rows):
         print("|", " | ".join(map(str, row)), "|", flush=True)
