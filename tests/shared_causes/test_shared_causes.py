@@ -191,3 +191,16 @@ def test_a_row_for_each_gear(with_loop):
     columns = cause_columns(with_loop)
     assert {len(column) for column in columns.values()} == {len(GEARS)}
     assert np.all(columns["probability"] >= columns["probability_none"] - 1e-12)
+
+
+def test_plain_noise_is_no_evidence_of_outliers():
+    """Of thirty gears none has odds of twenty, which one in twenty may have."""
+    x, found = np.linspace(0.02, 0.4, 20).round(3), []
+    for seed in range(30):
+        noise = np.random.default_rng(seed).normal(0.0, 0.3, 20)
+        table = {"deformation_mm": x, "force_N": np.round(231.0 * x + noise, 2)}
+        gear = hdcal.read_case(table | {"specimen": np.repeat("A", 20)})
+        weight = weigh_gear(0, gear, {"outliers": EFFECTS["outliers"]}, 0)[1]
+        found.append(weight["outliers"].log_evidence - weight["none"].log_evidence)
+    assert max(found) < np.log(20.0)
+    assert np.mean(np.exp(found)) < 1.5
