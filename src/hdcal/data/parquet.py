@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -28,9 +28,6 @@ from hdcal.data.parquet_table import parquet_files, parquet_table
 from hdcal.data.reading import GEAR_NAME, read_case
 from hdcal.data.too_far import beyond_radius
 from hdcal.errors import Finding, InputError
-
-if TYPE_CHECKING:
-    pass
 
 # Rows of a batch.
 _BATCH = 1 << 18

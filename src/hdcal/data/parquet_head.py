@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 # Rows that are looked at one by one.
 _SHOWN = 50_000
-REMEDY = "Save it anew"
+_REMEDY = "Save it anew"
 
 
 def first_rows(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
@@ -31,7 +31,7 @@ def first_rows(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
     try:
         return dataset.head(_SHOWN, columns=plain).to_pandas()
     except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(f"is no Parquet that can be read ({error})", REMEDY)
+        findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
 
 
 def rows_of_others(
