@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import ClassVar
 
@@ -307,6 +309,31 @@ def test_under_a_transformation_it_is_jit(cached):
     slope = jax.grad(lambda x: one({"x": x, "y": 0.0}, times=1)["sum"])(jnp.ones(3))
     np.testing.assert_allclose(slope, -np.sin(np.ones(3)))
     assert not kept(cached)
+
+
+_TRACED_AT_ONCE, _MOST_AT_ONCE = [], []
+
+
+def _slowly_traced(x, *, place: int):
+    """Note how many are being traced."""
+    _TRACED_AT_ONCE.append(place)
+    _MOST_AT_ONCE.append(len(_TRACED_AT_ONCE))
+    time.sleep(0.05)
+    _TRACED_AT_ONCE.remove(place)
+    return x + place
+
+
+@pytest.mark.parametrize("kept_on_disk", [True, False])
+def test_threads_trace_one_after_the_other(cached, kept_on_disk: bool):
+    """NumPyro's handlers are on one stack for all of them."""
+    if not kept_on_disk:
+        jax.config.update("jax_compilation_cache_dir", None)
+    _MOST_AT_ONCE.clear()
+    made = Program(_slowly_traced, static=("place",))
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda n: float(made(1.0, place=n)), range(4)))
+    assert found == [1.0, 2.0, 3.0, 4.0]
+    assert len(_MOST_AT_ONCE) == 4 and max(_MOST_AT_ONCE) == 1
 
 
 def test_a_class_comes_back(cached):

@@ -11,6 +11,7 @@ import hashlib
 import os
 import secrets
 import shutil
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, update_wrapper
@@ -41,6 +42,8 @@ _SETTINGS = (
 )
 _CODE = Path(__file__).parent
 _DIGEST_SIZE = hashlib.sha256().digest_size
+# NumPyro's handlers are on one stack, whatever the thread: only one may trace.
+_TRACING = threading.RLock()
 # Nobody else may write what is run.
 _OWN, _OTHERS_WRITE = 0o700, 0o022
 
@@ -114,12 +117,17 @@ class Program:
         exported = None if file is None else _read(file)
         if exported is None and file is not None:
             # What calls back into this process, say, cannot be kept.
-            with suppress(Exception):
+            with suppress(Exception), _TRACING:
                 kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
                 # As later processes have it: to the last bit the same.
                 exported = export.deserialize(bytearray(kept))
                 _write(file, kept)
-        return jax.jit(flat if exported is None else exported.call)
+        if exported is not None:
+            return jax.jit(exported.call)
+        ready = jax.jit(flat)
+        with _TRACING:
+            ready.lower(*leaves)
+        return ready
 
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hdcal.diagnosis.refit import weighed
+from hdcal.diagnosis.refit import _Together, weighed
 
 
 def calibrated(failing=(), widths=None):
@@ -103,3 +103,14 @@ def test_of_many_small_ones_the_likeliest_is_kept():
     found = weighed(chances, run)
     assert asked == ["none", "unknown"]
     assert shares(found) == pytest.approx({"none": 0.04, "unknown": 0.96})
+
+
+def test_calibrations_side_by_side_tell_how_far_all_are():
+    told = []
+    together = _Together(lambda done, total: told.append((done, total)), 3)
+    for name, done in (("a", 50), ("b", 50), ("a", 100), ("b", 100), ("c", 100)):
+        together(name, done, 100)
+    assert told == [(50, 300), (100, 300), (150, 300), (200, 300), (300, 300)]
+    # A model of what is left over comes after them.
+    together("d", 50, 100)
+    assert told[-1] == (350, 400)

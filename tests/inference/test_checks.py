@@ -15,7 +15,8 @@ from hdcal.inference.checks import (
     rounding_check,
     sampling_checks,
 )
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
+from hdcal.inference.mixing import mixing
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.problem import build_problem

@@ -248,6 +248,13 @@ def test_towards_the_other_sense_no_spread_grows():
     assert 0.3 < reached.lower_bound_mm < reached.upper_bound_mm < 0.5
 
 
+def test_a_bend_that_is_seen_goes_on():
+    place, rng = np.linspace(0.0, 0.5, 60), np.random.default_rng(4)
+    bent = 150.0 * place + 60.0 * place**2 + rng.normal(0.0, 0.3, 60)
+    told = hdcal.margin(regressed(place, bent, rng), 0.6, **QUICK).extrapolated[0]
+    assert "The bend that these rows leave over goes on there: +" in told
+
+
 def test_beyond_the_tested_deformation_a_bend_widens(one):
     inside = hdcal.margin(one, 0.5, **QUICK)
     beyond = hdcal.margin(one, 0.7, **QUICK)

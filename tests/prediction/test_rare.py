@@ -14,13 +14,14 @@ from slices import slice_of
 import hdcal
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior
+from hdcal.inference.pareto import pareto_shape
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES
 from hdcal.prediction.margin import rare as module
 from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
 from hdcal.prediction.margin.refined import rests_on as refined_words
-from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
+from hdcal.prediction.margin.sampling_laws import SamplingLaws
 
 AT = 0.4
 SIGMAS = {"Student's t": SIGMA, "normal": Prior("fixed", (0.9,))}

@@ -9,7 +9,9 @@ least.
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -27,6 +29,8 @@ from hdcal.report.parameters import credible_interval
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
+# Calibrations at a time: while one samples, the next is prepared.
+_AT_ONCE = 2
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,8 @@ def refit(
     if quick:
         return Refits({}, None, {})
 
+    together = progress and _Together(progress, len(_probable(posterior.probabilities)))
+
     def calibrated(name: str) -> Posterior:
         own = parts_of(name)
         return calibrate(
@@ -82,10 +88,25 @@ def refit(
             adapt_noise=False,
             seed=seed,
             registry=library,
-            progress=progress,
+            progress=together and partial(together, name),
         )
 
     return weighed(posterior.probabilities, calibrated)
+
+
+class _Together:
+    """Tells of calibrations that run side by side as of one."""
+
+    def __init__(self, progress: Progress, many: int):
+        self._progress, self._many = progress, many
+        self._done: dict[str, int] = {}
+
+    def __call__(self, name: str, done: int, total: int) -> None:
+        """Tell how far one of them has come; the others take as long as it does."""
+        self._done[name] = done
+        self._progress(
+            sum(self._done.values()), total * max(self._many, len(self._done))
+        )
 
 
 def weighed(
@@ -97,9 +118,9 @@ def weighed(
         probabilities: of all hypotheses, sum 1.
         calibrated: returns the posterior of one.
     """
-    ranked = sorted(probabilities, key=lambda name: -probabilities[name])
-    chosen = [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
-    fits = {name: calibrated(name) for name in chosen}
+    chosen = _probable(probabilities)
+    with ThreadPoolExecutor(_AT_ONCE) as pool:
+        fits = dict(zip(chosen, pool.map(calibrated, chosen), strict=True))
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)
@@ -118,6 +139,12 @@ def weighed(
         for name, fit in usable.items()
     }
     return Refits(models, LeftOut(missing, carrier), failed)
+
+
+def _probable(probabilities: Mapping[str, float]) -> list[str]:
+    """Return the hypotheses that are calibrated whatever the verdict."""
+    ranked = sorted(probabilities, key=lambda name: -probabilities[name])
+    return [n for n in ranked if probabilities[n] >= LEAST_SHARE] or ranked[:1]
 
 
 def _missing(probabilities: Mapping[str, float], fits: Mapping[str, Posterior]):

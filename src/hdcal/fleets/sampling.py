@@ -11,8 +11,8 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, mixing_checks, sampling_checks
-from hdcal.inference.diagnostics import mixing
 from hdcal.inference.independence import MAX_SHAPE, sample_independently
+from hdcal.inference.mixing import mixing
 from hdcal.inference.population_problem import PopulationProblem
 from hdcal.inference.sample import Progress, sample
 

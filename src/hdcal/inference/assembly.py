@@ -20,8 +20,9 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.density import densities
-from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters, mixing
+from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
+from hdcal.inference.mixing import mixing
 from hdcal.inference.posterior_tree import build_tree
 from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.sample import Draws

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.priors import Prior
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.distributions import bounds, frozen
+from hdcal.inference.mixing import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION, worth
 
@@ -113,12 +113,9 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
 
 
 def _explored(energy: np.ndarray) -> np.ndarray:
-    """Return the BFMI of each chain."""
-    # Late: it takes as long to import as a finished result to be read.
-    from arviz_stats import bfmi  # pyright: ignore[reportPrivateImportUsage]
-
+    """Return the BFMI of each chain (Betancourt, arXiv:1604.00695, 2016)."""
     with np.errstate(all="ignore"):
-        return np.asarray(bfmi(energy, chain_axis=0, draw_axis=1))
+        return np.mean(np.diff(energy) ** 2, axis=1) / np.var(energy, axis=1, ddof=1)
 
 
 def _bad(value: float) -> float:

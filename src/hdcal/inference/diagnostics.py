@@ -1,43 +1,27 @@
-"""How well chains mixed, and whether data or priors drive each parameter."""
+"""Whether data or priors drive each parameter, beside how well its chains mixed."""
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import xarray as xr
+from scipy.special import softmax
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import moments
+from hdcal.inference.mixing import Mixing, mixing
 
 # Part of the prior variance that must be gone before the data, not the prior, drive;
 # from the second value on also where power-scaling calls the likelihood weak.
 MIN_CONTRACTION, CLEAR_CONTRACTION = 0.75, 0.95
 # Power-scaling sensitivity from which a prior or a likelihood matters.
 SENSITIVE = 0.05
-
-# What chains that have mixed show at most, and at least.
-MAX_RHAT, ESS_PER_CHAIN = 1.01, 100
+# By so much a power is changed to see what it does.
+_POWER = 0.01
 
 Driver = Literal["data", "prior"]
 # The smallest number that has a logarithm.
 _TINY = np.finfo(float).tiny
-
-
-@dataclass(frozen=True)
-class Mixing:
-    """How well the chains mixed in one quantity.
-
-    Attributes:
-        rhat: rank-normalised split R-hat.
-        ess_bulk: effective draws for the centre.
-        ess_tail: effective draws for the interval's ends.
-    """
-
-    rhat: float
-    ess_bulk: float
-    ess_tail: float
 
 
 @dataclass(frozen=True)
@@ -71,32 +55,21 @@ def diagnose_parameters(
         log_prior: of each draw.
         log_likelihood: of each draw, all data.
     """
-    from arviz_base import from_dict
-
-    tree = from_dict(
-        {
-            "posterior": dict(draws),
-            "log_prior": {"prior": log_prior},
-            "log_likelihood": {"force": log_likelihood},
-        }
-    )
-    # On draws that stand still the statistics warn on their way to NaN; a NaN fails
-    # its check, so nothing is hidden by keeping the terminal quiet.
     mixed = mixing(draws)
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        to_prior = _sensitivity(tree, "prior")
-        to_data = _sensitivity(tree, "likelihood")
+    # On draws that stand still the statistics are NaN, which fails its check.
+    with np.errstate(all="ignore"):
+        to_prior = dict(zip(draws, _sensitivity(draws, log_prior), strict=True))
+        to_data = dict(zip(draws, _sensitivity(draws, log_likelihood), strict=True))
     found = {}
     for name, values in draws.items():
         contraction = _contraction(values, priors[name])
-        weak = to_data[name] < SENSITIVE < to_prior[name]
+        weak = bool(to_data[name] < SENSITIVE < to_prior[name])
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
         found[name] = Diagnosis(
             **vars(mixed[name]),
             contraction=contraction,
-            prior_sensitivity=to_prior[name],
-            likelihood_sensitivity=to_data[name],
+            prior_sensitivity=float(to_prior[name]),
+            likelihood_sensitivity=float(to_data[name]),
             driven_by="data" if contraction >= enough else "prior",
         )
     return found
@@ -114,40 +87,43 @@ def _contraction(draws: np.ndarray, prior: Prior) -> float:
     return float(1.0 - draws.var() / moments(prior)[1] ** 2)
 
 
-def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
-    """Return how well the chains mixed in each quantity, (chain, draw) each."""
-    # Late: a finished result is read without them. They are put there at import time,
-    # out of pyright's sight.
-    from arviz_base import from_dict
-    from arviz_stats import ess, rhat  # pyright: ignore[reportPrivateImportUsage]
+def _sensitivity(draws: Mapping[str, np.ndarray], log_part: np.ndarray) -> np.ndarray:
+    """Return how much each parameter changes with the power of a part of its density.
 
-    tree = from_dict({"posterior": dict(draws)})
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-        split, bulk = _by_name(rhat(tree)), _by_name(ess(tree))
-        tail = _by_name(ess(tree, method="tail"))
-    return {name: Mixing(split[name], bulk[name], tail[name]) for name in draws}
+    Source: Kallioinen, Paananen, Bürkner and Vehtari, Statistics and Computing 34, 57
+    (2024). Weights so near to one have no tail that was worth smoothing.
+
+    Args:
+        draws: of each parameter, (chain, draw).
+        log_part: log density of prior or likelihood of each draw.
+    """
+    flat = np.stack([values.ravel() for values in draws.values()])
+    order = np.argsort(flat, axis=1)
+    width = np.diff(np.take_along_axis(flat, order, axis=1))
+    slopes = []
+    for power in (1.0 - _POWER, 1.0 + _POWER):
+        weight = softmax((power - 1.0) * log_part.ravel())[order]
+        distance = np.maximum(
+            _distance(width, weight), _distance(width[:, ::-1], weight[:, ::-1])
+        )
+        slopes.append(distance / abs(np.log2(power)))
+    return np.mean(slopes, axis=0)
 
 
-def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
-    """Tell whether chains mixed in every quantity, (chain, draw) each."""
-    # A NaN, of draws that stand still, is neither.
-    return all(
-        one.rhat <= MAX_RHAT
-        and min(one.ess_bulk, one.ess_tail) >= ESS_PER_CHAIN * len(draws[name])
-        for name, one in mixing(draws).items()
+def _distance(width: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the cumulative Jensen-Shannon distance of weighted from equal draws.
+
+    Args:
+        width: between neighbours among the sorted draws, shape (k, d − 1).
+        weight: of the sorted draws, sum 1, shape (k, d).
+    """
+    equal = np.arange(1, weight.shape[1]) / weight.shape[1]
+    weighed = np.cumsum(weight, axis=1)[:, :-1]
+    middle = np.log2(0.5 * (equal + weighed))
+    areas = width @ equal, np.sum(width * weighed, axis=1)
+    lean = 0.5 / np.log(2.0) * (areas[1] - areas[0])
+    gains = (
+        np.sum(width * equal * (np.log2(equal) - middle), axis=1) + lean,
+        np.sum(width * weighed * (np.log2(weighed) - middle), axis=1) - lean,
     )
-
-
-def _sensitivity(tree: xr.DataTree, group: str) -> dict[str, float]:
-    from arviz_stats import psense  # pyright: ignore[reportPrivateImportUsage]
-
-    try:
-        return _by_name(psense(tree, group=group))
-    except ValueError:  # draws that are all alike have no tail to smooth
-        return dict.fromkeys(map(str, tree["posterior"].data_vars), np.nan)
-
-
-def _by_name(result) -> dict[str, float]:
-    dataset = result["posterior"].to_dataset() if "posterior" in result else result
-    return {str(name): float(value) for name, value in dataset.data_vars.items()}
+    return np.sqrt(sum(np.maximum(gain, 0.0) for gain in gains) / sum(areas))

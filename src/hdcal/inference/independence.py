@@ -20,8 +20,9 @@ import numpy as np
 from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
-from hdcal.inference.diagnostics import have_mixed
 from hdcal.inference.laplace import Whitening, potential, values_at
+from hdcal.inference.mixing import have_mixed
+from hdcal.inference.pareto import pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 from hdcal.programs import program
@@ -87,7 +88,7 @@ def sample_independently(
         new = (density - law.log_density(flat)).reshape(chains, length)
         weight = np.concatenate([weight, new], axis=1)
         place = np.concatenate([place, flat.reshape(chains, length, -1)], axis=1)
-        shape = _pareto_shape(weight)
+        shape = pareto_shape(_shares(weight.ravel()))
         if not shape <= MAX_SHAPE:
             return None
         chosen = _metropolis(weight, rng)[:, _FORGOTTEN::each]
@@ -120,7 +121,7 @@ def _adapted(
         each = [np.log(many / total) + one.log_density(place) for many, one in laws]
         share = _shares(np.concatenate(densities) - np.logaddexp.reduce(each))
         law = fitted_mixture(place, share, rng)
-        if efficiency >= _EFFICIENT and _pareto_shape(weight) <= _LIGHT:
+        if efficiency >= _EFFICIENT and pareto_shape(_shares(weight.ravel())) <= _LIGHT:
             break
     return law, float(efficiency)
 
@@ -139,14 +140,6 @@ def _metropolis(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         moves = weight[:, step] >= weight[each, at] + level[:, step]
         path[:, step] = at = np.where(moves, step, at)
     return path
-
-
-def _pareto_shape(weight: np.ndarray) -> float:
-    # Late: a finished result is read without it.
-    from arviz_stats.base.array import array_stats
-
-    # It takes log densities of readings, whose weights are their inverse.
-    return float(array_stats.psislw(-weight.ravel())[1])
 
 
 def _log_densities(

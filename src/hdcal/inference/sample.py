@@ -17,9 +17,9 @@ from jaxtyping import Key
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
 from hdcal.errors import Findings
-from hdcal.inference.diagnostics import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
+from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.programs import program
 

@@ -243,11 +243,11 @@ def member_force(
     return mean[-1], (noise.log_weight, noise.sd[:, -1])
 
 
-def bend_sd(force: PopulationForce) -> float:
-    """Return the sd of the bend that untested deformation may bring [N]."""
+def bend_law(force: PopulationForce) -> tuple[float, float]:
+    """Return mean and sd of the bend that untested deformation may bring [N]."""
     values, where = force.cause.values, force.conditions
     mean, sd = map(np.asarray, _bends(where.untested, values, where.deformation))
-    return float(np.sqrt(np.mean(sd**2) + np.var(mean)))
+    return float(np.mean(mean)), float(np.sqrt(np.mean(sd**2) + np.var(mean)))
 
 
 @program

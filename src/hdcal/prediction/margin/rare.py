@@ -25,6 +25,7 @@ from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
+from hdcal.inference.pareto import pareto_shape
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
@@ -39,7 +40,7 @@ from hdcal.prediction.engine.untested import (
     SITES,
     untested_of,
 )
-from hdcal.prediction.margin.sampling_laws import SamplingLaws, pareto_shape
+from hdcal.prediction.margin.sampling_laws import SamplingLaws
 from hdcal.programs import program
 
 # Points of a round; rounds whose points shape the laws, and rounds that count.

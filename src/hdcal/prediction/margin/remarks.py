@@ -15,7 +15,7 @@ from hdcal.prediction.engine.conditions import (
 )
 from hdcal.prediction.engine.loading_sense import LoadingSense
 from hdcal.prediction.engine.population import Population
-from hdcal.prediction.engine.population_force import PopulationForce, bend_sd
+from hdcal.prediction.engine.population_force import PopulationForce, bend_law
 from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
 from hdcal.prediction.margin.result import FAR, Level
@@ -108,8 +108,9 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
     if beyond > 0.0:
         yield (
             f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
-            f"the tested {low:g} … {high:g} mm. A bend that these rows need not show "
-            f"may bring {bend_sd(force):.2g} N (sd) there." + _FAR_OUT * (beyond > FAR)
+            f"the tested {low:g} … {high:g} mm. {_bend(force)}"
+            + _FAR_OUT
+            * (beyond > FAR)
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
@@ -118,6 +119,17 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
         yield f"Extrapolated: {word} was not tested; nothing widens the bounds for it."
     if not temperature_is_tested(records, temperature).all():
         yield _untested_temperature(force, temperature)
+
+
+def _bend(force: PopulationForce) -> str:
+    """Say what a bend may bring where nothing was tested, and what one that is seen."""
+    mean, sd = bend_law(force)
+    if abs(mean) < sd:
+        return f"A bend that these rows need not show may bring {sd:.2g} N (sd) there."
+    return (
+        f"The bend that these rows leave over goes on there: {mean:+.2g} N of the mean "
+        f"are its, and it may bring {sd:.2g} N (sd) more or less."
+    )
 
 
 def _untested_temperature(force: PopulationForce, temperature: np.ndarray) -> str:

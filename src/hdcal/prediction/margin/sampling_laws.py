@@ -12,8 +12,6 @@ from scipy.special import softmax
 _FREE, _SPREAD = 5.0, 1.3
 # Points per dimension that a shape rests on, at least.
 _RESTS_ON = 20.0
-# Weights that the shape of their tail is fitted to, over the root of their number.
-_FITTED = 3.5
 
 
 @dataclass(frozen=True)
@@ -97,18 +95,3 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
     if short(1.0) >= 0.0:
         return powered(1.0)
     return powered(scipy.optimize.root_scalar(short, bracket=(1e-12, 1.0)).root)
-
-
-def pareto_shape(weight: np.ndarray) -> float:
-    """Return the shape of the generalised Pareto law of the largest weights.
-
-    It is infinite where hardly any point has a weight.
-    """
-    # Late: a finished result is read without it.
-    from arviz_stats.base.array import array_stats
-
-    # The law is fitted to some three roots of the weights: none of them may be zero.
-    if np.count_nonzero(weight) < _FITTED * np.sqrt(len(weight)):
-        return np.inf
-    shape = array_stats.pareto_khat(weight[None], r_eff=1.0, tail="right")
-    return np.asarray(shape).item()
