@@ -13,6 +13,7 @@ NAMES = (
     "designs",
     "certificates",
     "fleets",
+    "causes",
 )
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from hdcal.data.reading import read_case
 from hdcal.fleets.misfit import misfit, misfit_words
+from hdcal.fleets.own_shapes import own_shapes
 
 GEARS, UP = 20, np.linspace(0.02, 0.5, 12)
 PATH = np.concatenate([UP, UP[-2::-1]])
@@ -29,7 +30,8 @@ def found(extra=0.0, *, correlation=0.0, seed=0, path=PATH, noise=0.3):
         "deformation_mm": (path + 0.0 * force).ravel(),
         "force_N": force.ravel(),
     }
-    return misfit(read_case(table), SLOPES, NOISE)
+    case = read_case(table)
+    return misfit(case, NOISE, own_shapes(case).clear)
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])

@@ -16,9 +16,9 @@ from hdcal.inference.checks import (
     sampling_checks,
 )
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
-from hdcal.inference.mixing import mixing
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
 from hdcal.inference.linearisation import linearise
+from hdcal.inference.mixing import mixing
 from hdcal.inference.problem import build_problem
 from hdcal.physics.registry import EFFECTS
 

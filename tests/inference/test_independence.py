@@ -14,8 +14,8 @@ from hdcal.data.resources import datasets_folder
 from hdcal.fleets.fleet_problem import fleet_problem
 from hdcal.fleets.readings import fleet_readings
 from hdcal.inference import independence, laplace
-from hdcal.inference.mixing import mixing
 from hdcal.inference.independence import sample_independently
+from hdcal.inference.mixing import mixing
 from hdcal.inference.sample import sample
 from hdcal.inference.sampled_problem import Sampled
 

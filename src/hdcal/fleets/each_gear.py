@@ -27,6 +27,7 @@ def each_gear(
     sums: MountingSums,
     draws: Mapping[str, np.ndarray],
     key: Key[Array, ""],
+    ratio: np.ndarray,
 ) -> dict[str, Any]:
     """Return what is known of each gear, as `Fleet` has it.
 
@@ -35,6 +36,7 @@ def each_gear(
         sums: of each mounting, as if one rig had read them all.
         draws: of the population by site, shape (d,).
         key: source of randomness.
+        ratio: of the noise of each gear beside its own shapes to that beside lines.
     """
     gears = len(problem.sums.lot)
     many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
@@ -51,14 +53,14 @@ def each_gear(
     return {
         "stiffness": stiffness,
         "apart": apart,
-        "noise_sd": noise_sd,
-        "own_noise_sd": _own_noise(problem, noise_sd),
+        "noise_sd": ratio * noise_sd,
+        "own_noise_sd": ratio * _own_noise(problem, noise_sd),
         "zero": np.bincount(sums.gear, zeros) / np.bincount(sums.gear),
         "distance": np.median(apart / chosen["specimen_sd"][:, None], axis=0),
         "off": off.mean(axis=0),
         "chances": {
             "stiffness": apart_by_chance,
-            "noise": noise_chance(problem),
+            "noise": noise_chance(problem, ratio),
             "zero": zero_chance(sums, chosen, stiffness, noise_sd),
         },
     }

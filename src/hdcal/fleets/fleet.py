@@ -49,7 +49,8 @@ class Fleet(Shown):
             (t, g) [N/mm as read].
         apart: of each gear from the centre of its lot, likewise, as a share of it.
         size_ratio: of each gear, by which its own sizes make it stiffer, shape (g,).
-        noise_sd: of each gear, shape (g,) [N].
+        noise_sd: of each gear, beside loop and bend where they are clear, shape (g,)
+            [N].
         own_noise_sd: likewise, by its own line and drawn towards no other gear.
         zero: of each gear in the mean of its mountings, shape (g,) [N].
         distance: of each gear from the centre in ordinary gears' sds, shape (g,).
@@ -222,9 +223,9 @@ def fleet(
     start = rough_values(problem, readings.sums)
     found = sample_population(problem, start, of_draws, progress=progress, **size)
     on_one_rig = readings.on_one_rig(found.values)
-    each = each_gear(problem, on_one_rig.sums, found.values, of_gears)
-    read = on_one_rig.case, ratio * np.median(each["stiffness"], axis=0)
-    shapes = own_shapes(*read)
+    shapes = own_shapes(on_one_rig.case)
+    about = problem, on_one_rig.sums, found.values
+    each = each_gear(*about, of_gears, shapes.noise_ratio)
     each["chances"]["shape"] = shapes.chance
     return Fleet(
         readings=readings,
@@ -239,7 +240,7 @@ def fleet(
         lots=groups(readings.case.lots)[0],
         operators=groups(readings.case.operators)[0],
         rigs=groups(readings.case.rigs)[0],
-        misfit=misfit(*read, each["noise_sd"]),
+        misfit=misfit(on_one_rig.case, each["noise_sd"], shapes.clear),
         force_tolerance=force_tolerance,
         checks=found.checks,
         settings={

@@ -10,6 +10,8 @@ from hdcal.fleets.notes import FEW
 from hdcal.report.words import estimate, number, percent
 
 _MOST_NAMED = 3
+# Stiffness of a gear over that of most that counts as none.
+_NO_RATIO = 1e-6
 
 
 def headline(
@@ -96,12 +98,28 @@ def _shaped(one: Mapping[str, Any], usual: Mapping[str, float]) -> str:
     what = {"loop_N": "a loop", "bend_N": "a bend"}[name]
     size, most = float(one[name]), usual[name]
     # As many digits of the others' as of its own: theirs may be next to nothing.
-    return f"has {what} of {size:.2g} N (most: {number(most, 10.0 * size)} N)"
+    return f"has {what} of {size:.2g} N (others: {number(most, 10.0 * size)} N)"
+
+
+def far_apart(percent_apart):
+    """Tell whether a gear is twice as stiff as most or more, or half as stiff or less.
+
+    Args:
+        percent_apart: from the centre [%].
+    """
+    return abs(np.log(np.maximum(1.0 + percent_apart / 100.0, _NO_RATIO))) >= np.log(
+        2.0
+    )
 
 
 def _softer(one: Mapping[str, Any], than: str) -> str:
     apart, low, high = (float(one[f"apart_{end}"]) for end in ("percent", "lo", "hi"))
     word = "softer" if apart < 0.0 else "stiffer"
+    if far_apart(apart):
+        ratio = max(1.0 + apart / 100.0, _NO_RATIO)
+        times = f"{max(ratio, 1.0 / ratio):.2f}".rstrip("0").rstrip(".")
+        times = times if len(times) < 5 else f"{max(ratio, 1.0 / ratio):.0f}"
+        return f"is {times} times {word}{than}, as with another unit"
     size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
     middle, least, most = (f"{end:.2g}" for end in size)
     sure = f"95 %: {least} … {most} %; probability {percent(one['probability_off'])}"

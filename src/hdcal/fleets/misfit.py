@@ -12,7 +12,7 @@ from hdcal.inference.serial_correlation import previous_rows
 from hdcal.report.answer import Real
 
 # Standard errors from which on something is said: of three tests in no fleet by chance.
-_CLEAR = 4.0
+CLEAR = 4.0
 # What is smaller is not worth saying: in noise sds, and as a correlation.
 _SMALL, _LITTLE = 0.2, 0.2
 # Correlation that is believed at most.
@@ -43,31 +43,34 @@ class Misfit:
         return float(np.sqrt((1.0 + self.correlation) / (1.0 - self.correlation)))
 
 
-def misfit(case: Case, stiffness: np.ndarray, noise_sd: np.ndarray) -> Misfit:
+def misfit(case: Case, noise_sd: np.ndarray, own: np.ndarray) -> Misfit:
     """Return what readings have beside straight lines with a zero for each mounting.
 
     Args:
         case: the readings.
-        stiffness: of each gear, shape (g,) [N/mm as read].
-        noise_sd: of each gear, shape (g,) [N].
+        noise_sd: of each gear beside its own shapes, shape (g,) [N].
+        own: sizes of a loop and a bend that are clearly a gear's own, NaN elsewhere,
+            shape (2, g) [N]: neighbours do not err alike for these.
     """
     records = case.records
     if not len(records.force):
         return Misfit(0.0, 0.0, 0.0)
     gear, sd = np.asarray(records.specimen), noise_sd[records.specimen]
-    error, shapes = beside_lines(records, stiffness)
-    sizes, clear, left = _fitted(shapes.T, error / sd, sd)
-    correlation = _correlation(left, previous_rows(records))
+    error, shapes = beside_lines(records)
+    sizes, clear = _fitted(shapes.T, error, sd)
+    left = error - np.sum(np.nan_to_num(own)[:, gear] * shapes, axis=0)
+    # What the other gears have in common is nobody's own.
+    common = shapes * np.isnan(own)[:, gear]
+    left -= _fitted(common.T, left, sd)[0] @ common
+    correlation = _correlation(left / sd, previous_rows(records))
     scatter = Misfit(correlation, 0.0, 0.0).widening
-    seen = np.abs(clear) > np.maximum(_CLEAR * scatter, _SMALL * np.sqrt(len(error)))
+    seen = np.abs(clear) > np.maximum(CLEAR * scatter, _SMALL * np.sqrt(len(error)))
     loop, bend = np.where(seen, sizes, 0.0)
     swing = float(np.nanmedian(swings(shapes[1], gear)))
     return Misfit(correlation, 2.0 * float(loop), swing * float(bend))
 
 
-def beside_lines(
-    records: Records, stiffness: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def beside_lines(records: Records) -> tuple[np.ndarray, np.ndarray]:
     """Return what lines leave of the forces [N], and the shapes of a loop and a bend.
 
     Of gears that are pulled it is that of the size of their force. Where the sizes of
@@ -76,7 +79,6 @@ def beside_lines(
 
     Args:
         records: the readings, shape (n,).
-        stiffness: of each gear, shape (g,) [N/mm as read].
 
     Returns:
         Errors, shape (n,), and shapes, (2, n).
@@ -86,8 +88,7 @@ def beside_lines(
     scaled = x / np.max(np.abs(x))
     shapes = side * np.asarray(records.sense), scaled * np.abs(scaled)
     shapes = [_beside_lines(records, each) for each in shapes]
-    error = _beside_lines(records, y - stiffness[records.specimen] * x)
-    return error, np.stack(shapes)
+    return _beside_lines(records, y), np.stack(shapes)
 
 
 def _beside_lines(records: Records, values: np.ndarray) -> np.ndarray:
@@ -103,7 +104,7 @@ def _within(run: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):
-    """Fit shapes to errors in sds: sizes [N], those in standard errors, what is left.
+    """Fit shapes to errors: sizes in the mean of all rows [N], and in standard errors.
 
     A shape that is none, or no other than those before it, has the size 0.
     """
@@ -112,13 +113,12 @@ def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):
     own = np.abs(np.diag(upper)) > _OTHER * length
     own &= length > _NOTHING * np.sqrt(len(error))
     sizes, clear = np.zeros((2, shapes.shape[1]))
-    shapes = shapes / sd[:, None]
     if own.any():
         some = shapes[:, own]
-        covariance = np.linalg.inv(some.T @ some)
-        sizes[own] = covariance @ (some.T @ error)
-        clear[own] = sizes[own] / np.sqrt(np.diag(covariance))
-    return sizes, clear, error - shapes @ sizes
+        fit = np.linalg.inv(some.T @ some) @ some.T
+        sizes[own] = fit @ error
+        clear[own] = sizes[own] / np.linalg.norm(fit * sd, axis=1)
+    return sizes, clear
 
 
 def swings(curve: np.ndarray, gear: np.ndarray) -> np.ndarray:
@@ -137,7 +137,7 @@ def _correlation(error: np.ndarray, before: np.ndarray) -> float:
         return 0.0
     tied = float(error[follows] @ error[before[follows]]) / pairs
     tied = min(tied * len(error) / square, _MOST_ALIKE)
-    return tied if tied > max(_LITTLE, _CLEAR / np.sqrt(pairs)) else 0.0
+    return tied if tied > max(_LITTLE, CLEAR / np.sqrt(pairs)) else 0.0
 
 
 def misfit_words(found: Misfit) -> Iterator[str]:

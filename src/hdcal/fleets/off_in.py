@@ -38,7 +38,7 @@ def called_off(chances: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     }
 
 
-def noise_chance(problem: PopulationProblem) -> np.ndarray:
+def noise_chance(problem: PopulationProblem, ratio: np.ndarray) -> np.ndarray:
     """Return the chance that an ordinary gear scatters as much, shape (g,).
 
     The log of the variance that ν degrees of freedom leave has a mean and a variance
@@ -46,11 +46,12 @@ def noise_chance(problem: PopulationProblem) -> np.ndarray:
 
     Args:
         problem: the gears.
+        ratio: of their noise beside what is no line's to that beside lines.
     """
     free = np.asarray(problem.sums.noise_free)
     told = np.flatnonzero(free > 0.0)
     half = 0.5 * free[told]
-    log_sd = np.asarray(problem.sums.log_noise_sd)[told]
+    log_sd = (np.asarray(problem.sums.log_noise_sd) + np.log(ratio))[told]
     log_sd = log_sd - 0.5 * (digamma(half) - np.log(half))
     found = np.ones(len(free))
     found[told] = chance_of(log_sd, log_sd, 0.25 * polygamma(1, half))

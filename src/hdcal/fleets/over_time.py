@@ -209,5 +209,7 @@ def _measured(found: Fleet):
     square = np.bincount(gears, sums.yy) - slope**2 * own_xx
     free = np.bincount(gears, sums.rows - 1.0) - 1.0
     with np.errstate(all="ignore"):
-        noise = 50.0 * np.log(square / free)
+        told = square / free > 0.0
+        # Beside loop and bend: of a change of shape it is no change of noise.
+        noise = np.where(told, 100.0 * np.log(found.own_noise_sd), np.nan)
         yield "noise", "percent", of_gear, labels, noise, 100.0 / np.sqrt(2.0 * free)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.fleets.misfit import beside_lines, swings
+from hdcal.fleets.misfit import CLEAR, beside_lines, swings
 from hdcal.fleets.off_in import chance_of
 
 # Square of a shape beside lines, in that of the gear with most of it, from which on a
@@ -24,45 +24,67 @@ class OwnShapes(NamedTuple):
         loop: of loading above unloading; NaN where no reading tells it [N].
         bend: of the middle of the curve under its ends; likewise [N].
         chance: that an ordinary gear is as far out in either.
+        clear: sizes of both, as `beside_lines` has them, where they are clearly there;
+            NaN elsewhere; shape (2, g) [N].
+        noise_ratio: of the noise beside what is clearly there to that beside lines.
     """
 
     loop: np.ndarray
     bend: np.ndarray
     chance: np.ndarray
+    clear: np.ndarray
+    noise_ratio: np.ndarray
 
 
-def own_shapes(case: Case, stiffness: np.ndarray) -> OwnShapes:
+def own_shapes(case: Case) -> OwnShapes:
     """Return loop and bend of each gear, held against those of the others.
 
     What all gears have is no gear's own.
 
     Args:
         case: the readings; of a gear without any nothing is told.
-        stiffness: of each gear, shape (g,) [N/mm as read].
     """
-    gears = len(stiffness)
+    gears = len(case.specimen_labels)
     if not len(case.records.force):
-        nothing = np.full(gears, np.nan)
-        return OwnShapes(nothing, nothing, np.ones(gears))
+        nothing, ones = np.full((2, gears), np.nan), np.ones(gears)
+        return OwnShapes(nothing[0], nothing[1], ones, nothing, ones)
     gear, run = np.asarray(case.records.specimen), np.asarray(case.records.run)
-    error, (way, curve) = beside_lines(case.records, stiffness)
+    error, (way, curve) = beside_lines(case.records)
     # Where loading and unloading differ in range, a bend is a loop in part.
     shared = np.nan_to_num(_slope(way, curve, gear, gears))
     beside = curve - shared[gear] * way
     bend = _slope(beside, error, gear, gears)
     loop = _slope(way, error, gear, gears) - shared * np.nan_to_num(bend)
-    left = error - np.nan_to_num(loop)[gear] * way - np.nan_to_num(bend)[gear] * curve
     mounted = np.unique(np.stack([gear, run]), axis=1)[0]
     free = np.bincount(gear, minlength=gears) - np.bincount(mounted, minlength=gears)
-    free = free - 1 - np.isfinite(loop) - np.isfinite(bend)
-    noise = _noise(np.bincount(gear, left**2, gears), free)
+
+    def left(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return squares that are left beside shapes, and degrees of freedom."""
+        own = np.nan_to_num(sizes)[:, gear]
+        rest = error - own[0] * way - own[1] * curve
+        used = 1 + np.isfinite(sizes).sum(axis=0)
+        return np.bincount(gear, rest**2, gears), free - used
+
+    sizes = np.stack([loop, bend])
+    noise = _noise(*left(sizes))
     of_way, of_bend = (noise / _square(shape, gear, gears) for shape in (way, beside))
     of_loop = of_way + shared**2 * np.where(np.isfinite(bend), of_bend, 0.0)
     chances = _chance(loop, of_loop), _chance(bend, of_bend)
     # One of two is as far out by chance twice as often.
     chance = np.minimum(2.0 * np.minimum(*chances), 1.0)
     swing = np.pad(swings(curve, gear), (0, gears - 1 - gear.max()))
-    return OwnShapes(2.0 * loop, swing * bend, chance)
+    clear = np.where(sizes**2 > CLEAR**2 * np.stack([of_loop, of_bend]), sizes, np.nan)
+    ratio = _noise_ratio(left(clear), left(np.full_like(sizes, np.nan)))
+    return OwnShapes(2.0 * loop, swing * bend, chance, clear, ratio)
+
+
+def _noise_ratio(beside, lines) -> np.ndarray:
+    """Return the ratio of two noise sds, each of squares and degrees of freedom."""
+    told = (beside[1] > 0) & (lines[0] > 0.0)
+    variances = [
+        np.where(told, s, 1.0) / np.where(told, f, 1) for s, f in (beside, lines)
+    ]
+    return np.sqrt(variances[0] / variances[1])
 
 
 def _square(shape: np.ndarray, gear: np.ndarray, gears: int) -> np.ndarray:

@@ -21,7 +21,7 @@ from hdcal.fleets.answer import (
 from hdcal.fleets.document import fleet_document
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.gauge import gauge
-from hdcal.fleets.headline import headline
+from hdcal.fleets.headline import far_apart, headline
 from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.fleets.next_force import CONTENTS, NextForce
 from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
@@ -186,6 +186,11 @@ def _rigs(found: Fleet) -> Iterator[RigAnswer]:
         yield RigAnswer(name, many, credible_interval(one))
 
 
+def _in_another_unit(found: Fleet) -> np.ndarray:
+    """Return which gears are so far off in stiffness that a unit may be wrong."""
+    return found.off_in["stiffness"] & far_apart(100.0 * np.median(found.apart, axis=0))
+
+
 def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
     parts = []
     # A softer gear by itself is as good a line as any: no diagnosis sees it.
@@ -198,7 +203,11 @@ def _next_step(found: Fleet, called: Sequence[str]) -> str | None:
             f"See what {odd[0]} has by itself: `hdcal diagnose` with the same data and "
             f"{alone}"
         )
-    if again := [name for name in called if name not in with_more]:
+    far = np.array(found.case.specimen_labels)[_in_another_unit(found)].tolist()
+    if far:
+        more = f" and {len(far) - 1} more" * (len(far) > 1)
+        parts.append(f"See in which units {far[0]}{more} was read: not in the others'")
+    if again := [name for name in called if name not in {*with_more, *far}]:
         more = f" and {len(again) - 1} more" * (len(again) > 1)
         parts.append(
             f"Mount {again[0]}{more} anew and measure again before you act on this"

@@ -110,7 +110,8 @@ def _expand(problem: Sampled, like: Position, flat):
         return gradient, (value, gradient)
 
     hessian, (value, gradient) = jax.jacfwd(slope, has_aux=True)(flat)
-    return value, gradient, hessian
+    # Far out rounding leaves its halves apart, with which a search may fail.
+    return value, gradient, 0.5 * (hessian + hessian.T)
 
 
 def _middle(site: dict[str, Any]):
