@@ -22,7 +22,7 @@ from hdcal.prediction.engine.mixture import Mixture, weighted_quantile
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.margin.gradients import Redesign, gradients
 from hdcal.prediction.margin.request import Criteria
-from hdcal.prediction.margin.variance_shares import variance_shares
+from hdcal.prediction.margin.variance_shares import sobol_indices, variance_shares
 
 WARM, CRITERIA = 40.0, Criteria(0.99, 0.95, None, None)
 QUANTILE = jax.jit(Mixture.quantile)
@@ -170,3 +170,21 @@ def test_a_single_source_has_all_of_it():
     """At the reference temperature the load hangs on the calibration alone."""
     (only,) = hdcal.margin(single(size=400), 0.4, quantity="load").shares
     assert (only.name, only.first, only.total) == ("calibration", 1.0, 1.0)
+
+
+def test_indices_are_those_of_ishigamis_function():
+    """Known in closed form; its third input acts through the first one only."""
+
+    def ishigami(points: np.ndarray) -> np.ndarray:
+        x, y, z = np.pi * (2.0 * points.T - 1.0)
+        return np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
+
+    a, b = 7.0, 0.1
+    alone = 0.5 * (1.0 + b * np.pi**4 / 5.0) ** 2, a**2 / 8.0, 0.0
+    both = 8.0 * b**2 * np.pi**8 / 225.0
+    total = np.array([alone[0] + both, alone[1], both])
+    whole = sum(alone) + both
+    for seed in range(4):
+        first, every = sobol_indices(ishigami, 3, 4096, seed)
+        np.testing.assert_allclose(first, np.array(alone) / whole, atol=0.01)
+        np.testing.assert_allclose(every, total / whole, atol=0.01)

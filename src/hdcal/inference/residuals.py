@@ -9,7 +9,7 @@ import numpy as np
 from hdcal.data.records import Records
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import moments
 from hdcal.inference.hypotheses import ORIGIN
 from hdcal.inference.linearisation import Linearisation, linearise
 from hdcal.inference.padding import pad_records
@@ -135,9 +135,9 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     priors = posterior.problem.priors_given(centre)
     table, pull = [near.members], [-near.place]
     for name, slope in near.slopes.items():
-        law = frozen(priors[name])
-        table.append(slope[:, None] * law.std())
-        pull.append(np.array([(law.mean() - centre[name]) / law.std()]))
+        mean, prior_sd = moments(priors[name])
+        table.append(slope[:, None] * prior_sd)
+        pull.append(np.array([(mean - centre[name]) / prior_sd]))
     below = np.concatenate(pull)
     shapes = shapes_of(records, posterior.case.gear.reference_temperature)
     return Whitened(

@@ -19,23 +19,25 @@ _LEAST, _SMALL = 0.01, 0.01
 
 @dataclass(frozen=True)
 class TMixture:
-    """Some parts with eight degrees of freedom each.
+    """Some parts with as many degrees of freedom each.
 
     Attributes:
         share: of each part, shape (k,).
         centre: shape (k, d).
         root: Cholesky factor of the scale matrix, shape (k, d, d).
+        freedom: degrees of it.
     """
 
     share: np.ndarray
     centre: np.ndarray
     root: np.ndarray
+    freedom: float = _FREEDOM
 
     def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
         """Return places, shape (count, d)."""
         part = rng.choice(len(self.share), count, p=self.share)
         normal = rng.standard_normal((count, self.centre.shape[1]))
-        tail = np.sqrt(_FREEDOM / rng.chisquare(_FREEDOM, count))
+        tail = np.sqrt(self.freedom / rng.chisquare(self.freedom, count))
         step = np.einsum("nij,nj->ni", self.root[part], normal)
         return self.centre[part] + tail[:, None] * step
 
@@ -54,11 +56,11 @@ class TMixture:
             away = solve_triangular(root, (place - centre).T, lower=True)
             square.append(np.sum(away**2, axis=0))
             volume.append(np.sum(np.log(np.diag(root))))
-        distance, half = np.stack(square, axis=1), 0.5 * (_FREEDOM + size)
-        constant = gammaln(half) - gammaln(0.5 * _FREEDOM)
-        constant -= 0.5 * size * np.log(np.pi * _FREEDOM)
+        distance, half = np.stack(square, axis=1), 0.5 * (self.freedom + size)
+        constant = gammaln(half) - gammaln(0.5 * self.freedom)
+        constant -= 0.5 * size * np.log(np.pi * self.freedom)
         log_part = np.log(self.share) + constant - np.array(volume)
-        return log_part - half * np.log1p(distance / _FREEDOM), distance
+        return log_part - half * np.log1p(distance / self.freedom), distance
 
 
 def first_mixture(size: int) -> TMixture:

@@ -8,7 +8,7 @@ bounds of `margin`, which agree with them where both exist.
 from collections.abc import Mapping
 
 import numpy as np
-import scipy
+from scipy import special
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
@@ -71,10 +71,8 @@ def k_factor(size: int, content: float = 0.99, confidence: float = 0.95) -> floa
     if findings:
         raise InputError(findings)
     root = np.sqrt(size)
-    return float(
-        scipy.stats.nct.ppf(confidence, size - 1, scipy.stats.norm.ppf(content) * root)
-        / root
-    )
+    shift = special.ndtri(content) * root
+    return float(special.nctdtrit(size - 1, shift, confidence) / root)
 
 
 def wilks_size(
@@ -104,7 +102,7 @@ def wilks_size(
 
     def short(size: int) -> bool:
         # Beyond the bound lie at most `sides − 1` of the sample.
-        chance = float(scipy.stats.binom.cdf(sides - 1, size, 1.0 - content))
+        chance = float(special.bdtr(sides - 1, size, 1.0 - content))
         return chance > 1.0 - confidence
 
     low, high = 0, 1

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import scipy
 from scipy.special import softmax
+
+from hdcal.inference.t_mixture import TMixture
 
 # Degrees of freedom of the laws, and how much wider than their shape they are.
 _FREE, _SPREAD = 5.0, 1.3
@@ -30,24 +31,20 @@ class SamplingLaws:
     def drawn(self, count: int, rng) -> tuple[np.ndarray, np.ndarray]:
         """Return points, half about each place, and the log density of their law.
 
+        The density is up to a factor.
+
         Args:
-            count: of the points, even.
+            count: of the points.
             rng: source of randomness.
         """
-        laws: list[Any] = [
-            scipy.stats.multivariate_t(centre, _SPREAD**2 * _wide(shape), df=_FREE)  # pyright: ignore
-            for centre, shape in self.places
-        ]
-        each = count // len(laws)
-        drawn = [
-            np.reshape(law.rvs(each, random_state=rng), (each, -1)) for law in laws
-        ]
+        centres, shapes = zip(*self.places, strict=True)
+        roots = [_SPREAD * np.linalg.cholesky(_wide(shape)) for shape in shapes]
+        even = np.full(len(centres), 1.0 / len(centres))
+        law = TMixture(even, np.stack(centres), np.stack(roots), _FREE)
         points = rng.normal(size=(count, len(self.counts)))
-        log_law = scipy.stats.norm.logpdf(points[:, ~self.counts]).sum(axis=1)
-        # What has an order of its own is spread evenly over both places.
-        points[:, self.counts] = rng.permutation(np.concatenate(drawn))
-        near = [np.atleast_1d(law.logpdf(points[:, self.counts])) for law in laws]
-        return points, log_law + np.logaddexp(*near)
+        log_law = -0.5 * np.sum(points[:, ~self.counts] ** 2, axis=1)
+        points[:, self.counts] = law.draw(count, rng)
+        return points, log_law + law.log_density(points[:, self.counts])
 
     def reshaped(
         self, points: np.ndarray, log_weights: Sequence[np.ndarray]

@@ -4,16 +4,16 @@ Sobol's shares assume independent inputs. Stiffness and zeros are tied together 
 data, and of K and E₀ only the product is known: all of these are one input, the draw.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy
 from scipy.special import ndtri
 
 from hdcal.prediction.engine.causes import Cause, Driver
+from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.population_force import (
@@ -100,12 +100,8 @@ def variance_shares(
     chances = np.cumsum([force.cause.probability for force in forces])
 
     def force_of(points: np.ndarray) -> np.ndarray:
-        blocks = np.split(points, points.shape[1] // _POINTS, axis=1)
-        return np.concatenate([one_block(block) for block in blocks])[None]
-
-    def one_block(block: np.ndarray) -> np.ndarray:
-        level = dict(zip(names, np.clip(block, 1e-9, 1.0 - 1e-9), strict=True))
-        cause = level.get("cause", np.zeros(block.shape[1]))
+        level = dict(zip(names, points.T, strict=True))
+        cause = level.get("cause", np.zeros(len(points)))
         model = np.searchsorted(chances[:-1], cause, side="right")
         each = [
             _forces_at(force, order, level)
@@ -113,13 +109,39 @@ def variance_shares(
         ]
         return np.stack(each)[model, np.arange(len(model))]
 
-    uniform = [scipy.stats.uniform() for _ in names]
-    index = scipy.stats.sobol_indices(func=force_of, n=_POINTS, dists=uniform, rng=seed)
-    first, total = np.ravel(index.first_order), np.ravel(index.total_order)
+    first, total = sobol_indices(force_of, len(names), _POINTS, seed)
     return tuple(
         VarianceShare(name, float(first[i]), float(total[i]), inputs[name])
         for i, name in enumerate(names)
     )
+
+
+def sobol_indices(
+    function: Callable[[np.ndarray], np.ndarray], inputs: int, count: int, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first-order and total indices of independent inputs, shape (k,) each.
+
+    Args:
+        function: of points between 0 and 1, shape (n, k), returns shape (n,).
+        inputs: their number, k.
+        count: points of each sample.
+        seed: of them.
+
+    Source:
+        Saltelli et al., Computer Physics Communications 181 (2010), 259.
+    """
+    # Of one set of points: those of two are even only each by itself.
+    ours, others = np.split(spread_evenly(count, 2 * inputs, seed), 2, axis=1)
+    own, other = function(ours), function(others)
+    both = np.stack([own, other])
+    middled, found = other - both.mean(), []
+    for place in range(inputs):
+        exchanged = ours.copy()
+        exchanged[:, place] = others[:, place]
+        change = function(exchanged) - own
+        found.append((np.mean(middled * change), 0.5 * np.mean(change**2)))
+    first, total = np.transpose(found) / both.var()
+    return first, total
 
 
 def _ranked(force: PopulationForce) -> np.ndarray:
