@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
-import scipy
+from scipy.special import betaincinv
 
 # An effect whose name other causes get more often than this is not named.
 _MOST_OTHERS = 0.15
@@ -35,8 +35,8 @@ class Tally:
     @property
     def at_most(self) -> float:
         """Share that is wrong at most, with a confidence of 95 % (Clopper, Pearson)."""
-        test = scipy.stats.binomtest(self.wrong, self.said, alternative="less")
-        return float(test.proportion_ci(_CONFIDENCE).high)
+        right = self.said - self.wrong
+        return float(betaincinv(self.wrong + 1, right, _CONFIDENCE)) if right else 1.0
 
 
 @dataclass(frozen=True)

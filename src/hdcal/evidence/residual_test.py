@@ -7,8 +7,8 @@ that the simulated band holds for all cells at once, whatever their correlation.
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from jaxtyping import Float, Int
+from scipy.linalg import solve_banded
 
 from hdcal.evidence.linear_rows import LinearRows, whiten
 from hdcal.evidence.prepare import PreparedCase
@@ -199,9 +199,9 @@ def pull_back(
     out = np.empty_like(cells)
     root = np.sqrt(1.0 - correlation**2)
     for start, end in zip(starts, ends, strict=True):
-        part = cells[start:end][::-1] * root
-        # Backwards y_i = √(1−ρ²) c_i + ρ y_(i+1); a run's first row is not scaled.
-        solved = scipy.signal.lfilter([1.0], [1.0, -correlation], part, axis=0)[::-1]
+        # y_i − ρ y_(i+1) = √(1−ρ²) c_i; a run's first row is not scaled.
+        bands = np.outer([-correlation, 1.0], np.ones(end - start))
+        solved = solve_banded((0, 1), bands, root * cells[start:end])
         first = cells[start]
         if end - start > 1:
             first = first + correlation * solved[1:2][0] / root
