@@ -102,7 +102,7 @@ def test_sizes_are_found(run: Path, here: Hdcal, tmp_path: Path):
     assert said["asked"]["limit_stress_MPa"] == 300.0
     assert said["design"]["force_N"]["kept"] == pytest.approx(70.0, rel=1e-5)
     assert 0.6 < said["design"]["sizes_mm"]["wall_thickness"] < 0.68
-    assert "keeps 70 N at 0.4 mm" in done.stdout
+    assert "needs at most 70 N at 0.4 mm" in done.stdout
     again = here("design", run, "--window", "0.3:0.5", "--out", out)
     assert again.returncode == 2 and "exists already" in again.stderr
 
@@ -263,12 +263,28 @@ def test_a_notebook_shows_what_a_design_comes_to():
     vary = {"wall_thickness_mm": (0.2, 0.8)}
     for found, words in (
         (wave_generator(gear, (0.2, 0.6), probability=0.5), "keeps the gear within"),
-        (inverse_design(gear, vary, 90.0, probability=0.5), "keeps 90 N at 0.4 mm"),
+        (inverse_design(gear, vary, 90.0, probability=0.5), "needs at most 90 N"),
         (study(gear, {"radius_mm": [38, 40]}), "2 designs, varying radius"),
     ):
         shown = found._repr_html_()
         assert "Prior only" in shown and words in shown
         assert "<html" not in shown
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_keeps_its_limits_as_tested_needs_no_change(
+    run: Path, here: Hdcal, tmp_path: Path
+):
+    done = here("design", run, "--limit-force", "300", "--vary", WALL, "--json")
+    assert done.returncode == 0, done.stderr
+    told = valid(done.stdout, InverseAnswer)
+    assert told["next_step"].startswith("No change is needed")
+    page = (tmp_path / "xb1-100-80-design" / "report.html").read_text("utf-8")
+    assert page.count("<td>40CrNiMoA</td>") == 1
+    strength = told["design"]["yield_MPa"]["median"]
+    shown = page.partition("limit stress [MPa]</dt><dd>")[2]
+    assert float(shown.partition(",")[0].partition(" ")[0]) == pytest.approx(strength)
+    assert "the yield strength" in shown.partition("</dd>")[0]
 
 
 def test_names_are_only_text(folders: dict[str, Path]):

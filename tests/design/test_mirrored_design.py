@@ -199,8 +199,9 @@ def test_the_figure_of_a_limit_that_is_pulled_shows_it(given):
     draws = given(known(SIZE))
     found = inverse_design(draws.gear, WALL, 60.0, deformation=-0.4, probability=0.9)
     told = inverse_report(found)
-    assert "keeps 60 N at -0.4 mm" in told.answer.answer[0]
+    assert "needs at most 60 N at -0.4 mm" in told.answer.answer[0]
     lines = {line.get_label(): line for line in told.figures()["design"].axes[0].lines}
     assert set(lines["limit"].get_ydata()) == {-60.0}
-    assert lines["chosen"].get_ydata()[0] == pytest.approx(-60.0, rel=1e-5)
+    chosen = lines["chosen, -60 N with that probability"]
+    assert chosen.get_ydata()[0] == pytest.approx(-60.0, rel=1e-5)
     assert np.all(np.asarray(lines["median and 95 % band"].get_ydata()) < 0.0)

@@ -51,7 +51,7 @@ def results():
         "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
         "InverseDesign": (
             hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
-            "keeps 90 N",
+            "needs at most 90 N",
         ),
         "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),

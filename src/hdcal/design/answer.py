@@ -231,3 +231,9 @@ class InverseAnswer(DesignAnswer):
     tested: CandidateAnswer
     candidates: tuple[CandidateAnswer, ...]
     elasticities: Mapping[str, float]
+
+    @property
+    def as_tested(self) -> bool:
+        """Whether the chosen design is the tested gear itself."""
+        own = self.design.material == self.tested.material
+        return own and self.design.change < 1e-9

@@ -71,7 +71,7 @@ def inverse_document(found: InverseAnswer, command: str = "") -> Document:
         *free,
         picture("profile", "Shape, moment and stress", _PROFILE),
         _candidates(found),
-        _asked(asdict(found.asked)),
+        _asked(asdict(found.asked) | _stress_limit(found)),
     ]
     words = [nearness(found), *inverse_details(found)]
     return design_document(found, "inverse geometry", words, sections, command)
@@ -166,9 +166,10 @@ def _with_span(interval: Interval) -> str:
 
 def _candidates(found: InverseAnswer) -> Section:
     names = list(found.asked.bounds)
-    listed = [("tested gear", found.tested)]
+    listed = [] if found.as_tested else [("tested gear", found.tested)]
+    chosen = "chosen, as tested" if found.as_tested else "chosen"
     listed += [
-        ("chosen" if one == found.design else "considered", one)
+        (chosen if one == found.design else "considered", one)
         for one in found.candidates
     ]
     numbers = [
@@ -201,6 +202,16 @@ def _candidate(one: CandidateAnswer, names: Sequence[str]) -> list[str]:
     ]
 
 
+def _stress_limit(found: InverseAnswer) -> dict[str, str]:
+    """Return what the stress was kept below where no limit was asked for."""
+    strength = found.design.yield_MPa
+    if found.asked.limit_stress_MPa is not None or strength is None:
+        return {}
+    middle, span = estimate(strength)
+    spread = f" ({span})" if strength.hi > strength.lo else ""
+    return {"limit_stress_MPa": f"{middle}{spread}, the yield strength"}
+
+
 def _asked(asked: Mapping[str, object]) -> Section:
     rows = [(_name(name), _value(value)) for name, value in asked.items()]
     return Section("What was asked", [Facts(rows)])
@@ -216,6 +227,8 @@ def _name(name: str) -> str:
 def _value(value) -> str:
     if value is None:
         return "–"
+    if isinstance(value, str):
+        return value
     if isinstance(value, Mapping):
         ranges = (f"{n.replace('_', ' ')} {_value(v)}" for n, v in value.items())
         return "; ".join(ranges) or "–"

@@ -148,7 +148,9 @@ def _along_one(axes: Axes, found: InverseDesign) -> None:
     sense = found.asked.sense
     limit, force = sense * found.asked.limit_force_N, sense * found.chosen.force
     axes.axhline(limit, color=RED, linewidth=0.9, label="limit")
-    axes.plot(found.chosen.sizes[name], force, "o", color=DARK, label="chosen")
+    # The limit is kept by this force, not by the median.
+    words = f"chosen, {force:.4g} N with that probability"
+    axes.plot(found.chosen.sizes[name], force, "o", color=DARK, label=words)
     axes.set_xlabel(f"{named(name)} [mm]")
     axes.set_ylabel("force [N]")
     axes.legend(loc="best")
@@ -165,7 +167,7 @@ def _over_two(figure: Figure, axes: Axes, found: InverseDesign) -> None:
     table = kept.reshape(len(y), len(x))
     drawn = axes.contourf(x, y, table, 20, cmap="cividis")
     figure.colorbar(
-        drawn, ax=axes, label=f"force kept with {found.asked.probability:g} [N]"
+        drawn, ax=axes, label=f"force not exceeded with {found.asked.probability:g} [N]"
     )
     limit = found.asked.sense * found.asked.limit_force_N
     axes.contour(x, y, table, [limit], colors=RED, linewidths=1.6)

@@ -41,6 +41,8 @@ def next_step(found: DesignAnswer) -> str | None:
             f"Set the free end of a spring of {number(found.spring.rate_N_per_mm)} "
             f"N/mm {_free_end(found)}."
         )
+    if isinstance(found, InverseAnswer) and found.as_tested:
+        return "No change is needed: the tested gear keeps the limits as it is."
     if isinstance(found, InverseAnswer):
         return "Make one such gear and test it: K is carried over to its sizes."
     return None
@@ -127,14 +129,16 @@ def _kept(found: InverseAnswer) -> str:
     )
     what = " with ".join(filter(None, (best.material, sizes)))
     return (
-        f"{what} keeps {asked.limit_force_N:g} N at {asked.deformation_mm:g} mm "
-        f"and {_warmth(asked.temperature_C)} with probability {_chance(best)} "
-        f"(required {asked.probability:g})."
+        f"{what} needs at most {asked.limit_force_N:g} N at "
+        f"{asked.deformation_mm:g} mm and {_warmth(asked.temperature_C)} with "
+        f"probability {_chance(best)} (required {asked.probability:g})."
     )
 
 
 def nearness(found: InverseAnswer) -> str:
     """Return what the sizes were chosen by."""
+    if found.as_tested:
+        return f"These are the sizes of {_own(found)}."
     return (
         "Of all that keep the limits its sizes are the nearest to those of "
         f"{_own(found)}."
@@ -145,11 +149,17 @@ def inverse_details(found: InverseAnswer) -> Iterator[str]:
     """Yield force, stress and slopes of the chosen design."""
     asked, best, tested = found.asked, found.design, found.tested
     middle, span = estimate(best.force_N)
-    yield (
+    most = number(best.force_N.kept, best.force_N.hi - best.force_N.lo)
+    words = (
         f"Its force is {middle} N ({percent(found.interval)} {_kind(found)} {span} "
-        f"N). {_own(found).capitalize()} takes {estimate(tested.force_N)[0]} N and "
-        f"keeps the limit with probability {_share(tested.probability)}."
+        f"N); with probability {asked.probability:g} it does not go beyond {most} N."
     )
+    if not found.as_tested:
+        words += (
+            f" {_own(found).capitalize()} needs {estimate(tested.force_N)[0]} N and "
+            f"keeps the limit with probability {_share(tested.probability)}."
+        )
+    yield words
     yield _stress(best, f"At {asked.deformation_mm:g} mm")
     if asked.limit_stress_MPa is not None:
         yield f"The stress was kept below {asked.limit_stress_MPa:g} MPa."
