@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from verdicts import KINDS, named
 
+from hdcal.diagnosis.answer import Refit
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.overview import overview_document, verdicts_answer
 from hdcal.diagnosis.summary import verdict_answer
@@ -29,6 +30,15 @@ def test_k_is_said_with_what_it_is_fitted_beside():
     assert "It is fitted beside hysteresis; a calibration with other effects" in words
     nothing = page(KINDS["none"]())
     assert "It is fitted beside no effect" in nothing
+    found = verdict_answer(named())
+    several = [Refit("hysteresis", 0.8, "a.nc"), Refit("none", 0.2, "b.nc")]
+    images = {name: b"" for name in ("where", "which", "shrink")}
+    for refits, whose in (
+        (several, "the average over the 2 models under “The corrected model”"),
+        (several[:1], "that of the model with hysteresis; a calibration with other"),
+    ):
+        shown = verdict_document(replace(found, refits=tuple(refits)), named().case)
+        assert f"It is {whose}" in html_page(shown, images)
 
 
 def test_where_nothing_is_suspected_no_run_is_proposed():
@@ -61,8 +71,8 @@ def test_an_effect_alone_is_told_from_one_with_its_pairs():
 def test_without_a_run_the_true_reason_stands():
     words = page(replace(named(), next_test=(), no_run="fewer than two are left"))
     assert "No run is proposed: fewer than two are left." in words
-    assert "left out of this ranking" not in words
-    assert "left out of this ranking" in page(named())
+    assert "predicts nothing and is left out" not in words
+    assert "predicts nothing and is left out" in page(named())
 
 
 def test_what_is_not_seen_has_a_dash_for_its_size():

@@ -229,7 +229,9 @@ def _specimens(found: CalibrationAnswer) -> Iterator[Section]:
 
 
 def _bands(found: CalibrationAnswer) -> Section:
-    gap = "; medium band: the same with the leftover discrepancy" * found.with_gap
+    gap = (
+        "; middle band: the same with the leftover discrepancy" * found.with_gap
+    )
     return Section(
         "Data and bands",
         [
@@ -237,8 +239,8 @@ def _bands(found: CalibrationAnswer) -> Section:
                 "calibration",
                 "Measured force over deformation with the bands of the calibrated "
                 "model",
-                f"Dark band: where the force model lies with 95 % probability{gap}. "
-                "Light band: where one new reading lies with 95 % probability. "
+                f"Inner band: where the force model lies with 95 % probability{gap}. "
+                "Outer band: where one new reading lies with 95 % probability. "
                 "Hatched and dotted: outside what was tested. The numbers are in "
                 "bands.csv.",
             )

@@ -22,7 +22,11 @@ from hdcal.report.document import (
     Text,
 )
 from hdcal.report.parameters import measured, parameter_estimates
-from hdcal.report.posterior_sections import driver_tag, parameter_table
+from hdcal.report.posterior_sections import (
+    PARAMETER_NOTE,
+    driver_tag,
+    parameter_table,
+)
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import (
     estimate,
@@ -32,6 +36,7 @@ from hdcal.report.words import (
     percent,
 )
 
+_CORRECTED = "The corrected model"
 _FAILED = (
     "The diagnosis did not pass its checks, so it gives no answer, and every number "
     "and figure on this page may be wrong."
@@ -104,8 +109,10 @@ def _next_runs(found: VerdictAnswer) -> Section:
     ]
     columns = ["run", "tells apart", "information [nat]", "cost"]
     note = (
-        "0.7 nat is what an answer of yes or no tells. “Something outside the library” "
-        "predicts nothing and is left out of this ranking."
+        "What tells most for its effort comes first. Tells apart: the two of the "
+        "likeliest hypotheses that the run parts best, among them such as are too "
+        "improbable for the answer. 0.7 nat is what an answer of yes or no tells. "
+        "“Something outside the library” predicts nothing and is left out."
     )
     table = Table(columns, rows, frozenset({"information [nat]"}))
     return Section(heading, [table, Text(note, soft=True)], brief=True)
@@ -118,8 +125,8 @@ def _budget(found: VerdictAnswer) -> Iterator[Section]:
     middle, span = estimate(budget.K)
     words = (
         f"K by the {budget.formula} formula, at the prior's mean modulus, is {middle}, "
-        f"95 % interval {span}. It is fitted beside {_fitted_beside(found)}; a "
-        f"calibration with other effects, or with none, gives another K. {budget.note}"
+        f"95 % interval {span}. {_whose(found)}; a calibration with other effects, or "
+        f"with none, gives another K. {budget.note}"
     )
     rows = [
         [
@@ -137,14 +144,22 @@ def _budget(found: VerdictAnswer) -> Iterator[Section]:
     yield Section("Why K is not 1", [Text(words), *table])
 
 
-def _fitted_beside(found: VerdictAnswer) -> str:
-    """Say which effects were in the model when K was fitted."""
+def _whose(found: VerdictAnswer) -> str:
+    """Say which effects were in the model, or the models, of which K is."""
+    if len(found.refits) > 1:
+        return (
+            f"It is the average over the {len(found.refits)} models under "
+            f"“{_CORRECTED}”, each weighed by its probability"
+        )
+    if found.refits:
+        return f"It is that of the model with {hypothesis(found.refits[0].hypothesis)}"
     names = found.which.named
-    return " and ".join(map(label, names)) if names else "no effect"
+    beside = " and ".join(map(label, names)) if names else "no effect"
+    return f"It is fitted beside {beside}"
 
 
 def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Section:
-    heading = "The corrected model"
+    heading = _CORRECTED
     if refit is None:
         why = ": the diagnosis was quick" if found.quick else ""
         return Section(heading, [Text(f"None was sampled{why}.")])
@@ -152,17 +167,16 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
     bad = "" if posterior.usable else " This fit failed its checks; do not use it."
     words = f"Calibrated again with {hypothesis(name)}.{bad} {_kept(found)}"
     caption = (
-        "Dark band: where the corrected model lies with 95 % probability. Light band: "
+        "Inner band: where the corrected model lies with 95 % probability. Outer band: "
         "where one new reading lies with 95 % probability. Hatched and dotted: outside "
         "what was tested."
     )
     shows = "Measured force over deformation with the bands of the corrected model"
-    note = "Intervals hold 95 % of the posterior, with equal tails."
     blocks = [
         Text(words),
         Picture("bands", shows, caption),
         parameter_table(measured(parameter_estimates(posterior), posterior.theory)),
-        Text(note, soft=True),
+        PARAMETER_NOTE,
     ]
     return Section(heading, blocks)
 

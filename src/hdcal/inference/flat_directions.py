@@ -110,6 +110,9 @@ def _inseparable(seen: dict[str, np.ndarray]) -> list[list[str]]:
 
 def _sentence(names: list[str]) -> str:
     if set(names) == {"K", "E0"}:
-        return "K and E0 cannot be told apart by this data; their product can"
+        return (
+            "K and E0 cannot be told apart by this data; their product can, and with "
+            "the prior of E0 that tells K"
+        )
     listed = ", ".join(names[:-1]) + " and " + names[-1]
     return f"{listed} cannot be told apart by this data; one combination of them can"

@@ -156,7 +156,7 @@ def _record(found: DynamicCalibrationAnswer) -> Section:
     picture = Picture(
         "motion",
         "Measured deformation over time with the bands of the calibrated model",
-        "Dark band: where the model lies with 95 % probability. Light band: where one "
+        "Inner band: where the model lies with 95 % probability. Outer band: where one "
         "new reading lies with 95 % probability. The numbers are in motion.csv.",
         tall=True,
     )

@@ -4,10 +4,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from hdcal.inference.checks import Check
+from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import Picture, Section, Table, Tag, Text, Tone
 from hdcal.report.parameters import ParameterEstimate
-from hdcal.report.words import estimate, label, prior_words, unit
+from hdcal.report.words import estimate, label, percent, prior_words, unit
 
 _OUTCOMES: Mapping[str, Tone] = {
     "passed": "good",
@@ -16,6 +17,13 @@ _OUTCOMES: Mapping[str, Tone] = {
     "failed": "bad",
 }
 _DRIVERS: Mapping[str, Tone] = {"data": "good", "prior": "caution"}
+PARAMETER_NOTE = Text(
+    "Intervals hold 95 % of the posterior, with equal tails. Driven by data: at least "
+    f"{percent(MIN_CONTRACTION)} of the prior's variance are gone, or "
+    f"{percent(CLEAR_CONTRACTION)} where power scaling finds the data weak and the "
+    "prior not.",
+    soft=True,
+)
 _PRIORS = Picture(
     "priors",
     "Posterior and prior density of every parameter",
@@ -35,8 +43,8 @@ def parameter_section(
     found: Mapping[str, ParameterEstimate], *, brief: bool = True
 ) -> Section:
     """Return the estimates with their figure, which is called priors."""
-    note = Text("Intervals hold 95 % of the posterior, with equal tails.", soft=True)
-    return Section("Parameters", [parameter_table(found), note, _PRIORS], brief)
+    blocks = [parameter_table(found), PARAMETER_NOTE, _PRIORS]
+    return Section("Parameters", blocks, brief)
 
 
 def parameter_table(found: Mapping[str, ParameterEstimate]) -> Table:
