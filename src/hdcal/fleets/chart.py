@@ -32,4 +32,5 @@ def fleet_chart(found: Fleet) -> Chart:
     whose = "at one size" if found.at_one_size else "as read"
     axis = "gears by their stiffness", f"stiffness {whose} [N/mm]"
     names = [found.case.specimen_labels[gear] for gear in order]
-    return Chart(*axis, [*curves, *points], [(0, 1, 0.25)], names=names)
+    bands, marked = [(0, 1, 0.25)], (np.flatnonzero(off) + 1).tolist()
+    return Chart(*axis, [*curves, *points], bands, names=names, marked=marked)

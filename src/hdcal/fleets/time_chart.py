@@ -47,7 +47,7 @@ def _control(series: TimeSeries) -> Chart:
         if rows.any()
     ]
     axis = _axis(series), _TITLES[series.what]
-    return Chart(*axis, [*lines, *points], height=260, names=[*_names(series)])
+    return _chart(*axis, [*lines, *points], series)
 
 
 def _sums(series: TimeSeries) -> Chart:
@@ -69,13 +69,18 @@ def _sums(series: TimeSeries) -> Chart:
         )
     ]
     axis = _axis(series), "sums [sd]"
-    return Chart(*axis, lines, height=260, names=[*_names(series)])
+    return _chart(*axis, lines, series)
+
+
+def _chart(x: str, y: str, curves: list[Series], series: TimeSeries) -> Chart:
+    marked = (np.flatnonzero(series.apart) + 1).tolist()
+    return Chart(x, y, curves, height=260, names=[*_names(series)], marked=marked)
 
 
 def _axis(series: TimeSeries) -> str:
     # Charts of one axis are zoomed together: those of gears, not those of days.
-    also = ", each day" * (series.what == "zero")
-    return f"date and gear{also}, in the order of measurement"
+    how = "day by day" if series.what == "zero" else "in order of measurement"
+    return f"date and gear, {how}"
 
 
 def _place(series: TimeSeries) -> np.ndarray:

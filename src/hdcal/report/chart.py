@@ -52,6 +52,8 @@ class Chart:
             lies between them.
         height: in pixels.
         names: what stands at 1, 2, … of the axis, in place of the numbers.
+        marked: places whose names stand there also where not all of them have room.
+        limits: least and largest value that y can have; None where there is none.
     """
 
     x: str
@@ -60,6 +62,8 @@ class Chart:
     bands: Sequence[tuple[int, int, float]] = ()
     height: int = 380
     names: Sequence[str] = ()
+    marked: Sequence[int] = ()
+    limits: tuple[float | None, float | None] = (None, None)
 
     def plain(self) -> dict:
         """Return it as the page's script takes it: all series over the same places."""
@@ -83,6 +87,8 @@ class Chart:
             "y": self.y,
             "height": self.height,
             "names": [*self.names],
+            "marked": [*self.marked],
+            "limits": [*self.limits],
             "bands": [list(band) for band in self.bands],
             "series": [
                 {n: v for n, v in vars(each).items() if n not in ("x", "y")}

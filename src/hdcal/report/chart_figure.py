@@ -10,6 +10,8 @@ _INK = "#222222"
 _MOST_NAMED, _LONGEST = 8, 40
 # More names, and longer ones, leave an axis no room.
 _MOST_PLACES, _LONGEST_PLACE = 60, 16
+# Letters that stand beside each other below an axis.
+_LEVEL = 60
 
 
 def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
@@ -33,13 +35,29 @@ def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
             line = ":" if series.dashed else "-"
             axes.plot(series.x, series.y, line, color=colour, label=label)
     axes.set_xlabel(chart.x)
-    if 0 < len(chart.names) <= _MOST_PLACES:
-        names = [plain(name, _LONGEST_PLACE) for name in chart.names]
-        axes.set_xticks(range(1, len(names) + 1), names, rotation=90, fontsize=7)
+    if chart.names:
+        _name_places(chart, axes)
     axes.set_ylabel(chart.y)
+    least, most = chart.limits
+    bottom, top = axes.get_ylim()
+    axes.set_ylim(
+        bottom if least is None else max(bottom, least),
+        top if most is None else min(top, most),
+    )
     if len(axes.get_legend_handles_labels()[1]) <= _MOST_NAMED:
         axes.legend(fontsize="small")
     return axes
+
+
+def _name_places(chart: Chart, axes: Axes) -> None:
+    """Name the places of an axis: all of them, or those that are marked."""
+    every = range(1, len(chart.names) + 1)
+    places = [*(every if len(every) <= _MOST_PLACES else chart.marked)][:_MOST_PLACES]
+    names = [plain(chart.names[place - 1], _LONGEST_PLACE) for place in places]
+    level = len(names) * max(map(len, names), default=0) <= _LEVEL
+    look = {} if level else {"rotation": 90, "fontsize": 7}
+    if names:
+        axes.set_xticks(places, names, **look)
 
 
 def axes_or_new(axes: Axes | None) -> Axes:

@@ -18,4 +18,5 @@ def causes_chart(found: FleetCauses) -> Chart:
     points = Series("median [%]", place, middle[order], COLOURS[1], points=True)
     names = [label(found.causes[k]) for k in order]
     axis = "causes", "share of gears to come [%]"
-    return Chart(*axis, [*curves, points], [(0, 1, 0.25)], names=names)
+    bands, limits = [(0, 1, 0.25)], (0.0, 100.0)
+    return Chart(*axis, [*curves, points], bands, names=names, limits=limits)

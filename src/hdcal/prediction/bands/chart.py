@@ -63,7 +63,7 @@ def _middle(x, middle, tested, named: str, colour: str) -> Iterator[Series]:
     """Yield the median, where it was tested and where not."""
     inside = np.asarray(tested, dtype=bool)
     for words, rows, dashed in (
-        (f"force model{named} [N]", inside, False),
+        (f"median of the model{named} [N]", inside, False),
         (f"not tested{named} [N]", beyond(inside), True),
     ):
         if rows.any():

@@ -82,14 +82,16 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
         axes.plot(span.median, place, "o", color="white", markersize=4.5)
     ends = [level.lower_bound_N, level.upper_bound_N]
     axes.plot(ends, [2, 2], color=DARK, linewidth=1.2)
-    for end, mark in zip(ends, "<>", strict=True):
+    # Away from each other: bounds may be near.
+    for end, mark, side in zip(ends, "<>", ("right", "left"), strict=True):
         axes.plot(end, 2, mark, color=DARK, markersize=7)
-        note(axes, f"{end:.1f} N", (end, 2), (0, -15), ha="center")
+        shift = -3 if side == "right" else 3
+        note(axes, f"{end:.1f} N", (end, 2), (shift, -15), ha=side)
     words = [row[0] for row in rows] + [f"{bound_name(found)} bounds,\none-sided each"]
     name_rows(axes, words)
     axes.set_ylim(2.75, -0.6)
     axes.set_xlabel("force [N]")
-    axes.margins(x=0.1)
+    axes.margins(x=0.15)
     if found.limit_force_N is not None:
         sense, words = found.loading_sense, f"capacity {found.limit_force_N:g} N"
         limit = sense * found.limit_force_N

@@ -54,12 +54,59 @@ function touch(figure) {
     return chart.names[Math.round(value) - 1] ?? "";
   }
 
+  // An axis of names: level where all of them have room, else upright and some left out,
+  // but none of those that are marked.
+  function named(chart) {
+    const longest = Math.min(26, Math.max(...chart.names.map(name => name.length)));
+    const wide = 7 * longest + 12;
+    const isLevel = plot => wide * chart.names.length < plot.width - 80;
+    return {
+      size: plot => isLevel(plot) ? 44 : 40 + 6 * longest,
+      rotate: plot => isLevel(plot) ? 0 : -90,
+      space: plot => isLevel(plot) ? wide : 16,
+      incrs: [1, 2, 5].flatMap(
+        n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
+      splits: (_, axis, low, high, step) => {
+        const kept = chart.marked.filter(at => low <= at && at <= high);
+        const others = [];
+        for (let at = step * Math.ceil(low / step); at <= high; at += step)
+          if (kept.every(one => Math.abs(one - at) >= step)) others.push(at);
+        return [...kept, ...others].sort((a, b) => a - b);
+      },
+      values: (_, places) => places.map(place => placed(chart, place).slice(0, 26)),
+    };
+  }
+
+  // What y spans, with some room but not beyond where it can be.
+  function spanned(chart, low, high) {
+    const [least, most] = uPlot.rangeNum(low ?? 0, high ?? 1, 0.1, true);
+    const [floor, roof] = chart.limits;
+    return [floor == null ? least : Math.max(least, floor),
+      roof == null ? most : Math.min(most, roof)];
+  }
+
   const isEdge = each => !each.points && each.width === 0;
 
-  // Bands are paler than lines and points, dashed lines hollow.
-  function marker(each) {
+  // Opacity as two digits behind a colour.
+  const hex = share => Math.round(255 * share).toString(16).padStart(2, "0");
+
+  // How strong each band looks, by the place of its upper end: a band lies on the paler
+  // ones that were drawn before it.
+  function strengths(chart) {
+    let clear = 1, before = 0;
+    return Object.fromEntries(chart.bands.map(([high, low, strength]) => {
+      clear = (strength > before ? clear : 1) * (1 - strength);
+      before = strength;
+      return [high, 1 - clear];
+    }));
+  }
+
+  // Bands are as pale as they are drawn, dashed lines hollow.
+  function marker(chart, k) {
+    const each = chart.series[k], strength = strengths(chart)[k];
     if (each.dashed) return "transparent";
-    return each.colour && isEdge(each) ? each.colour + "55" : each.colour || ink("--ink").trim();
+    return each.colour && isEdge(each) && strength
+      ? each.colour + hex(strength) : each.colour || ink("--ink").trim();
   }
 
   // The lower end of each band by its upper one, of those without lines.
@@ -87,22 +134,18 @@ function touch(figure) {
       cursor: {sync: {key: syncs[chart.x].key, scales: ["x", null]}, drag: {x: true, y: false}},
       scales: {x: {time: false, range: (_, low, high) =>
         low === chart.data[0][0] && high === chart.data[0].at(-1)
-          ? [ends.min - margin, ends.max + margin] : [low, high]}},
+          ? [ends.min - margin, ends.max + margin] : [low, high]},
+        y: {range: (_, low, high) => spanned(chart, low, high)}},
       legend: {markers: {
         width: (_, k) => k && chart.series[k - 1].dashed ? 2 : 0,
         dash: () => "dashed",
         stroke: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
-        fill: (_, k) => k ? marker(chart.series[k - 1]) : "transparent",
+        fill: (_, k) => k ? marker(chart, k - 1) : "transparent",
       }},
       axes: [chart.x, chart.y].map(label => ({
         label: label, stroke: text, grid: {stroke: line, width: 1},
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
-        ...(label === chart.x && chart.names.length ? {
-          size: 40 + 6 * Math.min(26, Math.max(...chart.names.map(name => name.length))),
-          rotate: -90, space: 16, incrs: [1, 2, 5].flatMap(
-            n => [0, 1, 2, 3, 4].map(tens => n * 10 ** tens)).sort((a, b) => a - b),
-          values: (_, places) => places.map(place => placed(chart, place).slice(0, 26)),
-        } : {}),
+        ...(label === chart.x && chart.names.length ? named(chart) : {}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({
@@ -116,8 +159,7 @@ function touch(figure) {
         }))),
       bands: chart.bands.map(([high, low, strength]) => ({
         series: [high + 1, low + 1],
-        fill: chart.series[high].colour +
-          Math.round(255 * strength).toString(16).padStart(2, "0"),
+        fill: chart.series[high].colour + hex(strength),
       })),
       hooks: {ready: [moving]},
     }, chart.data, cells[which]); });
