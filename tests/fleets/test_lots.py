@@ -60,7 +60,7 @@ def test_a_gear_that_is_off_is_off_from_its_lot():
     lots = replace(found, readings=readings, **told)
     said = fleet_answer(lots).headline
     # 180 of a lot of 220 N/mm.
-    assert "D is 18 % softer than its lot" in said
+    assert "D is 18.14 % softer than its lot" in said
     assert gear_columns(lots)["lot"].tolist() == ["low", "low", "high", "high"]
 
 

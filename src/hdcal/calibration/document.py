@@ -229,9 +229,7 @@ def _specimens(found: CalibrationAnswer) -> Iterator[Section]:
 
 
 def _bands(found: CalibrationAnswer) -> Section:
-    gap = (
-        "; middle band: the same with the leftover discrepancy" * found.with_gap
-    )
+    gap = "; middle band: the same with the leftover discrepancy" * found.with_gap
     return Section(
         "Data and bands",
         [

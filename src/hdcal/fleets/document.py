@@ -158,12 +158,16 @@ def _gear(columns: Mapping[str, np.ndarray], row: int) -> list[str | Tag]:
         *([str(one["lot"])] if "lot" in one else []),
         number(one["stiffness_N_per_mm"], width),
         f"{number(low, width)} … {number(high, width)}",
-        f"{one['apart_percent']:+.2g}",
+        _signed(one["apart_percent"], 10.0 * (one["apart_hi"] - one["apart_lo"])),
         percent(one["probability_off"]),
         f"{one['distance_sd']:+.1f}",
-        f"{one['noise_sd_N']:.2g}",
+        number(one["noise_sd_N"], 10.0 * one["noise_sd_N"]),
         str(one["rows"]),
     ]
+
+
+def _signed(value: float, width: float) -> str:
+    return ("+" if value > 0.0 else "") + number(value, width)
 
 
 def _scatter(answer: FleetAnswer) -> Section:

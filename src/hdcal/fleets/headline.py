@@ -121,6 +121,7 @@ def _softer(one: Mapping[str, Any], than: str) -> str:
         times = times if len(times) < 5 else f"{max(ratio, 1.0 / ratio):.0f}"
         return f"is {times} times {word}{than}, as with another unit"
     size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
-    middle, least, most = (f"{end:.2g}" for end in size)
+    # Two digits of the interval's width.
+    middle, least, most = (number(end, 10.0 * (high - low)) for end in size)
     sure = f"95 %: {least} … {most} %; probability {percent(one['probability_off'])}"
     return f"is {middle} % {word}{than} ({sure})"

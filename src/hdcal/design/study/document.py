@@ -38,10 +38,11 @@ def study_words(found: StudyAnswer) -> list[str]:
 
 def _span(found: StudyAnswer) -> str:
     force = list(map(float, found.columns["force_median_N"]))
+    least, most = min(force), max(force)
     varied = " and ".join(map(named, found.varied)) or "nothing"
     return (
         f"{len(force)} designs, varying {varied}: median force "
-        f"{number(min(force))} … {number(max(force))} N."
+        f"{number(least, most - least)} … {number(most, most - least)} N."
     )
 
 
@@ -57,18 +58,15 @@ def study_document(found: StudyAnswer, command: str = "") -> Document:
 
 def _designs(found: StudyAnswer) -> list[Section]:
     """Return the designs in a table; of many, only the first are brief."""
-    shown = [name for name in HEADINGS if name in found.columns]
+    shown, same = _columns(found)
     numbers = [HEADINGS[name] for name in shown if name != "material"]
     numbers += ["force [N]", "band [N]", "stress [MPa]"]
-    varied = found.varied or ("deformation_mm",)
-    spare = {HEADINGS[name] for name in shown if name not in varied}
+    titles = ["material"] * ("material" in shown) + numbers
     count = len(found.columns["material"])
     rows = [_row(found, shown, row) for row in range(min(count, _MOST_ROWS))]
 
     def table(first: int, last: int) -> Table:
-        columns, part = ["material", *numbers], rows[first:last]
-        silent = frozenset(spare | {"stress [MPa]"})
-        return Table(columns, part, frozenset(numbers), spare=silent)
+        return Table(titles, rows[first:last], frozenset(numbers))
 
     def cut(at: int) -> list[Text]:
         words = f"The first {at} of {count}; all are in study.csv."
@@ -76,7 +74,7 @@ def _designs(found: StudyAnswer) -> list[Section]:
 
     words = f"Band: {band(found)}. Stress: hoop bending under the load, median."
     note = Text(words, soft=True)
-    first = [table(0, _FIRST_ROWS), note, *cut(_FIRST_ROWS)]
+    first = [*same, table(0, _FIRST_ROWS), note, *cut(_FIRST_ROWS)]
     sections = [Section("Designs", first, brief=True)]
     if count > _FIRST_ROWS:
         further = [table(_FIRST_ROWS, _MOST_ROWS), *cut(_MOST_ROWS)]
@@ -84,13 +82,30 @@ def _designs(found: StudyAnswer) -> list[Section]:
     return sections
 
 
+def _columns(found: StudyAnswer) -> tuple[list[str], list[Text]]:
+    """Return the columns of the table, and above it what is the same in all rows."""
+    given = [name for name in HEADINGS if name in found.columns]
+    varied = found.varied or ("deformation_mm",)
+    shown = [n for n in given if n in varied or len({*found.columns[n]}) > 1]
+    told = []
+    for name in given:
+        if name not in shown:
+            words, _, unit = HEADINGS[name].removesuffix("]").partition(" [")
+            told.append(f"{words} {_cell(found.columns[name][0])} {unit}".rstrip())
+    return shown, [Text(f"The same in all: {', '.join(told)}.")] if told else []
+
+
+def _cell(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"
+
+
 def _row(found: StudyAnswer, shown: Sequence[str], row: int) -> list[str]:
     columns = found.columns
     ends = (float(columns[f"force_{e}_N"][row]) for e in ("median", "lo", "hi"))
     stress = float(columns["stress_MPa"][row])
-    cells = [columns[name][row] for name in shown]
-    texts = [cell if isinstance(cell, str) else f"{cell:.6g}" for cell in cells]
-    return [*texts, *estimate(Interval(*ends)), number(stress)]
+    texts = [_cell(columns[name][row]) for name in shown]
+    most = max(map(float, columns["stress_MPa"]))
+    return [*texts, *estimate(Interval(*ends)), number(stress, 0.1 * most)]
 
 
 def article_document(found: ArticleAnswer) -> Document:
