@@ -9,6 +9,7 @@ from rigs import make_gear
 
 from hdcal import fleet, read_case
 from hdcal.data.prior import Prior
+from hdcal.fleets.chart import fleet_chart
 from hdcal.fleets.force.document import force_words
 from hdcal.fleets.notes import CERTIFICATES
 from hdcal.fleets.over_time import TimeAnswer
@@ -40,6 +41,12 @@ def test_a_gear_that_is_soft_is_measured_again_and_one_with_a_loop_diagnosed():
     assert again in said
     many = {"stiffness": [False, True, True, True]}
     assert " and 2 more anew" in str(fleet_answer(off_in(**many)).next_step)
+
+
+def test_a_gear_that_is_off_keeps_its_name_below_the_chart():
+    found = off_in(stiffness=[True, False, False, False])
+    chart = fleet_chart(found)
+    assert [chart.names[place - 1] for place in chart.marked] == ["A"]
 
 
 def test_gears_that_are_called_off_stand_first():

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from browser import Seen, look, play
 from commands import Done
+from matplotlib.figure import Figure
 
 from hdcal.report.chart import Chart, Series, boxes, charts_json
+from hdcal.report.chart_figure import draw_chart
 from hdcal.report.document import Document, Picture, Section
 from hdcal.report.html import html_page
 
@@ -42,6 +44,33 @@ def test_boxes_are_level_and_nothing_is_between_them():
     np.testing.assert_array_equal(np.interp(over, x, y), [5.0, np.nan, 7.0])
 
 
+def test_short_names_lie_level_and_long_ones_stand():
+    place = np.arange(1.0, 10.0)
+    points = [Series("points", place, place, "", points=True)]
+    for names, turned in ((["a"] * 9, 0.0), (["x" * 30] * 9, 90.0)):
+        axes = draw_chart(Chart("x", "y", points, names=names), Figure().add_subplot())
+        assert {text.get_rotation() for text in axes.get_xticklabels()} == {turned}
+
+
+def test_marked_places_keep_their_names_among_many():
+    place = np.arange(1.0, 100.0)
+    names = [f"gear {row:.0f}" for row in place]
+    points = [Series("points", place, place, "", points=True)]
+    chart = Chart("x", "y", points, names=names, marked=[7, 80])
+    axes = draw_chart(chart, Figure().add_subplot())
+    told = [text.get_text() for text in axes.get_xticklabels()]
+    assert told == ["gear 7", "gear 80"]
+    (plain,) = json.loads(charts_json([chart]))
+    assert plain["marked"] == [7, 80] and plain["limits"] == [None, None]
+
+
+def test_an_axis_ends_where_nothing_can_be():
+    points = [Series("points", X, np.array([60.0, 80.0, 90.0, 100.0]), "", points=True)]
+    chart = Chart("x", "share [%]", points, limits=(0.0, 100.0))
+    low, high = draw_chart(chart, Figure().add_subplot()).get_ylim()
+    assert high == 100.0 and 0.0 < low < 60.0
+
+
 @pytest.fixture(scope="module")
 def seen(calibrated: tuple[Done, object], tmp_path_factory) -> Seen:
     return look(calibrated[1] / "report.html", tmp_path_factory.mktemp("browser"))
@@ -52,6 +81,22 @@ def test_screens_show_charts_and_paper_the_images(seen: Seen):
     assert drawn["phone"] == drawn["desk"] == drawn["paper"] - 1
     assert seen.frames["desk"]["canvases"] == 2
     assert not seen.complaints and not seen.requests
+
+
+SWATCHES = """
+const rows = [...page.querySelectorAll(".u-legend .u-series")];
+return rows.filter(row => row.offsetHeight > 0 && row.querySelector(".u-marker"))
+  .map(row => [row.innerText.trim(),
+    page.defaultView.getComputedStyle(row.querySelector(".u-marker")).backgroundColor]);
+"""
+
+
+def test_no_two_rows_of_a_legend_look_alike(calibrated, tmp_path):
+    rows = play(calibrated[1] / "report.html", tmp_path, SWATCHES)
+    first = rows[: next(k for k, row in enumerate(rows) if "− fit" in row[0]) - 2]
+    assert len(first) >= 4
+    assert len({words for words, _ in first}) == len({hue for _, hue in first})
+    assert len({words for words, _ in first}) == len(first)
 
 
 TURN = """

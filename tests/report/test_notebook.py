@@ -47,7 +47,7 @@ def results():
             hdcal.compare({"old": posterior, "new": stiffer(posterior, 1.1)}),
             "% stiffer than old",
         ),
-        "Fleet": (handmade(), "D is 10."),
+        "Fleet": (handmade(), "% softer (95 %: "),
         "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
         "InverseDesign": (
             hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),

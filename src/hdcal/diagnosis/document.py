@@ -11,6 +11,8 @@ from hdcal.diagnosis.sections import (
     which_section,
 )
 from hdcal.diagnosis.words import nothing_suspected
+from hdcal.evidence.case_evidence import UNKNOWN
+from hdcal.inference.hypotheses import parts_of
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
     Document,
@@ -110,9 +112,9 @@ def _next_runs(found: VerdictAnswer) -> Section:
     columns = ["run", "tells apart", "information [nat]", "cost"]
     note = (
         "What tells most for its effort comes first. Tells apart: the two of the "
-        "likeliest hypotheses that the run parts best, among them such as are too "
-        "improbable for the answer. 0.7 nat is what an answer of yes or no tells. "
-        "“Something outside the library” predicts nothing and is left out."
+        "likeliest hypotheses that the run parts best; the answer above need not name "
+        "them. 0.7 nat is what an answer of yes or no tells. “Something outside the "
+        "library” predicts nothing and is left out."
     )
     table = Table(columns, rows, frozenset({"information [nat]"}))
     return Section(heading, [table, Text(note, soft=True)], brief=True)
@@ -166,10 +168,12 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
     name, posterior = refit
     bad = "" if posterior.usable else " This fit failed its checks; do not use it."
     words = f"Calibrated again with {hypothesis(name)}.{bad} {_kept(found)}"
+    with_gap = any(UNKNOWN in parts_of(one.hypothesis) for one in found.refits)
+    gap = "; middle band: the same with the leftover discrepancy" * with_gap
     caption = (
-        "Inner band: where the corrected model lies with 95 % probability. Outer band: "
-        "where one new reading lies with 95 % probability. Hatched and dotted: outside "
-        "what was tested."
+        f"Inner band: where the corrected model lies with 95 % probability{gap}. Outer "
+        "band: where one new reading lies with 95 % probability. Hatched and dotted: "
+        "outside what was tested."
     )
     shows = "Measured force over deformation with the bands of the corrected model"
     blocks = [

@@ -137,8 +137,8 @@ function touch(figure) {
           ? [ends.min - margin, ends.max + margin] : [low, high]},
         y: {range: (_, low, high) => spanned(chart, low, high)}},
       legend: {markers: {
-        width: (_, k) => k && chart.series[k - 1].dashed ? 2 : 0,
-        dash: () => "dashed",
+        width: (_, k) => !k ? 0 : chart.series[k - 1].dashed ? 2 : isEdge(chart.series[k - 1]) ? 1 : 0,
+        dash: (_, k) => k && chart.series[k - 1].dashed ? "dashed" : "solid",
         stroke: (_, k) => k ? hue(chart.series[k - 1]) : "transparent",
         fill: (_, k) => k ? marker(chart, k - 1) : "transparent",
       }},
