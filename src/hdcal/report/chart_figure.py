@@ -54,10 +54,10 @@ def _name_places(chart: Chart, axes: Axes) -> None:
     every = range(1, len(chart.names) + 1)
     places = [*(every if len(every) <= _MOST_PLACES else chart.marked)][:_MOST_PLACES]
     names = [plain(chart.names[place - 1], _LONGEST_PLACE) for place in places]
-    level = len(names) * max(map(len, names), default=0) <= _LEVEL
-    look = {} if level else {"rotation": 90, "fontsize": 7}
     if names:
-        axes.set_xticks(places, names, **look)
+        axes.set_xticks(places, names)
+    if len(names) * max(map(len, names), default=0) > _LEVEL:
+        axes.tick_params(axis="x", labelrotation=90, labelsize=7)
 
 
 def axes_or_new(axes: Axes | None) -> Axes:
