@@ -14,7 +14,7 @@ from hdcal.inference.checks import Check
 from hdcal.inference.residuals import residuals
 from hdcal.report.document import Document, Tag
 from hdcal.report.html import html_page
-from hdcal.report.parameters import parameter_estimates
+from hdcal.report.parameters import Interval, parameter_estimates
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.posterior_sections import (
@@ -24,7 +24,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.terminal import terminal_lines
-from hdcal.report.words import with_labels
+from hdcal.report.words import estimate, with_labels
 
 
 def shown(*sections) -> tuple[str, str]:
@@ -81,6 +81,11 @@ def test_an_estimate_is_in_the_units_of_people():
     found = parameter_estimates(posterior)["E0"]
     assert found.unit == "GPa"
     assert found.median == pytest.approx(np.median(posterior.draws["E0"]) / 1e3)
+
+
+def test_an_interval_of_equal_draws_is_told_as_one_number():
+    at = 0.3988177
+    assert estimate(Interval(at, at, at + 1e-16)) == ("0.3988", "0.3988 … 0.3988")
 
 
 def test_outcomes_differ_by_colour_and_words():

@@ -40,6 +40,8 @@ _FAMILY_WORDS = {
 }
 # Those of the families' numbers that carry no unit.
 _PURE = {"log_sd", "a", "b"}
+# Relative to a number, what doubles that are the same may differ by once computed.
+_ROUNDING = 1e-12
 
 
 def number(value: float | None, width: float | None = None) -> str:
@@ -51,7 +53,8 @@ def number(value: float | None, width: float | None = None) -> str:
     """
     if not known(value):
         return "–"
-    if not width or not math.isfinite(width):
+    # A width that is nothing but rounding of the last digits is none.
+    if not width or not math.isfinite(width) or width < _ROUNDING * abs(value):
         return f"{value:.4g}"
     place = _place(width)
     if abs(value) >= 1e6 or place < -8:
