@@ -171,7 +171,7 @@ def sample(
     *longer, shortest = TARGET_ACCEPTANCE[problem.bent :]
     for target in longer:
         run = begin(target)
-        run.advance(draws)
+        run.advance(draws, in_vain_if_diverging=True)
         if _sound(run.kept()):
             found = _gone_on(run, draws)
             if not found.diverging.any():
@@ -220,8 +220,13 @@ class _Run:
         self._states = _start(problem, whitening, keys, target, warmup=warmup)
         self._done, self._kept = 0, []
 
-    def advance(self, draws: int) -> None:
-        """Draw so many more from each chain, after its warm-up."""
+    def advance(self, draws: int, *, in_vain_if_diverging: bool = False) -> None:
+        """Draw so many more from each chain, after its warm-up.
+
+        Args:
+            draws: their number.
+            in_vain_if_diverging: stop at the first trajectory that diverges.
+        """
         warmup, total = self._warmup, max(self._done, self._warmup) + draws
         while self._done < total:
             # Stretches end with the warm-up, so that all but the last ones are alike.
@@ -234,6 +239,11 @@ class _Run:
             self._done += length
             if self._progress is not None:
                 self._progress(self._done, total)
+            if in_vain_if_diverging and self._diverged():
+                return
+
+    def _diverged(self) -> bool:
+        return bool(self._kept) and self._kept[-1][_DIVERGING].any()
 
     def kept(self) -> list[np.ndarray]:
         """Return what is kept of each draw, axes chain and draw first."""
