@@ -79,7 +79,7 @@ def drawn(seed: int):
     scale = rng.choice([1.0 / 3.0, 1.0, 3.0], p=[0.25, 0.5, 0.25])
     values = {}
     for field, about in parameters(EFFECTS[name]).items():
-        value = frozen(priors[f"{name}.{field}"]).rvs(random_state=rng)
+        value = float(frozen(priors[f"{name}.{field}"]).ppf(rng.random()))
         values[field] = value * (scale if about.null is not None else 1.0)
     return name, simulated(cycles(ROWS), {name: values}, seed=seed)
 

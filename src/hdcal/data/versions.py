@@ -2,7 +2,7 @@
 
 from importlib import metadata
 
-_PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "arviz-stats", "numpy")
+_PACKAGES = ("hdcal", "jax", "numpyro", "arviz-base", "scipy", "numpy")
 
 
 def versions() -> dict[str, str]:

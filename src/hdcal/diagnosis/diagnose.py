@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.data.case import Case, require_case
@@ -41,6 +42,8 @@ _NO_GAP = "no gap is detected, so that there is nothing to close"
 _NO_CAUSE = "that nothing is missing remains the most probable hypothesis"
 
 
+# Thousands of small systems are solved, over which threads only wait for each other.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def diagnose(
     case: Case,
     *,

@@ -82,25 +82,31 @@ class PriorLaw(NamedTuple):
         return special.betaincinv(first, others[0], q)
 
     def pdf(self, x: ArrayLike) -> np.ndarray:
-        """Return the density, of the shape of `x`; nothing beyond the ends."""
+        """Return the density, of the shape of `x`."""
+        return np.exp(self.logpdf(x))
+
+    def logpdf(self, x: ArrayLike) -> np.ndarray:
+        """Return the log of the density, of the shape of `x`; −∞ beyond the ends."""
         x, (first, *others) = np.asarray(x, float), self.numbers
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        low, high = _SUPPORTS.get(self.family, self.numbers)
+        inside = np.where((x < low) | (x > high), np.nan, x)
+        with np.errstate(divide="ignore", invalid="ignore"):
             match self.family:
                 case "uniform":
-                    density = np.full(x.shape, 1.0 / (others[0] - first))
+                    density = 0.0 * inside - np.log(high - low)
                 case "beta":
-                    log_density = special.xlogy(first - 1.0, x)
-                    log_density += special.xlog1py(others[0] - 1.0, -x)
-                    density = np.exp(log_density - special.betaln(first, others[0]))
+                    density = special.xlogy(first - 1.0, inside)
+                    density += special.xlog1py(others[0] - 1.0, -inside)
+                    density -= special.betaln(first, others[0])
                 case family:
-                    sd, twice = (others or [first])[0], family == "half_normal"
-                    sd = sd * x if family == "lognormal" else sd
-                    height = np.exp(-0.5 * self._score(x) ** 2) / np.sqrt(2.0 * np.pi)
-                    density = (1.0 + twice) * height / sd
-        low, high = _SUPPORTS.get(self.family, self.numbers)
-        return np.where(
-            (x < low) | (x > high), 0.0, np.nan_to_num(density, posinf=np.inf)
-        )
+                    sd = others[0] if others else first
+                    density = -0.5 * self._score(inside) ** 2 - np.log(sd)
+                    density -= 0.5 * np.log(2.0 * np.pi)
+                    if family == "half_normal":
+                        density += np.log(2.0)
+                    if family == "lognormal":
+                        density = np.where(x > 0.0, density - np.log(inside), np.nan)
+        return np.where(np.isnan(density), -np.inf, density)
 
     def median(self) -> float:
         """Return the value that as much lies below as above."""

@@ -47,7 +47,12 @@ def repeat_last_row(tree: Tree, size: int) -> Tree:
         tree: pytree of arrays that share their first axis.
         size: rows in all, as `bucket_size` gives it.
     """
-    return jax.tree.map(lambda array: _pad(array, size, "edge"), tree)
+
+    def padded(array) -> np.ndarray:
+        array = np.asarray(array)
+        return array[np.minimum(np.arange(size), len(array) - 1)]
+
+    return jax.tree.map(padded, tree)
 
 
 def pad_records(records: Records) -> Records:
@@ -62,7 +67,14 @@ def append_zeros(tree: Tree, size: int) -> Tree:
         tree: pytree of arrays that share their first axis.
         size: rows in all, as `bucket_size` gives it.
     """
-    return jax.tree.map(lambda array: _pad(array, size, "constant"), tree)
+
+    def padded(array) -> np.ndarray:
+        array = np.asarray(array)
+        whole = np.zeros((size, *array.shape[1:]), array.dtype)
+        whole[: len(array)] = array
+        return whole
+
+    return jax.tree.map(padded, tree)
 
 
 def measured(size: int, count) -> Bool[Array, " n"]:
@@ -73,9 +85,3 @@ def measured(size: int, count) -> Bool[Array, " n"]:
         count: rows that were measured, not compiled in.
     """
     return jnp.arange(size) < count
-
-
-def _pad(array, size: int, mode) -> np.ndarray:
-    array = np.asarray(array)
-    widths = [(0, size - len(array)), *[(0, 0)] * (array.ndim - 1)]
-    return np.pad(array, widths, mode=mode)

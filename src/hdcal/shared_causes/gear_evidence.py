@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
@@ -113,6 +114,8 @@ def _at_one_zero(
     return y - (zero - np.average(zero, weights=rows))[run]
 
 
+# As in a diagnosis threads would only wait for each other.
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def weigh_gear(place: int, gear: Case, library: Mapping, seed: int):
     """Return the place of a gear, and what its readings say of each cause.
 
