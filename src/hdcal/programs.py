@@ -111,8 +111,7 @@ class Program:
             found = self._function(*args, **named, **fixed)
             return found if self._returns is None else jax.tree.leaves(found)
 
-        # By which logs and profiles name it.
-        flat.__name__ = self._function.__name__
+        flat = _named(flat, self._function.__name__)
         file = self._file(kind)
         exported = None if file is None else _read(file)
         if exported is None and file is not None:
@@ -123,7 +122,7 @@ class Program:
                 exported = export.deserialize(bytearray(kept))
                 _write(file, kept)
         if exported is not None:
-            return jax.jit(exported.call)
+            return jax.jit(_named(exported.call, self._function.__name__))
         ready = jax.jit(flat)
         with _TRACING:
             ready.lower(*leaves)
@@ -159,6 +158,16 @@ def program(
     if function is None:
         return lambda function: Program(function, static, returns)
     return Program(function, static, returns)
+
+
+def _named(function: Callable, name: str) -> Callable:
+    """Return a function with a name by which logs and profiles tell it."""
+
+    def named(*leaves):
+        return function(*leaves)
+
+    named.__name__ = name
+    return named
 
 
 def _is_placed(leaf: Any) -> bool:

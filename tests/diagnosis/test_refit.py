@@ -1,5 +1,6 @@
 """Which hypotheses are calibrated, and who carries the probability of the rest."""
 
+from threading import Event
 from types import SimpleNamespace
 
 import numpy as np
@@ -114,3 +115,21 @@ def test_calibrations_side_by_side_tell_how_far_all_are():
     # A model of what is left over comes after them.
     together("d", 50, 100)
     assert told[-1] == (350, 400)
+
+
+def test_an_interruption_waits_for_no_other_calibration():
+    begun, released = Event(), Event()
+
+    def run(name: str):
+        if name == "a":
+            begun.set()
+            released.wait(60.0)
+        begun.wait(60.0)
+        raise KeyboardInterrupt
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            weighed({"b": 0.5, "a": 0.5}, run)
+        assert not released.is_set()
+    finally:
+        released.set()

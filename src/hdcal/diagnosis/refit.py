@@ -119,8 +119,12 @@ def weighed(
         calibrated: returns the posterior of one.
     """
     chosen = _probable(probabilities)
-    with ThreadPoolExecutor(_AT_ONCE) as pool:
+    pool = ThreadPoolExecutor(_AT_ONCE)
+    try:
         fits = dict(zip(chosen, pool.map(calibrated, chosen), strict=True))
+    finally:
+        # Who interrupts does not wait for the other one.
+        pool.shutdown(wait=False, cancel_futures=True)
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)

@@ -82,9 +82,10 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@program(static=("warmup",))
-def _start(problem, whitening, keys, target, *, warmup):
+@program(static=("warmup", "chains"))
+def _start(problem, whitening, key, target, *, warmup, chains):
     """Return the states of chains at their start, as the leaves of NUTS' own."""
+    keys = jax.random.split(key, chains)
     return jax.tree.leaves(_states(problem, whitening, keys, target, warmup))
 
 
@@ -127,7 +128,9 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 
 @program
-def _constrain(problem, whitening, standard, keys):
+def _constrain(problem, whitening, standard, key):
+    keys = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
+
     def one(drawn):
         e, key = drawn
         named = values_at(problem, whitening.position(e))
@@ -216,8 +219,8 @@ class _Run:
     def __init__(self, problem, whitening, key, chains, warmup, progress, target):
         self._problem, self._whitening, self._key = problem, whitening, key
         self._warmup, self._progress, self._target = warmup, progress, target
-        keys = jax.random.split(key, chains)
-        self._states = _start(problem, whitening, keys, target, warmup=warmup)
+        size = {"warmup": warmup, "chains": chains}
+        self._states = _start(problem, whitening, key, target, **size)
         self._done, self._kept = 0, []
 
     def advance(self, draws: int, *, in_vain_if_diverging: bool = False) -> None:
@@ -253,8 +256,7 @@ class _Run:
     def found(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
         standard, *about = self.kept()
-        members = jax.random.split(jax.random.fold_in(self._key, 1), standard.shape[:2])
-        values = _constrain(self._problem, self._whitening, standard, members)
+        values = _constrain(self._problem, self._whitening, standard, self._key)
         named = {name: np.asarray(value) for name, value in values.items()}
         return Draws(named, *about, target_acceptance=self._target)
 
