@@ -91,7 +91,7 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         logging.getLogger("matplotlib").setLevel(logging.ERROR)
         try:
-            with _laid_out(figure, kind):
+            with laid_out(figure, kind):
                 figure.savefig(target, format=kind, dpi=_DPI, metadata=metadata)
         finally:
             logging.getLogger("matplotlib").setLevel(level)
@@ -99,8 +99,11 @@ def render(figure: Figure, kind: Literal["svg", "png"], title: str = "") -> byte
 
 
 @contextmanager
-def _laid_out(figure: Figure, kind: Literal["svg", "png"]) -> Iterator[None]:
-    """Place what a figure holds; to place it, `savefig` would draw all of it twice."""
+def laid_out(figure: Figure, kind: Literal["svg", "png"]) -> Iterator[None]:
+    """Place what a figure holds, for as many files as are made of it meanwhile.
+
+    To place it, `savefig` would draw all of it twice, each time.
+    """
     engine, canvas, dpi = figure.get_layout_engine(), figure.canvas, figure.dpi
     if engine is None:
         yield

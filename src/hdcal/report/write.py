@@ -113,13 +113,15 @@ def report_files(
         kept: figures that become files of their own too; by default all of them.
         charts: pictures that can be touched, by name.
     """
-    from hdcal.report.canvas import render
+    from hdcal.report.canvas import laid_out, render
 
     title = f"{document.name}: {document.kind}"
-    images = {name: render(figure, "svg", title) for name, figure in figures.items()}
+    images, files = {}, {}
+    for name, figure in figures.items():
+        with laid_out(figure, "svg"):
+            images[name] = render(figure, "svg", title)
+            if kept is None or name in kept:
+                files[f"{name}.svg"] = images[name]
+                files[f"{name}.png"] = render(figure, "png", title)
     page = html_page(document, images, charts=charts)
-    files = {PAGE: page.encode("utf-8", "xmlcharrefreplace")}
-    for name in figures if kept is None else kept:
-        files[f"{name}.svg"] = images[name]
-        files[f"{name}.png"] = render(figures[name], "png", title)
-    return files
+    return {PAGE: page.encode("utf-8", "xmlcharrefreplace"), **files}
