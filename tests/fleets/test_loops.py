@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import hdcal
+from hdcal.fleets.misfit import misfit
 from hdcal.fleets.over_time import time_answer, time_series
+from hdcal.fleets.own_shapes import own_shapes
 from hdcal.fleets.summary import fleet_answer, gear_columns
 
 UP = np.linspace(0.05, 0.4, 8)
@@ -70,3 +72,18 @@ def test_a_gear_in_another_unit_is_told_to_be():
     assert "times softer, as with another unit" in answer.headline
     assert "See in which units G05 was read" in answer.next_step
     assert gear_columns(one)["apart_percent"][OTHER_UNIT] < -99.0
+
+
+def test_a_loop_without_noise_leaves_some():
+    """As of computed readings: what rounding leaves has a logarithm."""
+    gear, row = (i.ravel() for i in np.indices((4, len(X))))
+    force = 200.0 * X[row] + 0.5 * WAY[row] * (gear == 0)
+    force += np.where(gear > 0, 0.1 * np.sin(7.0 * row + gear), 0.0)
+    table = {"specimen": np.char.add("G", gear.astype(str)), "force_N": force}
+    case = hdcal.read_case(table | {"deformation_mm": X[row]}, theory="spring")
+    found = own_shapes(case)
+    assert found.loop[0] == pytest.approx(1.0)
+    assert 0.0 < found.noise_ratio[0] < 1e-3
+    assert np.all(found.noise_ratio[1:] > 0.1)
+    one = misfit(case, 0.1 * found.noise_ratio, found.clear)
+    assert np.isfinite([one.correlation, one.loop_N, one.bend_N]).all()

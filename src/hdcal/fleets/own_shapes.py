@@ -13,6 +13,9 @@ from hdcal.fleets.off_in import chance_of
 _TOLD = 0.05
 # Square of a shape, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
+# Noise beside a loop over that beside lines that rounding alone gives: it has a
+# logarithm.
+_LEAST_RATIO = 1e-6
 # As so many degrees of freedom the noise of most counts beside that of a gear.
 _POOLED = 8
 
@@ -84,7 +87,7 @@ def _noise_ratio(beside, lines) -> np.ndarray:
     variances = [
         np.where(told, s, 1.0) / np.where(told, f, 1) for s, f in (beside, lines)
     ]
-    return np.sqrt(variances[0] / variances[1])
+    return np.maximum(np.sqrt(variances[0] / variances[1]), _LEAST_RATIO)
 
 
 def _square(shape: np.ndarray, gear: np.ndarray, gears: int) -> np.ndarray:
