@@ -355,3 +355,21 @@ def test_a_second_process_says_the_same_without_what_only_tracing_needs(tmp_path
     without = run(__file__)
     assert first[0] == second[0] == without[0]
     assert (first[1], second[1], without[1]) == ("True", "False", "True")
+
+
+def test_an_xla_that_lacks_an_option_is_asked_without(cached, monkeypatch):
+    own = jax.jit
+
+    def older(function, *args, compiler_options=None, **named):
+        if compiler_options:
+            raise ValueError("No such compile option")
+        return own(function, *args, **named)
+
+    monkeypatch.setattr(jax, "jit", older)
+    programs._options.cache_clear()
+    try:
+        assert programs._options() is None
+        found = Program(doubled)(np.arange(3.0))
+        np.testing.assert_array_equal(found[1], [0.0, 2.0, 4.0])
+    finally:
+        programs._options.cache_clear()
