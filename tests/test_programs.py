@@ -357,7 +357,7 @@ def test_a_second_process_says_the_same_without_what_only_tracing_needs(tmp_path
     assert (first[1], second[1], without[1]) == ("True", "False", "True")
 
 
-def test_of_numbers_that_another_trace_does_not_know_it_is_computed(cached):
+def test_of_known_numbers_it_is_part_of_another_trace(cached):
     inner, given = Program(doubled), np.arange(3.0)
     found = jax.jit(lambda x: x + inner(given)[1])(1.0)
     np.testing.assert_array_equal(found, [1.0, 3.0, 5.0])

@@ -14,7 +14,7 @@ import shutil
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache, update_wrapper
+from functools import cache, partial, update_wrapper
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +23,7 @@ import jax
 import numpy as np
 from jax import export
 from jax.core import Tracer
+from jax.extend.core import get_opaque_trace_state
 
 # Versions of the code whose programs stay beside each other in one cache.
 _VERSIONS_KEPT = 4
@@ -44,6 +45,9 @@ _CODE = Path(__file__).parent
 _DIGEST_SIZE = hashlib.sha256().digest_size
 # NumPyro's handlers are on one stack, whatever the thread: only one may trace.
 _TRACING = threading.RLock()
+# Which trace is under way, and none: inside of another one a program is part of it.
+_trace_state = partial(get_opaque_trace_state, convention="flax")
+_NO_TRACE = _trace_state()
 # Nobody else may write what is run.
 _OWN, _OTHERS_WRITE = 0o700, 0o022
 
@@ -81,7 +85,7 @@ class Program:
         """Return what the function returns; static arguments are named."""
         fixed = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
-        if any(map(_is_placed, leaves)):
+        if any(map(_is_placed, leaves)) or _trace_state() != _NO_TRACE:
             return self._jitted(*args, **named, **fixed)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         kind = _Kind(
@@ -91,11 +95,9 @@ class Program:
             tuple(getattr(jax.config, name) for name in _SETTINGS),
             _folder(_cached()),
         )
-        # What hangs on no traced argument is computed while another program is traced.
-        with jax.ensure_compile_time_eval():
-            if kind not in self._ready:
-                self._ready[kind] = self._made(kind, leaves)
-            found = self._ready[kind](*leaves)
+        if kind not in self._ready:
+            self._ready[kind] = self._made(kind, leaves)
+        found = self._ready[kind](*leaves)
         return found if self._returns is None else self._returns(*found)
 
     def clear_cache(self) -> None:
