@@ -68,3 +68,23 @@ def test_one_that_diverges_as_it_goes_on_is_repeated_with_shorter_steps(
 
 def test_too_short_a_run_stays_what_was_asked_for():
     assert calibrate(case(), **TOO_SHORT).settings["draws"] == TOO_SHORT["draws"]
+
+
+@pytest.mark.parametrize("diverging", [True, False])
+def test_a_run_is_given_up_at_the_first_divergence(monkeypatch, diverging: bool):
+    """After the warm-up, where trajectories may diverge, and only if that is asked."""
+
+    def stretch(problem, whitening, states, target, *, warmup, length):
+        kept = [np.zeros((length, 2)) for _ in range(7)]
+        kept[sample._DIVERGING] = np.full((length, 2), diverging)
+        return states, kept
+
+    monkeypatch.setattr(sample, "_start", lambda *_, **__: [])
+    monkeypatch.setattr(sample, "_advance", stretch)
+    run = sample._Run(None, None, None, 2, 100, None, 0.8)
+    run.advance(500, in_vain_if_diverging=True)
+    assert run._done == (150 if diverging else 600)
+    assert run.kept()[0].shape[1] == (50 if diverging else 500)
+    whole = sample._Run(None, None, None, 2, 100, None, 0.8)
+    whole.advance(500)
+    assert whole._done == 600

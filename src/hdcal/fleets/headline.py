@@ -107,18 +107,20 @@ def far_apart(percent_apart):
     Args:
         percent_apart: from the centre [%].
     """
-    return abs(np.log(np.maximum(1.0 + percent_apart / 100.0, _NO_RATIO))) >= np.log(
-        2.0
-    )
+    ratio = _ratio(percent_apart)
+    return np.maximum(ratio, 1.0 / ratio) >= 2.0
+
+
+def _ratio(percent_apart):
+    return np.maximum(1.0 + percent_apart / 100.0, _NO_RATIO)
 
 
 def _softer(one: Mapping[str, Any], than: str) -> str:
     apart, low, high = (float(one[f"apart_{end}"]) for end in ("percent", "lo", "hi"))
     word = "softer" if apart < 0.0 else "stiffer"
     if far_apart(apart):
-        ratio = max(1.0 + apart / 100.0, _NO_RATIO)
-        times = f"{max(ratio, 1.0 / ratio):.2f}".rstrip("0").rstrip(".")
-        times = times if len(times) < 5 else f"{max(ratio, 1.0 / ratio):.0f}"
+        ratio = _ratio(apart)
+        times = number(max(ratio, 1.0 / ratio))
         return f"is {times} times {word}{than}, as with another unit"
     size = (-apart, -high, -low) if apart < 0.0 else (apart, low, high)
     # Two digits of the interval's width.

@@ -106,11 +106,10 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
     at, low, high = (float(x) for x in (where.deformation, where.low, where.high))
     beyond = beyond_tested(where)
     if beyond > 0.0:
+        far = _FAR_OUT * (beyond > FAR)
         yield (
             f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
-            f"the tested {low:g} … {high:g} mm. {_bend(force)}"
-            + _FAR_OUT
-            * (beyond > FAR)
+            f"the tested {low:g} … {high:g} mm. {_bend(force)}{far}"
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"

@@ -29,7 +29,7 @@ class SamplingLaws:
     places: tuple[tuple[np.ndarray, np.ndarray], ...]
 
     def drawn(self, count: int, rng) -> tuple[np.ndarray, np.ndarray]:
-        """Return points, half about each place, and the log density of their law.
+        """Return points about both places alike, and the log density of their law.
 
         The density is up to a factor.
 
