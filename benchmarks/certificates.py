@@ -13,7 +13,6 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
-from arviz_base import from_dict
 
 from benchmarks.children import table
 from hdcal.data.case import Case, Gear
@@ -22,6 +21,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.records import Records
 from hdcal.inference import laplace
+from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.sample import sample
@@ -151,8 +151,8 @@ def sampled(case: Case, seed: int) -> Posterior:
     size = {"chains": 2, "warmup": 300, "draws": 500}
     draws = sample(problem, laplace.fit(problem), key, **size)
     priors = problem_priors(case, (), shipped, theory)
-    tree = from_dict({"posterior": draws.values})
-    return Posterior(case, theory, (), priors, tree, {}, (), {"with_gap": False})
+    arrays = ArrayTree({"posterior": group_of(draws.values)})
+    return Posterior(case, theory, (), priors, arrays, {}, (), {"with_gap": False})
 
 
 @jax.jit

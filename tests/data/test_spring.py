@@ -129,16 +129,15 @@ def test_a_case_read_as_a_spring_stays_one(rig):
 
 
 def test_it_is_held_in_a_posterior_file(rig):
-    import xarray as xr
-
+    from hdcal.inference.array_tree import group_of
     from hdcal.inference.posterior_file import UNITS
 
     records = rig.records
-    rows = {n: xr.DataArray(np.asarray(getattr(records, n)), dims="row") for n in UNITS}
-    force = xr.DataArray(np.asarray(records.force), dims="row")
+    rows = group_of({n: getattr(records, n) for n in UNITS}, ("row",))
+    force = np.asarray(records.force)
     text = describe_case(rig)
     assert "NaN" not in text
-    back = restore_case(text, xr.Dataset(rows), force)
+    back = restore_case(text, rows, force)
     assert math.isnan(back.gear.geometry.radius)
     assert replace(back.gear, geometry=None, source={}) == replace(
         rig.gear, geometry=None, source={}
@@ -146,6 +145,6 @@ def test_it_is_held_in_a_posterior_file(rig):
     with pytest.raises(ValueError, match="lacks the sizes"):
         restore_case(
             text.replace('"theory": "spring"', '"theory": "ring"'),
-            xr.Dataset(rows),
+            rows,
             force,
         )

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from fleets import handmade
 from posteriors import single
+from trees import with_tree
 
 import hdcal
 from hdcal.errors import InputError, NotUsable
@@ -114,7 +115,7 @@ def sealed_anew(found: FleetPosterior, path: Path, site: str, value: float) -> P
     """Write a posterior of which a draw is another number, with a digest of it."""
     tree = found.tree.copy(deep=True)
     tree["posterior"][site][0, 0] = value
-    path.write_bytes(replace(found, tree=tree).to_netcdf())
+    path.write_bytes(with_tree(found, tree).to_netcdf())
     return path
 
 
@@ -145,7 +146,7 @@ def test_a_lot_too_many_or_a_fact_too_few_is_refused(fleet, tmp_path):
     del facts["largest_mm"]
     attributes = {"fleet": json.dumps(facts)}
     path.write_bytes(
-        posterior_file.sealed(found.tree, posterior_file.FLEET, attributes)
+        posterior_file.sealed(found.arrays, posterior_file.FLEET, attributes)
     )
     with pytest.raises(InputError, match="not a posterior that hdcal wrote"):
         FleetPosterior.load(path)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from rigs import cycles, make_case, make_gear, make_records, ramp
 from short import SHORT, TOO_SHORT
 
@@ -55,7 +54,7 @@ def stats_of(chains=4, draws=500, **change):
         "n_steps": np.full((chains, draws), 7),
     }
     fields |= change
-    return xr.Dataset({n: (("chain", "draw"), v) for n, v in fields.items()})
+    return fields
 
 
 def diagnoses_of(draws):

@@ -11,6 +11,7 @@ from numpyro.infer.util import log_density
 from rigs import cycles, draw_truth, make_case, make_gear, make_records, ramp, simulate
 from scipy import stats
 from slices import slice_of
+from trees import with_tree
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.data.certificates import (
@@ -232,6 +233,6 @@ def test_a_file_that_was_made_up_is_refused(pair, tmp_path, spoil: str):
     else:
         table["force_gain"] = replace(table["force_gain"], numbers=(0.0, 3.0))
     case = with_gear(pair[1].case, replace(gear, gauge_priors=table))
-    replace(pair[1], case=case, tree=tree).save(tmp_path / "posterior.nc")
+    replace(with_tree(pair[1], tree), case=case).save(tmp_path / "posterior.nc")
     with pytest.raises(InputError, match="not a posterior"):
         Posterior.load(tmp_path / "posterior.nc")

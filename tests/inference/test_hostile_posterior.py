@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from posteriors import batch
+from trees import arrays_of
 
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import InputError
@@ -357,10 +358,10 @@ def test_what_hdcal_wrote_is_read(file):
     ],
 )
 def test_a_broken_content_is_refused_though_its_digest_is_right(file, tmp_path, spoil):
-    tree = open_tree(file)
+    tree = open_tree(file).datatree
     spoil(tree)
     del tree.attrs[posterior_file.DIGEST]
-    tree.attrs[posterior_file.DIGEST] = posterior_file.digest(tree)
+    tree.attrs[posterior_file.DIGEST] = posterior_file.digest(arrays_of(tree))
     tree.to_netcdf(tmp_path / "posterior.nc", engine="h5netcdf")
     with pytest.raises(InputError, match="is not a posterior that hdcal wrote"):
         Posterior.load(tmp_path)

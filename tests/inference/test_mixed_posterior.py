@@ -15,6 +15,7 @@ from posteriors import (
     with_leftover,
     written_posterior,
 )
+from trees import with_tree
 
 from hdcal.errors import InputError
 from hdcal.inference.hypotheses import HYPOTHESIS, ORIGIN
@@ -156,7 +157,7 @@ def test_draws_that_are_no_mixture_are_refused(mixed: Posterior, tmp_path, chang
     tree = mixed.tree.copy(deep=True)
     change(tree)
     file = tmp_path / "posterior.nc"
-    replace(mixed, tree=tree).save(file)
+    with_tree(mixed, tree).save(file)
     with pytest.raises(InputError, match="is not a posterior that hdcal wrote"):
         Posterior.load(file)
 

@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 from posteriors import plain_draws, ramp_case, written_posterior
 from rigs import cycles, make_case, make_gear
+from trees import arrays_of
 
 import hdcal
 from hdcal.errors import InputError
@@ -43,7 +44,7 @@ def without_correlation(posterior: Posterior) -> Posterior:
         case=replace(case, gear=replace(case.gear, scale_priors=scales)),
         priors={n: p for n, p in posterior.priors.items() if n != CORRELATION},
         diagnoses={n: d for n, d in posterior.diagnoses.items() if n != CORRELATION},
-        tree=tree,
+        arrays=arrays_of(tree),
     )
 
 
@@ -86,7 +87,7 @@ def test_the_kept_form_decides_whether_a_file_is_whole(tmp_path):
         tree = found.tree.copy()
         bare = tree["posterior"].to_dataset().drop_vars(CORRELATION)
         tree["posterior"] = xr.DataTree(bare)
-        found = replace(found, tree=tree, diagnoses={})
+        found = replace(found, arrays=arrays_of(tree), diagnoses={})
         found.save(tmp_path / "posterior.nc")
         if correlated:
             with pytest.raises(InputError, match="damaged"):
@@ -107,7 +108,7 @@ def test_a_leftover_of_before_it_knew_loading_from_unloading_is_read(tmp_path):
             last = held["gap_weights"].dims[-1]
             tree[group] = xr.DataTree(held.isel({last: slice(20)}))
     settings = {name: kept for name, kept in now.settings.items() if name != LOOP}
-    old = replace(now, tree=tree, settings=settings)
+    old = replace(now, arrays=arrays_of(tree), settings=settings)
     old.save(tmp_path / "posterior.nc")
     back = Posterior.load(tmp_path / "posterior.nc")
     assert back.draws["gap_weights"].shape[1] == 20

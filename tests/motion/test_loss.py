@@ -9,6 +9,7 @@ import pytest
 from arviz_base import from_dict
 from jax.flatten_util import ravel_pytree
 from moving import TRUTH, frictional_case, motion, moving_case, moving_gear
+from trees import arrays_of
 
 from hdcal import InputError, Prior, calibrate_dynamic, respond
 from hdcal.inference import laplace, posterior_file
@@ -256,7 +257,7 @@ def posterior() -> DynamicPosterior:
     settings |= {"target_acceptance": 0.8}
     checks = (Check("by hand", "passed", "told to"),)
     priors = dynamic_site_priors(case, "ring", (CoulombFriction,))
-    about = (CoulombFriction,), priors, tree, {}, checks, settings
+    about = (CoulombFriction,), priors, arrays_of(tree), {}, checks, settings
     return DynamicPosterior(case, "ring", *about)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from arviz_base import from_dict
 from rigs import make_case, make_gear, make_records
+from trees import arrays_of
 
 from hdcal import EFFECTS, Posterior
 from hdcal.data.priors import dynamic_priors, effect_priors
@@ -142,5 +143,5 @@ def still_posterior(
     settings |= {"seconds": 0.0, "versions": {}}
     priors = problem_priors(case, chosen, effect_priors(), "ring")
     return Posterior(
-        case, "ring", chosen, priors, tree, {"K": driven}, (check,), settings
+        case, "ring", chosen, priors, arrays_of(tree), {"K": driven}, (check,), settings
     )

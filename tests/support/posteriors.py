@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from arviz_base import from_dict
 from rigs import make_case, make_gear, make_records
+from trees import arrays_of, with_tree
 
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case, Gear
@@ -85,7 +86,9 @@ def written_posterior(
     }
     checks = (Check("written down", "passed", "for a test"),)
     theory = case.gear.theory
-    return Posterior(case, theory, chosen, priors, tree, diagnoses, checks, settings)
+    return Posterior(
+        case, theory, chosen, priors, arrays_of(tree), diagnoses, checks, settings
+    )
 
 
 def plain_draws(case: Case, size: int = 2000, seed: int = 0) -> dict:
@@ -207,4 +210,4 @@ def stiffer(posterior: Posterior, factor: float) -> Posterior:
     tree = posterior.tree.copy(deep=True)
     for name in ("K", "stiffness"):
         tree["posterior"][name] = tree["posterior"][name] * factor
-    return replace(posterior, tree=tree)
+    return with_tree(posterior, tree)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 from rigs import BASE, make_case, program, ramp
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
 from hdcal.errors import InputError
+from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
@@ -38,10 +38,11 @@ def handmade(names, **spread) -> Posterior:
     for name, (middle, sd) in spread.items():
         draws[name.replace("__", ".")] = middle + sd * rng.normal(size=DRAWS)
     draws["stiffness"] = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
-    data = xr.Dataset({n: (("chain", "draw"), v[None]) for n, v in draws.items()})
-    tree = xr.DataTree.from_dict({"posterior": data})
+    drawn = group_of({name: values[None] for name, values in draws.items()})
     settings = {"with_gap": False}
-    return Posterior(case, "ring", effects, priors, tree, {}, (), settings)
+    return Posterior(
+        case, "ring", effects, priors, ArrayTree({"posterior": drawn}), {}, (), settings
+    )
 
 
 ONSET = {"contact_onset__ratio": (0.3, 0.05), "contact_onset__onset": (0.25, 0.02)}

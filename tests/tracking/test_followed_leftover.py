@@ -1,11 +1,10 @@
 """A fitted leftover is followed with the stiffness, as the calibration left it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from posteriors import beside, plain_draws, ramp_case, written_posterior
 from streams import follow
+from trees import with_tree
 
 from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_values
@@ -92,7 +91,7 @@ def test_what_is_forgotten_of_a_long_wave_fades_to_the_prior_too():
     tree = posterior.tree.copy(deep=True)
     weights = tree["posterior"]["gap_weights"]
     tree["posterior"]["gap_weights"] = weights * 10.0 ** (-4.0 * np.arange(20))
-    tracker = Tracker(replace(posterior, tree=tree), forget=0.9)
+    tracker = Tracker(with_tree(posterior, tree), forget=0.9)
     rng, found = np.random.default_rng(0), []
     for at in np.resize(PLACES, 4000).tolist():
         answer = tracker.update(at, 205.0 * at + rng.normal(0.0, 0.5))

@@ -5,11 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
-import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
@@ -32,6 +31,9 @@ from hdcal.inference.executables import bound_executables
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 from hdcal.report.plain import as_plain
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True, repr=False)
@@ -129,7 +131,7 @@ class Fleet(Shown):
         return FleetPosterior.of(self)
 
     @property
-    def tree(self) -> xr.DataTree:
+    def tree(self) -> "xr.DataTree":
         """Draws of the population in ArviZ' groups."""
         return self.posterior.tree
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from hdcal.data.plausible import implausible
 from hdcal.data.typed_json import typed_text
@@ -25,10 +24,13 @@ from hdcal.fleets.next_force import (
 )
 from hdcal.fleets.next_gear import CONFIDENCE
 from hdcal.inference import posterior_file
+from hdcal.inference.array_tree import ArrayTree, group_of, joined
 from hdcal.inference.posterior import FILE_NAME
 from hdcal.inference.posterior_limits import check_draws
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from hdcal.fleets.fleet import Fleet
 
 _NEXT = "stiffness"
@@ -41,13 +43,12 @@ class FleetPosterior:
     """What is known of the population of a fleet.
 
     Attributes:
-        tree: ArviZ DataTree: of the group posterior the draws of the population by
-            site, of the group predictions the stiffness of a gear to come [N/mm as
-            read]; chains by draws.
+        arrays: of the group posterior the draws of the population by site, of the group
+            predictions the stiffness of a gear to come [N/mm as read]; chains by draws.
         facts: what they rest on.
     """
 
-    tree: xr.DataTree
+    arrays: ArrayTree
     facts: FleetFacts
 
     def __repr__(self) -> str:
@@ -61,7 +62,12 @@ class FleetPosterior:
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws of the population by site, chains joined, as `Fleet` has them."""
-        return posterior_file.joined_draws(self.tree)
+        return joined(self.arrays.groups["posterior"])
+
+    @property
+    def tree(self) -> "xr.DataTree":
+        """What ArviZ draws from: its groups as a DataTree."""
+        return self.arrays.datatree
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -120,7 +126,7 @@ class FleetPosterior:
             "status": "failed" if self.reasons else "ok",
             "fleet": json.dumps(asdict(self.facts)),
         }
-        return posterior_file.sealed(self.tree, posterior_file.FLEET, attributes)
+        return posterior_file.sealed(self.arrays, posterior_file.FLEET, attributes)
 
     @classmethod
     def load(cls, path: Path | str) -> "FleetPosterior":
@@ -147,25 +153,19 @@ class FleetPosterior:
     @classmethod
     def of(cls, found: "Fleet") -> "FleetPosterior":
         """Return the population of a fleet."""
-        from arviz_base import from_dict
-
         facts = facts_of(found)
         chains = facts.settings.chains
-        groups = {
-            "posterior": {
-                name: values.reshape(chains, -1) for name, values in found.draws.items()
-            },
-            "predictions": {_NEXT: found.next_stiffness.reshape(chains, -1)},
-        }
-        tree = from_dict(groups)
-        for name, unit in facts.units.items():
-            if name in found.draws:
-                tree["posterior"][name].attrs["units"] = unit
+        drawn = {name: v.reshape(chains, -1) for name, v in found.draws.items()}
+        population = group_of(drawn)
+        said = {name: {"units": unit} for name, unit in facts.units.items()}
         for kind, names in facts.groups.items():
             for place, name in enumerate(names, 1):
-                tree["posterior"][f"{kind}_{place}"].attrs["long_name"] = name
-        tree["predictions"][_NEXT].attrs["units"] = "N/mm"
-        return cls(tree, facts)
+                said.setdefault(f"{kind}_{place}", {})["long_name"] = name
+        for name in said.keys() & drawn.keys():
+            population[name] = population[name]._replace(said=said[name])
+        ahead = group_of({_NEXT: found.next_stiffness.reshape(chains, -1)})
+        ahead[_NEXT] = ahead[_NEXT]._replace(said={"units": "N/mm"})
+        return cls(ArrayTree({"posterior": population, "predictions": ahead}), facts)
 
 
 def is_fleet(path: Path | str) -> bool:
@@ -197,14 +197,15 @@ def _check_population(found: FleetPosterior) -> None:
         KeyError, ValueError: they are not.
     """
     draws = found.draws
-    chains = found.tree["posterior"].sizes["chain"]
+    drawn = found.arrays.groups["posterior"]
+    chains = len(drawn["stiffness"].values)
     if not found.facts.checks or chains != found.facts.settings.chains:
         raise ValueError("has other chains, or no checks")
     if draws.keys() != found.facts.units.keys():
         raise ValueError("has other sites than a population")
-    check_draws(found.tree, dict.fromkeys(draws, ()))
-    ahead = found.tree["predictions"][_NEXT]
-    if ahead.shape != found.tree["posterior"]["stiffness"].shape:
+    check_draws(drawn, dict.fromkeys(draws, ()))
+    ahead = found.arrays.groups["predictions"][_NEXT].values
+    if ahead.shape != drawn["stiffness"].values.shape:
         raise ValueError("has another number of gears to come")
     if not np.isfinite(ahead).all():
         raise ValueError("has a gear to come that is not finite")

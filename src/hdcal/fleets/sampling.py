@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Key
 
 from hdcal.data.prior import Prior
@@ -60,10 +59,8 @@ def sample_population(
         checks = (*mixing_checks(mixed, chains), _covering(cheap.shape))
         return SampledPopulation(_flat(cheap.values), checks, "independent proposals")
     found = sample(problem, whitening, key, warmup=warmup, **size)
-    over = ("chain", "draw")
-    names = ("energy", "diverging", "n_steps")
-    stats = xr.Dataset({name: (over, getattr(found, name)) for name in names})
-    checks = sampling_checks(stats, mixing(_free(found.values, problem.priors)))
+    mixed = mixing(_free(found.values, problem.priors))
+    checks = sampling_checks(vars(found), mixed)
     return SampledPopulation(_flat(found.values), checks, "NUTS")
 
 

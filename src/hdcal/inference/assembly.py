@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import xarray as xr
 from jaxtyping import Key
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
 from hdcal.data.versions import versions
+from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.checks import (
     Check,
     bound_check,
@@ -55,7 +55,7 @@ def assemble(
     found: Draws,
     own: Specifics,
     key: Key[Array, ""],
-) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
+) -> tuple[ArrayTree, dict[str, Diagnosis], tuple[Check, ...]]:
     """Return the groups, diagnoses and checks of a posterior.
 
     Args:
@@ -78,18 +78,17 @@ def assemble(
     scalars = {name: found.values[name] for name in sampled}
     diagnoses = diagnose_parameters(scalars, sampled, *weights)
     prior_draws = draw_priors(sampled, key)
-    tree = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
+    arrays = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
     dead = dead_parameters(own.slopes, problem)
     alive = {name: slope for name, slope in own.slopes.items() if name not in dead}
-    statistics = tree["sample_stats"].to_dataset()
     checks = (
-        *sampling_checks(statistics, diagnoses | mixing(own.mixed)),
+        *sampling_checks(vars(found), diagnoses | mixing(own.mixed)),
         *own.checks,
         conflict_check(scalars, sampled),
         bound_check(scalars, sampled),
         *identification_checks(dead, flat_directions(alive, problem)),
     )
-    return tree, diagnoses, checks
+    return arrays, diagnoses, checks
 
 
 def run_settings(found: Draws, began: float) -> dict[str, object]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import xarray as xr
 
 from hdcal.data.priors import Prior
 from hdcal.inference.distributions import bounds, frozen
@@ -52,19 +51,19 @@ class Check:
 
 
 def sampling_checks(
-    stats: xr.Dataset, mixed: Mapping[str, Mixing]
+    stats: Mapping[str, np.ndarray], mixed: Mapping[str, Mixing]
 ) -> tuple[Check, ...]:
     """Return the checks on the sampler: any of them failed fails the result.
 
     Args:
-        stats: energy, diverging, n_steps; dimensions chain and draw.
+        stats: energy, diverging, n_steps, each (chain, draw).
         mixed: by quantity.
     """
-    energy = _explored(stats["energy"].to_numpy())
+    energy = _explored(stats["energy"])
     divergent = int(stats["diverging"].sum())
     saturated = float((stats["n_steps"] >= 2**MAX_TREE_DEPTH - 1).mean())
     return (
-        *mixing_checks(mixed, stats.sizes["chain"]),
+        *mixing_checks(mixed, len(stats["energy"])),
         _check(
             "energy is explored (BFMI)",
             bool(np.all(energy >= MIN_BFMI)),

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import xarray as xr
 
 from hdcal.data.typed_json import STRICT, Name, Share
+from hdcal.inference.array_tree import DRAW, Group
 from hdcal.inference.problem import without_scatter
 from hdcal.physics.effect import Effect, parameters
 
@@ -79,7 +79,7 @@ def null_sites(effects: Sequence[type[Effect]]) -> Iterator[tuple[str, float]]:
 
 
 def check_hypotheses(
-    draws: xr.Dataset,
+    draws: Group,
     effects: Sequence[type[Effect]],
     probabilities: Mapping[str, float],
 ) -> None:
@@ -93,10 +93,10 @@ def check_hypotheses(
     Raises:
         ValueError: they are none.
     """
-    labels = draws.coords[HYPOTHESIS]
-    if labels.dims != ("draw",) or labels.dtype.kind not in "OTU":
+    axes, labels, _ = draws[HYPOTHESIS]
+    if axes != (DRAW,) or labels.dtype.kind not in "OTU":
         raise ValueError("has hypotheses that are not those of draws")
-    names = np.asarray(labels.to_numpy(), str)
+    names = np.asarray(labels, str)
     if {*names.tolist()} != {*probabilities}:
         raise ValueError("has draws of other hypotheses than it says")
     known = {effect.name for effect in effects} | {UNKNOWN}
@@ -109,5 +109,5 @@ def check_hypotheses(
         if UNKNOWN not in own:
             nulls |= {site: 0.0 for site in GAP if site in draws}
         for site, null in nulls.items():
-            if (draws[site].to_numpy()[:, rows] != null).any():
+            if (draws[site].values[:, rows] != null).any():
                 raise ValueError(f"has {site} in draws of {name}")

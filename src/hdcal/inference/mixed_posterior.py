@@ -4,8 +4,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import xarray as xr
 
+from hdcal.inference.array_tree import (
+    CHAIN,
+    DRAW,
+    OVER_DRAWS,
+    ArrayTree,
+    Group,
+    Named,
+)
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.hypotheses import (
@@ -54,7 +61,7 @@ def mixed_posterior(models: _Weighed) -> Posterior:
         likeliest,
         effects=effects,
         priors={n: p for one in reversed(posteriors) for n, p in one.priors.items()},
-        tree=_tree(names, posteriors, rows, effects),
+        arrays=_arrays(names, posteriors, rows, effects),
         diagnoses={
             name: found
             for name, found in _diagnoses(posteriors).items()
@@ -83,18 +90,16 @@ def causes_of_draws(posterior: Posterior) -> np.ndarray:
 
     Draws are in the order of `Posterior.draws`, chain after chain.
     """
-    sizes, labels = posterior.tree["posterior"].sizes, _hypotheses(posterior)
+    (chains, draws), labels = posterior.size, _hypotheses(posterior)
     if labels is None:
-        return np.zeros(sizes["chain"] * sizes["draw"], int)
-    return np.tile(np.unique(labels, return_inverse=True)[1], sizes["chain"])
+        return np.zeros(chains * draws, int)
+    return np.tile(np.unique(labels, return_inverse=True)[1], chains)
 
 
 def _hypotheses(posterior: Posterior) -> np.ndarray | None:
     """Return the hypothesis of each draw of a chain; None of one model."""
-    draws = posterior.tree["posterior"].to_dataset()
-    if HYPOTHESIS not in draws.coords:
-        return None
-    return np.asarray(draws[HYPOTHESIS].to_numpy(), str)
+    found = posterior.arrays.groups["posterior"].get(HYPOTHESIS)
+    return None if found is None else np.asarray(found.values, str)
 
 
 def _alone(posterior: Posterior, name: str, rows: np.ndarray) -> Posterior:
@@ -102,25 +107,20 @@ def _alone(posterior: Posterior, name: str, rows: np.ndarray) -> Posterior:
     own = parts_of(name)
     effects = tuple(e for e in posterior.effects if e.name in own)
     sites = posterior.sites(posterior.case, effects, UNKNOWN in own)
-    tree = posterior.tree.copy()
-    for group in _OF_DRAWS:
-        if group in tree.children:
-            kept = (
-                tree[group]
-                .to_dataset()
-                .isel(draw=rows)
-                .drop_vars(HYPOTHESIS, errors="ignore")
-            )
-            if group == "posterior":
-                kept = kept[[n for n in kept.data_vars if n in sites]]
-            tree[group] = xr.DataTree(kept)
+    groups = {**posterior.arrays.groups}
+    for group in groups.keys() & _OF_DRAWS:
+        groups[group] = _taken(groups[group], rows)
+    drawn = groups["posterior"]
+    own_sites = [one for name, one in drawn.items() if name in sites]
+    kept = {*sites, *(axis for one in own_sites for axis in one.axes)}
+    groups["posterior"] = {name: one for name, one in drawn.items() if name in kept}
     origin = posterior.settings[ORIGIN]
     assert isinstance(origin, dict)
     known = {"with_gap": UNKNOWN in own, "draws": len(rows)}
     return replace(
         posterior,
         effects=effects,
-        tree=tree,
+        arrays=ArrayTree(groups),
         diagnoses={n: d for n, d in posterior.diagnoses.items() if n in sites},
         settings={
             **posterior.settings,
@@ -132,7 +132,7 @@ def _alone(posterior: Posterior, name: str, rows: np.ndarray) -> Posterior:
 
 def _rows(shares: Sequence[float], posteriors: Sequence[Posterior]) -> list[np.ndarray]:
     """Return which draws of each chain every model gives, evenly along it."""
-    held = [one.tree["posterior"].sizes["draw"] for one in posteriors]
+    held = [one.size[1] for one in posteriors]
     count = min(held)
     ends = np.round(np.cumsum(shares) / sum(shares) * count).astype(int)
     given = np.maximum(np.diff(ends, prepend=0), 1)
@@ -142,49 +142,69 @@ def _rows(shares: Sequence[float], posteriors: Sequence[Posterior]) -> list[np.n
     ]
 
 
-def _tree(names, posteriors: Sequence[Posterior], rows, effects) -> xr.DataTree:
-    tree = posteriors[0].tree.copy()
+def _arrays(names, posteriors: Sequence[Posterior], rows, effects) -> ArrayTree:
+    groups = {**posteriors[0].arrays.groups}
     labels = np.repeat(names, list(map(len, rows)))
-    for group in _OF_DRAWS:
+    for group in groups.keys() & _OF_DRAWS:
         tables = [
-            one.tree[group].to_dataset().isel(draw=kept)
+            _taken(one.arrays.groups[group], kept)
             for one, kept in zip(posteriors, rows, strict=True)
-            if group in one.tree.children
+            if group in one.arrays.groups
         ]
         if len(tables) < len(posteriors):
             continue
         if group == "posterior":
             tables = [_completed(table, posteriors, effects) for table in tables]
-        common = set.intersection(*({*table.data_vars} for table in tables))
-        joined = xr.concat([t[sorted(map(str, common))] for t in tables], "draw")
-        joined = joined.assign_coords(draw=np.arange(len(labels)))
-        if group == "posterior":
-            joined = joined.assign_coords({HYPOTHESIS: ("draw", labels.astype(object))})
-        tree[group] = xr.DataTree(joined)
-    priors = [one.tree["prior"].to_dataset() for one in posteriors]
-    least = min(table.sizes["draw"] for table in priors)
-    tables = [table.isel(draw=slice(least)) for table in reversed(priors)]
-    tree["prior"] = xr.DataTree(xr.merge(tables, compat="override", join="override"))
-    return tree
+        groups[group] = _end_to_end(tables)
+    groups["posterior"] = {
+        **groups["posterior"],
+        HYPOTHESIS: Named((DRAW,), labels.astype(object)),
+    }
+    priors = [one.arrays.groups["prior"] for one in posteriors]
+    least = np.arange(min(len(table[DRAW].values) for table in priors))
+    shortest = [_taken(table, least) for table in priors]
+    groups["prior"] = {n: one for table in shortest for n, one in table.items()}
+    return ArrayTree(groups)
 
 
-def _completed(
-    table: xr.Dataset, posteriors: Sequence[Posterior], effects
-) -> xr.Dataset:
+def _taken(group: Group, rows: np.ndarray) -> dict[str, Named]:
+    """Return a group with these draws of each chain only."""
+    return {name: one.taken(DRAW, rows) for name, one in group.items()}
+
+
+def _end_to_end(tables: Sequence[Group]) -> dict[str, Named]:
+    """Return groups as one, the draws of the next after those of the last."""
+    found = {}
+    for name in sorted(set.intersection(*({*table} for table in tables))):
+        first = tables[0][name]
+        if DRAW in first.axes:
+            each = [table[name].values for table in tables]
+            whole = np.concatenate(each, first.axes.index(DRAW))
+            first = first._replace(values=whole)
+        found[name] = first
+    found[DRAW] = Named((DRAW,), np.arange(len(found[DRAW].values)))
+    return found
+
+
+def _completed(table: Group, posteriors: Sequence[Posterior], effects) -> Group:
     """Return draws of a model with the sites that only others have."""
     nulls = dict(null_sites(effects)) | dict.fromkeys((*GAP, CORRELATION), 0.0)
+    found = {**table}
+    size = len(table[CHAIN].values), len(table[DRAW].values)
     for one in posteriors:
-        held = one.tree["posterior"].to_dataset()
-        shapes = one.tree["prior"].to_dataset()
-        for site in {*map(str, held.data_vars)} - {*map(str, table.data_vars)}:
-            size = (table.sizes["chain"], table.sizes["draw"], *held[site].shape[2:])
+        held, shapes = (one.arrays.groups[name] for name in ("posterior", "prior"))
+        for name in held.keys() - found.keys():
+            if held[name].axes[:2] != OVER_DRAWS:
+                found[name] = held[name]
+                continue
             # What has no prior to draw from is fixed.
-            source = shapes if site in shapes else held
-            filled = np.full(size, nulls[site]) if site in nulls else None
+            source = shapes if name in shapes else held
+            whole = (*size, *held[name].values.shape[2:])
+            filled = np.full(whole, nulls[name]) if name in nulls else None
             if filled is None:
-                filled = np.resize(source[site].to_numpy(), size)
-            table = table.assign({site: (held[site].dims, filled)})
-    return table
+                filled = np.resize(source[name].values, whole)
+            found[name] = held[name]._replace(values=filled)
+    return found
 
 
 def _diagnoses(posteriors: Sequence[Posterior]) -> dict[str, Diagnosis]:

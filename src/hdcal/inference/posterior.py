@@ -5,10 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
@@ -16,6 +15,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.typed_json import typed, typed_text
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import posterior_file
+from hdcal.inference.array_tree import CHAIN, DRAW, ArrayTree, Group, joined
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.held import LOOP, PILOT_NOISE, HeldModel, HeldSettings
@@ -25,6 +25,9 @@ from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FILE_NAME = "posterior.nc"
 
@@ -38,8 +41,8 @@ class Posterior(Shown):
         theory: which stiffness K multiplies.
         effects: effects in the model.
         priors: of every site, in code units, K under `theory`.
-        tree: ArviZ DataTree with the groups posterior, prior, sample_stats,
-            observed_data, constant_data and log_likelihood.
+        arrays: the groups posterior, prior, sample_stats, observed_data,
+            constant_data and log_likelihood.
         diagnoses: sampling quality and driver by parameter.
         checks: what was checked and what came out.
         settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
@@ -52,7 +55,7 @@ class Posterior(Shown):
     theory: Theory
     effects: tuple[type[Effect], ...]
     priors: Mapping[str, Prior]
-    tree: xr.DataTree
+    arrays: ArrayTree
     diagnoses: Mapping[str, Diagnosis]
     checks: tuple[Check, ...]
     settings: Mapping[str, object]
@@ -96,7 +99,18 @@ class Posterior(Shown):
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws in code units by site, chains joined: [draw, …]."""
-        return posterior_file.joined_draws(self.tree)
+        return joined(self.arrays.groups["posterior"])
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Chains, and draws of each."""
+        group = self.arrays.groups["posterior"]
+        return len(group[CHAIN].values), len(group[DRAW].values)
+
+    @property
+    def tree(self) -> "xr.DataTree":
+        """What ArviZ draws from: its groups as a DataTree."""
+        return self.arrays.datatree
 
     @cached_property
     def problem(self) -> Problem:
@@ -153,7 +167,7 @@ class Posterior(Shown):
             ),
         }
         kind = posterior_file.CALIBRATION
-        return posterior_file.sealed(self.tree, kind, attributes)
+        return posterior_file.sealed(self.arrays, kind, attributes)
 
     @classmethod
     def load(
@@ -181,8 +195,8 @@ class Posterior(Shown):
                 raise InputError([_of_another_kind(file, cls.kind)])
             case = posterior_file.restore_case(
                 tree.attrs["case"],
-                tree["constant_data"].to_dataset(),
-                tree["observed_data"].to_dataset()["force"],
+                tree.groups["constant_data"],
+                tree.groups["observed_data"]["force"].values,
             )
             if (model.theory == SPRING) != (case.gear.theory == SPRING):
                 raise ValueError("is of another theory than its gear")
@@ -192,23 +206,23 @@ class Posterior(Shown):
                 theory=model.theory,
                 effects=chosen,
                 priors=posterior_file.restore_priors(model.priors),
-                tree=tree,
+                arrays=tree,
                 diagnoses=model.diagnoses,
                 checks=tuple(model.checks),
                 settings=model.settings,
             )
             sites = found.sites(case, chosen, settings.with_gap)
-            check_draws(tree, sites)
-            _check_mixture(tree, chosen, settings)
+            draws = tree.groups["posterior"]
+            check_draws(draws, sites)
+            _check_mixture(draws, chosen, settings)
             model.check_diagnoses(sites)
             return found
         except (KeyError, ValueError, TypeError, AttributeError) as error:
             raise InputError([posterior_file.not_a_posterior(file)]) from error
 
 
-def _check_mixture(tree: xr.DataTree, effects, settings: HeldSettings) -> None:
-    draws, origin = tree["posterior"].to_dataset(), settings.diagnosis
-    labelled = HYPOTHESIS in draws.coords
+def _check_mixture(draws: Group, effects, settings: HeldSettings) -> None:
+    origin, labelled = settings.diagnosis, HYPOTHESIS in draws
     if origin is None or origin.hypothesis is not None:
         if labelled:
             raise ValueError("has hypotheses of which it says nothing")

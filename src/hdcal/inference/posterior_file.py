@@ -4,13 +4,12 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import h5py
 import numpy as np
-import xarray as xr
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.full_scale import FullScale
@@ -18,6 +17,7 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, InputError
+from hdcal.inference.array_tree import ArrayTree, Group, read
 from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
 from hdcal.inference.posterior_limits import check_container, check_rows
 from hdcal.inference.serial_correlation import CORRELATION
@@ -139,7 +139,7 @@ def describe_case(case: Case) -> str:
     )
 
 
-def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
+def restore_case(text: str, constant: Group, force: np.ndarray) -> Case:
     """Return the case that was described, with its rows.
 
     Raises:
@@ -157,8 +157,8 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
         **{name: math.nan if size is None else size for name, size in sizes.items()}
     )
     gear["full_scale"] = FullScale(**vars(held.gear.full_scale))
-    rows = {name: constant[name].to_numpy() for name in UNITS}
-    rows["force"] = force.to_numpy()
+    rows = {name: constant[name].values for name in UNITS}
+    rows["force"] = force
     check_rows(rows, len(held.run_labels), len(held.specimen_labels))
     return Case(
         name=held.name,
@@ -171,7 +171,7 @@ def restore_case(text: str, constant: xr.Dataset, force: xr.DataArray) -> Case:
     )
 
 
-def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
+def open_tree(path, kind: Kind = CALIBRATION) -> ArrayTree:
     """Open a posterior file and read it whole.
 
     Raises:
@@ -179,8 +179,7 @@ def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
     """
     try:
         check_container(Path(path))
-        with xr.open_datatree(path, engine="h5netcdf") as tree:
-            loaded = tree.load()
+        return read(path)
     except FileNotFoundError as error:
         none = "there is no such file", "Name the folder of a calibration"
         words, remedy = _WITHOUT.get(_kind_beside(Path(path)), none)
@@ -189,7 +188,6 @@ def open_tree(path, kind: Kind = CALIBRATION) -> xr.DataTree:
         raise
     except Exception as error:
         raise InputError([not_a_posterior(path, kind)]) from error
-    return loaded
 
 
 def kind_of(path: Path) -> Kind | None:
@@ -225,40 +223,25 @@ def not_a_posterior(path, kind: Kind = CALIBRATION) -> Finding:
     return Finding(str(path), words, kind.again)
 
 
-def sealed(tree: xr.DataTree, kind: Kind, attributes: Mapping[str, Any]) -> bytes:
-    """Return the content of a NetCDF file that ArviZ opens, with its digest.
-
-    Made in memory: HDF5 crashes where a disk that is full refuses its writes.
-    """
-    tree = tree.copy()
-    tree.attrs = {_FORMAT: kind.format, **attributes}
-    tree.attrs[DIGEST] = digest(tree)
-    return bytes(tree.to_netcdf(engine="h5netcdf"))
+def sealed(tree: ArrayTree, kind: Kind, attributes: Mapping[str, str]) -> bytes:
+    """Return the content of a NetCDF file that ArviZ opens, with its digest."""
+    tree = replace(tree, attrs={_FORMAT: kind.format, **attributes})
+    return replace(tree, attrs={**tree.attrs, DIGEST: digest(tree)}).content()
 
 
-def joined_draws(tree: xr.DataTree) -> dict[str, np.ndarray]:
-    """Return all draws of a posterior by site, chains joined: [draw, …]."""
-    group = tree["posterior"].to_dataset()
-    return {
-        str(name): values.to_numpy().reshape(-1, *values.shape[2:])
-        for name, values in group.data_vars.items()
-    }
-
-
-def digest(tree: xr.DataTree) -> str:
+def digest(tree: ArrayTree) -> str:
     """Return a SHA-256 of every number, label and attribute that hdcal reads back.
 
     It is the same before writing and after reading: groups and variables in the order
     of their names, numbers as little-endian 64 bits, labels and attributes as text.
     """
     whole = hashlib.sha256()
-    for name in sorted(set(map(str, tree.attrs)) - {DIGEST}):
-        whole.update(json.dumps([name, str(tree.attrs[name])]).encode())
-    for node in sorted(tree.subtree, key=lambda node: node.path):
-        variables = node.to_dataset(inherit=False).variables
-        for name in sorted(map(str, variables)):
-            kind, data = _canonical(np.asarray(variables[name].values))
-            head = [node.path, name, variables[name].dims, kind, len(data)]
+    for name in sorted({*tree.attrs} - {DIGEST}):
+        whole.update(json.dumps([name, tree.attrs[name]]).encode())
+    for place, group in sorted(tree.groups.items()):
+        for name, one in sorted(group.items()):
+            kind, data = _canonical(one.values)
+            head = [f"/{place}", name, one.axes, kind, len(data)]
             whole.update(json.dumps(head).encode())
             whole.update(data)
     return whole.hexdigest()
@@ -272,7 +255,7 @@ def _canonical(values: np.ndarray) -> tuple[str, bytes]:
     return f"text{values.shape}", json.dumps([str(v) for v in values.flat]).encode()
 
 
-def check_unchanged(tree: xr.DataTree, path, kind: Kind = CALIBRATION) -> None:
+def check_unchanged(tree: ArrayTree, path, kind: Kind = CALIBRATION) -> None:
     """Refuse a posterior of another kind or version, or not as hdcal wrote it.
 
     The digest detects accidental changes. It is no signature: it can be computed
@@ -281,7 +264,7 @@ def check_unchanged(tree: xr.DataTree, path, kind: Kind = CALIBRATION) -> None:
     Raises:
         InputError: with what is wrong.
     """
-    written = str(tree.attrs.get(_FORMAT, ""))
+    written = tree.attrs.get(_FORMAT, "")
     found = _kind(written)
     if found is None:
         raise InputError([not_a_posterior(path, kind)])

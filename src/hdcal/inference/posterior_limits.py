@@ -5,13 +5,13 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import xarray as xr
 from h5py import h5o  # pyright: ignore[reportAttributeAccessIssue]
 
 from hdcal.data.plausible import implausible
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import Finding, InputError
+from hdcal.inference.array_tree import CHAIN, DRAW, OVER_DRAWS, Group
 
 LARGEST_FILE = 1 << 32
 # What a file may unpack to: this many times its size, but at least so many bytes.
@@ -160,30 +160,29 @@ def _check_users(dtype: np.dtype) -> None:
     _check_type(kinds[1])
 
 
-def check_draws(tree: xr.DataTree, sites: Mapping[str, tuple[int, ...]]) -> None:
+def check_draws(draws: Group, sites: Mapping[str, tuple[int, ...]]) -> None:
     """Check that draws are whole, whoever wrote them.
 
     Args:
-        tree: as it was read.
+        draws: the group posterior, as it was read.
         sites: shape of each parameter that the model has.
 
     Raises:
         KeyError, ValueError: they are not.
     """
-    draws = tree["posterior"].to_dataset()
-    size = draws.sizes["chain"], draws.sizes["draw"]
+    size = len(draws[CHAIN].values), len(draws[DRAW].values)
     if min(size) < 1:
         raise ValueError("there are no draws")
-    for name in {*sites, *map(str, draws.data_vars)}:
-        one = draws[name]
-        if one.dims[:2] != ("chain", "draw"):
+    for name in {*sites, *(n for n, one in draws.items() if len(one.axes) > 1)}:
+        axes, values, _ = draws[name]
+        if axes[:2] != OVER_DRAWS:
             raise ValueError(f"{name} has other axes")
-        if name in sites and one.shape != (*size, *sites[name]):
+        if name in sites and values.shape != (*size, *sites[name]):
             raise ValueError(f"{name} has another shape")
-        if one.dtype.kind not in "biuf" or not np.isfinite(one).all():
+        if values.dtype.kind not in "biuf" or not np.isfinite(values).all():
             raise ValueError(f"{name} is not finite")
         # The widest range there is: chains that failed go far.
-        if implausible(name, one.to_numpy(), "effect"):
+        if implausible(name, values, "effect"):
             raise ValueError(f"{name} is beyond every rig")
 
 

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 
 import jax
 import numpy as np
-import xarray as xr
-from arviz_base import from_dict
 
 from hdcal.data.case import Case
 from hdcal.inference import posterior_file
+from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.density import densities, pointwise_log_likelihood
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.padding import pad_records
@@ -20,6 +19,13 @@ from hdcal.programs import program
 # Above this many numbers the log likelihood of every row and draw is not kept.
 MOST_LOG_LIKELIHOODS = 8_000_000
 TOTAL = "total"
+_ROW = "row"
+# Of what has more axes than chain and draw.
+_AXES = {
+    "run_offset": ("run_label",),
+    "specimen_deviation": ("specimen_label",),
+    "gap_weights": ("basis",),
+}
 
 
 def build_tree(
@@ -28,7 +34,7 @@ def build_tree(
     prior_draws: Mapping[str, np.ndarray],
     log_likelihood: Mapping[str, np.ndarray],
     observed: tuple[str, ...] = ("force",),
-) -> xr.DataTree:
+) -> ArrayTree:
     """Collect everything in ArviZ' groups.
 
     Args:
@@ -40,33 +46,26 @@ def build_tree(
         observed: columns of the records that the model explains.
     """
     rows = {name: np.asarray(getattr(case.records, name)) for name in observed}
-    tree = from_dict(
-        {
-            "posterior": draws.values,
-            "prior": {name: values[None] for name, values in prior_draws.items()},
-            "sample_stats": _sampler_statistics(draws),
-            "observed_data": rows,
-            "constant_data": posterior_file.covariates(case.records),
-            "log_likelihood": dict(log_likelihood),
-        },
-        dims={
-            **{name: ["row"] for name in (*observed, *posterior_file.UNITS)},
-            "run_offset": ["run_label"],
-            "specimen_deviation": ["specimen_label"],
-            "gap_weights": ["basis"],
-        },
-        coords={
-            "run_label": list(case.run_labels),
-            "specimen_label": list(case.specimen_labels),
-        },
-    )
-    if TOTAL in log_likelihood:
+    over_rows = dict.fromkeys(observed, (_ROW,))
+    labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
+    likelihood = group_of(log_likelihood, axes=over_rows)
+    if TOTAL in likelihood:
         size = log_likelihood[TOTAL].size * len(case.records.force)
-        tree["log_likelihood"].attrs["note"] = (
+        words = (
             f"{size} values by row and draw are not kept; this is the log likelihood "
             "of all rows, runs, specimens and gap integrated out where they were"
         )
-    return tree
+        likelihood[TOTAL] = likelihood[TOTAL]._replace(said={"comment": words})
+    return ArrayTree(
+        {
+            "posterior": group_of(draws.values, axes=_AXES, labels=labels),
+            "prior": group_of({name: v[None] for name, v in prior_draws.items()}),
+            "sample_stats": group_of(_sampler_statistics(draws)),
+            "observed_data": group_of(rows, (_ROW,)),
+            "constant_data": group_of(posterior_file.covariates(case.records), (_ROW,)),
+            "log_likelihood": likelihood,
+        }
+    )
 
 
 def force_log_likelihood(

@@ -97,11 +97,11 @@ def _density(values: np.ndarray, edges: tuple[float, float]):
 
 def sampler_figure(posterior: Posterior) -> Figure:
     """Draw rank plots: chains that agree are level everywhere."""
-    names = list(posterior.diagnoses)
+    names, drawn = list(posterior.diagnoses), posterior.arrays.groups["posterior"]
     with style():
         figure, panels = _grid(len(names), 1.75)
         for axes, name in zip(panels, names, strict=True):
-            _draw_ranks(axes, posterior.tree["posterior"][name].to_numpy())
+            _draw_ranks(axes, drawn[name].values)
             rhat = posterior.diagnoses[name].rhat
             words = plain(label(name), 40)
             axes.set_title(words, loc="left", fontsize=8, fontweight="bold")

@@ -3,10 +3,12 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, is_dataclass
 from numbers import Number
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def own_columns(found: Any) -> Any:
@@ -33,8 +35,10 @@ def as_columns(table: Any) -> dict[str, Any]:
     return columns
 
 
-def datatree(columns: Mapping[str, Any]) -> xr.DataTree:
+def datatree(columns: Mapping[str, Any]) -> "xr.DataTree":
     """Return columns over one dimension, `row`."""
+    import xarray as xr
+
     arrays = {name: ("row", np.asarray(column)) for name, column in columns.items()}
     return xr.DataTree(xr.Dataset(arrays))
 

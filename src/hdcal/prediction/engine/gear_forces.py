@@ -46,7 +46,7 @@ def gear_values(
     # Of what fills a space evenly, a part that was picked from it need not.
     levels = spread_evenly(len(kept), SITES, seed)
     # A mixture has its causes in the order of its draws, alike in each chain.
-    chains = posterior.tree["posterior"].sizes["chain"]
+    chains = posterior.size[0]
     sizes = [cause.size // chains for cause in causes]
     index = np.tile(np.repeat(np.arange(len(causes)), sizes), chains)[kept]
     each = [untested_of(cause, levels[index == i]) for i, cause in enumerate(causes)]
