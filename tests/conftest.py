@@ -83,6 +83,10 @@ def few_executables() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def own_traces(request: pytest.FixtureRequest) -> None:
     """Keep no trace of code that a test has changed, and read none beside it."""
-    if "monkeypatch" in request.fixturenames and "hdcal.programs" in sys.modules:
+    if (
+        "monkeypatch" in request.fixturenames
+        and "hdcal.programs.program" in sys.modules
+    ):
         patch = request.getfixturevalue("monkeypatch")
-        patch.setattr("hdcal.programs._folder", lambda _: None)
+        for user in ("program", "ahead"):
+            patch.setattr(f"hdcal.programs.{user}.folder_in", lambda _: None)

@@ -19,7 +19,7 @@ from importlib import import_module
 
 import arviz_base, arviz_stats, diffrax, distributed, equinox, h5netcdf, jax
 import matplotlib, numpy, numpyro.contrib.hsgp.laplacian, optimistix, pandas, pint
-import pydantic, rich, scipy.optimize, scipy.stats, xarray
+import pydantic, rich, scipy.optimize, scipy.stats, threadpoolctl, xarray
 
 def state():
     return {

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import hdcal
-from hdcal import programs
-from hdcal.programs import Program, program
+from hdcal.programs import compiling, files
+from hdcal.programs.program import Program, program
 
 _TWICE = """
 import sys
@@ -127,12 +127,12 @@ def test_other_code_is_another_program(cached, tmp_path, monkeypatch):
     code = tmp_path / "code"
     code.mkdir()
     (code / "one.py").write_text("changed = True")
-    monkeypatch.setattr(programs, "_CODE", code)
-    programs._folder.cache_clear()
+    monkeypatch.setattr(files, "_CODE", code)
+    files.folder_in.cache_clear()
     another(one)({"x": np.zeros(3), "y": 0.0}, times=1)
     assert len(traced) == 2
     assert {file.parent for file in kept(cached)} != {folder}
-    programs._folder.cache_clear()
+    files.folder_in.cache_clear()
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", b"x" * 4000])
@@ -274,7 +274,7 @@ def test_settings_that_are_equal_and_of_another_type_are_told_apart(cached):
 def test_what_lies_on_another_device_is_jit(tmp_path):
     script = f"""
 import jax, numpy as np
-from hdcal.programs import program
+from hdcal.programs.program import program
 jax.config.update("jax_compilation_cache_dir", {str(tmp_path)!r})
 from pathlib import Path
 from test_programs import kept, doubled
@@ -374,10 +374,10 @@ def test_an_xla_that_lacks_an_option_is_asked_without(cached, monkeypatch):
         return own(function, *args, **named)
 
     monkeypatch.setattr(jax, "jit", older)
-    programs._options.cache_clear()
+    compiling._options.cache_clear()
     try:
-        assert programs._options() is None
+        assert compiling._options() is None
         found = Program(doubled)(np.arange(3.0))
         np.testing.assert_array_equal(found[1], [0.0, 2.0, 4.0])
     finally:
-        programs._options.cache_clear()
+        compiling._options.cache_clear()

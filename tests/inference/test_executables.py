@@ -87,6 +87,8 @@ def test_they_go_when_half_the_limit_is_in_use(monkeypatch, tmp_path, compilatio
     theirs = jax.jit(lambda x: jnp.linalg.solve(x + 1.0, x))
     problem = build_problem(make_case(ramp()), effect_priors())
     theirs(jnp.eye(2)).block_until_ready()
+    # What is none of the sampler's stays, and is here already.
+    laplace.fit(problem)
     limit = tmp_path / "limit"
     monkeypatch.setattr(executables, "_LIMIT", limit)
     # Of what other tests left there.

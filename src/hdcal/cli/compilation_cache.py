@@ -2,7 +2,11 @@
 
 import os
 import secrets
+from functools import partial
 from pathlib import Path
+
+import click
+from click.core import ParameterSource
 
 
 def one_thread_for_algebra() -> None:
@@ -33,6 +37,19 @@ def keep_compilations() -> None:
     # By default JAX keeps only what took long; a run here is many short ones.
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    if (command := click.get_current_context(silent=True)) is not None:
+        _load_ahead(command)
+
+
+def _load_ahead(command: click.Context) -> None:
+    """Load what the command needed the last time that these options were given."""
+    from hdcal.programs import ahead
+
+    own = ParameterSource.COMMANDLINE
+    given = [n for n in command.params if command.get_parameter_source(n) is own]
+    task = "-".join([*command.command_path.split(), *sorted(given)])
+    command.call_on_close(partial(ahead.end, task))
+    ahead.begin(task)
 
 
 def _writable_folder() -> Path | None:

@@ -11,7 +11,7 @@ from hdcal.design.design_draws import DesignDraws
 from hdcal.design.force_limit import LimitedGear
 from hdcal.design.nearest_point import CLOSE, nearest_kept
 from hdcal.prediction.engine.sizes import SIZES
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Draws on either side of a quantile that tell its slope.
 _BESIDE = 50

@@ -10,7 +10,7 @@ from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
 from hdcal.inference.loop_cells import loop_cells
 from hdcal.physics.history import load_cycle
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Ends of the curve, as shares of the largest deformation.
 _TOE, _HEAD = 0.25, 0.75

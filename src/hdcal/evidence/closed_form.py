@@ -29,7 +29,7 @@ from hdcal.evidence.inner_products import (
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
 from hdcal.inference.padding import bucket_size, repeat_last_row
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 # Gauss–Hermite nodes for log σ: its posterior is close to normal.

@@ -9,7 +9,7 @@ from hdcal.data.records import Records
 from hdcal.inference.padding import pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.

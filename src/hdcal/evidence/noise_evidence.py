@@ -23,7 +23,7 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 _AMPLITUDES, _SHAPES = 10, 3
 _STEPS = 15

@@ -24,7 +24,7 @@ from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.inference.likelihood import log_interval
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Cells of each effect that take part: the most probable ones alone, and some across
 # its prior for what only shows beside another effect.

@@ -11,7 +11,7 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 
 def amplitude_units(

@@ -25,7 +25,7 @@ from hdcal.inference.values import (
     with_rounding,
 )
 from hdcal.physics.effect import Noise
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 
 def pointwise_log_likelihood(

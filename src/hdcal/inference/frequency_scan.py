@@ -14,7 +14,7 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import LinearGear, linear_response
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 _RATIOS = np.array([0.005, 0.03, 0.2])
 # Frequencies are scanned in steps of this share of one over the duration.

@@ -25,7 +25,7 @@ from hdcal.inference.mixing import have_mixed
 from hdcal.inference.pareto import pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Proposals of a round; rounds end when such a share of the last ones is worth a draw.
 _ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from hdcal.data.records import Array
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 Position = dict[str, Any]
 

@@ -12,7 +12,7 @@ from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import predict_rows
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
 # parameter of an effect on the noise.

@@ -6,7 +6,7 @@ from jaxtyping import Float
 from hdcal.data.records import Records
 from hdcal.inference.padding import pad_records
 from hdcal.physics.history import stop_cells
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 _stop_cells = program(stop_cells)
 

@@ -10,7 +10,7 @@ from hdcal.inference.padding import bucket_size, pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # A gear of ordinary stiffness without noise to hide behind [N/mm, N].
 _BASE = (200.0, 0.0, 0.0, 0.0, 1.0)

@@ -23,7 +23,7 @@ from hdcal.inference.density import log_likelihood
 from hdcal.inference.gear_sums import GearSums, line_noise, stretched
 from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
 _NODES = 4

@@ -14,7 +14,7 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.serial_correlation import previous_rows
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Above this many numbers the log likelihood of every row and draw is not kept.
 MOST_LOG_LIKELIHOODS = 8_000_000

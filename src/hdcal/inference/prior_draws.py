@@ -9,7 +9,7 @@ from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import without_texts
 from hdcal.inference.values import POSITIVE
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 _PRIOR_DRAWS = 2000
 

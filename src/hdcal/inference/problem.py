@@ -30,7 +30,7 @@ from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 _base_columns = program(linear_columns)
 

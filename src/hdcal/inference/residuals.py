@@ -26,7 +26,7 @@ from hdcal.inference.residual_shapes import (
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
 from hdcal.notebook import Shown
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.

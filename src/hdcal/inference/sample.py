@@ -21,7 +21,7 @@ from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.records import Array, Records
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Its site in the model.
 CORRELATION = "noise_correlation"

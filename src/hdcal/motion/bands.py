@@ -8,7 +8,7 @@ import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
-from hdcal.programs import program
+from hdcal.programs.program import program
 from hdcal.report.parameters import INTERVAL
 
 # Draws from which the bands of a record are made.

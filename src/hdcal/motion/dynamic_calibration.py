@@ -35,7 +35,7 @@ from hdcal.motion.loss import (
     loss_effects,
     noise_probability,
 )
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 FEWEST_ROWS = 20
 _PEAKS = 3

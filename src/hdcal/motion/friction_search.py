@@ -22,7 +22,7 @@ from hdcal.inference.dynamic_problem import (
     predict_motion,
     stopping_distance,
 )
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Shares of the largest swing down to which the record is looked at, one by one.
 _SHARES = (0.5, 0.25, 0.1)

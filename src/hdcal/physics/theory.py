@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 Scalar = Float[Array, ""] | float
 Stiffness = Callable[[Geometry, Scalar], Scalar]

@@ -16,7 +16,7 @@ from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
 from hdcal.prediction.engine.forces import grid_records
-from hdcal.programs import program
+from hdcal.programs.program import program
 from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import StreamPrior
 

@@ -27,7 +27,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.

@@ -19,7 +19,7 @@ from hdcal.prediction.engine.untested import (
     Untested,
     untested_of,
 )
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Sites of a draw: which of the causes it is of, and its modulus over that of the tested
 # gear where another material was drawn.

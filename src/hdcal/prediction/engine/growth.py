@@ -21,7 +21,7 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.prediction.engine.causes import Cause
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Rows nearer to each other than this part of the range are one: the bend is smooth.
 _KNOTS = 48

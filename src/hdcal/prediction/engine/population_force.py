@@ -38,7 +38,7 @@ from hdcal.prediction.engine.untested import (
     Untested,
     untested_of,
 )
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # More draws than this change no digit that is printed.
 MOST_DRAWS = 8000

@@ -11,7 +11,7 @@ from hdcal.physics.effect import Noise
 from hdcal.prediction.engine.forces import force_of
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.untested import Untested
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 
 @program

@@ -24,7 +24,7 @@ from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Sites of a draw beside those of the posterior: size of the bend and its noise beyond
 # each end, and standard normal scores of the bend, the zero and the frame.

@@ -15,7 +15,7 @@ from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
 from hdcal.prediction.engine.growth import Growth, bend_covariance
 from hdcal.prediction.engine.untested import BENDS, Untested, fitted_columns
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Draws that tell: their sd is then known to some 5 %.
 _DRAWS = 256

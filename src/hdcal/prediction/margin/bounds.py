@@ -33,7 +33,7 @@ from hdcal.prediction.margin.result import (
     ModelBound,
     sizes_needed,
 )
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # The least probability and the least distance to 1 that a number can hold.
 LEAST, LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg

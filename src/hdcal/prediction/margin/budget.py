@@ -27,7 +27,7 @@ from hdcal.prediction.engine.causes import Cause, Driver, independent_draws
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.population_force import PopulationForce, member_force
 from hdcal.prediction.margin.force_model import DRIFTS, ForceModel
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Sites of a draw that a certificate states, where the calibration has them.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")

@@ -17,7 +17,7 @@ from hdcal.prediction.engine.mixture import Mixture, quantile_weights
 from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
 from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # The search ends at this multiple of the tested deformation: what lies beyond rests
 # on nothing.

@@ -30,7 +30,7 @@ from hdcal.prediction.engine.sizes import (
     tolerance_strata,
 )
 from hdcal.prediction.margin.request import Criteria
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # What scales the stiffness of every draw: its site, and code units in the unit shown.
 _MODULI = {"E0_GPa": ("E0", 1e3), "K": ("K", 1.0)}

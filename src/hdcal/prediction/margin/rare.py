@@ -41,7 +41,7 @@ from hdcal.prediction.engine.untested import (
     untested_of,
 )
 from hdcal.prediction.margin.sampling_laws import SamplingLaws
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Points of a round; rounds whose points shape the laws, and rounds that count.
 _POINTS, _TRIALS, _COUNTED = 4096, 2, 2

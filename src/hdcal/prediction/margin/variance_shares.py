@@ -23,7 +23,7 @@ from hdcal.prediction.engine.population_force import (
 )
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
 from hdcal.prediction.engine.untested import PLACES
-from hdcal.programs import program
+from hdcal.programs.program import program
 
 # Points of each input's sample; a power of two.
 _POINTS = 4096

@@ -8,14 +8,10 @@ instead of tracing anew, and imports none of what only tracing needs.
 
 import builtins
 import hashlib
-import os
-import secrets
-import shutil
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import cache, partial, update_wrapper
-from importlib.metadata import PackageNotFoundError, version
+from functools import partial, update_wrapper
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,12 +21,12 @@ from jax import export
 from jax.core import Tracer
 from jax.extend.core import get_opaque_trace_state
 
-# Versions of the code whose programs stay beside each other in one cache.
-_VERSIONS_KEPT = 4
-# Libraries of which a trace has code.
-_TRACED = ("jax", "jaxlib", "numpyro", "equinox", "diffrax", "optimistix", "lineax")
+from hdcal.programs import ahead
+from hdcal.programs.compiling import cache_folder, jitted
+from hdcal.programs.files import TRACED, folder_in, read, write
+
 # Whose classes may be in it: their code, or version, is in its name.
-_KNOWN = {*_TRACED, "hdcal", "collections", "numpy"}
+_KNOWN = {*TRACED, "hdcal", "collections", "numpy"}
 # Settings of JAX that change what is traced; the last one is a device.
 _SETTINGS = (
     "jax_enable_x64",
@@ -41,15 +37,11 @@ _SETTINGS = (
     "jax_debug_nans",
     "jax_default_device",
 )
-_CODE = Path(__file__).parent
-_DIGEST_SIZE = hashlib.sha256().digest_size
 # NumPyro's handlers are on one stack, whatever the thread: only one may trace.
 _TRACING = threading.RLock()
 # Which trace is under way, and none: inside of another one a program is part of it.
 _trace_state = partial(get_opaque_trace_state, convention="flax")
 _NO_TRACE = _trace_state()
-# Nobody else may write what is run.
-_OWN, _OTHERS_WRITE = 0o700, 0o022
 
 
 class _Kind(NamedTuple):
@@ -93,7 +85,7 @@ class Program:
             tuple((name, type(value), value) for name, value in fixed.items()),
             tuple((leaf.shape, leaf.dtype) for leaf in leaves),
             tuple(getattr(jax.config, name) for name in _SETTINGS),
-            _folder(_cached()),
+            folder_in(cache_folder()),
         )
         if kind not in self._ready:
             self._ready[kind] = self._made(kind, leaves)
@@ -115,20 +107,20 @@ class Program:
             found = self._function(*args, **named, **fixed)
             return found if self._returns is None else jax.tree.leaves(found)
 
-        flat = _named(flat, self._function.__name__)
-        file = self._file(kind)
-        exported = None if file is None else _read(file)
+        name, file = self._function.__name__, self._file(kind)
+        if file is not None and (ready := ahead.called(file, name)) is not None:
+            return ready
+        exported = None if file is None else read(file)
         if exported is None and file is not None:
             # What calls back into this process, say, cannot be kept.
             with suppress(Exception), _TRACING:
                 kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
                 # As later processes have it: to the last bit the same.
                 exported = export.deserialize(bytearray(kept))
-                _write(file, kept)
+                write(file, kept)
         if exported is not None:
-            call = _named(exported.call, self._function.__name__)
-            return jax.jit(call, compiler_options=_options())
-        ready = jax.jit(flat, compiler_options=_options())
+            return jitted(exported.call, name)
+        ready = jitted(flat, name)
         with _TRACING:
             ready.lower(*leaves)
         return ready
@@ -163,33 +155,6 @@ def program(
     if function is None:
         return lambda function: Program(function, static, returns)
     return Program(function, static, returns)
-
-
-@cache
-def _options() -> dict[str, Any] | None:
-    """Return with what XLA compiles faster, where it knows that.
-
-    Measured: a first calibration takes a fifth less, a first diagnosis a tenth; those
-    after it, and sampling itself, as long as before.
-    """
-    faster = {"xla_cpu_use_fusion_emitters": False}
-    if jax.default_backend() != "cpu":
-        return None
-    try:
-        jax.jit(_named(lambda x: x, "options"), compiler_options=faster)(0.0)
-    except Exception:
-        return None
-    return faster
-
-
-def _named(function: Callable, name: str) -> Callable:
-    """Return a function with a name by which logs and profiles tell it."""
-
-    def named(*leaves):
-        return function(*leaves)
-
-    named.__name__ = name
-    return named
 
 
 def _is_placed(leaf: Any) -> bool:
@@ -232,68 +197,3 @@ def _classes_in(held: Any) -> Iterator[type]:
         yield from _classes_in([*held.items()])
     else:
         yield type(held)
-
-
-def _cached() -> str | None:
-    """Return the folder of JAX' compilation cache; None without one."""
-    # Flags are put there at import time, out of pyright's sight.
-    return jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def _read(file: Path) -> export.Exported | None:
-    """Return what is kept; a file that is damaged is thrown away."""
-    try:
-        content = file.read_bytes()
-    except OSError:
-        return None
-    digest, kept = content[:_DIGEST_SIZE], content[_DIGEST_SIZE:]
-    with suppress(Exception):
-        if hashlib.sha256(kept).digest() == digest:
-            return export.deserialize(bytearray(kept))
-    with suppress(OSError):
-        file.unlink()
-    return None
-
-
-def _write(file: Path, kept: bytes) -> None:
-    """Keep a program, whole or not at all; a full disk keeps none."""
-    part = file.with_suffix(f".{secrets.token_hex(4)}")
-    with suppress(OSError):
-        try:
-            part.write_bytes(hashlib.sha256(kept).digest() + kept)
-            os.replace(part, file)
-        finally:
-            part.unlink(missing_ok=True)
-
-
-@cache
-def _folder(cached: str | None) -> Path | None:
-    """Return the folder of this code's programs in a cache; None where none can be."""
-    if not cached:
-        return None
-    whole = Path(cached) / "programs"
-    try:
-        folder = whole / _of_code()
-        for one in (whole, folder):
-            one.mkdir(_OWN, parents=True, exist_ok=True)
-            held = one.stat()
-            if held.st_mode & _OTHERS_WRITE or held.st_uid != os.getuid():
-                return None
-        os.utime(folder)
-        older = sorted(whole.iterdir(), key=lambda one: one.stat().st_mtime)
-        for one in older[:-_VERSIONS_KEPT]:
-            shutil.rmtree(one, ignore_errors=True)
-    except OSError:
-        return None
-    return folder
-
-
-def _of_code() -> str:
-    """Return a digest of all code that a trace may have."""
-    whole = hashlib.sha256()
-    for file in sorted(_CODE.rglob("*.py")):
-        whole.update(str(file.relative_to(_CODE)).encode() + file.read_bytes())
-    for name in _TRACED:
-        with suppress(PackageNotFoundError):
-            whole.update(f"{name} {version(name)}".encode())
-    return whole.hexdigest()[:32]

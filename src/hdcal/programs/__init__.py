@@ -1,0 +1,1 @@
+"""Compiled functions that start fast: traced once, kept, and loaded ahead."""

@@ -1,0 +1,92 @@
+"""Programs that are loaded ahead, beside what else is done before they are called.
+
+Most of what a kept program costs is loading, which XLA does while Python goes on. What
+a task called the last time is what it will call; as soon as it calls anything else,
+no more is loaded.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
+
+import jax
+
+from hdcal.programs.compiling import cache_folder, jitted
+from hdcal.programs.files import folder_in, put, read
+
+# By file: the names of those that were called, in their order, and those to come.
+_called: dict[Path, str] = {}
+_coming: dict[Path, Future] = {}
+
+
+def begin(task: str) -> None:
+    """Begin to load what a task called the last time."""
+    listed = _list_of(task)
+    if listed is None:
+        return
+    pool = ThreadPoolExecutor(1)
+    for file, name in _read_list(listed).items():
+        _coming[file] = pool.submit(_load, file, name)
+    pool.shutdown(wait=False)
+
+
+def end(task: str) -> None:
+    """Load no more, and keep in mind what the task called."""
+    _stop()
+    listed = _list_of(task)
+    if listed is None or _called.keys() <= _read_list(listed).keys():
+        return
+    lines = [f"{file.name} {name}\n" for file, name in _called.items()]
+    put(listed, "".join(lines).encode())
+
+
+def called(file: Path, name: str) -> Callable | None:
+    """Return a kept program that is loaded, or nearly; None where another has to be.
+
+    Args:
+        file: where it is kept.
+        name: of its function.
+    """
+    _called.setdefault(file, name)
+    coming = _coming.pop(file, None)
+    if coming is None:
+        _stop()
+    elif not coming.cancel():
+        # It is not to be had there for the reason for which it is not to be had here.
+        with suppress(Exception):
+            return coming.result()
+    return None
+
+
+def _stop() -> None:
+    for one in [*_coming.values()]:
+        one.cancel()
+
+
+def _load(file: Path, name: str) -> Callable | None:
+    exported = read(file)
+    if exported is None:
+        return None
+    ready = jitted(exported.call, name)
+    arguments = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in exported.in_avals]
+    # Data, which switch it on for the process, may not have been read yet.
+    with jax.enable_x64(True):
+        # JAX remembers what came of it, and a call does neither again.
+        ready.lower(*arguments).compile()
+    return ready
+
+
+def _list_of(task: str) -> Path | None:
+    folder = folder_in(cache_folder())
+    return None if folder is None else folder / f"{task}.called"
+
+
+def _read_list(listed: Path) -> dict[Path, str]:
+    """Return the programs of a list; of one that is damaged those that it names."""
+    try:
+        lines = listed.read_text("utf-8").splitlines()
+    except (OSError, ValueError):
+        return {}
+    pairs = [line.split() for line in lines]
+    return {listed.with_name(one[0]): one[1] for one in pairs if len(one) == 2}
