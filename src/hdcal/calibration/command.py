@@ -52,6 +52,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
+    keep_compilations()
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.sample import check_settings
 
@@ -75,7 +76,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
             out = f"{case.name}-calibration"
         console.reserve_folder(out, force)
     assert case is not None and out is not None
-    keep_compilations()
     if dynamic:
         from hdcal.motion.dynamic_calibration import calibrate_dynamic as sample
         from hdcal.motion.summary import dynamic_report as report

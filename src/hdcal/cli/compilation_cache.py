@@ -8,6 +8,9 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+# In the context of a command: that it loads ahead.
+_ASKED = f"{__name__}.asked"
+
 
 def one_thread_for_algebra() -> None:
     """Keep OpenBLAS to one thread; to be called before NumPy is imported.
@@ -37,7 +40,8 @@ def keep_compilations() -> None:
     # By default JAX keeps only what took long; a run here is many short ones.
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    if (command := click.get_current_context(silent=True)) is not None:
+    command = click.get_current_context(silent=True)
+    if command is not None and _ASKED not in command.meta:
         _load_ahead(command)
 
 
@@ -45,6 +49,7 @@ def _load_ahead(command: click.Context) -> None:
     """Load what the command needed the last time that these options were given."""
     from hdcal.programs import ahead
 
+    command.meta[_ASKED] = True
     own = ParameterSource.COMMANDLINE
     given = [n for n in command.params if command.get_parameter_source(n) is own]
     task = "-".join([*command.command_path.split(), *sorted(given)])

@@ -50,6 +50,7 @@ def diagnose(console: Console, cases, out, force, **settings):
     Of one CASE the result is DIR itself, of several DIR/NAME each.
     """
     one_thread_for_algebra()
+    keep_compilations()
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes
@@ -72,7 +73,6 @@ def diagnose(console: Console, cases, out, force, **settings):
         if wrong and asked is not None:
             wrong.extend(asked.findings)
     assert asked is not None and console.folder is not None
-    keep_compilations()
     tell_notes(console, asked)
     if settings["report"] is None:
         settings["report"] = len(asked.found) <= MANY

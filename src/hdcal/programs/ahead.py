@@ -12,7 +12,7 @@ from pathlib import Path
 
 import jax
 
-from hdcal.programs.compiling import cache_folder, jitted
+from hdcal.programs.compiling import cache_folder, lowered
 from hdcal.programs.files import folder_in, put, read
 
 # By file: the names of those that were called, in their order, and those to come.
@@ -68,13 +68,10 @@ def _load(file: Path, name: str) -> Callable | None:
     exported = read(file)
     if exported is None:
         return None
-    ready = jitted(exported.call, name)
     arguments = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in exported.in_avals]
     # Data, which switch it on for the process, may not have been read yet.
     with jax.enable_x64(True):
-        # JAX remembers what came of it, and a call does neither again.
-        ready.lower(*arguments).compile()
-    return ready
+        return lowered(exported.call, name, arguments).compile()
 
 
 def _list_of(task: str) -> Path | None:

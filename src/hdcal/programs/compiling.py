@@ -1,15 +1,25 @@
 """How functions are compiled, and where JAX keeps what came of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
 import jax
 
 
-def jitted(function: Callable, name: str) -> Any:
-    """Return a function as `jax.jit` makes it, with a name for logs and profiles."""
-    return jax.jit(_named(function, name), compiler_options=_options())
+def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
+    """Return a function for such arguments, to be compiled.
+
+    Compiled for these alone, it takes arrays that JAX has bound to their device, as
+    those are that another one returned, and others: `jax.jit` would compile twice.
+
+    Args:
+        function: of arrays.
+        name: for logs and profiles.
+        arguments: arrays, or their shapes and types.
+    """
+    jitted = jax.jit(_named(function, name), compiler_options=_options())
+    return jitted.lower(*arguments)
 
 
 def cache_folder() -> str | None:

@@ -22,7 +22,7 @@ from jax.core import Tracer
 from jax.extend.core import get_opaque_trace_state
 
 from hdcal.programs import ahead
-from hdcal.programs.compiling import cache_folder, jitted
+from hdcal.programs.compiling import cache_folder, lowered
 from hdcal.programs.files import TRACED, folder_in, read, write
 
 # Whose classes may be in it: their code, or version, is in its name.
@@ -94,8 +94,7 @@ class Program:
 
     def clear_cache(self) -> None:
         """Release what was compiled."""
-        for one in (self._jitted, *self._ready.values()):
-            one.clear_cache()
+        self._jitted.clear_cache()
         self._ready.clear()
 
     def _made(self, kind: _Kind, leaves: Sequence) -> Callable:
@@ -118,12 +117,10 @@ class Program:
                 # As later processes have it: to the last bit the same.
                 exported = export.deserialize(bytearray(kept))
                 write(file, kept)
-        if exported is not None:
-            return jitted(exported.call, name)
-        ready = jitted(flat, name)
         with _TRACING:
-            ready.lower(*leaves)
-        return ready
+            call = flat if exported is None else exported.call
+            found = lowered(call, name, leaves)
+        return found.compile()
 
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""

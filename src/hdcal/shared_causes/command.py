@@ -40,6 +40,7 @@ def causes(
     DATA names the gear of each row in a column `specimen`, also called gear or serial.
     """
     one_thread_for_algebra()
+    keep_compilations()
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
@@ -57,7 +58,6 @@ def causes(
             out = f"{readings.case.name}-causes" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None and effects is not None
-    keep_compilations()
     from hdcal.shared_causes.causes import causes as shared_causes
     from hdcal.shared_causes.summary import causes_report
 
