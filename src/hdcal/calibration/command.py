@@ -53,6 +53,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
     keep_compilations()
+    from hdcal.cli.meanwhile import imported_meanwhile
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.sample import check_settings
 
@@ -89,6 +90,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
         settings["adapt_noise"] = not settings.pop("constant_noise")
     for note in case.notes:
         console.words(note)
-    with progress_bar() as progress:
+    with progress_bar() as progress, imported_meanwhile("hdcal.report.canvas"):
         posterior: Any = sample(case, progress=progress, **settings)
     return console.report(report(posterior, console.command))

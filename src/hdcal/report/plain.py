@@ -33,6 +33,8 @@ def as_json(value: Any) -> str:
 
 def printable(text: str) -> str:
     """Return a text from a file without characters that steer a terminal or XML."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
