@@ -1,6 +1,7 @@
 """The few inner products that hold all that the rows say about a hypothesis."""
 
-import equinox as eqx
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float
 
@@ -14,7 +15,7 @@ from hdcal.evidence.linear_rows import (
 )
 
 
-class CommonTerms(eqx.Module):
+class CommonTerms(NamedTuple):
     """What all hypotheses share, one entry per correlation.
 
     Attributes:
@@ -26,7 +27,7 @@ class CommonTerms(eqx.Module):
     rows: float
 
 
-class PieceProducts(eqx.Module):
+class PieceProducts(NamedTuple):
     """Pieces e = y − o, u in the space beside the base model; [correlation, piece].
 
     Attributes:
@@ -46,7 +47,7 @@ class PieceProducts(eqx.Module):
     tu: Float[Array, "r g j"]
 
 
-class SubspaceProducts(eqx.Module):
+class SubspaceProducts(NamedTuple):
     """Subspaces with one prior variance each; [correlation, subspace].
 
     Attributes:
@@ -62,11 +63,9 @@ class SubspaceProducts(eqx.Module):
 
 def common_terms(rows: LinearRows) -> CommonTerms:
     """Return what every hypothesis shares."""
-    constant = [
-        log_det_whitening(rows, c) + 0.5 * log_det_projection(rows, c)
-        for c in rows.correlations
-    ]
-    return CommonTerms(np.array(constant), float(len(rows.reading)))
+    base = np.array([log_det_projection(rows, c) for c in rows.correlations])
+    constant = log_det_whitening(rows, rows.correlations) + 0.5 * base
+    return CommonTerms(constant, float(len(rows.reading)))
 
 
 def piece_products(

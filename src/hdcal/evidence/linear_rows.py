@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
+from hdcal.data.records import Array
 from hdcal.inference import serial_correlation
 
 # AR(1) coefficients of the noise within a run that are always integrated over; more
@@ -52,7 +53,7 @@ class LinearRows:
         Readings without noise leave next to nothing of the priors: the sum itself
         would be singular by rounding.
         """
-        return np.linalg.qr(_stacked(self, self.base), mode="r")
+        return np.asarray(np.linalg.qr(_stacked(self, self.base), mode="r"))
 
 
 def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndarray:
@@ -67,11 +68,13 @@ def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndar
     return serial_correlation.whiten(scaled, rows.before, correlation)
 
 
-def log_det_whitening(rows: LinearRows, correlation: float) -> float:
-    """Return log |d whitened / d reading|."""
+def log_det_whitening(
+    rows: LinearRows, correlation: Float[Array, "*r"] | float
+) -> Float[np.ndarray, "*r"]:
+    """Return log |d whitened / d reading| at one or several correlations."""
     following = np.sum(rows.before >= 0)
     volume = serial_correlation.log_volume(following, correlation)
-    return float(np.sum(np.log(rows.weight)) - volume)
+    return np.sum(np.log(rows.weight)) - np.asarray(volume)
 
 
 def log_det_projection(rows: LinearRows, correlation: float) -> float:
