@@ -109,12 +109,11 @@ def subspace_products(
         rows: the data.
         columns: of each subspace, per unit of its prior sd [N].
     """
-    count, width, size = columns.shape
-    parts = []
+    count, parts, there = len(columns), [], np.any(columns != 0.0, axis=2)
     for correlation in rows.correlations:
         left = project(rows, correlation, rows.reading[None])[0]
-        inside = project(rows, correlation, columns.reshape(-1, size))
-        inside = inside.reshape(count, width, -1)
+        inside = np.zeros((*there.shape, len(left)))
+        inside[there] = project(rows, correlation, columns[there])
         reading = np.broadcast_to(left, (count, 1, len(left)))
         spread, (be,) = _along_axes(inside, reading)
         parts.append((np.full(count, left @ left), spread, be))
