@@ -73,7 +73,7 @@ def cells_at(pieces, tolerance):
     kept = cells.tolerance == tolerance
     cells = jax.tree.map(lambda column: column[kept], cells)
     weight = cells.log_weight + np.log(len(TOLERANCES)) - np.log(0.6)
-    return join_cells([replace(cells, log_weight=weight)], [0])
+    return join_cells([cells._replace(log_weight=weight)], [0])
 
 
 def closed_form(rows, pieces, tolerance, sigma):

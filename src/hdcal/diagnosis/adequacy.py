@@ -92,11 +92,12 @@ def leaves_more_than_noise(
     # Rounding in steps above the noise leaves a pattern that is no effect.
     if {NONE, UNKNOWN, QUANTISATION} & {*names}:
         return False
-    mean = next((name for name in names if name not in evidence.noise), "")
+    mean = next((name for name in names if name not in evidence.noise), None)
+    curve = fitted_curve(evidence, mean) if mean else None
     prepared = beside_effects(evidence, names)
     kept = np.ones(len(prepared.rows.reading), bool)
     for noise in {*names} & evidence.noise.keys():
-        relative = relative_sd(evidence, library, noise, mean)
+        relative = relative_sd(evidence, library, noise, curve)
         if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
             return True
         if library[noise].mixture:

@@ -152,7 +152,8 @@ def carried(evidence: CaseEvidence) -> dict[str, float]:
 
 def _inclusion(share: Mapping[str, float], effects: Iterable[str]) -> dict[str, float]:
     """Return the probability of each effect over all hypotheses that hold it."""
-    return {
-        effect: sum((p for n, p in share.items() if effect in n.split("+")), 0.0)
-        for effect in effects
-    }
+    found = dict.fromkeys(effects, 0.0)
+    for name, chance in share.items():
+        for effect in found.keys() & name.split("+"):
+            found[effect] += chance
+    return found

@@ -7,6 +7,7 @@ them: the odds of that are evidence for structure in their place.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from itertools import product
 
 import numpy as np
@@ -49,16 +50,18 @@ def with_bursts(
     """
     table, closed = dict(evidence.table), dict(evidence.closed)
     correlation = evidence.likeliest_correlation
+    curve_of = cache(partial(fitted_curve, evidence))
     for effect, noise in _candidates(evidence, log_prior):
         pair, key = _keys(effect, noise)
-        relative = relative_sd(evidence, library, noise, effect)
+        curve = curve_of(effect) if effect else None
+        relative = relative_sd(evidence, library, noise, curve)
         names = [effect] if effect else []
         log_odds, off = burst_odds(evidence, names, relative, correlation)
         # As seldom beforehand beside the noise in whose place it stands.
         seldom = _SELDOM + log_prior[pair] - log_prior[key]
         lasting = evidence.table[pair] + log_odds + seldom
-        if effect:
-            share = _share(evidence, effect, off)
+        if curve is not None:
+            share = _share(evidence, curve, off)
             closed[effect] = _mixed(closed[effect], table[key], share, lasting)
         table[key] = np.logaddexp(table[key], lasting)
     return replace(evidence, table=table, closed=closed)
@@ -108,7 +111,10 @@ def _mixed(
 
 
 def relative_sd(
-    evidence: CaseEvidence, library: Mapping[str, type[Effect]], noise: str, effect: str
+    evidence: CaseEvidence,
+    library: Mapping[str, type[Effect]],
+    noise: str,
+    beside: np.ndarray | None,
 ) -> np.ndarray:
     """Return the noise of each row over that of a usual one, (n,).
 
@@ -119,12 +125,11 @@ def relative_sd(
         evidence: of the case.
         library: effects by name.
         noise: name of an effect on the noise.
-        effect: beside which it stands, "" for none.
+        beside: what an effect adds beside which it stands [N], None for none.
     """
-    if not effect:
+    if beside is None:
         return evidence.noise[noise].relative_sd
-    curve = fitted_curve(evidence, effect)
-    return noise_evidence(library[noise], evidence.prepared, curve).relative_sd
+    return noise_evidence(library[noise], evidence.prepared, beside).relative_sd
 
 
 def is_noisy(relative: np.ndarray) -> np.ndarray:
@@ -166,11 +171,11 @@ def burst_odds(
     return log_sign_odds(same, int(np.sum(both))), np.where(together, left, 0.0)
 
 
-def _share(evidence: CaseEvidence, effect: str, off: np.ndarray) -> float:
-    """Return the share of the visible gap that an effect closes beside the bursts."""
+def _share(evidence: CaseEvidence, curve: np.ndarray, off: np.ndarray) -> float:
+    """Return the share of the visible gap that a curve closes beside the bursts."""
     bursts = np.mean(np.maximum(off**2 - evidence.prepared.noise_sd**2, 0.0))
-    curve = remove_base(evidence.prepared.rows, fitted_curve(evidence, effect)[None])
-    whole = bursts + np.mean(curve**2)
+    seen = remove_base(evidence.prepared.rows, curve[None])
+    whole = bursts + np.mean(seen**2)
     return float(1.0 - np.sqrt(bursts / max(whole, 1e-300)))
 
 

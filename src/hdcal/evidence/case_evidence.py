@@ -1,6 +1,7 @@
 """The evidences of one case and what they were computed from."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -60,17 +61,17 @@ class CaseEvidence:
     closed: dict[str, Float[np.ndarray, " d"]] = field(default_factory=dict)
     unseen: dict[str, dict[str, float]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def effects(self) -> tuple[str, ...]:
         """Names of the effects that take part."""
         return tuple(n for n in self.table if n not in (NONE, UNKNOWN) and "+" not in n)
 
-    @property
+    @cached_property
     def on_noise(self) -> tuple[str, ...]:
         """Names of the effects that take part on the noise."""
         return tuple(n for n in self.effects if n in self.noise or n == QUANTISATION)
 
-    @property
+    @cached_property
     def likeliest_kernel(self) -> str:
         """Kernel along which unknown structure is most probable."""
         by_name = self.subspaces.by_correlation
@@ -89,7 +90,7 @@ class CaseEvidence:
         """Indices of the AR(1) coefficients that are not next to impossible."""
         return np.flatnonzero(self.weight_of_correlations >= _LEAST_WEIGHT)
 
-    @property
+    @cached_property
     def weight_of_correlations(self) -> np.ndarray:
         """Weight of each AR(1) coefficient, by the best hypothesis at each."""
         best = np.max(np.stack(list(self.table.values())), axis=0)

@@ -10,9 +10,8 @@ Pieces, cells and subspaces are padded to few lengths, so that few executables s
 all cases.
 """
 
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -43,7 +42,7 @@ TINY = 1e-12
 Tree = TypeVar("Tree")
 
 
-class AmplitudeCells(eqx.Module):
+class AmplitudeCells(NamedTuple):
     """Cells of amplitudes on pieces of effects, one entry for each.
 
     Attributes:

@@ -22,10 +22,11 @@ def design_of(evidence: CaseEvidence, names: Sequence[str]) -> DesignMatrix:
     for name in names:
         if name in single.names:
             index = single.names.index(name)
-            effect = evidence.piecewise[index]
-            weight = np.logaddexp.reduce(single.parts[0].of(index).log_evidence, axis=0)
-            cells = amplitude_cells(effect, exact=True)
-            parts.append(_piece_design(effect, cells, int(np.argmax(weight))))
+            found = single.parts[0].of(index)
+            own = found.cells.piece - single.starts[index]
+            cells = found.cells._replace(piece=own)
+            best = int(np.argmax(np.logaddexp.reduce(found.log_evidence)))
+            parts.append(_piece_design(evidence.piecewise[index], cells, best))
         elif name in evidence.subspaces.names:
             parts.append(_subspace_design(evidence.subspaces, name))
     return join_designs(parts, len(evidence.prepared.rows.reading))

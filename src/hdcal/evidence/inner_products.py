@@ -1,6 +1,7 @@
 """The few inner products that hold all that the rows say about a hypothesis."""
 
-import equinox as eqx
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float
 
@@ -14,7 +15,7 @@ from hdcal.evidence.linear_rows import (
 )
 
 
-class CommonTerms(eqx.Module):
+class CommonTerms(NamedTuple):
     """What all hypotheses share, one entry per correlation.
 
     Attributes:
@@ -26,7 +27,7 @@ class CommonTerms(eqx.Module):
     rows: float
 
 
-class PieceProducts(eqx.Module):
+class PieceProducts(NamedTuple):
     """Pieces e = y − o, u in the space beside the base model; [correlation, piece].
 
     Attributes:
@@ -46,7 +47,7 @@ class PieceProducts(eqx.Module):
     tu: Float[Array, "r g j"]
 
 
-class SubspaceProducts(eqx.Module):
+class SubspaceProducts(NamedTuple):
     """Subspaces with one prior variance each; [correlation, subspace].
 
     Attributes:
@@ -62,11 +63,9 @@ class SubspaceProducts(eqx.Module):
 
 def common_terms(rows: LinearRows) -> CommonTerms:
     """Return what every hypothesis shares."""
-    constant = [
-        log_det_whitening(rows, c) + 0.5 * log_det_projection(rows, c)
-        for c in rows.correlations
-    ]
-    return CommonTerms(np.array(constant), float(len(rows.reading)))
+    base = np.array([log_det_projection(rows, c) for c in rows.correlations])
+    constant = log_det_whitening(rows, rows.correlations) + 0.5 * base
+    return CommonTerms(constant, float(len(rows.reading)))
 
 
 def piece_products(
@@ -110,12 +109,11 @@ def subspace_products(
         rows: the data.
         columns: of each subspace, per unit of its prior sd [N].
     """
-    count, width, size = columns.shape
-    parts = []
+    count, parts, there = len(columns), [], np.any(columns != 0.0, axis=2)
     for correlation in rows.correlations:
         left = project(rows, correlation, rows.reading[None])[0]
-        inside = project(rows, correlation, columns.reshape(-1, size))
-        inside = inside.reshape(count, width, -1)
+        inside = np.zeros((*there.shape, len(left)))
+        inside[there] = project(rows, correlation, columns[there])
         reading = np.broadcast_to(left, (count, 1, len(left)))
         spread, (be,) = _along_axes(inside, reading)
         parts.append((np.full(count, left @ left), spread, be))

@@ -1,11 +1,13 @@
 """The rows of a case and the linearised base model: whitening and projection."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
+from hdcal.data.records import Array
 from hdcal.inference import serial_correlation
 
 # AR(1) coefficients of the noise within a run that are always integrated over; more
@@ -35,6 +37,23 @@ class LinearRows:
     weight: Float[np.ndarray, " n"]
     correlations: Float[np.ndarray, " r"]
     tolerance: Float[np.ndarray, "j n"]
+    _whitened_base: dict = field(init=False, default_factory=dict, repr=False)
+
+    def whitened_base(self, correlation: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return Q and R of the whitened base above its priors, kept once computed."""
+        if correlation not in self._whitened_base:
+            white = whiten(self, self.base, correlation)
+            self._whitened_base[correlation] = np.linalg.qr(_stacked(self, white))
+        return self._whitened_base[correlation]
+
+    @cached_property
+    def root(self) -> np.ndarray:
+        """The upper triangular R with R'R = X'X + S⁻¹, shape (p, p).
+
+        Readings without noise leave next to nothing of the priors: the sum itself
+        would be singular by rounding.
+        """
+        return np.asarray(np.linalg.qr(_stacked(self, self.base), mode="r"))
 
 
 def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndarray:
@@ -49,11 +68,13 @@ def whiten(rows: LinearRows, columns: np.ndarray, correlation: float) -> np.ndar
     return serial_correlation.whiten(scaled, rows.before, correlation)
 
 
-def log_det_whitening(rows: LinearRows, correlation: float) -> float:
-    """Return log |d whitened / d reading|."""
+def log_det_whitening(
+    rows: LinearRows, correlation: Float[Array, "*r"] | float
+) -> Float[np.ndarray, "*r"]:
+    """Return log |d whitened / d reading| at one or several correlations."""
     following = np.sum(rows.before >= 0)
     volume = serial_correlation.log_volume(following, correlation)
-    return float(np.sum(np.log(rows.weight)) - volume)
+    return np.sum(np.log(rows.weight)) - np.asarray(volume)
 
 
 def log_det_projection(rows: LinearRows, correlation: float) -> float:
@@ -62,7 +83,7 @@ def log_det_projection(rows: LinearRows, correlation: float) -> float:
     The base coefficients have prior precision `rows.precision`/σ²; zero columns change
     nothing.
     """
-    factor = _root(rows, whiten(rows, rows.base, correlation))
+    _, factor = rows.whitened_base(correlation)
     prior = np.sum(np.log(rows.precision))
     return float(prior - 2.0 * np.sum(np.log(np.abs(np.diag(factor)))))
 
@@ -76,8 +97,7 @@ def remove_base(
     temperature.
     """
     base = rows.base
-    root = _root(rows, base)
-    return curves - (curves @ base) @ cho_solve((root, False), base.T)
+    return curves - (curves @ base) @ cho_solve((rows.root, False), base.T)
 
 
 def restore_base(
@@ -97,19 +117,10 @@ def project(
     further entries as the base has columns.
     """
     white = whiten(rows, curves.T, correlation).T
-    held = np.zeros((len(white), len(rows.precision)))
-    whole = np.concatenate([white, held], axis=1)
-    axes, _ = np.linalg.qr(_stacked(rows, whiten(rows, rows.base, correlation)))
-    return whole - (whole @ axes) @ axes.T
-
-
-def _root(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:
-    """Return the upper triangular R with R'R = X'X + S⁻¹, shape (p, p).
-
-    Readings without noise leave next to nothing of the priors: the sum itself would
-    be singular by rounding.
-    """
-    return np.asarray(np.linalg.qr(_stacked(rows, base), mode="r"))
+    axes, _ = rows.whitened_base(correlation)
+    left = -(white @ axes[: white.shape[1]]) @ axes.T
+    left[:, : white.shape[1]] += white
+    return left
 
 
 def _stacked(rows: LinearRows, base: Float[np.ndarray, "n p"]) -> np.ndarray:

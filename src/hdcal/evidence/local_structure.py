@@ -7,6 +7,7 @@ the data show most represents all, and its evidence is divided by their number, 
 is a lower bound of the family's own.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,11 +105,14 @@ def _windows(rows: int) -> np.ndarray:
     return np.concatenate(found)
 
 
-def likeliest_directions(case: PreparedCase) -> list[tuple[str, np.ndarray, float]]:
+def likeliest_directions(
+    case: PreparedCase, families: Iterable[DirectionFamily]
+) -> list[tuple[str, np.ndarray, float]]:
     """Return of each family the member that the data show most.
 
     Args:
         case: whose readings choose.
+        families: of its records.
 
     Returns:
         Name, columns (width, n) and log of the number of members.
@@ -116,7 +120,7 @@ def likeliest_directions(case: PreparedCase) -> list[tuple[str, np.ndarray, floa
     rows = case.rows
     error = remove_base(rows, rows.reading[None])[0]
     found = []
-    for family in direction_families(case.records):
+    for family in families:
         left = remove_base(rows, family.columns)
         table = left.reshape(-1, family.width, left.shape[-1])
         if not len(table):

@@ -118,7 +118,7 @@ def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
             (axes.T @ slope) / jnp.maximum(jnp.abs(strength), _LEAST_CURVATURE)
         )
         tries = jnp.stack([point - move * s for s in (1.0, 0.3, 0.1, 0.0)])
-        heights = jax.vmap(minus)(tries)
+        heights = jnp.append(jax.vmap(minus)(tries[:-1]), height)
         heights = jnp.where(jnp.isfinite(heights), heights, jnp.inf)
         # What rounding decides is no descent: then the full step, which converges.
         after = tries[jnp.argmin(jnp.round(heights, _DIGITS))]

@@ -6,9 +6,8 @@ effects are not judged by the slope of small ones.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from hdcal.evidence.closed_form import AmplitudeCells
@@ -162,7 +161,7 @@ def join_cells(
         starts: index of each one's first piece among all.
     """
     moved = [
-        replace(part, piece=part.piece + start)
+        part._replace(piece=part.piece + start)
         for part, start in zip(parts, starts, strict=True)
     ]
-    return jax.tree.map(lambda *columns: np.concatenate(columns), *moved)
+    return AmplitudeCells(*map(np.concatenate, zip(*moved, strict=True)))

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -31,7 +31,7 @@ from hdcal.programs.program import program
 _BEST, _SPREAD = 4, 2
 
 
-class CellPairs(eqx.Module):
+class CellPairs(NamedTuple):
     """Pairs of amplitude cells, one entry for each; inner products after projection.
 
     Attributes:

@@ -17,7 +17,11 @@ from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.inner_products import common_terms
 from hdcal.evidence.kernels import visible_kernels
 from hdcal.evidence.linear_rows import remove_base
-from hdcal.evidence.local_structure import likeliest_directions
+from hdcal.evidence.local_structure import (
+    DirectionFamily,
+    direction_families,
+    likeliest_directions,
+)
 from hdcal.evidence.prepare import PreparedCase, with_relative_noise
 from hdcal.evidence.single_evidence import evidence_of_none
 from hdcal.evidence.subspaces import WIDTH, SubspaceEvidence, evidence_of_subspaces
@@ -43,25 +47,25 @@ def with_remainders(evidence: CaseEvidence, rng: np.random.Generator) -> CaseEvi
     if not evidence.kernel_names:
         return evidence
     table, closed, every = evidence.table, {}, {}
+    families = direction_families(evidence.prepared.records)
     on_mean = [name for name in evidence.effects if name not in evidence.on_noise]
     on_mean.sort(key=lambda name: -np.logaddexp.reduce(table[name]))
     for name in on_mean[:_MOST]:
         beside = beside_effects(evidence, [name])
-        gain, kernels, counts = _gain(evidence, beside)
+        gain, kernels, counts = _gain(evidence, beside, families)
         closed[name] = _shares(evidence, beside, kernels, counts, rng)
         every[with_remainder(name)] = table[name] + gain
     # An effect on the noise carries nothing of a gap in the mean.
     closed |= {name: np.zeros(_DRAWS) for name in evidence.on_noise}
     for name, effect in evidence.noise.items():
-        gain, _, _ = _gain(
-            evidence, with_relative_noise(evidence.prepared, effect.relative_sd)
-        )
+        case = with_relative_noise(evidence.prepared, effect.relative_sd)
+        gain, _, _ = _gain(evidence, case, families)
         every[with_remainder(name)] = table[name] + gain
     return replace(evidence, table=table | every, closed=closed)
 
 
 def _gain(
-    evidence: CaseEvidence, case: PreparedCase
+    evidence: CaseEvidence, case: PreparedCase, families: Sequence[DirectionFamily]
 ) -> tuple[np.ndarray, SubspaceEvidence, dict[str, float]]:
     """Return log evidence of unknown structure less that without, [correlation].
 
@@ -70,8 +74,9 @@ def _gain(
     Args:
         evidence: for the kernels that its rows can show.
         case: whose base model holds the effect beside which it is looked for.
+        families: of local structure.
     """
-    spaces, local = evidence.subspaces, likeliest_directions(case)
+    spaces, local = evidence.subspaces, likeliest_directions(case, families)
     every, weight = case.rows.correlations, evidence.weight_of_correlations
     likely = np.sort(np.argsort(-weight)[:_CORRELATIONS])
     case = replace(case, rows=replace(case.rows, correlations=every[likely]))

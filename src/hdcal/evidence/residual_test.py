@@ -84,14 +84,15 @@ class _Statistics:
         """Return the statistics of each row of errors, all free of the noise sd."""
         size = np.sqrt(np.sum(error**2, axis=1, keepdims=True) / self.freedom)
         scaled = error / size
+        square = scaled**2
         z = scaled @ self.unit
         return {
             "z": z,
             "largest": np.max(np.abs(z), axis=1, initial=0.0),
             "local": np.max(np.abs(scaled @ self.local), axis=1, initial=0.0),
             "between": np.sum((scaled @ self.between) ** 2, axis=1),
-            "spread": np.abs(scaled**2 @ self.square),
-            "tails": np.sum(scaled**4, axis=1),
+            "spread": np.abs(square @ self.square),
+            "tails": np.sum(square**2, axis=1),
         }
 
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-import jax
 import numpy as np
 
 from hdcal.data.priors import Prior
@@ -15,7 +14,7 @@ from hdcal.evidence.inner_products import (
     common_terms,
     piece_products,
 )
-from hdcal.evidence.linear_rows import LinearRows
+from hdcal.evidence.linear_rows import LinearRows, project
 from hdcal.evidence.piecewise_effect import (
     NO_TOLERANCE,
     PiecewiseEffect,
@@ -34,7 +33,7 @@ class CellEvidence:
     """Log evidences of cells; [correlation, cell].
 
     Attributes:
-        owner: index of the effect of each cell.
+        owner: index of the effect of each cell, those of one beside each other.
         cells: of the amplitudes.
         log_evidence: with prior weights, without the prior of the correlation.
         mean: of the amplitude before its cell cuts it.
@@ -49,9 +48,9 @@ class CellEvidence:
 
     def of(self, effect: int) -> "CellEvidence":
         """Return the cells of one effect."""
-        own = self.owner == effect
+        own = slice(*np.searchsorted(self.owner, (effect, effect + 1)))
         tables = (t[:, own] for t in (self.log_evidence, self.mean, self.sd))
-        cells = jax.tree.map(lambda column: column[own], self.cells)
+        cells = AmplitudeCells(*(column[own] for column in self.cells))
         return CellEvidence(self.owner[own], cells, *tables)
 
 
@@ -143,9 +142,8 @@ def single_evidence(
 
 def evidence_of_none(rows: LinearRows, sigma: Prior) -> np.ndarray:
     """Return the log evidence without any effect, [correlation]."""
-    nothing = np.zeros((1, len(rows.reading)))
-    ee = np.asarray(piece_products(rows, nothing, nothing).ee)
-    return base_evidence(common_terms(rows), ee[:, 0], sigma)
+    left = [project(rows, c, rows.reading[None])[0] for c in rows.correlations]
+    return base_evidence(common_terms(rows), np.sum(np.square(left), axis=1), sigma)
 
 
 def _in_blocks(rows: LinearRows, *curves: np.ndarray) -> PieceProducts:
@@ -155,7 +153,8 @@ def _in_blocks(rows: LinearRows, *curves: np.ndarray) -> PieceProducts:
         piece_products(rows, *(table[i : i + block] for table in curves))
         for i in range(0, max(len(curves[0]), 1), block)
     ]
-    return jax.tree.map(lambda *leaves: np.concatenate(leaves, axis=1), *parts)
+    joined = (np.concatenate(leaves, axis=1) for leaves in zip(*parts, strict=True))
+    return PieceProducts(*joined)
 
 
 def _likeliest(exact: CellEvidence, starts: np.ndarray) -> np.ndarray:
@@ -188,8 +187,8 @@ def _tolerant(common, products, effects, starts, sigma, chosen) -> CellEvidence:
     place = np.full(starts[-1], -1)
     place[chosen] = np.arange(len(chosen))
     kept = place[cells.piece] >= 0
-    owner, cells = owner[kept], jax.tree.map(lambda leaf: leaf[kept], cells)
-    among_chosen = replace(cells, piece=place[cells.piece])
+    owner, cells = owner[kept], AmplitudeCells(*(leaf[kept] for leaf in cells))
+    among_chosen = cells._replace(piece=place[cells.piece])
     found = cell_evidence(common, products, among_chosen, sigma)
     return CellEvidence(owner, cells, *found)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from hdcal.evidence.kernels import kernel_columns, visible_kernels
 from hdcal.evidence.linear_rows import LinearRows, remove_base
-from hdcal.evidence.local_structure import likeliest_directions
+from hdcal.evidence.local_structure import direction_families, likeliest_directions
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.evidence.subspaces import WIDTH, SubspaceEffect, SubspaceEvidence
@@ -34,7 +34,7 @@ def unknown_kernels(
         Columns of each by name, shape (WIDTH, n), and log of the number of kernels
         that it was chosen from.
     """
-    chosen = likeliest_directions(case)
+    chosen = likeliest_directions(case, direction_families(case.records))
     tables = kernel_columns(case.records) | {name: table for name, table, _ in chosen}
     names, kernels = visible_kernels(case.rows, tables, WIDTH)
     spanned = _spanned(case.rows, kernels, effects, subspaces)

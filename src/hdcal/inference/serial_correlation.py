@@ -56,8 +56,8 @@ def worth(rows: int, correlation: float) -> float:
 
 
 @program
-def log_volume(following, correlation) -> Float[Array, ""]:
-    """Return log |de/dz|, of as many rows as follow another one."""
+def log_volume(following, correlation) -> Float[Array, "*r"]:
+    """Return log |de/dz| at each ρ, of as many rows as follow another one."""
     return 0.5 * following * jnp.log1p(-(correlation**2))
 
 
