@@ -75,8 +75,8 @@ def test_a_run_is_given_up_at_the_first_divergence(monkeypatch, diverging: bool)
     """After the warm-up, where trajectories may diverge, and only if that is asked."""
 
     def stretch(problem, whitening, states, target, *, warmup, length):
-        kept = [np.zeros((length, 2)) for _ in range(7)]
-        kept[sample._DIVERGING] = np.full((length, 2), diverging)
+        kept = [np.zeros((2, length)) for _ in range(7)]
+        kept[sample._DIVERGING] = np.full((2, length), diverging)
         return states, kept
 
     monkeypatch.setattr(sample, "_start", lambda *_, **__: [])

@@ -102,15 +102,12 @@ def _states(problem, whitening, keys, target, warmup):
 @program(static=("warmup", "length"))
 def _advance(problem, whitening, leaves, target, *, warmup, length):
     """Return the states after so many steps, as leaves, and what is kept of each."""
-    keys = jax.random.split(jax.random.key(0), len(leaves[0]))
-    begun = partial(_states, problem, whitening, target=target, warmup=warmup)
-    structure = jax.tree.structure(jax.eval_shape(begun, keys))
     start, step = _kernel(problem, whitening, warmup, target)
     # The step function takes its settings from the last call of its init.
-    start(jnp.zeros(len(whitening.factor)))
+    structure = jax.tree.structure(start(jnp.zeros(len(whitening.factor))))
 
     def one(state, _):
-        state = jax.vmap(step)(state)
+        state = step(state)
         kept = (
             state.z,
             state.energy,
@@ -122,8 +119,10 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
         )
         return state, kept
 
+    # One chain after the other: side by side all would take as many steps as the one
+    # that takes most, and either way at each fork.
     states = jax.tree.unflatten(structure, leaves)
-    states, kept = jax.lax.scan(one, states, length=length)
+    states, kept = jax.lax.map(partial(jax.lax.scan, one, length=length), states)
     return jax.tree.leaves(states), kept
 
 
@@ -251,7 +250,7 @@ class _Run:
     def kept(self) -> list[np.ndarray]:
         """Return what is kept of each draw, axes chain and draw first."""
         parts = zip(*self._kept, strict=True)
-        return [np.concatenate(part).swapaxes(0, 1) for part in parts]
+        return [np.concatenate(part, axis=1) for part in parts]
 
     def found(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
