@@ -26,7 +26,6 @@ from benchmarks.density import (
     named,
 )
 from benchmarks.tensors import nutpie, nutpie_jax, pymc
-from hdcal.cli.compilation_cache import compile_loops_whole
 
 # Chains of the JAX samplers start as far apart as hdcal's.
 OVERDISPERSION = 2.0
@@ -105,9 +104,6 @@ CONTENDERS = {
 
 def measure(name: str, numbers: Numbers, repeats: int) -> dict:
     prepare, modules = CONTENDERS[name]
-    if name == "hdcal":
-        # As its commands do.
-        compile_loops_whole()
     for module in modules.split():
         import_module(module)
     began = time.perf_counter()

@@ -19,7 +19,6 @@ from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
 from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
-from hdcal.cli.compilation_cache import compile_loops_whole
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
 from hdcal.cli.topics import COMPLETE, show_completion, show_topic
@@ -107,7 +106,6 @@ def main(arguments: list[str] | None = None) -> None:
         # A shell asks for what may follow, and click answers and ends the process.
         hdcal.main([], "hdcal")
     gc.set_threshold(_MADE_AND_KEPT)
-    compile_loops_whole()
     console = Console(json="--json" in given)
     console.prepare()
     _hear_interruptions()

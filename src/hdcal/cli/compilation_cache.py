@@ -2,16 +2,12 @@
 
 import os
 import secrets
-import sys
 from functools import partial
 from pathlib import Path
 
 import click
 from click.core import ParameterSource
 
-# Of XLA on CPUs: loops that touch fewer bytes a turn are one kernel each.
-_WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
-_EXTRA = "--xla_backend_extra_options"
 # In the context of a command: that it loads ahead.
 _ASKED = f"{__name__}.asked"
 
@@ -25,31 +21,16 @@ def one_thread_for_algebra() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def compile_loops_whole() -> None:
-    """Let XLA compile loops as one piece; to be called before JAX is imported.
-
-    A step of a sampler is hundreds of operations on a few numbers each: to start one
-    kernel for each operation takes longer than all of them. Only the environment can
-    say so, which XLA reads once. What the user has set stands.
-    """
-    flags = os.environ.get("XLA_FLAGS", "")
-    # Said too late it would only be part of the names under which programs are kept.
-    if "jax" not in sys.modules and _EXTRA not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} {_EXTRA}={_WHOLE_LOOPS}".strip()
-
-
 def keep_compilations() -> None:
     """Keep on disk what was traced and compiled, for later processes.
 
     Commands do. A script that calls it first starts faster from its second run on, with
-    the same results. What has code of a user's own effects is traced anew. Called
-    before JAX is imported, it makes sampling two to three times as fast too.
+    the same results. What has code of a user's own effects is traced anew.
 
     The folder is the user's cache folder, or what the environment variable
     HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept. It sets options
     of JAX for the whole process.
     """
-    compile_loops_whole()
     folder = _writable_folder()
     if folder is None:
         return

@@ -13,12 +13,16 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
+from hdcal.programs.compiling import compile_loops_whole
+
 # Measured on the reading edge as NumPy arrays, traced as JAX arrays.
 Array = jax.Array | np.ndarray
 
 
 def _use_double_precision(made: eqx.Module) -> None:
     """Switch JAX to double precision for the whole process, unless it already is.
+
+    If it has computed nothing yet it is also told how to compile loops.
 
     A product of stiffness and deformation with relative error 1e-7 is larger than the
     posterior sd at a million rows. Importing hdcal changes nothing: every computation
@@ -31,6 +35,7 @@ def _use_double_precision(made: eqx.Module) -> None:
         RuntimeError: it is made within what JAX compiles or differentiates, whose
             arguments are in single precision already.
     """
+    compile_loops_whole()
     if jax.config.read("jax_enable_x64"):
         return
     leaves = [jnp.zeros(()), *jax.tree.leaves(made)]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import jax
 
-from hdcal.programs.compiling import cache_folder, lowered
+from hdcal.programs.compiling import cache_folder, compile_loops_whole, lowered
 from hdcal.programs.files import folder_in, put, read
 
 # By file: the names of those that were called, in their order, and those to come.
@@ -25,6 +25,7 @@ def begin(task: str) -> None:
     listed = _list_of(task)
     if listed is None:
         return
+    compile_loops_whole()
     pool = ThreadPoolExecutor(1)
     for file, name in _read_list(listed).items():
         _coming[file] = pool.submit(_load, file, name)

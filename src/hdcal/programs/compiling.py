@@ -1,10 +1,39 @@
 """How functions are compiled, and where JAX keeps what came of it."""
 
+import os
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
 import jax
+
+# Of XLA on CPUs: loops that touch fewer bytes a turn are one kernel each.
+_WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
+_EXTRA = "--xla_backend_extra_options"
+
+
+@cache
+def compile_loops_whole() -> None:
+    """Let XLA compile each loop as one piece, if it computes nothing yet.
+
+    A step of a sampler is hundreds of operations on a few numbers each: to start a
+    kernel for each operation takes two thirds of the time. No option of a program can
+    say so, only the environment, which XLA reads once, when it begins. What the user
+    has set stands.
+    """
+    flags = os.environ.get("XLA_FLAGS", "")
+    # Said too late it would only be part of the names under which programs are kept.
+    if _EXTRA not in flags and not _has_begun():
+        os.environ["XLA_FLAGS"] = f"{flags} {_EXTRA}={_WHOLE_LOOPS}".strip()
+
+
+def _has_begun() -> bool:
+    """Return whether XLA runs; where that cannot be told it may."""
+    try:
+        from jax._src.xla_bridge import backends_are_initialized
+    except ImportError:
+        return True
+    return backends_are_initialized()
 
 
 def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
