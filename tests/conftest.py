@@ -15,7 +15,8 @@ pytest_plugins = ["commands", "clusters"]
 _OWN = pytest.StashKey[str]()
 _COMPILED_PLAINLY = (
     "--xla_cpu_use_fusion_emitters=false --xla_backend_optimization_level=1 "
-    "--xla_cpu_parallel_codegen_split_count=1"
+    "--xla_cpu_parallel_codegen_split_count=1 --xla_backend_extra_options="
+    "xla_cpu_small_while_loop_byte_threshold=100000000"
 )
 
 
