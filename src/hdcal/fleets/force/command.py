@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from hdcal.cli.command import Command
+from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.options import is_given
 from hdcal.errors import Finding
@@ -30,6 +31,7 @@ _REMEDIES = {"required_probability": "Ask for that share as `content`"}
 
 @click.pass_context
 def _margin(context: click.Context, run: str, **asked):
+    keep_compilations()
     from hdcal.fleets.fleet_posterior import is_fleet
 
     if is_fleet(run):

@@ -6,7 +6,6 @@ import click
 
 from hdcal.cli import options
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH, WINDOW
 
@@ -64,7 +63,6 @@ def margin(console: Console, run, out, force, certificate, **asked):
     could not tell apart are averaged over by their probability. Of a folder of `hdcal
     fleet` it tells what gears to come need.
     """
-    keep_compilations()
     from hdcal.prediction.engine.causes import read_models
     from hdcal.prediction.margin.margin import margin as bounds_of
     from hdcal.prediction.margin.summary import margin_report

@@ -8,7 +8,6 @@ import numpy as np
 from hdcal.data.versions import versions
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import DataUsed, MarginAnswer
-from hdcal.prediction.margin.certificate import FILE, certificate_page
 from hdcal.prediction.margin.document import CALIBRATION_SHARE, whole_document
 from hdcal.prediction.margin.result import Margin
 from hdcal.prediction.margin.sentences import answer, headline, next_steps
@@ -89,6 +88,8 @@ def margin_report(
     document = whole_document(answer, posterior, command)
     others = []
     if certificate is not None:
+        from hdcal.prediction.margin.certificate import FILE, certificate_page
+
         page = certificate_page(answer, posterior, certificate)
         others.append((FILE, page.encode("utf-8", "xmlcharrefreplace")))
     tables = {"budget.csv": budget_columns(found)} if found.budget else {}
