@@ -5,12 +5,12 @@ variance, whatever else is linear in the rows is whitened alike, and
 log |dz/de| = −½ m log(1 − ρ²) with m the rows that follow another one.
 """
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.records import Array, Records
-from hdcal.programs.program import program
 
 # Its site in the model.
 CORRELATION = "noise_correlation"
@@ -55,10 +55,13 @@ def worth(rows: int, correlation: float) -> float:
     return (rows - (rows - 2) * correlation) / (1.0 + correlation)
 
 
-@program
 def log_volume(following, correlation) -> Float[Array, "*r"]:
-    """Return log |de/dz| at each ρ, of as many rows as follow another one."""
-    return 0.5 * following * jnp.log1p(-(correlation**2))
+    """Return log |de/dz| at each ρ, of as many rows as follow another one.
+
+    In NumPy of what is no array of JAX: nothing is compiled.
+    """
+    xp = jnp if isinstance(correlation, jax.Array) else np
+    return 0.5 * following * xp.log1p(-(correlation**2))
 
 
 def given_before(mean, sd, error, before, correlation):
