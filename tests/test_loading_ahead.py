@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from commands import Hdcal
 from jax._src import compiler
+from moving import still_posterior
 from posteriors import single
 
 from hdcal.programs import ahead, files
@@ -157,3 +158,17 @@ def test_commands_say_the_same_with_and_without(hdcal: Hdcal, tmp_path, monkeypa
     assert listed.name == "hdcal-predict-deformation-run.called"
     assert "readings" in listed.read_text()
     assert told[0] == told[1] == told[2] and "0.4,20" in told[0]
+
+
+def test_a_program_that_integrates_over_time_is_kept(
+    hdcal: Hdcal, tmp_path, monkeypatch
+):
+    """Though its library may raise an error from within."""
+    monkeypatch.setenv("HDCAL_CACHE_DIR", str(tmp_path / "cache"))
+    still_posterior().save(tmp_path / "posterior.nc")
+    asked = "--force", "step", "--amplitude", "40", "--duration", "0.02"
+    where = "--out", str(tmp_path / "response")
+    done = hdcal("respond", str(tmp_path / "posterior.nc"), *asked, *where)
+    assert done.returncode == 0, done.stderr
+    (listed,) = (tmp_path / "cache").rglob("*.called")
+    assert "_each" in listed.read_text().split()

@@ -106,6 +106,9 @@ def main(arguments: list[str] | None = None) -> None:
         # A shell asks for what may follow, and click answers and ends the process.
         hdcal.main([], "hdcal")
     gc.set_threshold(_MADE_AND_KEPT)
+    # A program that may call back into its process, to raise an error, is not kept:
+    # what is wrong is no number instead, and looked for in what comes out.
+    os.environ.setdefault("EQX_ON_ERROR", "nan")
     console = Console(json="--json" in given)
     console.prepare()
     _hear_interruptions()

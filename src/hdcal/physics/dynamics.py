@@ -192,4 +192,5 @@ def integrate(
         throw=False,
     )
     states = jnp.asarray(found.ys) * jnp.stack([size, size * pace])
-    return states, found.result == diffrax.RESULTS.successful
+    done = found.result == diffrax.RESULTS.successful
+    return states, done & jnp.all(jnp.isfinite(states))
