@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from commands import Hdcal
 from jax._src import compiler
+from jax.experimental.compilation_cache import compilation_cache
 from moving import still_posterior
 from posteriors import single
 
@@ -41,11 +42,13 @@ def cached(monkeypatch, tmp_path) -> Iterator[Path]:
     monkeypatch.undo()
     before = jax.config.jax_compilation_cache_dir
     jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    compilation_cache.reset_cache()
     monkeypatch.setattr(ahead, "_called", {})
     monkeypatch.setattr(ahead, "_coming", {})
     with jax.enable_x64(True):
         yield tmp_path
     jax.config.update("jax_compilation_cache_dir", before)
+    compilation_cache.reset_cache()
 
 
 @pytest.fixture
@@ -74,6 +77,19 @@ def test_a_program_that_came_is_neither_read_nor_compiled_when_it_is_called(
             patch.setattr(compiler, "compile_or_get_cached", None)
             np.testing.assert_array_equal(Program(one)(X), was)
     assert not ahead._coming
+
+
+def test_what_was_compiled_for_what_another_returned_serves(cached):
+    """Bound to its device it would be compiled as another program."""
+    found = Program(second)(Program(first)(X))
+    assert found.committed
+    ahead.end("task")
+    compiled = {*cached.glob("jit_*")}
+    ahead._called.clear()
+    ahead.begin("task")
+    loaded()
+    np.testing.assert_array_equal(Program(second)(np.cumsum(X)), found)
+    assert {*cached.glob("jit_*")} == compiled and len(compiled) >= 2
 
 
 def test_without_having_come_it_is_read(task, monkeypatch):

@@ -69,10 +69,9 @@ def _load(file: Path, name: str) -> Callable | None:
     exported = read(file)
     if exported is None:
         return None
-    arguments = [jax.ShapeDtypeStruct(a.shape, a.dtype) for a in exported.in_avals]
     # Data, which switch it on for the process, may not have been read yet.
     with jax.enable_x64(True):
-        return lowered(exported.call, name, arguments).compile()
+        return lowered(exported.call, name, exported.in_avals).compile()
 
 
 def _list_of(task: str) -> Path | None:

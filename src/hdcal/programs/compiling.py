@@ -39,16 +39,17 @@ def _has_begun() -> bool:
 def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
     """Return a function for such arguments, to be compiled.
 
-    Compiled for these alone, it takes arrays that JAX has bound to their device, as
-    those are that another one returned, and others: `jax.jit` would compile twice.
+    Compiled for shapes and types alone, it takes arrays that JAX has bound to their
+    device, as those are that another one returned, and others: `jax.jit` would compile
+    twice.
 
     Args:
         function: of arrays.
         name: for logs and profiles.
-        arguments: arrays, or their shapes and types.
+        arguments: arrays, or what has their shape and type.
     """
     jitted = jax.jit(_named(function, name), compiler_options=_options())
-    return jitted.lower(*arguments)
+    return jitted.lower(*[jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arguments])
 
 
 def cache_folder() -> str | None:
