@@ -35,10 +35,11 @@ def begin(task: str) -> None:
 def end(task: str) -> None:
     """Load no more, and keep in mind what the task called."""
     _stop()
-    listed = _list_of(task)
-    if listed is None or _called.keys() <= _read_list(listed).keys():
+    # After an interruption other threads may go on to call.
+    listed, needed = _list_of(task), {**_called}
+    if listed is None or needed.keys() <= _read_list(listed).keys():
         return
-    lines = [f"{file.name} {name}\n" for file, name in _called.items()]
+    lines = [f"{file.name} {name}\n" for file, name in needed.items()]
     put(listed, "".join(lines).encode())
 
 
