@@ -69,7 +69,8 @@ def _each_draw(mixture: Mixture, sense, shares, limit):
     Along the sense of loading.
     """
     mixture = mixture.along(sense)
-    found = [mixture.quantile(share) for share in shares]
+    # One after the other: the program is a third as large.
+    found = jax.lax.map(mixture.quantile, shares)
     size = mixture.mean.shape[:-1]
     above = mixture.above(jnp.broadcast_to(limit, size))
     return (*found, mixture.centre(), above)
@@ -82,8 +83,13 @@ def _predicted(parts, sense, rounding_sd, shown, exact):
     Along the sense of loading, of mixtures with weights of their draws.
     """
     whole = pooled([(weight, part.along(sense)) for weight, part in parts])
-    read = jax.lax.map(whole.widened(rounding_sd).quantile, shown)
-    return jnp.concatenate([read, jax.lax.map(whole.quantile, exact)])
+    sd = [jnp.full(len(shown), rounding_sd), jnp.zeros(len(exact))]
+
+    def quantile(asked):
+        sd, share = asked
+        return whole.widened(sd).quantile(share)
+
+    return jax.lax.map(quantile, (jnp.concatenate(sd), jnp.append(shown, exact)))
 
 
 def population_draws(
