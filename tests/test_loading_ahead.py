@@ -76,7 +76,6 @@ def test_a_program_that_came_is_neither_read_nor_compiled_when_it_is_called(
         with monkeypatch.context() as patch:
             patch.setattr(compiler, "compile_or_get_cached", None)
             np.testing.assert_array_equal(Program(one)(X), was)
-    assert not ahead._coming
 
 
 def test_what_was_compiled_for_what_another_returned_serves(cached):
@@ -130,6 +129,24 @@ def test_another_call_than_expected_ends_it(task, monkeypatch):
     (listed,) = files.folder_in(jax.config.jax_compilation_cache_dir).glob("*.called")
     names = [line.split()[1] for line in listed.read_text().splitlines()]
     assert names == ["third", "first"]
+
+
+def test_two_threads_may_call_the_same(task):
+    ahead.begin("task")
+    waits = [*ahead._coming.values()]
+    for _ in range(2):
+        np.testing.assert_array_equal(Program(first)(X), task[0])
+    assert not any(one.cancelled() for one in waits[1:])
+    np.testing.assert_array_equal(Program(second)(X), task[1])
+
+
+def test_a_list_without_end_is_not_loaded_whole(task, cached):
+    (listed,) = cached.rglob("*.called")
+    listed.write_text("".join(f"{place} first\n" for place in range(1000)))
+    ahead.begin("task")
+    assert len(ahead._coming) == ahead._MOST
+    ahead.release()
+    assert not ahead._coming
 
 
 def test_a_shorter_run_forgets_nothing(task, cached):

@@ -381,3 +381,41 @@ def test_an_xla_that_lacks_an_option_is_asked_without(cached, monkeypatch):
         np.testing.assert_array_equal(found[1], [0.0, 2.0, 4.0])
     finally:
         compiling._options.cache_clear()
+
+
+def test_a_program_has_the_same_name_in_every_process():
+    """Sets are in another order in each."""
+    script = """
+import jax
+from rigs import make_records
+from hdcal.programs.program import _outline, _text
+known = frozenset({"run", "temperature", "time", "rates"})
+records = make_records([0.0, 1.0], [0.0, 1.0], known=known)
+print(_outline(jax.tree.structure(records)), _text(("known", known)))
+"""
+    said = set()
+    for seed in range(4):
+        env = {**os.environ, "PYTHONHASHSEED": str(seed)}
+        env["PYTHONPATH"] = os.pathsep.join(sys.path)
+        command = [sys.executable, "-c", script]
+        said.add(subprocess.check_output(command, text=True, env=env))
+    (told,) = said
+    assert told.count("'rates','run','temperature','time'") == 2
+
+
+@pytest.mark.parametrize("name", ["jax_disable_jit", "jax_debug_nans"])
+def test_who_debugs_gets_jit_itself(cached, name):
+    jax.config.update(name, True)
+    try:
+        assert float(counted()[0]({"x": np.zeros(3), "y": 0.0}, times=1)["sum"]) == 3.0
+    finally:
+        jax.config.update(name, False)
+    assert not kept(cached)
+
+
+def test_what_becomes_of_an_error_within_is_part_of_the_name(cached, monkeypatch):
+    monkeypatch.undo()
+    for said in ("raise", "nan"):
+        monkeypatch.setenv("EQX_ON_ERROR", said)
+        counted()[0]({"x": np.zeros(3), "y": 0.0}, times=1)
+    assert len(kept(cached)) == 2

@@ -41,6 +41,7 @@ def test_a_loop_is_one_kernel(before, flags):
     ("before", "flags"),
     [
         ("", "--xla_backend_extra_options=xla_cpu_other=1"),
+        ("", "a_file_of_flags.txt"),
         ("import jax; jax.devices()\n", ""),
         ("import sys, jax; sys.modules['jax._src.xla_bridge'] = None\n", ""),
     ],

@@ -194,6 +194,45 @@ def test_a_pipe_and_a_device_are_refused_at_once(tmp_path):
             open_tree(tmp_path / name)
 
 
+def scaled(file: h5py.File) -> None:
+    file["posterior/K"].attrs["scale_factor"] = 2.0
+
+
+def shifted(file: h5py.File) -> None:
+    file["observed_data/force"].attrs["add_offset"] = 10.0
+
+
+def with_gaps(file: h5py.File) -> None:
+    file["posterior/K"].attrs["_FillValue"] = file["posterior/K"][0, 0]
+
+
+def dated(file: h5py.File) -> None:
+    file["constant_data/time"].attrs["units"] = "seconds since 2000-01-01"
+
+
+@pytest.mark.parametrize("change", [scaled, shifted, with_gaps, dated])
+def test_what_others_would_read_as_other_numbers_is_refused(file, tmp_path, change):
+    copy = Path(shutil.copy(file, tmp_path / "posterior.nc"))
+    with h5py.File(copy, "a") as opened:
+        change(opened)
+    with pytest.raises(InputError, match="is not a posterior that hdcal wrote"):
+        Posterior.load(copy)
+
+
+def test_numbers_of_another_machine_are_read(file, tmp_path):
+    copy = Path(shutil.copy(file, tmp_path / "posterior.nc"))
+    with h5py.File(copy, "a") as opened:
+        values, scales = opened["posterior/K"][...], opened["posterior/K"].dims
+        axes = [scale[0] for scale in scales]
+        del opened["posterior/K"]
+        held = opened.create_dataset("posterior/K", data=values.astype(">f8"))
+        for place, axis in enumerate(axes):
+            held.dims[place].attach_scale(axis)
+    found = Posterior.load(copy).draws["K"]
+    assert found.dtype == np.dtype("=f8")
+    np.testing.assert_array_equal(found, Posterior.load(file).draws["K"])
+
+
 def nothing_drawn(tree) -> None:
     tree["posterior"] = tree["posterior"].isel(draw=slice(0, 0))
 

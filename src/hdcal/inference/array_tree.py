@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 # What NetCDF says of an array that is read back; the rest is how it is stored.
 _SAID = ("units", "long_name", "comment")
 _TYPE, _LABELS = "dtype", "coordinates"
+# All that arrays are said to be; the rest of it is of HDF5 and NetCDF.
+_KNOWN = {*_SAID, _TYPE, _LABELS, "_FillValue", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
+_KNOWN |= {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"}
 CHAIN, DRAW = "chain", "draw"
 OVER_DRAWS = (CHAIN, DRAW)
 
@@ -154,10 +157,21 @@ def _named(name: str, held: h5py.Dataset) -> Named:
     axes = (name,) if held.is_scale else last
     text = h5py.check_string_dtype(held.dtype) is not None
     values = np.asarray(held.asstr()[...] if text else held[...])
+    # As this machine has it, for JAX.
+    values = values.astype(values.dtype.newbyteorder("="), copy=False)
+    _check_attributes(name, held)
     if held.attrs.get(_TYPE) == "bool":
         values = values.astype(bool)
     said = {key: str(held.attrs[key]) for key in _SAID if key in held.attrs}
     return Named((*axes,), values, said)
+
+
+def _check_attributes(name: str, held: h5py.Dataset) -> None:
+    """Refuse what makes others read other numbers: no digest would tell."""
+    fill = held.attrs.get("_FillValue")
+    scaled = {*held.attrs} - _KNOWN or (fill is not None and not np.all(fill != fill))
+    if scaled or "since" in str(held.attrs.get("units", "")):
+        raise ValueError(f"{name} is scaled, or has gaps")
 
 
 def _write(node: h5py.Group, group: Group) -> None:

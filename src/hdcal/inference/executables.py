@@ -4,6 +4,7 @@ import gc
 from pathlib import Path
 
 from hdcal.inference import independence, laplace, sample
+from hdcal.programs import ahead
 
 _MAPS = Path("/proc/self/maps")
 _LIMIT = Path("/proc/sys/vm/max_map_count")
@@ -26,6 +27,7 @@ def bound_executables() -> bool:
         m for room in (laplace, sample, independence) for m in room.COMPILED
     ):
         compiled.clear_cache()  # pyright: ignore[reportAttributeAccessIssue]
+    ahead.release()
     gc.collect()
     return True
 

@@ -109,7 +109,7 @@ class Posterior(Shown):
 
     @property
     def tree(self) -> "xr.DataTree":
-        """What ArviZ draws from: its groups as a DataTree."""
+        """What ArviZ draws from: its groups as a DataTree, which is not saved again."""
         return self.arrays.datatree
 
     @cached_property

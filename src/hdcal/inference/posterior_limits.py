@@ -173,7 +173,9 @@ def check_draws(draws: Group, sites: Mapping[str, tuple[int, ...]]) -> None:
     size = len(draws[CHAIN].values), len(draws[DRAW].values)
     if min(size) < 1:
         raise ValueError("there are no draws")
-    for name in {*sites, *(n for n, one in draws.items() if len(one.axes) > 1)}:
+    labels = {n for n, one in draws.items() if one.values.dtype.kind in "OTU"}
+    numbers = {n for n, one in draws.items() if one.axes != (n,)} - labels
+    for name in {*sites, *numbers}:
         axes, values, _ = draws[name]
         if axes[:2] != OVER_DRAWS:
             raise ValueError(f"{name} has other axes")

@@ -163,7 +163,7 @@ def sample(
         problem: the inference problem.
         whitening: coordinates from `laplace.fit`.
         key: source of randomness; the same key gives the same draws.
-        chains: independent chains, advanced side by side.
+        chains: independent chains, one after the other in each stretch.
         warmup: iterations of adaptation per chain, discarded.
         draws: iterations kept per chain, or a multiple of them.
         progress: called after every stretch.

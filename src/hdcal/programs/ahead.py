@@ -15,6 +15,8 @@ import jax
 from hdcal.programs.compiling import cache_folder, compile_loops_whole, lowered
 from hdcal.programs.files import folder_in, put, read
 
+# More at once would fill what memory mappings a process may have.
+_MOST = 150
 # By file: the names of those that were called, in their order, and those to come.
 _called: dict[Path, str] = {}
 _coming: dict[Path, Future] = {}
@@ -27,14 +29,14 @@ def begin(task: str) -> None:
         return
     compile_loops_whole()
     pool = ThreadPoolExecutor(1)
-    for file, name in _read_list(listed).items():
+    for file, name in [*_read_list(listed).items()][:_MOST]:
         _coming[file] = pool.submit(_load, file, name)
     pool.shutdown(wait=False)
 
 
 def end(task: str) -> None:
     """Load no more, and keep in mind what the task called."""
-    _stop()
+    release()
     # After an interruption other threads may go on to call.
     listed, needed = _list_of(task), {**_called}
     if listed is None or needed.keys() <= _read_list(listed).keys():
@@ -51,9 +53,10 @@ def called(file: Path, name: str) -> Callable | None:
         name: of its function.
     """
     _called.setdefault(file, name)
-    coming = _coming.pop(file, None)
+    # It stays there: two threads may call the same.
+    coming = _coming.get(file)
     if coming is None:
-        _stop()
+        release()
     elif not coming.cancel():
         # It is not to be had there for the reason for which it is not to be had here.
         with suppress(Exception):
@@ -61,9 +64,11 @@ def called(file: Path, name: str) -> Callable | None:
     return None
 
 
-def _stop() -> None:
-    for one in [*_coming.values()]:
-        one.cancel()
+def release() -> None:
+    """Load no more, and hold nothing that was loaded."""
+    while _coming:
+        with suppress(KeyError):
+            _coming.popitem()[1].cancel()
 
 
 def _load(file: Path, name: str) -> Callable | None:

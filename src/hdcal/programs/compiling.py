@@ -23,7 +23,9 @@ def compile_loops_whole() -> None:
     """
     flags = os.environ.get("XLA_FLAGS", "")
     # Said too late it would only be part of the names under which programs are kept.
-    if _EXTRA not in flags and not _has_begun():
+    # What begins otherwise names a file of flags.
+    is_file = flags.strip() and not flags.lstrip().startswith("-")
+    if _EXTRA not in flags and not is_file and not _has_begun():
         os.environ["XLA_FLAGS"] = f"{flags} {_EXTRA}={_WHOLE_LOOPS}".strip()
 
 

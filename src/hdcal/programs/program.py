@@ -8,6 +8,7 @@ instead of tracing anew, and imports none of what only tracing needs.
 
 import builtins
 import hashlib
+import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -77,14 +78,18 @@ class Program:
         """Return what the function returns; static arguments are named."""
         fixed = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
-        if any(map(_is_placed, leaves)) or _trace_state() != _NO_TRACE:
+        placed = any(map(_is_placed, leaves))
+        if placed or _trace_state() != _NO_TRACE or _is_debugged():
             return self._jitted(*args, **named, **fixed)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         kind = _Kind(
             structure,
             tuple((name, type(value), value) for name, value in fixed.items()),
             tuple((leaf.shape, leaf.dtype) for leaf in leaves),
-            tuple(getattr(jax.config, name) for name in _SETTINGS),
+            (
+                os.environ.get("EQX_ON_ERROR"),
+                *(getattr(jax.config, name) for name in _SETTINGS),
+            ),
             folder_in(cache_folder()),
         )
         if kind not in self._ready:
@@ -125,7 +130,8 @@ class Program:
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        told = repr((name, *kind[:-1], jax.default_backend()))
+        held = _text(kind.fixed), kind.arrays, kind.settings, jax.default_backend()
+        told = repr((name, _outline(kind.structure), *held))
         # A function that another one made, or what is told by its place in this
         # process' memory, has no name elsewhere.
         nameless = "<" in name or " at 0x" in told
@@ -152,6 +158,30 @@ def program(
     if function is None:
         return lambda function: Program(function, static, returns)
     return Program(function, static, returns)
+
+
+def _is_debugged() -> bool:
+    """Return whether JAX is to do otherwise than compile for its own device."""
+    asked = "disable_jit", "debug_nans", "debug_infs", "default_device"
+    return any(getattr(jax.config, f"jax_{name}") for name in asked)
+
+
+def _outline(structure: Any) -> str:
+    """Return a structure as text, the same in every process."""
+    node = structure.node_data()
+    if node is None:
+        return "*"
+    inner = ",".join(map(_outline, structure.children()))
+    return f"{node[0].__module__}.{node[0].__qualname__}:{_text(node[1])}({inner})"
+
+
+def _text(held: Any) -> str:
+    """Return what is no array as text; the order in a set is that of the process."""
+    if isinstance(held, set | frozenset):
+        return f"{{{','.join(sorted(map(_text, held)))}}}"
+    if isinstance(held, tuple | list):
+        return f"({','.join(map(_text, held))})"
+    return repr(held)
 
 
 def _is_placed(leaf: Any) -> bool:
