@@ -9,6 +9,7 @@ import signal
 import sys
 from functools import partial
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -97,6 +98,8 @@ for _command in (
 # Objects after which some are looked for that can go: a command makes many by loading
 # what it needs, all of them stay, and looking at them took a tenth of its time.
 _MADE_AND_KEPT = 100_000
+# Until an interruption that came within an import is tried again [s].
+_A_MOMENT = 0.02
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -191,13 +194,29 @@ def _hear_interruptions() -> None:
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         heard.append(signal.SIGINT)
 
-    def stop(*_) -> None:
+    def stop(_, frame: FrameType | None) -> None:
+        if _is_importing(frame):
+            signal.setitimer(signal.ITIMER_REAL, _A_MOMENT)
+            return
         for each in heard:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for each in heard:
+    for each in (*heard, signal.SIGALRM):
         signal.signal(each, stop)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Return whether a module is being imported.
+
+    To interrupt that may be swallowed, leave a lock held for which other threads wait,
+    or end the process from within an extension.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def run() -> None:

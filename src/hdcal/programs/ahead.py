@@ -56,7 +56,8 @@ def called(file: Path, name: str) -> Callable | None:
     # It stays there: two threads may call the same.
     coming = _coming.get(file)
     if coming is None:
-        release()
+        for one in [*_coming.values()]:
+            one.cancel()
     elif not coming.cancel():
         # It is not to be had there for the reason for which it is not to be had here.
         with suppress(Exception):
