@@ -48,10 +48,6 @@ def pytest_configure(config: pytest.Config) -> None:
     # As commands do: two processes on two cores, each with two threads, only wait.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     config.stash[_OWN] = os.environ["HDCAL_CACHE_DIR"] = tempfile.mkdtemp("-hdcal")
-    # What `hdcal.cli.compilation_cache` sets for commands.
-    os.environ["JAX_COMPILATION_CACHE_DIR"] = f"{config.stash[_OWN]}/compiled"
-    os.environ["JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS"] = "0"
-    os.environ["JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES"] = "-1"
     # Most of a test run is compilation of programs that run for less than a second:
     # compiled plainly they take less time. `make demo` runs as users do.
     os.environ.setdefault("XLA_FLAGS", _COMPILED_PLAINLY)
@@ -62,6 +58,14 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the cache."""
     if _OWN in config.stash:
         shutil.rmtree(config.stash[_OWN], ignore_errors=True)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_programs() -> None:
+    """Keep programs, as commands do."""
+    from hdcal.cli.compilation_cache import keep_compilations
+
+    keep_compilations()
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -90,4 +94,4 @@ def own_traces(request: pytest.FixtureRequest) -> None:
     ):
         patch = request.getfixturevalue("monkeypatch")
         for user in ("program", "ahead"):
-            patch.setattr(f"hdcal.programs.{user}.folder_in", lambda _: None)
+            patch.setattr(f"hdcal.programs.{user}.folder", lambda: None)

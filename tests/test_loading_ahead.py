@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from commands import Hdcal
 from jax._src import compiler
-from jax.experimental.compilation_cache import compilation_cache
 from moving import still_posterior
 from posteriors import single
 
@@ -40,15 +39,13 @@ def third(x):
 def cached(monkeypatch, tmp_path) -> Iterator[Path]:
     """Give a cache, and a process that has called nothing."""
     monkeypatch.undo()
-    before = jax.config.jax_compilation_cache_dir
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
-    compilation_cache.reset_cache()
+    before = files._kept_in
+    files.keep_in(str(tmp_path))
     monkeypatch.setattr(ahead, "_called", {})
     monkeypatch.setattr(ahead, "_coming", {})
     with jax.enable_x64(True):
         yield tmp_path
-    jax.config.update("jax_compilation_cache_dir", before)
-    compilation_cache.reset_cache()
+    files.keep_in(before)
 
 
 @pytest.fixture
@@ -80,24 +77,23 @@ def test_a_program_that_came_is_neither_read_nor_compiled_when_it_is_called(
 
 def test_what_was_compiled_for_what_another_returned_serves(cached):
     """Bound to its device it would be compiled as another program."""
-    found = Program(second)(Program(first)(X))
-    assert found.committed
+    bound = jax.device_put(Program(first)(X), jax.devices()[0])
+    found = Program(second)(bound)
+    assert bound.committed
     ahead.end("task")
-    compiled = {*cached.glob("jit_*")}
+    kept = {*cached.rglob("*")}
     ahead._called.clear()
     ahead.begin("task")
     loaded()
     np.testing.assert_array_equal(Program(second)(np.cumsum(X)), found)
-    assert {*cached.glob("jit_*")} == compiled and len(compiled) >= 2
+    assert {*cached.rglob("*")} == kept and len(kept) >= 4
 
 
 def test_without_having_come_it_is_read(task, monkeypatch):
     """What the test above would see."""
-    for where, name in ((made, "read"), (compiler, "compile_or_get_cached")):
-        with monkeypatch.context() as patch:
-            patch.setattr(where, name, None)
-            with pytest.raises(TypeError):
-                Program(first)(X)
+    monkeypatch.setattr(made, "read", None)
+    with pytest.raises(TypeError):
+        Program(first)(X)
 
 
 def test_what_has_not_begun_is_done_by_who_calls_it(task, monkeypatch):
@@ -126,7 +122,7 @@ def test_another_call_than_expected_ends_it(task, monkeypatch):
     # What came to nothing is made as ever.
     np.testing.assert_array_equal(Program(first)(X), task[0])
     ahead.end("task")
-    (listed,) = files.folder_in(jax.config.jax_compilation_cache_dir).glob("*.called")
+    (listed,) = files.folder().glob("*.called")
     names = [line.split()[1] for line in listed.read_text().splitlines()]
     assert names == ["third", "first"]
 
@@ -175,7 +171,7 @@ def test_a_list_that_is_damaged_is_no_error(task, cached, spoil):
 
 
 def test_nothing_is_loaded_where_nothing_is_kept(cached):
-    jax.config.update("jax_compilation_cache_dir", None)
+    files.keep_in(None)
     ahead.begin("task")
     np.testing.assert_allclose(Program(first)(X), np.cumsum(X))
     ahead.end("task")

@@ -31,10 +31,10 @@ print("numpyro" in sys.modules)
 @pytest.fixture
 def cached(tmp_path):
     """Give a cache of its own for one test."""
-    before = jax.config.jax_compilation_cache_dir
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    before = files._kept_in
+    files.keep_in(str(tmp_path))
     yield tmp_path
-    jax.config.update("jax_compilation_cache_dir", before)
+    files.keep_in(before)
 
 
 def kept(folder: Path) -> list[Path]:
@@ -128,11 +128,11 @@ def test_other_code_is_another_program(cached, tmp_path, monkeypatch):
     code.mkdir()
     (code / "one.py").write_text("changed = True")
     monkeypatch.setattr(files, "_CODE", code)
-    files.folder_in.cache_clear()
+    files._folder_in.cache_clear()
     another(one)({"x": np.zeros(3), "y": 0.0}, times=1)
     assert len(traced) == 2
     assert {file.parent for file in kept(cached)} != {folder}
-    files.folder_in.cache_clear()
+    files._folder_in.cache_clear()
 
 
 @pytest.mark.parametrize("damage", [b"", b"short", b"x" * 4000])
@@ -199,6 +199,51 @@ def test_few_versions_of_the_code_stay(cached):
     names = {folder.name for folder in whole.iterdir()}
     assert len(names) == 4
     assert {"old3", "old4", "old5"} < names
+
+
+_FACTOR = """
+import sys
+import numpy as np
+from hdcal.programs.files import keep_in
+from test_programs import factor, program
+keep_in(sys.argv[1])
+print(float(program(factor)(np.eye(3) + 1.0).sum()).hex())
+"""
+
+
+def factor(x):
+    """Return what LAPACK computes."""
+    return jnp.linalg.cholesky(x)
+
+
+def test_what_calls_lapack_finds_it_in_a_later_process(tmp_path):
+    """It is there only once JAX has looked for it; to call it before is a crash."""
+    command = [sys.executable, "-c", _FACTOR, str(tmp_path)]
+    env = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    env |= {"JAX_ENABLE_X64": "true"}
+    said = {subprocess.check_output(command, text=True, env=env) for _ in range(2)}
+    assert len(kept(tmp_path)) == len(said) == 1
+    found = float.fromhex(said.pop())
+    assert found == pytest.approx(np.linalg.cholesky(np.eye(3) + 1.0).sum())
+
+
+def test_beside_a_cache_of_jax_nothing_is_kept(cached):
+    """What JAX read from there, written once more, lacks functions that it calls."""
+    jax.config.update("jax_compilation_cache_dir", str(cached / "own"))
+    try:
+        counted()[0]({"x": np.zeros(3), "y": 0.0}, times=1)
+        assert not kept(cached)
+        files.keep_in(str(cached))
+        assert jax.config.jax_compilation_cache_dir is None
+    finally:
+        jax.config.update("jax_compilation_cache_dir", None)
+
+
+def test_another_processor_has_other_programs(cached, monkeypatch):
+    here = files._of_code_and_machine()
+    assert here == files._of_code_and_machine()
+    monkeypatch.setattr(files, "_processor", lambda: "flags: none")
+    assert files._of_code_and_machine() != here
 
 
 def test_what_calls_back_works_and_is_not_kept(cached):
@@ -275,7 +320,8 @@ def test_what_lies_on_another_device_is_jit(tmp_path):
     script = f"""
 import jax, numpy as np
 from hdcal.programs.program import program
-jax.config.update("jax_compilation_cache_dir", {str(tmp_path)!r})
+from hdcal.programs.files import keep_in
+keep_in({str(tmp_path)!r})
 from pathlib import Path
 from test_programs import kept, doubled
 one = program(doubled)
@@ -327,7 +373,7 @@ def _slowly_traced(x, *, place: int):
 def test_threads_trace_one_after_the_other(cached, kept_on_disk: bool):
     """NumPyro's handlers are on one stack for all of them."""
     if not kept_on_disk:
-        jax.config.update("jax_compilation_cache_dir", None)
+        files.keep_in(None)
     _MOST_AT_ONCE.clear()
     made = Program(_slowly_traced, static=("place",))
     with ThreadPoolExecutor(4) as pool:
@@ -344,7 +390,6 @@ def test_a_class_comes_back(cached):
 def test_a_second_process_says_the_same_without_what_only_tracing_needs(tmp_path):
     def run(cache):
         env = os.environ | {"HDCAL_CACHE_DIR": str(cache)}
-        env.pop("JAX_COMPILATION_CACHE_DIR")
         command = [sys.executable, "-c", _TWICE, "datasets/xb1-100-80"]
         done = subprocess.run(
             command, capture_output=True, text=True, check=True, env=env

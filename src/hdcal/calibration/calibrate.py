@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 
-import jax
 import numpy as np
 
 from hdcal.data.case import Case, Theory, require_case
@@ -28,6 +27,7 @@ from hdcal.inference.noise_form import (
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
+from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
@@ -186,7 +186,7 @@ def calibrate(
     problem = build_problem(case, shipped, chosen, **model)
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    of_draws, of_prior = separate_keys(seed, count=2)
     found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
     own = _specifics(case, problem, found, shown=shown)
     parts = assemble(case, priors, problem, found, own, of_prior)

@@ -22,24 +22,21 @@ def one_thread_for_algebra() -> None:
 
 
 def keep_compilations() -> None:
-    """Keep on disk what was traced and compiled, for later processes.
+    """Keep on disk what was compiled, for later processes.
 
     Commands do. A script that calls it first starts faster from its second run on, with
     the same results. What has code of a user's own effects is traced anew.
 
     The folder is the user's cache folder, or what the environment variable
-    HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept. It sets options
-    of JAX for the whole process.
+    HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept. JAX' own
+    compilation cache, which cannot serve beside it, is switched off for the process.
     """
     folder = _writable_folder()
     if folder is None:
         return
-    import jax
+    from hdcal.programs.files import keep_in
 
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    # By default JAX keeps only what took long; a run here is many short ones.
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    keep_in(str(folder))
     command = click.get_current_context(silent=True)
     if command is not None and _ASKED not in command.meta:
         _load_ahead(command)

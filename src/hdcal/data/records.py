@@ -8,12 +8,11 @@ from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float, Int
 
-from hdcal.programs.compiling import compile_loops_whole
+from hdcal.programs.compiling import compile_loops_whole, is_tracing
 
 # Measured on the reading edge as NumPy arrays, traced as JAX arrays.
 Array = jax.Array | np.ndarray
@@ -38,8 +37,7 @@ def _use_double_precision(made: eqx.Module) -> None:
     compile_loops_whole()
     if jax.config.read("jax_enable_x64"):
         return
-    leaves = [jnp.zeros(()), *jax.tree.leaves(made)]
-    if any(isinstance(leaf, Tracer) for leaf in leaves):
+    if is_tracing() or any(isinstance(x, Tracer) for x in jax.tree.leaves(made)):
         raise RuntimeError(
             f"a {type(made).__name__} switches JAX to double precision, too late "
             "within what is compiled or differentiated: make one before, or call "

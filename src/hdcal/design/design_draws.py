@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
-import jax
 import numpy as np
 
 from hdcal.data.case import Gear
@@ -26,6 +25,7 @@ from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.residuals import misfits
 from hdcal.inference.values import Values
 from hdcal.physics.chain import Reading
@@ -161,7 +161,7 @@ class DesignDraws:
         if name == self.material:
             return self
         facts = read_material(name)
-        keys = jax.random.split(jax.random.key(seed), 2)
+        keys = separate_keys(seed, count=2)
         new = {
             site: sample_prior(facts[site], site, key, self.size)
             for site, key in zip(("E0", "alpha"), keys, strict=True)
@@ -196,7 +196,7 @@ def design_draws(
         return _calibrated(source, seed)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
-    keys = jax.random.split(jax.random.key(seed), len(priors))
+    keys = separate_keys(seed, count=len(priors))
     values = {
         name: sample_prior(prior, name, key, draws)
         for key, (name, prior) in zip(keys, priors.items(), strict=True)

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jax
 import numpy as np
 
 from hdcal.data.case import Case
@@ -28,6 +27,7 @@ from hdcal.fleets.sampling import sample_population
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
 from hdcal.inference.executables import bound_executables
+from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 from hdcal.report.plain import as_plain
@@ -220,7 +220,7 @@ def fleet(
     bound_executables()
     readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)
-    of_draws, of_gears = jax.random.split(jax.random.key(seed))
+    of_draws, of_gears = separate_keys(seed, count=2)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = rough_values(problem, readings.sums)
     found = sample_population(problem, start, of_draws, progress=progress, **size)

@@ -49,8 +49,8 @@ class MotionBands:
 
 
 @program
-def _predict(problem: DynamicProblem, values, key):
-    keys = jax.random.split(key, len(values["mass"]))
+def _predict(problem: DynamicProblem, values, seed):
+    keys = jax.random.split(jax.random.key(seed), len(values["mass"]))
 
     def one(value, key):
         states = predict_states(problem, value)
@@ -62,7 +62,7 @@ def _predict(problem: DynamicProblem, values, key):
     return jax.vmap(one)(values, keys)
 
 
-def _stretches(problem: DynamicProblem, values, key) -> Iterator[np.ndarray]:
+def _stretches(problem: DynamicProblem, values, seed) -> Iterator[np.ndarray]:
     """Yield the bands of one stretch of rows after the other, shape (6, row).
 
     Each stretch begins with the last row of the one before, where its states are known.
@@ -70,7 +70,7 @@ def _stretches(problem: DynamicProblem, values, key) -> Iterator[np.ndarray]:
     tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
     for first in range(0, problem.count, _STRETCH):
         part = stretch(problem, first, _STRETCH + 1)
-        mean, new, last = _predict(part, values, key)
+        mean, new, last = _predict(part, values, seed)
         values = values | {
             "initial_deformation": last[:, 0],
             "initial_velocity": last[:, 1],
@@ -90,8 +90,8 @@ def motion_bands(posterior: DynamicPosterior, seed: int = 0) -> MotionBands:
     problem, draws = posterior.moving, posterior.draws
     rows = np.linspace(0, len(draws["mass"]) - 1, _DRAWS).astype(int)
     values = {name: draw[rows] for name, draw in draws.items()}
-    real, key = slice(problem.count), jax.random.key(seed)
-    parts = list(_stretches(problem, values, key))
+    real = slice(problem.count)
+    parts = list(_stretches(problem, values, seed))
     low, middle, high, new_low, _, new_high = np.concatenate(parts, axis=1)
     return MotionBands(
         np.asarray(problem.time[real]),

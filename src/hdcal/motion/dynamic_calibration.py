@@ -20,6 +20,7 @@ from hdcal.inference.executables import bound_executables
 from hdcal.inference.frequency_scan import scan
 from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
+from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import (
     Draws,
     Progress,
@@ -88,7 +89,7 @@ def calibrate_dynamic(
     theory = theory or case.gear.theory
     chosen, rival = _chosen(case, theory, effects)
     problem, priors = chosen.problem, chosen.priors
-    of_draws, of_prior = jax.random.split(jax.random.key(seed))
+    of_draws, of_prior = separate_keys(seed, count=2)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, chosen.whitening, of_draws, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}

@@ -10,10 +10,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-import jax
-
-from hdcal.programs.compiling import cache_folder, compile_loops_whole, lowered
-from hdcal.programs.files import folder_in, put, read
+from hdcal.programs.compiling import compile_loops_whole
+from hdcal.programs.files import folder, put, read
 
 # More at once would fill what memory mappings a process may have.
 _MOST = 150
@@ -29,8 +27,8 @@ def begin(task: str) -> None:
         return
     compile_loops_whole()
     pool = ThreadPoolExecutor(1)
-    for file, name in [*_read_list(listed).items()][:_MOST]:
-        _coming[file] = pool.submit(_load, file, name)
+    for file in [*_read_list(listed)][:_MOST]:
+        _coming[file] = pool.submit(read, file)
     pool.shutdown(wait=False)
 
 
@@ -72,18 +70,9 @@ def release() -> None:
             _coming.popitem()[1].cancel()
 
 
-def _load(file: Path, name: str) -> Callable | None:
-    exported = read(file)
-    if exported is None:
-        return None
-    # Data, which switch it on for the process, may not have been read yet.
-    with jax.enable_x64(True):
-        return lowered(exported.call, name, exported.in_avals).compile()
-
-
 def _list_of(task: str) -> Path | None:
-    folder = folder_in(cache_folder())
-    return None if folder is None else folder / f"{task}.called"
+    kept = folder()
+    return None if kept is None else kept / f"{task}.called"
 
 
 def _read_list(listed: Path) -> dict[Path, str]:

@@ -1,15 +1,25 @@
-"""How functions are compiled, and where JAX keeps what came of it."""
+"""How functions are compiled, and what of that later processes can load."""
 
 import os
+import pickle
+import re
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import jax
+from jax import numpy as jnp
+from jax.extend.core import get_opaque_trace_state
 
 # Of XLA on CPUs: loops that touch fewer bytes a turn are one kernel each.
 _WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
 _EXTRA = "--xla_backend_extra_options"
+# What code outside of XLA a program calls, and what of it other processes have.
+_CALLED = re.compile(r"custom_call @(\w+)")
+_LAPACK = "lapack_"
+# Which trace is under way, and none.
+_trace_state = partial(get_opaque_trace_state, convention="flax")
+_NO_TRACE = _trace_state()
 
 
 @cache
@@ -38,6 +48,11 @@ def _has_begun() -> bool:
     return backends_are_initialized()
 
 
+def is_tracing() -> bool:
+    """Return whether JAX traces, to compile or to differentiate."""
+    return _trace_state() != _NO_TRACE
+
+
 def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
     """Return a function for such arguments, to be compiled.
 
@@ -54,10 +69,40 @@ def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
     return jitted.lower(*[jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arguments])
 
 
-def cache_folder() -> str | None:
-    """Return the folder of JAX' compilation cache; None without one."""
-    # Flags are put there at import time, out of pyright's sight.
-    return jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
+def to_keep(program: Any, compiled: Any) -> bytes | None:
+    """Return what a later process loads; None where only this one can run it.
+
+    Args:
+        program: what `lowered` returned.
+        compiled: what came of it.
+    """
+    called = set(_CALLED.findall(program.as_text()))
+    if not all(name.startswith(_LAPACK) for name in called):
+        # A function of Python, say, is known by where it lies in memory.
+        return None
+    from jax.experimental.serialize_executable import serialize
+
+    return pickle.dumps((bool(called), serialize(compiled)))
+
+
+def loaded(kept: bytes) -> Callable:
+    """Return a function of which `to_keep` made the bytes.
+
+    It is machine code, like all that JAX' cache holds: a file that others could have
+    written must never come here.
+    """
+    from jax.experimental.serialize_executable import deserialize_and_load
+
+    needs_lapack, executable = pickle.loads(kept)
+    if needs_lapack:
+        _find_lapack()
+    return deserialize_and_load(*executable, execution_devices=jax.devices()[:1])
+
+
+@cache
+def _find_lapack() -> None:
+    """Let JAX look for LAPACK, which it does when it lowers what needs it."""
+    jax.jit(jnp.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), jnp.float32))
 
 
 @cache

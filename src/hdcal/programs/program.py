@@ -1,9 +1,10 @@
 """Compiled functions that start fast: what was traced once is kept on disk.
 
-A program is `jax.jit` of a function of a module. Where JAX' compilation cache has a
-folder, what tracing makes of the function is kept there too, as `jax.export` writes it,
-for each kind of arguments: structure, shapes and types. A later process reads that
-instead of tracing anew, and imports none of what only tracing needs.
+A program is `jax.jit` of a function of a module. Where there is a folder for it, what
+was compiled is kept, as the device runs it, for each kind of arguments: structure,
+shapes and types. A later process loads that, where with JAX' own cache it had to trace
+and lower the function to find out what to load; it imports none of what only tracing
+needs.
 """
 
 import builtins
@@ -12,19 +13,17 @@ import os
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from functools import partial, update_wrapper
+from functools import update_wrapper
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jax import export
 from jax.core import Tracer
-from jax.extend.core import get_opaque_trace_state
 
 from hdcal.programs import ahead
-from hdcal.programs.compiling import cache_folder, lowered
-from hdcal.programs.files import TRACED, folder_in, read, write
+from hdcal.programs.compiling import is_tracing, lowered, to_keep
+from hdcal.programs.files import TRACED, folder, read, write
 
 # Whose classes may be in it: their code, or version, is in its name.
 _KNOWN = {*TRACED, "hdcal", "collections", "numpy"}
@@ -40,9 +39,6 @@ _SETTINGS = (
 )
 # NumPyro's handlers are on one stack, whatever the thread: only one may trace.
 _TRACING = threading.RLock()
-# Which trace is under way, and none: inside of another one a program is part of it.
-_trace_state = partial(get_opaque_trace_state, convention="flax")
-_NO_TRACE = _trace_state()
 
 
 class _Kind(NamedTuple):
@@ -79,7 +75,8 @@ class Program:
         fixed = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
         placed = any(map(_is_placed, leaves))
-        if placed or _trace_state() != _NO_TRACE or _is_debugged():
+        # Inside of another trace a program is part of it.
+        if placed or is_tracing() or _is_debugged():
             return self._jitted(*args, **named, **fixed)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         kind = _Kind(
@@ -88,9 +85,10 @@ class Program:
             tuple((leaf.shape, leaf.dtype) for leaf in leaves),
             (
                 os.environ.get("EQX_ON_ERROR"),
+                os.environ.get("XLA_FLAGS"),
                 *(getattr(jax.config, name) for name in _SETTINGS),
             ),
-            folder_in(cache_folder()),
+            folder(),
         )
         if kind not in self._ready:
             self._ready[kind] = self._made(kind, leaves)
@@ -114,23 +112,22 @@ class Program:
         name, file = self._function.__name__, self._file(kind)
         if file is not None and (ready := ahead.called(file, name)) is not None:
             return ready
-        exported = None if file is None else read(file)
-        if exported is None and file is not None:
-            # What calls back into this process, say, cannot be kept.
-            with suppress(Exception), _TRACING:
-                kept = bytes(export.export(jax.jit(flat))(*leaves).serialize())
-                # As later processes have it: to the last bit the same.
-                exported = export.deserialize(bytearray(kept))
-                write(file, kept)
+        if file is not None and (ready := read(file)) is not None:
+            return ready
         with _TRACING:
-            call = flat if exported is None else exported.call
-            found = lowered(call, name, leaves)
-        return found.compile()
+            found = lowered(flat, name, leaves)
+        compiled = found.compile()
+        # What cannot be kept is traced anew.
+        with suppress(Exception):
+            if file is not None and (kept := to_keep(found, compiled)) is not None:
+                write(file, kept)
+        return compiled
 
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        held = _text(kind.fixed), kind.arrays, kind.settings, jax.default_backend()
+        device = jax.devices()[0].device_kind
+        held = _text(kind.fixed), kind.arrays, kind.settings, device
         told = repr((name, _outline(kind.structure), *held))
         # A function that another one made, or what is told by its place in this
         # process' memory, has no name elsewhere.

@@ -13,6 +13,7 @@ from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, case_reading
+from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.values import Values
 from hdcal.motion.respond.request import Request
 from hdcal.physics.chain import Base, Reading
@@ -56,7 +57,7 @@ def unseen(posterior: Posterior, values: dict, mass, seed: int):
     if isinstance(posterior, DynamicPosterior):
         return values["mass"], values["damping_ratio"]
     count, gear = len(values["K"]), posterior.case.gear
-    of_mass, of_ratio = jax.random.split(jax.random.key(seed))
+    of_mass, of_ratio = separate_keys(seed, count=2)
     if mass is not None:
         moved = np.full(count, float(mass))
     else:

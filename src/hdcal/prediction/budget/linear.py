@@ -9,12 +9,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-import equinox as eqx
 import jax
 import numpy as np
+from jax.tree_util import Partial, all_leaves
 from scipy.special import ndtri, stdtrit
 
 from hdcal.prediction.budget.inputs import InputGroup
+from hdcal.programs.program import program
 
 # Digits of a standard uncertainty that count.
 _DIGITS = 2
@@ -71,7 +72,7 @@ def coverage_factor(dof: float, coverage: float = 0.95) -> float:
     return float(stdtrit(dof, share) if dof < 1e9 else ndtri(share))
 
 
-@eqx.filter_jit
+@program
 def _tangent(model, at):
     return jax.value_and_grad(model)(at)
 
@@ -84,7 +85,9 @@ def linear_budget(model: Model, groups: Sequence[InputGroup]) -> LinearBudget:
         groups: of inputs, independent of each other.
     """
     at = np.concatenate([group.estimates for group in groups])
-    value, slopes = _tangent(model, at)
+    # A function that is no pytree is one then.
+    tree = Partial(model) if all_leaves([model]) else model
+    value, slopes = _tangent(tree, at)
     slopes = np.asarray(slopes)
     names = tuple(name for group in groups for name in group.names)
     parts, sds, start = [], [], 0

@@ -68,7 +68,7 @@ class PopulationForce:
 
     def at(self, temperature: float) -> "PopulationForce":
         """Return the forces at another temperature [°C]."""
-        warm = replace(self.conditions, temperature=jnp.asarray(temperature, float))
+        warm = replace(self.conditions, temperature=np.asarray(temperature, float))
         return replace(self, conditions=warm)
 
     def of_sense(self, sense: LoadingSense) -> "PopulationForce":

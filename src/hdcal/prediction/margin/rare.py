@@ -221,14 +221,15 @@ def _points(force: PopulationForce, limit: float, seed: int):
     near = spread_evenly(rounds * _POINTS, SITES, seed)
     untested, sites = untested_of(force.cause, 1.0 - near**_TOWARDS_LARGE)
     towards_large = (_TOWARDS_LARGE - 1.0) * np.log(near[:, 0])
-    blur = 0.1 * float(np.std(np.asarray(force.mixture().centre())))
+    mixture = force.mixture()
+    centre = np.sum(np.asarray(mixture.weight) * np.asarray(mixture.mean), axis=-1)
     target = _Target(
         problem=force.cause.problem,
         whitening=force.cause.whitening,
         whose=force.whose,
         conditions=replace(force.conditions, untested=untested),
-        limit=jnp.asarray(limit),
-        blur=blur,
+        limit=np.asarray(limit, float),
+        blur=0.1 * float(np.std(centre)),
     )
     laws = _laws(target, np.median(force.cause.values[BENDS], axis=0))
     counted = []
