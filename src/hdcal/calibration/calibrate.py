@@ -13,6 +13,7 @@ from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
+from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.executables import bound_executables
@@ -187,12 +188,14 @@ def calibrate(
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     of_draws, of_prior = separate_keys(seed, count=2)
-    found = sample(problem, laplace.fit(problem), of_draws, progress=progress, **size)
+    fitted = laplace.fit(problem)
+    found = sample(problem, fitted, of_draws, progress=progress, **size)
     own = _specifics(case, problem, found, shown=shown)
-    parts = assemble(case, priors, problem, found, own, of_prior)
+    arrays, *checked = assemble(case, priors, problem, found, own, of_prior)
+    kept = ArrayTree({**arrays.groups, laplace.GROUP: laplace.to_group(fitted)})
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
     settings |= {LOOP: True} | run_settings(found, began)
-    return Posterior(case, theory, chosen, priors, *parts, settings)
+    return Posterior(case, theory, chosen, priors, kept, *checked, settings)
 
 
 def _chosen(

@@ -12,6 +12,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
 from hdcal.programs.program import program
@@ -20,6 +21,8 @@ Position = dict[str, Any]
 
 # Largest share of the gradient that may be left, in posterior sds, at the mode.
 _TOLERANCE = 1e-6
+# The group of a posterior file that holds it.
+GROUP = "laplace"
 # A search among bends ends when so many steps gained less than this [nat].
 _STEPS, _LEAST_GAIN = 12, 1e-3
 
@@ -198,6 +201,30 @@ def fit(
     factor = scale[:, None] * _inverse_root(expand(found.x)[2])
     centre = _unflatten(place, flat + scale * found.x)
     return Whitening(centre, factor)
+
+
+def to_group(found: Whitening) -> Group:
+    """Return a fit as the group of a posterior file."""
+    mode, factor = _flatten(found.centre), np.asarray(found.factor)
+    axes = {"mode": ("coordinate",), "factor": ("coordinate", "standard")}
+    return group_of({"mode": mode, "factor": factor}, (), axes)
+
+
+def from_group(problem: Sampled, group: Group | None) -> Whitening:
+    """Return the fit that a posterior file holds, or fit where it holds none.
+
+    Args:
+        problem: the inference problem.
+        group: from `to_group`; of another problem it counts as none.
+    """
+    if group is not None and {"mode", "factor"} <= group.keys():
+        mode, factor = group["mode"].values, group["factor"].values
+        like = _prior_middle(problem)
+        size = len(_flatten(like))
+        fits = mode.shape == (size,) and factor.shape == (size, size)
+        if fits and np.isfinite(mode).all() and np.isfinite(factor).all():
+            return Whitening(_unflatten(like, mode), factor)
+    return fit(problem)
 
 
 class _Patience:

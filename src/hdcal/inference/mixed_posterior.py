@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hdcal.inference import laplace
 from hdcal.inference.array_tree import (
     CHAIN,
     DRAW,
@@ -144,6 +145,7 @@ def _rows(shares: Sequence[float], posteriors: Sequence[Posterior]) -> list[np.n
 
 def _arrays(names, posteriors: Sequence[Posterior], rows, effects) -> ArrayTree:
     groups = {**posteriors[0].arrays.groups}
+    groups.pop(laplace.GROUP, None)
     labels = np.repeat(names, list(map(len, rows)))
     for group in groups.keys() & _OF_DRAWS:
         tables = [

@@ -62,7 +62,8 @@ class Cause:
     @cached_property
     def whitening(self) -> laplace.Whitening:
         """Mode of its density and curvature there."""
-        return laplace.fit(self.problem)
+        held = self.posterior.arrays.groups.get(laplace.GROUP)
+        return laplace.from_group(self.problem, held)
 
     @property
     def size(self) -> int:
