@@ -191,11 +191,11 @@ def calibrate(
     fitted = laplace.fit(problem)
     found = sample(problem, fitted, of_draws, progress=progress, **size)
     own = _specifics(case, problem, found, shown=shown)
-    arrays, *checked = assemble(case, priors, problem, found, own, of_prior)
+    arrays, diagnoses, checks = assemble(case, priors, problem, found, own, of_prior)
     kept = ArrayTree({**arrays.groups, laplace.GROUP: laplace.to_group(fitted)})
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
     settings |= {LOOP: True} | run_settings(found, began)
-    return Posterior(case, theory, chosen, priors, kept, *checked, settings)
+    return Posterior(case, theory, chosen, priors, kept, diagnoses, checks, settings)
 
 
 def _chosen(

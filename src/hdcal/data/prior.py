@@ -1,7 +1,9 @@
 """What is believed about one parameter, as a typed pytree."""
 
-import equinox as eqx
-from jaxtyping import Array, Float
+from jax import Array
+
+from hdcal.programs.node import Node, static
+from hdcal.programs.shapes import Float
 
 # family -> the numbers it needs, in the order of the distribution's arguments
 FAMILIES: dict[str, tuple[str, ...]] = {
@@ -14,7 +16,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 }
 
 
-class Prior(eqx.Module):
+class Prior(Node):
     """What is believed about one parameter before the data, in code units.
 
     Attributes:
@@ -24,10 +26,10 @@ class Prior(eqx.Module):
         source: where the numbers come from.
     """
 
-    family: str = eqx.field(static=True)
+    family: str = static()
     numbers: tuple[Float[Array, ""] | float, ...]
-    unit: str = eqx.field(static=True, default="")
-    source: str = eqx.field(static=True, default="")
+    unit: str = static(default="")
+    source: str = static(default="")
 
 
 def scaled(prior: Prior, factor) -> Prior:

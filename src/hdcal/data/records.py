@@ -6,19 +6,19 @@ are consistent, so nothing below the reading edge converts.
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 from jax.core import Tracer
-from jaxtyping import Float, Int
 
 from hdcal.programs.compiling import compile_loops_whole, is_tracing
+from hdcal.programs.node import Node, static
+from hdcal.programs.shapes import Float, Int
 
 # Measured on the reading edge as NumPy arrays, traced as JAX arrays.
 Array = jax.Array | np.ndarray
 
 
-def _use_double_precision(made: eqx.Module) -> None:
+def _use_double_precision(made: Node) -> None:
     """Switch JAX to double precision for the whole process, unless it already is.
 
     If it has computed nothing yet it is also told how to compile loops.
@@ -46,10 +46,10 @@ def _use_double_precision(made: eqx.Module) -> None:
     jax.config.update("jax_enable_x64", True)
 
 
-class _InDoublePrecision(eqx.Module):
+class _InDoublePrecision(Node):
     """What computations begin with, made here or sent by another process."""
 
-    def __check_init__(self) -> None:
+    def __post_init__(self) -> None:
         _use_double_precision(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -111,4 +111,4 @@ class Records(_InDoublePrecision):
     specimen: Int[Array, " n"]
     force: Float[Array, " n"]
     force_sd: Float[Array, " n"]
-    known: frozenset[str] = eqx.field(static=True)
+    known: frozenset[str] = static()

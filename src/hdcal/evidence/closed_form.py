@@ -16,7 +16,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import logsumexp
-from jaxtyping import Float, Int
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -29,6 +28,7 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float, Int
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 # Gauss–Hermite nodes for log σ: its posterior is close to normal.

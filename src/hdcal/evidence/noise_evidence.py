@@ -8,11 +8,9 @@ exact but for σ.
 from dataclasses import dataclass
 from functools import partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -23,7 +21,9 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
+from hdcal.programs.node import Node
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 _AMPLITUDES, _SHAPES = 10, 3
 _STEPS = 15
@@ -51,7 +51,7 @@ class NoiseEvidence:
     amplitude: tuple[float, float, float]
 
 
-class NoiseProblem(eqx.Module):
+class NoiseProblem(Node):
     """Rows with a linear mean and noise of any shape, padded to a shared length.
 
     Attributes:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -25,6 +24,7 @@ from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.inference.likelihood import log_interval
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 # Cells of each effect that take part: the most probable ones alone, and some across
 # its prior for what only shows beside another effect.

@@ -5,7 +5,6 @@ from functools import partial, singledispatch
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
@@ -26,6 +25,7 @@ from hdcal.inference.values import (
 )
 from hdcal.physics.effect import Noise
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 
 def pointwise_log_likelihood(

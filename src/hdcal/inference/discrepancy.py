@@ -9,14 +9,14 @@ It knows no temperature.
 
 from collections.abc import Sequence
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
+from hdcal.programs.node import Node, static
+from hdcal.programs.shapes import Float
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
 # tested deformation: enough for length-scales down to a tenth of the range.
@@ -30,7 +30,7 @@ BOUNDARY = 2.0
 _DIRECTION = {"unloading", "rates"}
 
 
-class Discrepancy(eqx.Module):
+class Discrepancy(Node):
     """Smooth functions of deformation, orthogonal to offset and slope at tested rows.
 
     Attributes:
@@ -44,7 +44,7 @@ class Discrepancy(eqx.Module):
     centre: float
     half_range: float
     absorbed: Float[Array, "2 m"]
-    directed: bool = eqx.field(static=True, default=False)
+    directed: bool = static(default=False)
     loop: float = 1.0
 
     @property

@@ -12,16 +12,16 @@ Source:
 
 from collections.abc import Mapping
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 from scipy.linalg import helmert
 
 from hdcal.data.records import Array
+from hdcal.programs.node import Node
+from hdcal.programs.shapes import Float
 
 
-class Grouping(eqx.Module):
+class Grouping(Node):
     """Where groups seem to be, which shapes the sampler's coordinates only.
 
     Attributes:

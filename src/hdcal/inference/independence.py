@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
 from hdcal.inference.laplace import Whitening, potential, values_at
@@ -26,6 +25,7 @@ from hdcal.inference.pareto import pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float, Key
 
 # Proposals of a round; rounds end when such a share of the last ones is worth a draw.
 _ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5

@@ -3,19 +3,19 @@
 from collections.abc import Mapping
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy
 from jax.flatten_util import ravel_pytree
-from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
+from hdcal.programs.node import Node
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 Position = dict[str, Any]
 
@@ -27,7 +27,7 @@ GROUP = "laplace"
 _STEPS, _LEAST_GAIN = 12, 1e-3
 
 
-class Whitening(eqx.Module):
+class Whitening(Node):
     """Affine map from standard to unconstrained coordinates: x = centre + factor·e.
 
     Attributes:

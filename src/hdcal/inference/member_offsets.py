@@ -13,17 +13,17 @@ they are eliminated one by one, at a cost that grows with their number, not its 
 That they sum to zero is one observation more, of zero and without noise.
 """
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
-from jaxtyping import Float, Int, Key
 from scipy.linalg import helmert
 
 from hdcal.data.records import Array
+from hdcal.programs.node import Node, static
+from hdcal.programs.shapes import Float, Int, Key
 
 
-class Grouped(eqx.Module):
+class Grouped(Node):
     """Members of which each row has one and which sum to zero: runs, or specimens.
 
     Attributes:
@@ -36,7 +36,7 @@ class Grouped(eqx.Module):
     index: Int[Array, " b"]
     column: Float[Array, " r"]
     sd: Float[Array, ""]
-    count: int = eqx.field(static=True)
+    count: int = static()
 
     @property
     def _block(self) -> int:
@@ -56,7 +56,7 @@ class Grouped(eqx.Module):
         return jax.ops.segment_sum(blocks, self.index, self.count)
 
 
-class _Remainder(eqx.Module):
+class _Remainder(Node):
     """What is left of design and residual, its last column, without the members.
 
     Attributes:
@@ -84,7 +84,7 @@ class _Remainder(eqx.Module):
         return sum((jnp.sum(rows**2) for rows in left), start=jnp.zeros(()))
 
 
-class Linear(eqx.Module):
+class Linear(Node):
     """A linear-Gaussian residual; rows may be compressed ones.
 
     Attributes:

@@ -9,13 +9,12 @@ rigs are, each a gain of its own: on it a gear's s is larger by that share.
 """
 
 from collections.abc import Mapping
+from dataclasses import field
 from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
@@ -24,6 +23,7 @@ from hdcal.inference.gear_sums import GearSums, line_noise, stretched
 from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
 _NODES = 4
@@ -83,7 +83,7 @@ class PopulationProblem(Sampled):
 
     priors: dict[str, Prior]
     sums: GearSums
-    groups: dict[str, Grouping] = eqx.field(default_factory=dict)
+    groups: dict[str, Grouping] = field(default_factory=dict)
 
     def declare(self) -> None:
         """Declare the joint density of the population and all readings to NumPyro."""

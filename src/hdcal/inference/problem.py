@@ -2,9 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-import equinox as eqx
 import numpy as np
-from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
 from hdcal.data.certificates import is_stated
@@ -30,7 +28,9 @@ from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.scatter import Scatter
 from hdcal.physics.theory import THEORIES
+from hdcal.programs.node import static
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float, Int
 
 _base_columns = program(linear_columns)
 
@@ -71,15 +71,15 @@ class Problem(Sampled):
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
-    effects: tuple[type[Effect], ...] = eqx.field(static=True)
-    rounded: bool = eqx.field(static=True)
-    runs: int = eqx.field(static=True)
-    specimens: int = eqx.field(static=True)
-    integrated: tuple[str, ...] = eqx.field(static=True)
+    effects: tuple[type[Effect], ...] = static()
+    rounded: bool = static()
+    runs: int = static()
+    specimens: int = static()
+    integrated: tuple[str, ...] = static()
     count: int = 0
     before: Int[Array, " n"] | None = None
-    correlated: bool = eqx.field(static=True, default=False)
-    zero_stated: bool = eqx.field(static=True, default=False)
+    correlated: bool = static(default=False)
+    zero_stated: bool = static(default=False)
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the prior of each parameter given how mountings differ in a draw.

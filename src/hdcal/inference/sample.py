@@ -12,7 +12,6 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Key
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
@@ -22,6 +21,7 @@ from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Key
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]

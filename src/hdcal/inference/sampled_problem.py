@@ -5,13 +5,13 @@ was traced before draws without it.
 """
 
 from collections.abc import Mapping
-
-import equinox as eqx
+from typing import TYPE_CHECKING
 
 from hdcal.data.priors import Prior
+from hdcal.programs.node import Node
 
 
-class Sampled(eqx.Module):
+class Sampled(Node):
     """A pytree of data and priors that declares its density.
 
     Another kind of problem subclasses this; sampler, whitening and checks then serve it
@@ -21,7 +21,8 @@ class Sampled(eqx.Module):
         priors: by site name, in code units.
     """
 
-    priors: eqx.AbstractVar[dict[str, Prior]]
+    if TYPE_CHECKING:
+        priors: dict[str, Prior]
 
     @property
     def bent(self) -> bool:

@@ -10,15 +10,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import RING_SERIES
+from hdcal.programs.node import Node
+from hdcal.programs.shapes import Float
 
 Scalar = Float[Array, ""] | float
 
@@ -63,7 +63,7 @@ def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Sc
     return radial / 2.0 + whole / 4.0
 
 
-class Oscillator(eqx.Module):
+class Oscillator(Node):
     """One set of parameters of the dynamic model, per millimetre as read.
 
     Attributes:

@@ -6,18 +6,12 @@ have a null value: there the effect changes nothing.
 """
 
 import dataclasses
-from abc import abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
-
-import equinox as eqx
-from jaxtyping import Float
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar, Literal
 
 from hdcal.data.records import Array, Records
-
-if TYPE_CHECKING:
-    from typing import ClassVar as AbstractClassVar
-else:
-    from equinox import AbstractClassVar
+from hdcal.programs.node import Node
+from hdcal.programs.shapes import Float
 
 Stage = Literal["deformation", "force", "sensor", "noise"]
 
@@ -43,12 +37,12 @@ def parameter(
     unit: str, meaning: str, *, typical: float, null: float | None = None
 ) -> Any:
     """Declare a field of an effect as a parameter."""
-    return eqx.field(
+    return dataclasses.field(
         metadata={"parameter": Parameter(unit, meaning, typical, null)},
     )
 
 
-class Rows(eqx.Module):
+class Rows(Node):
     """What an effect may look at: the records and what earlier stages made of them.
 
     Attributes:
@@ -65,7 +59,7 @@ class Rows(eqx.Module):
     deformation: Float[Array, " n"]
 
 
-class Noise(eqx.Module):
+class Noise(Node):
     """Reading noise as a mixture of normals, one column per row of the data.
 
     Attributes:
@@ -77,7 +71,7 @@ class Noise(eqx.Module):
     sd: Float[Array, "c n"]
 
 
-class Effect(eqx.Module):
+class Effect(Node, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
     Class attributes:
@@ -97,9 +91,9 @@ class Effect(eqx.Module):
         twin: what obeys the same equation and is no effect of the library.
     """
 
-    name: AbstractClassVar[str]
-    stage: AbstractClassVar[Stage]
-    groups: AbstractClassVar[tuple[str, ...]]
+    name: ClassVar[str]
+    stage: ClassVar[Stage]
+    groups: ClassVar[tuple[str, ...]]
     needs: ClassVar[frozenset[str]] = frozenset()
     symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
     mixture: ClassVar[bool] = False

@@ -1,20 +1,14 @@
 """Scatter effects: members of one kind that differ, described by their spread."""
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Literal, final
+from typing import TYPE_CHECKING, ClassVar, Literal, final
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax.scipy.special import ndtri
-from jaxtyping import Float, Int
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows
-
-if TYPE_CHECKING:
-    from typing import ClassVar as AbstractClassVar
-else:
-    from equinox import AbstractClassVar
+from hdcal.programs.shapes import Float, Int
 
 Kind = Literal["run", "specimen"]
 # Multiples of it fill the unit interval evenly, whatever their number.
@@ -39,9 +33,10 @@ class Scatter(Effect):
         members: what differs, run or specimen.
     """
 
-    members: AbstractClassVar[Kind]
+    members: ClassVar[Kind]
 
-    sd: eqx.AbstractVar[Float[Array, ""] | float]
+    if TYPE_CHECKING:
+        sd: Float[Array, ""] | float
 
     @abstractmethod
     def unit(self, signal: Float[Array, " n"], rows: Rows) -> Float[Array, " n"]:

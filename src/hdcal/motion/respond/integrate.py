@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -28,6 +27,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
+from hdcal.programs.node import Node
 from hdcal.programs.program import program
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
@@ -35,7 +35,7 @@ from hdcal.programs.program import program
 _CHUNK, _MOST_STATES = 250, 1_000_000
 
 
-class _Leftover(eqx.Module):
+class _Leftover(Node):
     """What the model leaves of the force of one draw, none at the unloaded gear."""
 
     problem: Problem

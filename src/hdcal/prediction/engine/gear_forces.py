@@ -3,7 +3,6 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.inference.gauges import acting, shown
@@ -20,6 +19,7 @@ from hdcal.prediction.engine.untested import (
     untested_of,
 )
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 # Sites of a draw: which of the causes it is of, and its modulus over that of the tested
 # gear where another material was drawn.

@@ -2,7 +2,6 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.problem import Problem
@@ -12,6 +11,7 @@ from hdcal.prediction.engine.forces import force_of
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.untested import Untested
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float, Key
 
 
 @program

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import numpy as np
 
@@ -30,6 +29,7 @@ from hdcal.prediction.engine.sizes import (
     tolerance_strata,
 )
 from hdcal.prediction.margin.request import Criteria
+from hdcal.programs.node import Node, static
 from hdcal.programs.program import program
 
 # What scales the stiffness of every draw: its site, and code units in the unit shown.
@@ -57,7 +57,7 @@ class Gradient:
     bound_N_per_percent: float
 
 
-class Redesign(eqx.Module):
+class Redesign(Node):
     """The forces of a population as a function of the gear's sizes, modulus and K.
 
     Attributes:
@@ -78,7 +78,7 @@ class Redesign(eqx.Module):
     geometry: Geometry
     tolerances: dict[str, float]
     origin: dict[str, float]
-    theory: Theory = eqx.field(static=True)
+    theory: Theory = static()
 
     @classmethod
     def of(cls, force: PopulationForce, moduli: Mapping[str, float]) -> "Redesign":

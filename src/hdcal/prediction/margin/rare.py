@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy
 from jax.scipy.special import log_ndtr, logsumexp
-from jaxtyping import Float
 from scipy import special
 
 from hdcal.data.records import Array
@@ -41,7 +39,9 @@ from hdcal.prediction.engine.untested import (
     untested_of,
 )
 from hdcal.prediction.margin.sampling_laws import SamplingLaws
+from hdcal.programs.node import Node
 from hdcal.programs.program import program
+from hdcal.programs.shapes import Float
 
 # Points of a round; rounds whose points shape the laws, and rounds that count.
 _POINTS, _TRIALS, _COUNTED = 4096, 2, 2
@@ -83,7 +83,7 @@ _UNTOLD = 0.7
 _NOWHERE = Rare(0.0, np.nan, np.nan, np.nan)
 
 
-class _Target(eqx.Module):
+class _Target(Node):
     """What a point is weighed by: the posterior, and what exceeds the limit.
 
     A point is a whitened position followed by the scores of what is left open. A force
