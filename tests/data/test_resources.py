@@ -20,8 +20,8 @@ def test_from_a_zip(tmp_path):
     with zipfile.ZipFile(archive, "w") as target:
         target.writestr("hdcal/__init__.py", "")
         target.write(package / "errors.py", "hdcal/errors.py")
-        for source in (package / "data").glob("*.py"):
-            target.write(source, f"hdcal/data/{source.name}")
+        for source in [*package.glob("data/*.py"), *package.glob("programs/*.py")]:
+            target.write(source, f"hdcal/{source.parent.name}/{source.name}")
         for source in Path(str(priors_folder())).glob("*.toml"):
             target.write(source, f"hdcal/_data/priors/{source.name}")
     code = (

@@ -23,13 +23,13 @@ class Node:
     """A frozen dataclass whose fields are the children of a tree for JAX.
 
     Each subclass is made one as it is defined. Two are equal whose structures and
-    numbers are, and the numbers of one that is looked up in a table are no arrays.
+    numbers are; one that is looked up in a table has numbers that are no arrays.
     """
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         dataclasses.dataclass(frozen=True, eq=False)(cls)
-        jax.tree_util.register_dataclass(cls)
+        _register(cls)
 
     def __eq__(self, other: object) -> bool:
         mine, structure = jax.tree.flatten(self)
@@ -39,3 +39,32 @@ class Node:
     def __hash__(self) -> int:
         leaves, structure = jax.tree.flatten(self)
         return hash((structure, *leaves))
+
+
+def _register(cls: type) -> None:
+    """Tell JAX what the children of a class are.
+
+    Not by its `register_dataclass`: two structures with as many fields are equal there,
+    whatever their classes are (JAX 0.10), and one program would serve both.
+    """
+    children, fixed = [], []
+    for field in dataclasses.fields(cls):
+        (fixed if field.metadata.get("static") else children).append(field.name)
+    keys = [jax.tree_util.GetAttrKey(name) for name in children]
+
+    def flatten(node):
+        held = vars(node)
+        return [held[name] for name in children], tuple(held[name] for name in fixed)
+
+    def with_keys(node):
+        values, told = flatten(node)
+        return list(zip(keys, values, strict=True)), told
+
+    def unflatten(told, values):
+        # As it was: what is checked of a new one would be in the way of tracing.
+        node = object.__new__(cls)
+        vars(node).update(zip(children, values, strict=True))
+        vars(node).update(zip(fixed, told, strict=True))
+        return node
+
+    jax.tree_util.register_pytree_with_keys(cls, with_keys, unflatten, flatten)
