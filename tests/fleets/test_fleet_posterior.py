@@ -16,9 +16,10 @@ from trees import with_tree
 import hdcal
 from hdcal.errors import InputError, NotUsable
 from hdcal.fleets.fleet import Fleet
-from hdcal.fleets.fleet_posterior import FleetPosterior, is_fleet
+from hdcal.fleets.fleet_posterior import FleetPosterior
 from hdcal.inference import posterior_file
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_file import CALIBRATION, FLEET, kind_of
 
 CHANGED = "was changed after hdcal wrote it. Take the file .* ask for the fleet again"
 
@@ -55,7 +56,8 @@ def test_what_is_loaded_is_what_was_saved(fleet: Fleet, file: Path):
     np.testing.assert_array_equal(ahead.values.ravel(), fleet.next_stiffness)
     assert again.next_force(0.4, 85.0) == fleet.next_force(0.4, 85.0)
     assert "4 gears, 400 draws, usable" in repr(again)
-    assert is_fleet(file) and is_fleet(file.parent) and not is_fleet(file.parents[1])
+    assert kind_of(file) is kind_of(file.parent) is FLEET
+    assert kind_of(file.parents[1]) is None
 
 
 def test_draws_are_those_of_their_chain_with_their_unit(fleet: Fleet):
@@ -158,7 +160,7 @@ def test_one_kind_of_posterior_is_not_taken_for_the_other(file: Path, tmp_path):
     single().save(tmp_path / "gear.nc")
     with pytest.raises(InputError, match="is of a calibration, not of a fleet"):
         FleetPosterior.load(tmp_path / "gear.nc")
-    assert not is_fleet(tmp_path / "gear.nc")
+    assert kind_of(tmp_path / "gear.nc") is CALIBRATION
     with h5py.File(file, "r+") as opened:
         opened.attrs["hdcal_format"] = "hdcal.fleet-posterior/9"
     with pytest.raises(InputError, match="posterior/9, and this hdcal reads"):

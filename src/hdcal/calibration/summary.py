@@ -21,7 +21,8 @@ from hdcal.calibration.loop_stiffness import loop_stiffness
 from hdcal.data.case import Case
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
-from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.inference.residuals import Residuals, residuals
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.bands.bands import Bands, default_bands

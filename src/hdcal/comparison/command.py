@@ -47,7 +47,7 @@ def compare(console: Console, runs, out, force, **asked):
 
 def _folder(run: str) -> Path:
     """Return the folder of a result, however it is spelled."""
-    from hdcal.inference.posterior import FILE_NAME
+    from hdcal.inference.posterior_file import FILE_NAME
 
     path = Path(os.path.realpath(run))
     return path.parent if path.name == FILE_NAME else path

@@ -12,7 +12,8 @@ from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
 from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN
 from hdcal.inference.mixed_posterior import mixed_posterior
-from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval

@@ -25,7 +25,6 @@ from hdcal.fleets.next_force import (
 from hdcal.fleets.next_gear import CONFIDENCE
 from hdcal.inference import posterior_file
 from hdcal.inference.array_tree import ArrayTree, group_of, joined
-from hdcal.inference.posterior import FILE_NAME
 from hdcal.inference.posterior_limits import check_draws
 
 if TYPE_CHECKING:
@@ -139,7 +138,7 @@ class FleetPosterior:
             InputError: the file is missing, damaged, changed, from another version or
                 of no fleet.
         """
-        file, kind = file_of(path), posterior_file.FLEET
+        file, kind = posterior_file.file_of(path), posterior_file.FLEET
         tree = posterior_file.open_tree(file, kind)
         posterior_file.check_unchanged(tree, file, kind)
         try:
@@ -166,17 +165,6 @@ class FleetPosterior:
         ahead = group_of({_NEXT: found.next_stiffness.reshape(chains, -1)})
         ahead[_NEXT] = ahead[_NEXT]._replace(said={"units": "N/mm"})
         return cls(ArrayTree({"posterior": population, "predictions": ahead}), facts)
-
-
-def is_fleet(path: Path | str) -> bool:
-    """Tell whether a result folder, or a posterior file, is of a fleet."""
-    return posterior_file.kind_of(file_of(path)) is posterior_file.FLEET
-
-
-def file_of(path: Path | str) -> Path:
-    """Return the posterior file of a result folder, or the file itself."""
-    path = Path(path)
-    return path / FILE_NAME if path.is_dir() else path
 
 
 def _share_findings(shares: Mapping[str, float], draws: int) -> Iterator[Finding]:

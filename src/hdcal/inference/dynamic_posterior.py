@@ -11,7 +11,7 @@ from hdcal.inference import posterior_file
 from hdcal.inference.dynamic_priors import dynamic_sites
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
 from hdcal.inference.held import LOSS
-from hdcal.inference.posterior import FILE_NAME, Posterior
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 
 
@@ -63,8 +63,7 @@ def load_any(path: Path | str) -> Posterior:
     Raises:
         InputError: as `Posterior.load`.
     """
-    file = Path(path)
-    file = file / FILE_NAME if file.is_dir() else file
-    described = str(posterior_file.open_tree(file).attrs.get("model", ""))
+    tree = posterior_file.open_tree(posterior_file.file_of(path))
+    described = str(tree.attrs.get("model", ""))
     kind = DynamicPosterior if '"kind": "dynamic"' in described else Posterior
     return kind.load(path)

@@ -29,8 +29,6 @@ from hdcal.physics.effect import Effect
 if TYPE_CHECKING:
     import xarray as xr
 
-FILE_NAME = "posterior.nc"
-
 
 @dataclass(frozen=True, repr=False)
 class Posterior(Shown):
@@ -184,8 +182,7 @@ class Posterior(Shown):
             InputError: the file is missing, damaged, changed or from another
                 version, or names an effect that the library lacks.
         """
-        path = Path(path)
-        file = path / FILE_NAME if path.is_dir() else path
+        file = posterior_file.file_of(path)
         tree = posterior_file.open_tree(file)
         posterior_file.check_unchanged(tree, file)
         try:

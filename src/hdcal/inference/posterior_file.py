@@ -69,6 +69,7 @@ _WITHOUT = {
 # The attributes that hold the format, and the digest of everything else.
 _FORMAT, DIGEST = "hdcal_format", "sha256"
 
+FILE_NAME = "posterior.nc"
 UNITS = {
     "deformation": "mm",
     "temperature": "degC",
@@ -190,11 +191,20 @@ def open_tree(path, kind: Kind = CALIBRATION) -> ArrayTree:
         raise InputError([not_a_posterior(path, kind)]) from error
 
 
-def kind_of(path: Path) -> Kind | None:
-    """Return what a file says it is of; None of what is no posterior file."""
+def file_of(path: Path | str) -> Path:
+    """Return the posterior file of a result folder, or the file itself."""
+    path = Path(path)
+    return path / FILE_NAME if path.is_dir() else path
+
+
+def kind_of(path: Path | str) -> Kind | None:
+    """Return what a result folder, or its posterior file, says it is of.
+
+    None where there is no posterior file.
+    """
     try:
-        check_container(path)
-        with h5py.File(path, "r") as file:
+        check_container(file_of(path))
+        with h5py.File(file_of(path), "r") as file:
             written = str(file.attrs[_FORMAT])
     except (InputError, OSError, KeyError):
         return None

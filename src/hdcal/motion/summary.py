@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import FRICTION
-from hdcal.inference.posterior import FILE_NAME
+from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.motion.answer import DynamicCalibrationAnswer, Loss
 from hdcal.motion.bands import MotionBands, motion_bands
 from hdcal.motion.document import (

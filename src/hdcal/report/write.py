@@ -10,7 +10,6 @@ import numpy as np
 from hdcal.report.chart import Chart
 from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document, answer_spoken_of, spoken_of
-from hdcal.report.html import html_page
 from hdcal.report.parquet_columns import columns_parquet
 from hdcal.report.plain import as_json
 from hdcal.report.saving.disk import write_file
@@ -114,6 +113,7 @@ def report_files(
         charts: pictures that can be touched, by name.
     """
     from hdcal.report.canvas import laid_out, render
+    from hdcal.report.html import html_page
 
     title = f"{document.name}: {document.kind}"
     images, files = {}, {}

@@ -32,9 +32,9 @@ _REMEDIES = {"required_probability": "Ask for that share as `content`"}
 @click.pass_context
 def _margin(context: click.Context, run: str, **asked):
     keep_compilations()
-    from hdcal.fleets.fleet_posterior import is_fleet
+    from hdcal.inference.posterior_file import FLEET, kind_of
 
-    if is_fleet(run):
+    if kind_of(run) is FLEET:
         return _of_fleet(context.obj, run, **asked)
     assert of_models.callback is not None
     return context.invoke(of_models.callback, run=run, **asked)
