@@ -6,13 +6,13 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy
 from jax.flatten_util import ravel_pytree
 
 from hdcal.data.records import Array
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
+from hdcal.inference.trust_region import expansion, minimise
 from hdcal.programs.node import Node
 from hdcal.programs.program import program
 from hdcal.programs.shapes import Float
@@ -107,14 +107,7 @@ def _expand(problem: Sampled, like: Position, flat):
         flat: where to expand, flattened.
     """
     _, unravel = ravel_pytree(like)
-
-    def slope(x):
-        value, gradient = jax.value_and_grad(lambda x: _typical(problem, unravel(x)))(x)
-        return gradient, (value, gradient)
-
-    hessian, (value, gradient) = jax.jacfwd(slope, has_aux=True)(flat)
-    # Far out rounding leaves its halves apart, with which a search may fail.
-    return value, gradient, 0.5 * (hessian + hessian.T)
+    return expansion(lambda x: _typical(problem, unravel(x)), flat)
 
 
 def _middle(site: dict[str, Any]):
@@ -171,36 +164,20 @@ def fit(
     if start:
         place = _moved(problem, place, dict(start))
     flat = _flatten(place)
-    cache: dict[bytes, tuple] = {}
     hessian = np.asarray(_expand(problem, place, flat)[2])
     # Parameters differ by many orders in scale: a trust region wants them alike.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 
     def expand(u):
-        point = u.tobytes()
-        if point not in cache:
-            cache.clear()
-            value, slope, curve = _expand(problem, place, flat + scale * u)
-            slope, curve = np.asarray(slope) * scale, np.asarray(curve) * scale
-            if all(np.isfinite(part).all() for part in (value, slope, curve)):
-                cache[point] = float(value), slope, curve * scale[:, None]
-            else:
-                cache[point] = np.inf, np.zeros(len(u)), np.eye(len(u))
-        return cache[point]
+        value, slope, curve = _expand(problem, place, flat + scale * u)
+        slope, curve = np.asarray(slope) * scale, np.asarray(curve) * scale
+        return value, slope, curve * scale[:, None]
 
-    found = scipy.optimize.minimize(
-        lambda u: expand(u)[0],
-        np.zeros(len(flat)),
-        method="trust-exact",
-        jac=lambda u: expand(u)[1],
-        hess=lambda u: expand(u)[2],
-        options={"gtol": _TOLERANCE, "maxiter": 300, "max_trust_radius": 1e4},
-        # At a bend no gradient vanishes: the end is where nothing more is gained.
-        callback=_Patience() if problem.bent else None,
-    )
-    factor = scale[:, None] * _inverse_root(expand(found.x)[2])
-    centre = _unflatten(place, flat + scale * found.x)
-    return Whitening(centre, factor)
+    # At a bend no gradient vanishes: the end is where nothing more is gained.
+    patience = (_STEPS, _LEAST_GAIN) if problem.bent else None
+    found = minimise(expand, np.zeros(len(flat)), _TOLERANCE, patience=patience)
+    factor = scale[:, None] * _inverse_root(found.curve)
+    return Whitening(_unflatten(place, flat + scale * found.place), factor)
 
 
 def to_group(found: Whitening) -> Group:
@@ -225,25 +202,6 @@ def from_group(problem: Sampled, group: Group | None) -> Whitening:
         if fits and np.isfinite(mode).all() and np.isfinite(factor).all():
             return Whitening(_unflatten(like, mode), factor)
     return fit(problem)
-
-
-class _Patience:
-    """Ends a search whose last steps gained next to nothing."""
-
-    def __init__(self):
-        self._levels: list[float] = []
-
-    def __call__(self, *, intermediate_result: "scipy.optimize.OptimizeResult") -> None:
-        """Look at one more step.
-
-        Raises:
-            StopIteration: it was the last one.
-        """
-        self._levels.append(float(intermediate_result.fun))
-        if len(self._levels) > _STEPS:
-            gained = self._levels[-1 - _STEPS] - self._levels[-1]
-            if gained < _LEAST_GAIN:
-                raise StopIteration
 
 
 def sites_at(problem: Sampled, position: Position) -> dict[str, float]:

@@ -15,7 +15,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy
 from jax.scipy.special import log_ndtr, logsumexp
 from scipy import special
 
@@ -24,6 +23,7 @@ from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
 from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.trust_region import Secant, minimise
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
@@ -48,6 +48,8 @@ _POINTS, _TRIALS, _COUNTED = 4096, 2, 2
 _ABREAST = 4
 # Standard normal scores of a point, beside its parameters.
 _OPEN = 5
+# Slope at which a search ends, and the least curvature that it believes.
+_SLOPE, _FLAT = 1e-3, 1e-4
 # Of the levels of a bend's size, the power of their distance from the largest.
 _TOWARDS_LARGE = 4.0
 # Nodes of a standard normal, and their shares.
@@ -254,17 +256,12 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
     size = len(target.whitening.factor) + _OPEN
     start = np.zeros(size)
 
-    def towards(point):
-        return tuple(map(np.asarray, _towards(target, point, sizes)))
-
-    options = {"maxiter": 200, "gtol": 1e-3}
-    found = scipy.optimize.minimize(
-        towards, start, jac=True, method="BFGS", options=options
-    )
-    shape, place = found.hess_inv, found.x
-    if not (np.isfinite(shape).all() and np.isfinite(place).all()):
-        shape, place = np.eye(size), start
-    counts = np.append(np.ones(size - _OPEN, bool), towards(start)[1][-_OPEN:] != 0.0)
+    towards = partial(_towards, target, sizes=sizes)
+    slope = np.asarray(towards(start)[1])
+    place, curve = minimise(Secant(towards), start, _SLOPE)
+    strength, axes = np.linalg.eigh(curve)
+    shape = (axes / np.maximum(np.abs(strength), _FLAT)) @ axes.T
+    counts = np.append(np.ones(size - _OPEN, bool), slope[-_OPEN:] != 0.0)
     place, shape = place[counts], shape[np.ix_(counts, counts)]
     return SamplingLaws(counts, ((0.0 * place, np.eye(len(place))), (place, shape)))
 

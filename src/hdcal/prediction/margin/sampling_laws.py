@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from scipy.special import softmax
 
 from hdcal.inference.t_mixture import TMixture
@@ -13,6 +12,8 @@ from hdcal.inference.t_mixture import TMixture
 _FREE, _SPREAD = 5.0, 1.3
 # Points per dimension that a shape rests on, at least.
 _RESTS_ON = 20.0
+# The power of weights is searched for between 1 and ten to this one, by halves.
+_LEAST_POWER, _HALVINGS = -12.0, 40
 
 
 @dataclass(frozen=True)
@@ -83,12 +84,16 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
     if np.count_nonzero(np.isfinite(log_weight)) < 2.0 * least:
         return None
 
-    def powered(power: float) -> np.ndarray:
-        return softmax(power * log_weight)
+    def powered(exponent: float) -> np.ndarray:
+        return softmax(10.0**exponent * log_weight)
 
-    def short(power: float) -> float:
-        return 1.0 / np.sum(powered(power) ** 2) - least
+    def is_worth_it(exponent: float) -> bool:
+        return 1.0 / np.sum(powered(exponent) ** 2) >= least
 
-    if short(1.0) >= 0.0:
-        return powered(1.0)
-    return powered(scipy.optimize.root_scalar(short, bracket=(1e-12, 1.0)).root)
+    if is_worth_it(0.0):
+        return powered(0.0)
+    low, high = _LEAST_POWER, 0.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if is_worth_it(middle) else (low, middle)
+    return powered(low)
