@@ -404,3 +404,24 @@ def test_a_broken_content_is_refused_though_its_digest_is_right(file, tmp_path, 
     tree.to_netcdf(tmp_path / "posterior.nc", engine="h5netcdf")
     with pytest.raises(InputError, match="is not a posterior that hdcal wrote"):
         Posterior.load(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["none", "many", "number", "folder", "garbage"])
+def test_what_a_file_is_of_is_told_without_reading_it(file, tmp_path, name):
+    """Nothing but that of a file that says it; no error of any other."""
+    assert posterior_file.kind_of(file) is posterior_file.CALIBRATION
+    assert '"theory"' in posterior_file.told(file, "model")
+    other = tmp_path / "other.nc"
+    if name == "folder":
+        other.mkdir()
+    elif name == "garbage":
+        other.write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(99))
+    elif name != "none":
+        shutil.copy(file, other)
+        with h5py.File(other, "r+") as opened:
+            said = opened.attrs["hdcal_format"]
+            many = np.array([said] * 3, dtype=object)
+            del opened.attrs["hdcal_format"]
+            opened.attrs["hdcal_format"] = many if name == "many" else 7
+    assert posterior_file.kind_of(other) is None
+    assert posterior_file.told(other, "no such") == ""

@@ -63,7 +63,6 @@ def load_any(path: Path | str) -> Posterior:
     Raises:
         InputError: as `Posterior.load`.
     """
-    tree = posterior_file.open_tree(posterior_file.file_of(path))
-    described = str(tree.attrs.get("model", ""))
+    described = posterior_file.told(path, "model")
     kind = DynamicPosterior if '"kind": "dynamic"' in described else Posterior
     return kind.load(path)

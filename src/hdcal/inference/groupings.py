@@ -14,7 +14,6 @@ from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
-from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 from hdcal.programs.node import Node
@@ -42,6 +41,9 @@ class Grouping(Node):
 
 def grouping(means: np.ndarray, covariance: np.ndarray) -> Grouping:
     """Return groups from the mean of each, shape (k,), and their covariance."""
+    # Late: only where something is grouped.
+    from scipy.linalg import helmert
+
     basis = helmert(len(means)).T
     return Grouping(basis, basis.T @ means, np.diag(basis.T @ covariance @ basis))
 

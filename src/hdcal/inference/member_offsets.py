@@ -16,7 +16,6 @@ That they sum to zero is one observation more, of zero and without noise.
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
-from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 from hdcal.programs.node import Node, static
@@ -169,4 +168,7 @@ def contrasts(count: int) -> Float[Array, "count k"]:
     Deviations from the mean of the tested members: their common part is already
     the population's centre.
     """
+    # Late: only where there are members.
+    from scipy.linalg import helmert
+
     return jnp.asarray(helmert(count).T)

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
 import scipy.special
 
 # What chains that have mixed show at most, and at least.
@@ -123,7 +122,7 @@ def _ess(whole: np.ndarray) -> np.ndarray:
 
 def _autocovariance(whole: np.ndarray) -> np.ndarray:
     many = whole.shape[-1]
-    length = scipy.fft.next_fast_len(2 * many, real=True)
+    length = 1 << (2 * many - 1).bit_length()
     waves = np.fft.rfft(whole - whole.mean(axis=-1, keepdims=True), length)
     return np.fft.irfft(np.abs(waves) ** 2, length)[..., :many] / many
 

@@ -4,11 +4,11 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import NamedTuple
 
-import h5py
 import numpy as np
 
 from hdcal.data.case import Case, Gear
@@ -19,7 +19,7 @@ from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, InputError
 from hdcal.inference.array_tree import ArrayTree, Group, read
 from hdcal.inference.held import HeldCase, HeldGear, HeldPrior
-from hdcal.inference.posterior_limits import check_container, check_rows
+from hdcal.inference.posterior_limits import check_container, check_rows, read_text
 from hdcal.inference.serial_correlation import CORRELATION
 
 
@@ -202,13 +202,15 @@ def kind_of(path: Path | str) -> Kind | None:
 
     None where there is no posterior file.
     """
-    try:
-        check_container(file_of(path))
-        with h5py.File(file_of(path), "r") as file:
-            written = str(file.attrs[_FORMAT])
-    except (InputError, OSError, KeyError):
-        return None
-    return _kind(written)
+    return _kind(told(path, _FORMAT))
+
+
+def told(path: Path | str, name: str) -> str:
+    """Return what an attribute of a posterior file says; nothing without the two."""
+    # Why it cannot be read is told when it is read whole.
+    with suppress(InputError, OSError, KeyError, TypeError, ValueError, RuntimeError):
+        return read_text(file_of(path), name)
+    return ""
 
 
 def _kind(written: str) -> Kind | None:

@@ -52,6 +52,20 @@ def check_container(path: Path) -> None:
         raise _refusal(path, words)
 
 
+def read_text(path: Path, name: str) -> str:
+    """Return what one attribute of a file as a whole says, the rest unread.
+
+    Raises:
+        InputError, OSError, KeyError, TypeError, ValueError, RuntimeError: the file or
+            the attribute is none, or not of a posterior.
+    """
+    if (why := why_not_readable(path, LARGEST_FILE)) is not None:
+        raise InputError([Finding(str(path), *why)])
+    with h5py.File(path, "r") as file:
+        _attribute(file, name)
+        return str(file.attrs[name])
+
+
 def _objects(file: h5py.File) -> Iterator[h5py.Group | h5py.Dataset]:
     """Yield every group and dataset once.
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.special import gammaln, softmax
 
 # Tails heavier than a posterior's, which keep weights bounded.
@@ -53,7 +52,7 @@ class TMixture:
         size = place.shape[1]
         square, volume = [], []
         for centre, root in zip(self.centre, self.root, strict=True):
-            away = solve_triangular(root, (place - centre).T, lower=True)
+            away = np.linalg.solve(root, (place - centre).T)
             square.append(np.sum(away**2, axis=0))
             volume.append(np.sum(np.log(np.diag(root))))
         distance, half = np.stack(square, axis=1), 0.5 * (self.freedom + size)
