@@ -1,6 +1,6 @@
 """Forces over time that the dynamic model can be driven with."""
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 
 import jax.numpy as jnp
 
@@ -11,7 +11,7 @@ from hdcal.programs.shapes import Float
 Scalar = Float[Array, ""] | float
 
 
-class Forcing(Node):
+class Forcing(Node, ABC):
     """A force as a function of time."""
 
     @abstractmethod

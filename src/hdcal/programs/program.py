@@ -1,4 +1,4 @@
-"""Compiled functions that start fast: what was traced once is kept on disk.
+"""Compiled functions that start fast: what was compiled once is kept on disk.
 
 A program is `jax.jit` of a function of a module. Where there is a folder for it, what
 was compiled is kept, as the device runs it, for each kind of arguments: structure,

@@ -1,5 +1,6 @@
 """The gears of a posterior, each integrated on its own."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -77,7 +78,7 @@ def _with_values(effect: type[Effect], values) -> Effect:
 
 @program(static=("kept", "with_damping"))
 def _each(
-    reading, values, temperature, damping, force, times, leftover, *, kept, with_damping
+    values, reading, temperature, damping, force, times, leftover, *, kept, with_damping
 ):
     """Return motion, facts and whether each draw of a batch came through."""
 
@@ -163,21 +164,18 @@ def integrate_all(
     size = max(min(_CHUNK, _MOST_STATES // len(request.times)), 1)
     count = len(values["K"])
     motion, parts = np.empty((count, len(request.times))), []
-    for start in range(0, count, size):
-        chunk = {name: v[start : start + size] for name, v in values.items()}
-        given = 0.0 if damping is None else float(damping)
-        moved, *part = _each(
-            reading,
-            chunk,
-            temperature,
-            given,
-            request.force,
-            request.times,
-            leftover,
-            kept=kept,
-            with_damping=damping is not None,
-        )
-        motion[start : start + size] = moved
-        parts.append(jax.device_get(part))
+    given = 0.0 if damping is None else float(damping)
+    about = reading, temperature, given, request.force, request.times, leftover
+    asked = {"kept": kept, "with_damping": damping is not None}
+    # Of a batch, which may take minutes, who interrupts does not wait for the end.
+    pool = ThreadPoolExecutor(1)
+    try:
+        for start in range(0, count, size):
+            chunk = {name: v[start : start + size] for name, v in values.items()}
+            moved, *part = pool.submit(_each, chunk, *about, **asked).result()
+            motion[start : start + size] = moved
+            parts.append(jax.device_get(part))
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
     facts = {n: np.concatenate([p[0][n] for p in parts]) for n in parts[0][0]}
     return motion, facts, np.concatenate([part[1] for part in parts])
