@@ -256,7 +256,9 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
     size = len(target.whitening.factor) + _OPEN
     start = np.zeros(size)
 
-    towards = partial(_towards, target, sizes=sizes)
+    def towards(point):
+        return _towards(target, point, sizes)
+
     slope = np.asarray(towards(start)[1])
     place, curve = minimise(Secant(towards), start, _SLOPE)
     strength, axes = np.linalg.eigh(curve)
