@@ -8,9 +8,11 @@ import pytest
 from moving import TRUTH, motion, still_posterior
 
 from hdcal import InputError, NotUsable, respond
+from hdcal.data.case import Gear
 from hdcal.inference.discrepancy import BASIS_SIZE
 from hdcal.motion.respond import integrate
 from hdcal.motion.respond import respond as asked
+from hdcal.physics import dynamics
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.prediction.engine.gear_forces import gear_forces, gear_values
 from hdcal.prediction.engine.untested import PLACES
@@ -219,3 +221,20 @@ def test_every_fault_is_told_at_once():
     with pytest.raises(InputError) as caught:
         respond(still_posterior(), "sine", duration=-1.0, mass=-1.0, points=0)
     assert len(caught.value.findings) == 4
+
+
+def test_gears_that_run_away_are_told_at_once(monkeypatch):
+    """Beyond what was tested a draw may give way: to follow it took minutes."""
+    posterior = still_posterior()
+    stiffness = motion(TRUTH, posterior.case).stiffness
+    reach = 1.2 * 40.0 / stiffness
+    monkeypatch.setattr(Gear, "reach", property(lambda _: reach))
+    with pytest.raises(NotUsable, match=r"50 of 50 gears give way .* pulled as well"):
+        respond(posterior, "step", amplitude=40.0, **KNOWN, **SMALL)
+
+
+def test_a_motion_of_too_many_steps_is_told(monkeypatch):
+    monkeypatch.setattr(dynamics, "MOST_STEPS", 3)
+    asked_for = {**SMALL, "points": 102}
+    with pytest.raises(NotUsable, match="50 of 50 motions could not be integrated"):
+        respond(still_posterior(), "step", amplitude=40.0, **KNOWN, **asked_for)

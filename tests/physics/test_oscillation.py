@@ -40,7 +40,7 @@ def gear(ratio: float, effects=(), reading=None) -> Oscillator:
 @jax.jit
 def move(oscillator, force, times):
     """Return the integrated motion."""
-    states, done = integrate(oscillator, force, times)
+    states, done, _ = integrate(oscillator, force, times)
     return jnp.where(done, states, jnp.nan)
 
 
@@ -184,3 +184,12 @@ def test_the_mass_of_the_ring_is_rayleighs():
     # lies above it, as Rayleigh's quotient must, and not by much.
     exact = 6.0 / 5**0.5 * np.sqrt(modulus * 0.68**2 / (12.0 * density * 40.0**4))
     assert 1.0 < found / (exact / (2.0 * np.pi)) < 1.03
+
+
+@pytest.mark.parametrize(("reach", "ends"), [(1.9, True), (2.1, False)])
+def test_it_is_not_followed_beyond_its_reach(reach, ends):
+    """An undamped gear swings to twice its deformation at rest."""
+    static = FORCE / STIFFNESS
+    asked = gear(0.0), Step(FORCE), TIMES, reach * static
+    _, done, gone = jax.jit(integrate)(*asked)
+    assert (bool(gone), bool(done)) == (ends, not ends)

@@ -146,8 +146,11 @@ def damping_ratio(mass: Scalar, damping: Scalar, stiffness: Scalar):
 
 
 def integrate(
-    oscillator: Oscillator, force: Forcing, times: Float[Array, " n"]
-) -> tuple[Float[Array, "n 2"], Float[Array, ""]]:
+    oscillator: Oscillator,
+    force: Forcing,
+    times: Float[Array, " n"],
+    reach: Scalar = jnp.inf,
+) -> tuple[Float[Array, "n 2"], Float[Array, ""], Float[Array, ""]]:
     """Integrate the equation of motion from rest and zero deformation.
 
     Time is counted in radians of the natural frequency and speed in the deformation
@@ -157,10 +160,13 @@ def integrate(
         oscillator: one set of parameters.
         force: over time.
         times: increasing [s]; motion begins at the first.
+        reach: deformation at which the integration ends: what gives way there runs
+            on for ever [mm].
 
     Returns:
-        Deformation [mm] and speed [mm/s] at the times, and whether the integration
-        came to its end within the allowed number of steps.
+        Deformation [mm] and speed [mm/s] at the times, whether the integration came
+        to its end within the allowed number of steps, and whether it ended at the
+        reach.
     """
     pace = jnp.sqrt(oscillator.stiffness / oscillator.mass)
     size = force.largest() / oscillator.stiffness
@@ -189,8 +195,10 @@ def integrate(
         saveat=diffrax.SaveAt(ts=shown),
         stepsize_controller=controller,
         max_steps=MOST_STEPS,
+        event=diffrax.Event(lambda t, y, args, **_: jnp.abs(y[0]) * size > reach),
         throw=False,
     )
     states = jnp.asarray(found.ys) * jnp.stack([size, size * pace])
     done = found.result == diffrax.RESULTS.successful
-    return states, done & jnp.all(jnp.isfinite(states))
+    gone = found.result == diffrax.RESULTS.event_occurred
+    return states, done & jnp.all(jnp.isfinite(states)), gone

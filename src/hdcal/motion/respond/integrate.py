@@ -78,9 +78,19 @@ def _with_values(effect: type[Effect], values) -> Effect:
 
 @program(static=("kept", "with_damping"))
 def _each(
-    values, reading, temperature, damping, force, times, leftover, *, kept, with_damping
+    values,
+    reading,
+    temperature,
+    damping,
+    force,
+    times,
+    reach,
+    leftover,
+    *,
+    kept,
+    with_damping,
 ):
-    """Return motion, facts and whether each draw of a batch came through."""
+    """Return motion, facts, whether each draw of a batch came through, or ran away."""
 
     def one(value):
         left = None
@@ -96,10 +106,10 @@ def _each(
         k = still.stiffness
         c = damping if with_damping else 2.0 * value["_ratio"] * jnp.sqrt(k * mass)
         gear = replace(still, damping=c)
-        states, done = integrate(gear, force, times)
+        states, done, gone = integrate(gear, force, times, reach)
         deformation = states[:, 0]
         facts = _facts(mass, c, k) | {"peak_mm": _largest(times, states)}
-        return deformation, facts, done
+        return deformation, facts, done, gone
 
     return jax.vmap(one)(values)
 
@@ -144,6 +154,7 @@ def integrate_all(
     temperature: float,
     damping,
     request: Request,
+    reach: float,
     leftover: tuple[Problem, Untested] | None,
 ):
     """Integrate every draw.
@@ -155,17 +166,19 @@ def integrate_all(
         temperature: of the gear [°C].
         damping: given [N·s/mm], or None for that of the ratio.
         request: force and times.
+        reach: deformation beyond which no gear of this size is followed [mm].
         leftover: structure and what is untested, whose sites the draws then hold; None
             where the force at rest was not calibrated.
 
     Returns:
-        Deformation (draw, time), facts by name (draw,), and which draws came through.
+        Deformation (draw, time), facts by name (draw,), which draws came through, and
+        which ones ran away.
     """
     size = max(min(_CHUNK, _MOST_STATES // len(request.times)), 1)
     count = len(values["K"])
     motion, parts = np.empty((count, len(request.times))), []
     given = 0.0 if damping is None else float(damping)
-    about = reading, temperature, given, request.force, request.times, leftover
+    about = reading, temperature, given, request.force, request.times, reach, leftover
     asked = {"kept": kept, "with_damping": damping is not None}
     # Of a batch, which may take minutes, who interrupts does not wait for the end.
     pool = ThreadPoolExecutor(1)
@@ -178,4 +191,5 @@ def integrate_all(
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     facts = {n: np.concatenate([p[0][n] for p in parts]) for n in parts[0][0]}
-    return motion, facts, np.concatenate([part[1] for part in parts])
+    done, gone = (np.concatenate([part[place] for part in parts]) for place in (1, 2))
+    return motion, facts, done, gone

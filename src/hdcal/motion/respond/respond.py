@@ -138,10 +138,12 @@ def _move(
     reading = case_reading(posterior.case)
     whole = {**values, "_mass": moved, "_ratio": ratio}
     _check_reach(posterior, request, values, moved)
-    motion, facts, done = integrate_all(
-        kept, reading, whole, at, damping, request, leftover
+    reach = posterior.case.gear.reach
+    motion, facts, done, gone = integrate_all(
+        kept, reading, whole, at, damping, request, reach, leftover
     )
-    lo, middle, hi = _band(motion, done)
+    _check_motion(done, gone, reach)
+    lo, middle, hi = _band(motion)
     estimates = {
         name: {**vars(credible_interval(facts[name])), "driven_by": driver}
         for name, driver in drivers(posterior, mass, damping).items()
@@ -181,17 +183,28 @@ def _what_moves(posterior: Posterior, draws: int, seed: int):
     return own, (posterior.problem, untested)
 
 
-def _band(deformation: np.ndarray, done: np.ndarray) -> np.ndarray:
-    """Return the ends and the middle of the band at every time [mm].
+def _check_motion(done: np.ndarray, gone: np.ndarray, reach: float) -> None:
+    """Refuse what is no motion to its end.
 
     Raises:
-        NotUsable: a motion was not integrated to its end.
+        NotUsable: some motions are not.
     """
+    if gone.any():
+        raise NotUsable(
+            f"{np.count_nonzero(gone)} of {len(gone)} gears give way under this force, "
+            f"up to {reach:g} mm: no reading says that they resist where it takes "
+            "them. Ask for a smaller amplitude, or measure that far, pulled as well as "
+            "pushed, and calibrate again"
+        )
     if not done.all():
         raise NotUsable(
             f"{np.count_nonzero(~done)} of {len(done)} motions could not be "
             "integrated: ask for a shorter duration"
         )
+
+
+def _band(deformation: np.ndarray) -> np.ndarray:
+    """Return the ends and the middle of the band at every time [mm]."""
     tail = (1.0 - INTERVAL) / 2.0
     parts = np.array_split(deformation, -(-deformation.shape[1] // _TIMES), axis=1)
     tails = [tail, 0.5, 1.0 - tail]
