@@ -200,4 +200,5 @@ def test_a_program_that_integrates_over_time_is_kept(
     done = hdcal("respond", str(tmp_path / "posterior.nc"), *asked, *where)
     assert done.returncode == 0, done.stderr
     (listed,) = (tmp_path / "cache").rglob("*.called")
-    assert "_each" in listed.read_text().split()
+    called = dict(line.split()[::-1] for line in listed.read_text().splitlines())
+    assert listed.with_name(called["_each"]).exists()

@@ -100,6 +100,21 @@ def test_a_new_one_is_checked_and_one_put_together_is_not():
     assert jax.tree.map(lambda x: -x, Checked(1.0)).number == -1.0
 
 
+def test_what_equinox_did_and_this_does_not_is_told():
+    with pytest.raises(TypeError, match="__post_init__"):
+
+        class Late(Node):
+            number: float
+
+            def __check_init__(self):
+                raise ValueError
+
+    with pytest.raises(TypeError, match="nothing is converted"):
+
+        class Converted(Node):
+            number: int = dataclasses.field(metadata={"converter": int})
+
+
 def test_one_that_lacks_a_method_cannot_be_made():
     with pytest.raises(TypeError, match="abstract"):
         Shape()  # pyright: ignore[reportAbstractUsage]

@@ -1,4 +1,4 @@
-"""Programs that were traced once start fast, and say the same, to the last bit."""
+"""Programs that were compiled once start fast, and say the same, to the last bit."""
 
 import os
 import subprocess

@@ -59,7 +59,7 @@ def rig(loop, seed=0, width=1.0, runs=4, noise=0.25, alike=0.7, **labels):
 
 
 def calibrated(case, effects=()):
-    return hdcal.calibrate(case, effects=effects, warmup=500, draws=500)
+    return hdcal.calibrate(case, effects=effects, warmup=500, draws=1000)
 
 
 @pytest.mark.parametrize("loop", [_dahl, _jenkins, _opening])

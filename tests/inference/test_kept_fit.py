@@ -63,6 +63,8 @@ def test_an_older_file_has_none(written):
         {"mode": np.full(6, np.nan)},
         {"factor": np.eye(5)},
         {"factor": np.full((6, 6), np.inf)},
+        {"factor": np.zeros((6, 6))},
+        {"mode": np.array(["a"] * 6, dtype=object)},
     ],
 )
 def test_what_fits_no_such_problem_counts_as_none(written, changed):

@@ -62,7 +62,7 @@ def test_the_minimum_is_scipys(name):
 def test_gradients_alone_lead_there_too():
     function, start = FUNCTIONS["rosenbrock"]
     with jax.enable_x64(True):
-        slopes = Secant(jax.jit(jax.value_and_grad(function)))
+        slopes = Secant(jax.jit(jax.value_and_grad(function)), 4)
         found = minimise(slopes, np.array(start), TOLERANCE)
         exact = minimise(of(function), found.place, TOLERANCE)
         np.testing.assert_allclose(found.place, exact.place, atol=1e-6)
@@ -71,7 +71,7 @@ def test_gradients_alone_lead_there_too():
 def test_the_hessian_of_a_quadratic_is_learned():
     root = np.random.default_rng(0).normal(size=(5, 5))
     whole = root @ root.T + np.eye(5)
-    bowl = Secant(lambda x: (0.5 * x @ whole @ x, whole @ x))
+    bowl = Secant(lambda x: (0.5 * x @ whole @ x, whole @ x), 5)
     found = minimise(bowl, np.ones(5), TOLERANCE)
     np.testing.assert_allclose(found.place, np.zeros(5), atol=1e-6)
     np.testing.assert_allclose(found.curve, whole, rtol=1e-4, atol=1e-4)
@@ -99,6 +99,19 @@ def test_no_point_within_the_radius_is_lower(least, radius):
             for points in (step[None], points)
         )
         assert lowest <= np.min(others) + 1e-9 * abs(lowest)
+
+
+def test_where_several_axes_bend_down_alike_and_nothing_pulls_one_is_taken():
+    step, _ = _step(np.array([0.0, 0.0, 1.0]), np.diag([-2.0, -2.0, 2.0]), 1.0)
+    np.testing.assert_allclose(step[2], -0.25)
+    assert np.linalg.norm(step) == pytest.approx(1.0)
+
+    def egg_box(x):
+        return jnp.sum(0.25 * x[:2] ** 4 - 0.5 * x[:2] ** 2) + 0.5 * (x[2] - 1.0) ** 2
+
+    with jax.enable_x64(True):
+        found = minimise(of(egg_box), np.array([0.0, 0.0, 3.0]), TOLERANCE)
+    np.testing.assert_allclose(np.abs(found.place), np.ones(3), atol=1e-6)
 
 
 def test_what_is_nowhere_finite_stays_where_it_began():

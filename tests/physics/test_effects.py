@@ -1,6 +1,7 @@
 """Every effect is null at null, differentiable, symmetric as declared, composable."""
 
 import dataclasses
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -26,7 +27,7 @@ from jax.flatten_util import ravel_pytree
 from hdcal import EFFECTS
 from hdcal.inference.padding import repeat_last_row
 from hdcal.physics.chain import predict_reading
-from hdcal.physics.effect import parameters
+from hdcal.physics.effect import Effect, parameter, parameters
 
 
 @everyone
@@ -178,3 +179,15 @@ def test_the_whole_library_composes(size, scattered, base, reading):
     library = tuple(size(name) for name in EFFECTS)
     found = score_and_slope(library, base, numbers(records), reading)
     assert np.isfinite(ravel_pytree(found)[0]).all()
+
+
+def test_an_effect_that_says_too_little_of_itself_is_none():
+    class Own(Effect):
+        name: ClassVar[str] = "own"
+        error: float = parameter("1", "", typical=1.0, null=0.0)
+
+        def apply(self, signal, rows):
+            return signal
+
+    with pytest.raises(TypeError, match="Own is no effect without stage, groups"):
+        Own(1.0)

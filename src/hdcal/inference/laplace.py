@@ -199,7 +199,9 @@ def from_group(problem: Sampled, group: Group | None) -> Whitening:
         like = _prior_middle(problem)
         size = len(_flatten(like))
         fits = mode.shape == (size,) and factor.shape == (size, size)
-        if fits and np.isfinite(mode).all() and np.isfinite(factor).all():
+        fits = fits and mode.dtype.kind in "iuf" and factor.dtype.kind in "iuf"
+        fits = fits and np.isfinite(mode).all() and np.isfinite(factor).all()
+        if fits and np.linalg.matrix_rank(factor) == size:
             return Whitening(_unflatten(like, mode), factor)
     return fit(problem)
 

@@ -68,6 +68,9 @@ def minimise(
     place, here = start, _finite(expand(start))
     radius, levels = 1.0, []
     for _ in range(_MOST_STEPS):
+        if isinstance(expand, Secant):
+            # A step that was not taken has taught it too.
+            here = (*here[:2], expand.curve)
         value, slope, curve = here
         if np.linalg.norm(slope) < tolerance:
             break
@@ -94,28 +97,30 @@ def minimise(
 class Secant:
     """A function whose Hessian is learned from its gradients, from the identity on.
 
-    Symmetric updates of rank one: steps that were not taken teach it too.
+    By symmetric updates of rank one.
+
+    Attributes:
+        curve: what is known of the Hessian, (d, d).
     """
 
-    def __init__(self, function: Callable):
-        """Take a function that returns value and gradient (d,)."""
+    def __init__(self, function: Callable, size: int):
+        """Take a function of (size,) that returns value and gradient."""
         self._function = function
-        self._last: tuple | None = None
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self.curve = np.eye(size)
 
     def __call__(self, place: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         """Return value, gradient and what is known of the Hessian."""
         value, slope = (np.asarray(part, float) for part in self._function(place))
-        curve = np.eye(len(place))
-        if self._last is not None:
-            before, slope_before, curve = self._last
-            step = place - before
-            missed = slope - slope_before - curve @ step
-            along = missed @ step
-            if abs(along) > _TOLD * np.linalg.norm(missed) * np.linalg.norm(step):
-                curve = curve + np.outer(missed, missed) / along
         if np.isfinite(slope).all():
-            self._last = place, slope, curve
-        return float(value), slope, curve
+            if self._last is not None:
+                step = place - self._last[0]
+                missed = slope - self._last[1] - self.curve @ step
+                along = missed @ step
+                if abs(along) > _TOLD * np.linalg.norm(missed) * np.linalg.norm(step):
+                    self.curve = self.curve + np.outer(missed, missed) / along
+            self._last = place, slope
+        return float(value), slope, self.curve
 
 
 def _finite(found) -> tuple[float, np.ndarray, np.ndarray]:
@@ -136,12 +141,18 @@ def _step(slope: np.ndarray, curve: np.ndarray, radius: float):
     # The curvature is raised by what makes the step as long as the radius.
     low = max(0.0, -strength[0])
     high = low + np.linalg.norm(slope) / radius
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            is_long = np.linalg.norm(along / (strength + middle)) > radius
-            low, high = (middle, high) if is_long else (low, middle)
-        step = -along / (strength + high)
+    # Where nothing pulls, nothing moves, however little holds it there.
+    pulled = along != 0.0
+
+    def raised(by) -> np.ndarray:
+        with np.errstate(divide="ignore"):
+            return np.divide(-along, strength + by, out=0.0 * along, where=pulled)
+
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        is_long = np.linalg.norm(raised(middle)) > radius
+        low, high = (middle, high) if is_long else (low, middle)
+    step = raised(high)
     # Where nothing pulls along the axis of least curvature, both ends of it are lowest.
     rest = max(radius**2 - step[1:] @ step[1:], 0.0)
     step[0] = np.copysign(np.sqrt(rest), step[0])

@@ -91,6 +91,8 @@ class Effect(Node, ABC):
         twin: what obeys the same equation and is no effect of the library.
     """
 
+    # What each effect says of itself.
+    told: ClassVar[tuple[str, ...]] = ("name", "stage", "groups")
     name: ClassVar[str]
     stage: ClassVar[Stage]
     groups: ClassVar[tuple[str, ...]]
@@ -100,6 +102,12 @@ class Effect(Node, ABC):
     period: ClassVar[str] = ""
     acts_at_once: ClassVar[bool] = False
     twin: ClassVar[str] = ""
+
+    def __post_init__(self) -> None:
+        missing = [name for name in self.told if not hasattr(self, name)]
+        if missing:
+            words = f"{type(self).__name__} is no effect without {', '.join(missing)}"
+            raise TypeError(words)
 
     @abstractmethod
     def apply(self, signal: Any, rows: Rows) -> Any:

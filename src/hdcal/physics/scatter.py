@@ -33,6 +33,7 @@ class Scatter(Effect):
         members: what differs, run or specimen.
     """
 
+    told: ClassVar[tuple[str, ...]] = (*Effect.told, "members", "sd")
     members: ClassVar[Kind]
 
     if TYPE_CHECKING:

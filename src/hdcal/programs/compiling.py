@@ -15,7 +15,7 @@ from jax.extend.core import get_opaque_trace_state
 _WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
 _EXTRA = "--xla_backend_extra_options"
 # What code outside of XLA a program calls, and what of it other processes have.
-_CALLED = re.compile(r"custom_call @(\w+)")
+_CALLED = re.compile(r'custom_call @"?([^"\s(]+)')
 _LAPACK = "lapack_"
 # Which trace is under way, and none.
 _trace_state = partial(get_opaque_trace_state, convention="flax")

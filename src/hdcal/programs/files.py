@@ -112,7 +112,9 @@ def _of_code_and_machine() -> str:
     for name in TRACED:
         with suppress(PackageNotFoundError):
             # Its version is in there; to look for it takes longer than to read all.
-            whole.update((distribution(name).read_text("METADATA") or "").encode())
+            found = distribution(name)
+            told = found.read_text("METADATA") or found.read_text("PKG-INFO")
+            whole.update((told or found.version).encode())
     return whole.hexdigest()[:32]
 
 

@@ -29,6 +29,9 @@ class Node:
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
         dataclasses.dataclass(frozen=True, eq=False)(cls)
+        if "__check_init__" in vars(cls):
+            # Of a class that was written for equinox it would be passed over.
+            raise TypeError(f"{cls.__name__}: what checks a new one is __post_init__")
         _register(cls)
 
     def __eq__(self, other: object) -> bool:
@@ -49,6 +52,8 @@ def _register(cls: type) -> None:
     """
     children, fixed = [], []
     for field in dataclasses.fields(cls):
+        if "converter" in field.metadata:
+            raise TypeError(f"{cls.__name__}.{field.name}: nothing is converted here")
         (fixed if field.metadata.get("static") else children).append(field.name)
     keys = [jax.tree_util.GetAttrKey(name) for name in children]
 

@@ -52,7 +52,7 @@ class _Kind(NamedTuple):
 
 
 class Program:
-    """A function as `jax.jit` makes it, whose trace is kept.
+    """A function as `jax.jit` makes it, which is kept as it was compiled.
 
     Under a transformation (a gradient, another program) it is `jax.jit` and no more.
     Numbers among the arguments are taken as arrays.

@@ -36,7 +36,6 @@ _FONTS = ("Noto Sans CJK SC", "Noto Sans CJK JP", "WenQuanYi Zen Hei", "SimHei")
 _STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.formatter.limits": (-5, 7),
-    "axes.formatter.useoffset": False,
     "axes.edgecolor": "#555555",
     "axes.grid": True,
     "axes.labelsize": 10,
@@ -147,6 +146,8 @@ def watermark(figure: Figure) -> None:
 def heading(axes: Axes, text: str) -> None:
     """Write a small heading above a panel, at its left edge."""
     axes.set_title(text, loc="left", fontweight="bold", color=DARK)
+    # What all numbers beside it have in common, 10⁻⁵ say, stands left of the heading.
+    axes.yaxis.get_offset_text().set_horizontalalignment("right")
 
 
 def note(axes: Axes, text: str, at: tuple[Any, Any], shift, **look: Any) -> None:

@@ -180,7 +180,7 @@ def integrate_all(
     given = 0.0 if damping is None else float(damping)
     about = reading, temperature, given, request.force, request.times, reach, leftover
     asked = {"kept": kept, "with_damping": damping is not None}
-    # Of a batch, which may take minutes, who interrupts does not wait for the end.
+    # An interruption is heard while a batch, which may take minutes, goes on.
     pool = ThreadPoolExecutor(1)
     try:
         for start in range(0, count, size):

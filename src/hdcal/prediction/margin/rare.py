@@ -260,7 +260,7 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
         return _towards(target, point, sizes)
 
     slope = np.asarray(towards(start)[1])
-    place, curve = minimise(Secant(towards), start, _SLOPE)
+    place, curve = minimise(Secant(towards, size), start, _SLOPE)
     strength, axes = np.linalg.eigh(curve)
     shape = (axes / np.maximum(np.abs(strength), _FLAT)) @ axes.T
     counts = np.append(np.ones(size - _OPEN, bool), slope[-_OPEN:] != 0.0)
