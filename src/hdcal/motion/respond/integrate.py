@@ -114,6 +114,11 @@ def _each(
     return jax.vmap(one)(values)
 
 
+def _computed(*given, **asked):
+    """Return it when it is there: who waits for a promise of JAX hears nothing."""
+    return jax.device_get(_each(*given, **asked))
+
+
 def _largest(times, states):
     """Return the largest size of the deformation, also between the times [mm].
 
@@ -185,9 +190,9 @@ def integrate_all(
     try:
         for start in range(0, count, size):
             chunk = {name: v[start : start + size] for name, v in values.items()}
-            moved, *part = pool.submit(_each, chunk, *about, **asked).result()
+            moved, *part = pool.submit(_computed, chunk, *about, **asked).result()
             motion[start : start + size] = moved
-            parts.append(jax.device_get(part))
+            parts.append(part)
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
     facts = {n: np.concatenate([p[0][n] for p in parts]) for n in parts[0][0]}
