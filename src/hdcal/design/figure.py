@@ -1,6 +1,5 @@
 """Figures of a design: spring against gear, force against limit, a ring's shape."""
 
-import jax
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,6 +12,7 @@ from hdcal.design.sizes import named
 from hdcal.design.wave_generator import WaveGenerator
 from hdcal.physics.profile import ring_profile
 from hdcal.physics.theory import RING_SERIES
+from hdcal.programs.program import program
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -28,6 +28,7 @@ from hdcal.report.canvas import (
     temperature_colours,
 )
 
+_profile = program(ring_profile, static=("terms",))
 _TAILS = (0.025, 0.5, 0.975)
 # Points along a curve, and along each side of a map.
 _FINE, _COARSE = 41, 21
@@ -198,9 +199,8 @@ def profile_figure(geometry: Geometry, modulus: float, deformation: float) -> Fi
         deformation: radial displacement under each load [mm].
     """
     angle = np.linspace(0.0, np.pi, 181)
-    shape = jax.jit(ring_profile, static_argnames="terms")
-    full = shape(geometry, modulus, deformation, angle)
-    few = shape(geometry, modulus, deformation, angle, terms=3)
+    full = _profile(geometry, modulus, deformation, angle)
+    few = _profile(geometry, modulus, deformation, angle, terms=3)
     degrees = np.degrees(angle)
     panels = (
         ("Displacement", "[mm]", (("radial w", "radial"), ("along v", "tangential"))),

@@ -16,6 +16,7 @@ from hdcal.data.records import Array, Records
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
 from hdcal.programs.node import Node, static
+from hdcal.programs.program import program
 from hdcal.programs.shapes import Float
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
@@ -98,6 +99,7 @@ def _is_directed(records: Records, loop: bool) -> bool:
     return loop and "unloading" in records.known
 
 
+@program(static=("directed",))
 def _functions(scaled, movement, *, directed: bool):
     """Return the functions before anything is projected off, shape (n, m)."""
     smooth = _basis(scaled)
@@ -114,6 +116,7 @@ def _basis(scaled):
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
+@program
 def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
@@ -157,7 +160,12 @@ def discrepancy_columns(
     """
     if discrepancy is None:
         return None
-    return np.asarray(discrepancy.columns(records.deformation, records.sense))
+    return np.asarray(_columns(discrepancy, records.deformation, records.sense))
+
+
+@program
+def _columns(discrepancy: Discrepancy, deformation, movement):
+    return discrepancy.columns(deformation, movement)
 
 
 def prior_sd(sd, length) -> Float[Array, " m"]:

@@ -11,6 +11,7 @@ from hdcal.inference.problem import case_reading, influence_prior
 from hdcal.physics.dynamics import ring_mass
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.programs.program import program
 
 # In the order in which they are sampled and reported; K and E0 come first.
 SITES = (
@@ -22,6 +23,7 @@ SITES = (
     "initial_velocity",
     "deformation_sigma",
 )
+_ring_mass = program(ring_mass, static=("radial_per_read",))
 FRICTION = f"{CoulombFriction.name}.force"
 
 
@@ -40,7 +42,8 @@ def mass_prior(gear: Gear, radial_per_read: float) -> Prior:
         words = "no density of the material is known, so nor is the moved mass"
         remedy = "Add [density] to the material, or mass to the gear file's [priors]"
         raise InputError([Finding(gear.material, words, remedy)])
-    ring = float(ring_mass(gear.geometry, gear.density, radial_per_read))
+    read = {"radial_per_read": radial_per_read}
+    ring = float(_ring_mass(gear.geometry, gear.density, **read))
     prior = scaled(gear.dynamic_priors["mass_ratio"], ring)
     source = f"{1e3 * ring:.3g} kg move on a bare ring; {prior.source}"
     return Prior(prior.family, prior.numbers, "N*s^2/mm", source)

@@ -182,10 +182,10 @@ def stretch(problem: DynamicProblem, first: int, rows: int) -> DynamicProblem:
     part = slice(first, first + rows)
     return replace(
         problem,
-        change=None if problem.change is None else problem.change[part],
-        time=problem.time[part],
-        force=problem.force[part],
-        deformation=problem.deformation[part],
+        change=None if problem.change is None else np.asarray(problem.change)[part],
+        time=np.asarray(problem.time)[part],
+        force=np.asarray(problem.force)[part],
+        deformation=np.asarray(problem.deformation)[part],
         count=max(min(problem.count - first, rows), 0),
     )
 

@@ -60,6 +60,7 @@ def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
+@program
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrained(problem, position)
@@ -208,10 +209,14 @@ def from_group(problem: Sampled, group: Group | None) -> Whitening:
 
 def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     """Return the value of every sampled site at a position, as `fit` starts from it."""
+    return {name: float(value) for name, value in _sites(problem, position).items()}
+
+
+@program
+def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
     from numpyro.infer.util import constrain_fn
 
-    found = constrain_fn(model, (problem,), {}, position)
-    return {name: float(value) for name, value in found.items()}
+    return constrain_fn(model, (problem,), {}, position)
 
 
 def log_evidence(problem: Sampled, found: Whitening) -> float:

@@ -70,13 +70,13 @@ def _stretches(problem: DynamicProblem, values, seed) -> Iterator[np.ndarray]:
     tails = np.array([0.5 - INTERVAL / 2.0, 0.5, 0.5 + INTERVAL / 2.0])
     for first in range(0, problem.count, _STRETCH):
         part = stretch(problem, first, _STRETCH + 1)
-        mean, new, last = _predict(part, values, seed)
+        mean, new, last = map(np.asarray, _predict(part, values, seed))
         values = values | {
             "initial_deformation": last[:, 0],
             "initial_velocity": last[:, 1],
         }
         kept = slice(min(part.count, _STRETCH))
-        both = np.asarray(mean)[:, kept], np.asarray(new)[:, kept]
+        both = mean[:, kept], new[:, kept]
         yield np.concatenate([np.quantile(each, tails, axis=0) for each in both])
 
 

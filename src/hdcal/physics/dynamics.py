@@ -18,6 +18,7 @@ from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import RING_SERIES
 from hdcal.programs.node import Node
+from hdcal.programs.program import program
 from hdcal.programs.shapes import Float
 
 Scalar = Float[Array, ""] | float
@@ -135,6 +136,7 @@ def acting(
     return kept, tuple(effect for effect in effects if not effect.acts_at_once)
 
 
+@program
 def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     """Return √(k/m)/2π of the undamped linear model [Hz]."""
     return jnp.sqrt(stiffness / mass) / (2.0 * jnp.pi)

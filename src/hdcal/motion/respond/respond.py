@@ -23,8 +23,10 @@ from hdcal.motion.respond.integrate import integrate_all, unseen
 from hdcal.motion.respond.request import Drive, Request, make_request
 from hdcal.notebook import Shown
 from hdcal.physics.dynamics import acting, natural_frequency
+from hdcal.physics.forcing import Forcing
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.prediction.engine.gear_forces import evenly, gear_values
+from hdcal.programs.program import program
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
@@ -152,7 +154,7 @@ def _move(
     return Response(
         posterior,
         request.times,
-        np.asarray(jax.vmap(request.force)(request.times)),
+        np.asarray(_forces(request.force, request.times)),
         lo,
         middle,
         hi,
@@ -165,6 +167,11 @@ def _move(
         tuple(effect.name for effect in left),
         tuple(remarks(posterior, request.times, estimates, kept, left, tested)),
     )
+
+
+@program
+def _forces(force: Forcing, times):
+    return jax.vmap(force)(times)
 
 
 def _what_moves(posterior: Posterior, draws: int, seed: int):

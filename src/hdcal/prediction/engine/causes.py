@@ -25,9 +25,10 @@ from hdcal.inference.hypotheses import (
 )
 from hdcal.inference.mixed_posterior import models_of
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem
+from hdcal.inference.problem import Problem, without_texts
 from hdcal.inference.values import POSITIVE, Values
 from hdcal.prediction.engine.models import Models, model_pairs
+from hdcal.programs.program import program
 from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
@@ -212,8 +213,13 @@ def sample_prior(prior: Prior, name: str, key, count: int) -> np.ndarray:
     """
     if prior.family == "fixed":
         return np.full(count, float(prior.numbers[0]))
-    law = distribution(prior, positive=name in POSITIVE)
-    return np.asarray(law.sample(key, (count,)))
+    (known,) = without_texts({name: prior}).values()
+    return np.asarray(_drawn(known, key, positive=name in POSITIVE, count=count))
+
+
+@program(static=("positive", "count"))
+def _drawn(prior: Prior, key, *, positive: bool, count: int):
+    return distribution(prior, positive=positive).sample(key, (count,))
 
 
 def read_models(run: Path | str) -> list[tuple[float, Posterior]]:
