@@ -154,6 +154,19 @@ def test_a_damaged_file_is_thrown_away(cached, damage):
     assert len(traced) == 3
 
 
+def test_a_file_that_has_the_name_of_another_is_thrown_away(cached):
+    one, traced = counted()
+    for size in (3, 5):
+        one({"x": np.zeros(size), "y": 0.0}, times=1)
+    first, second = kept(cached)
+    contents = first.read_bytes(), second.read_bytes()
+    for file, content in zip((second, first), contents, strict=True):
+        file.write_bytes(content)
+    for size in (3, 5, 3, 5):
+        assert float(another(one)({"x": np.zeros(size), "y": 0.0}, times=1)["sum"])
+    assert len(traced) == 4
+
+
 def test_a_folder_that_others_may_write_keeps_nothing(cached):
     one, traced = counted()
     (cached / "programs").mkdir()

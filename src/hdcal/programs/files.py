@@ -42,7 +42,7 @@ def read(file: Path) -> Callable | None:
         return None
     digest, kept = content[:_DIGEST_SIZE], content[_DIGEST_SIZE:]
     with suppress(Exception):
-        if hashlib.sha256(kept).digest() == digest:
+        if _digest(file, kept) == digest:
             return loaded(zlib.decompress(kept))
     with suppress(OSError):
         file.unlink()
@@ -52,7 +52,12 @@ def read(file: Path) -> Callable | None:
 def write(file: Path, kept: bytes) -> None:
     """Keep a program, of what `to_keep` returned."""
     packed = zlib.compress(kept, _FAST)
-    put(file, hashlib.sha256(packed).digest() + packed)
+    put(file, _digest(file, packed) + packed)
+
+
+def _digest(file: Path, packed: bytes) -> bytes:
+    """Return what tells damage, and a file that has the name of another."""
+    return hashlib.sha256(file.name.encode() + packed).digest()
 
 
 def put(file: Path, content: bytes) -> None:
