@@ -357,6 +357,55 @@ with jax.default_device(second):
     assert done.returncode == 0, done.stderr
 
 
+_BESIDE_ANOTHER = """
+import sys
+import jax, numpy as np
+from hdcal import calibrate, read_case
+from hdcal.programs import compiling, program
+from hdcal.programs.files import keep_in
+from test_programs import doubled
+keep_in(sys.argv[1])
+places = jax.devices()
+place = places[int(sys.argv[2])]
+program.computing_device = compiling.computing_device = lambda: place
+found = calibrate(read_case("datasets/xb1-100-80"), warmup=100, draws=100)
+print(found.draws["K"].sum())
+one = program.program(doubled)
+# JAX' own arrays are on its first device, bound to nowhere.
+for x in (np.arange(4.0), jax.numpy.arange(4.0), one(np.arange(4.0))[1]):
+    assert one(x)[1].devices() == {place}
+"""
+
+
+def test_programs_run_on_their_device_and_not_where_jax_would(tmp_path):
+    """As beside a graphics processor, for which a second device stands."""
+    env = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=2"}
+    env["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    told = []
+    for place in ("0", "1", "1"):
+        command = [sys.executable, "-c", _BESIDE_ANOTHER, str(tmp_path / place), place]
+        done = subprocess.run(
+            command, capture_output=True, text=True, env=env, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        told.append(done.stdout)
+    assert told[0] == told[1] == told[2]
+    assert kept(tmp_path / "1")
+
+
+@pytest.mark.parametrize(("asked", "chosen"), [(None, "cpu"), ("cuda,cpu", "cuda,cpu")])
+def test_a_command_looks_for_no_other_processor_unless_told(asked, chosen):
+    script = "import os, atexit; from hdcal.__main__ import main; "
+    script += (
+        "atexit.register(lambda: print(os.environ['JAX_PLATFORMS'])); main(['-h'])"
+    )
+    env = {n: value for n, value in os.environ.items() if n != "JAX_PLATFORMS"}
+    env |= {} if asked is None else {"JAX_PLATFORMS": asked}
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=env, check=True)
+    assert done.stdout.splitlines()[-1] == chosen
+
+
 def test_a_setting_may_be_left_out(cached):
     one, _ = counted()
     assert float(one({"x": np.zeros(3), "y": 0.0})["sum"]) == 3.0

@@ -112,6 +112,8 @@ def main(arguments: list[str] | None = None) -> None:
     # A program that may call back into its process, to raise an error, is not kept:
     # what is wrong is no number instead, and looked for in what comes out.
     os.environ.setdefault("EQX_ON_ERROR", "nan")
+    # A graphics processor that is only looked for costs time and most of its memory.
+    os.environ.setdefault("JAX_PLATFORMS", "cpu")
     console = Console(json="--json" in given)
     console.prepare()
     _hear_interruptions()

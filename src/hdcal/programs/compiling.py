@@ -10,6 +10,7 @@ from typing import Any
 import jax
 from jax import numpy as jnp
 from jax.extend.core import get_opaque_trace_state
+from jax.sharding import SingleDeviceSharding
 
 # Of XLA on CPUs: loops that touch fewer bytes a turn are one kernel each.
 _WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
@@ -48,6 +49,17 @@ def _has_begun() -> bool:
     return backends_are_initialized()
 
 
+def computing_device() -> Any:
+    """Return the device that programs run on: the processor, unless JAX is told.
+
+    Beside an H200 a calibration took 35 times as long on it as on one core: each of
+    thousands of small steps waits for the one before. `JAX_PLATFORMS` tells JAX
+    otherwise.
+    """
+    asked = jax.config.jax_platforms  # pyright: ignore[reportAttributeAccessIssue]
+    return (jax.devices() if asked else jax.devices("cpu"))[0]
+
+
 def is_tracing() -> bool:
     """Return whether JAX traces, to compile or to differentiate."""
     return _trace_state() != _NO_TRACE
@@ -66,7 +78,15 @@ def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
         arguments: arrays, or what has their shape and type.
     """
     jitted = jax.jit(_named(function, name), compiler_options=_options())
-    return jitted.lower(*[jax.ShapeDtypeStruct(a.shape, a.dtype) for a in arguments])
+    return jitted.lower(*[_alike(a.shape, a.dtype) for a in arguments])
+
+
+def _alike(shape: tuple[int, ...], dtype: Any) -> jax.ShapeDtypeStruct:
+    """Return what stands for an array on the device that programs run on."""
+    device = computing_device()
+    # What JAX places itself is not bound to its device.
+    own = None if device == jax.devices()[0] else SingleDeviceSharding(device)
+    return jax.ShapeDtypeStruct(shape, dtype, sharding=own)
 
 
 def to_keep(program: Any, compiled: Any) -> bytes | None:
@@ -96,13 +116,13 @@ def loaded(kept: bytes) -> Callable:
     needs_lapack, executable = pickle.loads(kept)
     if needs_lapack:
         _find_lapack()
-    return deserialize_and_load(*executable, execution_devices=jax.devices()[:1])
+    return deserialize_and_load(*executable, execution_devices=[computing_device()])
 
 
 @cache
 def _find_lapack() -> None:
     """Let JAX look for LAPACK, which it does when it lowers what needs it."""
-    jax.jit(jnp.linalg.cholesky).lower(jax.ShapeDtypeStruct((1, 1), jnp.float32))
+    jax.jit(jnp.linalg.cholesky).lower(_alike((1, 1), jnp.float32))
 
 
 @cache
@@ -113,10 +133,11 @@ def _options() -> dict[str, Any] | None:
     after it, and sampling itself, as long as before.
     """
     faster = {"xla_cpu_use_fusion_emitters": False}
-    if jax.default_backend() != "cpu":
+    if computing_device().platform != "cpu":
         return None
     try:
-        jax.jit(_named(lambda x: x, "options"), compiler_options=faster)(0.0)
+        same = jax.jit(_named(lambda x: x, "options"), compiler_options=faster)
+        same.lower(_alike((), jnp.float32)).compile()
     except Exception:
         return None
     return faster

@@ -22,7 +22,7 @@ import numpy as np
 from jax.core import Tracer
 
 from hdcal.programs import ahead
-from hdcal.programs.compiling import is_tracing, lowered, to_keep
+from hdcal.programs.compiling import computing_device, is_tracing, lowered, to_keep
 from hdcal.programs.files import TRACED, folder, read, write
 
 # Whose classes may be in it: their code, or version, is in its name.
@@ -74,11 +74,12 @@ class Program:
         """Return what the function returns; static arguments are named."""
         fixed = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
-        placed = any(map(_is_placed, leaves))
+        device = computing_device()
+        placed = any(_is_placed(leaf, device) for leaf in leaves)
         # Inside of another trace a program is part of it.
         if placed or is_tracing() or _is_debugged():
             return self._jitted(*args, **named, **fixed)
-        leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
+        leaves = [_at_hand(leaf, device) for leaf in leaves]
         kind = _Kind(
             structure,
             tuple((name, type(value), value) for name, value in fixed.items()),
@@ -126,7 +127,7 @@ class Program:
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        device = jax.devices()[0].device_kind
+        device = computing_device().device_kind
         held = _text(kind.fixed), kind.arrays, kind.settings, device
         told = repr((name, _outline(kind.structure), *held))
         # A function that another one made, or what is told by its place in this
@@ -181,11 +182,18 @@ def _text(held: Any) -> str:
     return repr(held)
 
 
-def _is_placed(leaf: Any) -> bool:
+def _is_placed(leaf: Any, device: Any) -> bool:
     """Tell whether an argument is traced already, or bound to another device."""
     if isinstance(leaf, Tracer):
         return True
-    return getattr(leaf, "committed", False) and leaf.devices() != {jax.devices()[0]}
+    return getattr(leaf, "committed", False) and leaf.devices() != {device}
+
+
+def _at_hand(leaf: Any, device: Any) -> Any:
+    """Return an argument as an array that a program of this device takes."""
+    if not isinstance(leaf, jax.Array):
+        return np.asarray(leaf)
+    return leaf if leaf.devices() == {device} else jax.device_put(leaf, device)
 
 
 def _is_foreign(kind: _Kind) -> bool:
