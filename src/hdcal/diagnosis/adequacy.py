@@ -12,7 +12,7 @@ import scipy
 
 from hdcal.data.case import Case
 from hdcal.diagnosis.where import declared_directions
-from hdcal.evidence.bursts import BURSTS, burst_odds, is_noisy, relative_sd
+from hdcal.evidence.bursts import BURSTS, burst_odds, is_noisy, noise_beside
 from hdcal.evidence.case_evidence import NONE, QUANTISATION, UNKNOWN, CaseEvidence
 from hdcal.evidence.hypothesis_design import fitted_curve
 from hdcal.evidence.linear_rows import remove_base
@@ -97,7 +97,7 @@ def leaves_more_than_noise(
     prepared = beside_effects(evidence, names)
     kept = np.ones(len(prepared.rows.reading), bool)
     for noise in {*names} & evidence.noise.keys():
-        relative = relative_sd(evidence, library, noise, curve)
+        relative = noise_beside(evidence, library, noise, curve).relative_sd
         if burst_odds(evidence, names, relative, correlation)[0] > BURSTS:
             return True
         if library[noise].mixture:

@@ -22,7 +22,7 @@ from hdcal.evidence.case_evidence import (
 from hdcal.evidence.design_matrix import fit_design
 from hdcal.evidence.hypothesis_design import design_of, fitted_curve
 from hdcal.evidence.linear_rows import remove_base, whiten
-from hdcal.evidence.noise_evidence import noise_evidence
+from hdcal.evidence.noise_evidence import NoiseEvidence, noise_evidence
 from hdcal.evidence.prepare import with_relative_noise
 from hdcal.physics.effect import Effect
 
@@ -51,12 +51,17 @@ def with_bursts(
     table, closed = dict(evidence.table), dict(evidence.closed)
     correlation = evidence.likeliest_correlation
     curve_of = cache(partial(fitted_curve, evidence))
-    for effect, noise in _candidates(evidence, log_prior):
+    rivals = {
+        (effect, noise): noise_beside(
+            evidence, library, noise, curve_of(effect) if effect else None
+        )
+        for effect, noise in _candidates(evidence, log_prior)
+    }
+    for (effect, noise), found in rivals.items():
         pair, key = _keys(effect, noise)
         curve = curve_of(effect) if effect else None
-        relative = relative_sd(evidence, library, noise, curve)
         names = [effect] if effect else []
-        log_odds, off = burst_odds(evidence, names, relative, correlation)
+        log_odds, off = burst_odds(evidence, names, found.relative_sd, correlation)
         # As seldom beforehand beside the noise in whose place it stands.
         seldom = _SELDOM + log_prior[pair] - log_prior[key]
         lasting = evidence.table[pair] + log_odds + seldom
@@ -110,13 +115,13 @@ def _mixed(
     return np.concatenate([np.full(count, share), closed[count:]])
 
 
-def relative_sd(
+def noise_beside(
     evidence: CaseEvidence,
     library: Mapping[str, type[Effect]],
     noise: str,
     beside: np.ndarray | None,
-) -> np.ndarray:
-    """Return the noise of each row over that of a usual one, (n,).
+) -> NoiseEvidence:
+    """Return the evidence of an effect on the noise.
 
     Beside a loop of friction, which leaves little, wild readings are farther off than
     on their own.
@@ -128,12 +133,12 @@ def relative_sd(
         beside: what an effect adds beside which it stands [N], None for none.
     """
     if beside is None:
-        return evidence.noise[noise].relative_sd
-    return noise_evidence(library[noise], evidence.prepared, beside).relative_sd
+        return evidence.noise[noise]
+    return noise_evidence(library[noise], evidence.prepared, beside)
 
 
 def is_noisy(relative: np.ndarray) -> np.ndarray:
-    """Tell which readings are noisier than the middle one, of `relative_sd`."""
+    """Tell which readings are noisier than the middle one, of their relative sds."""
     return relative > _NOISY * np.median(relative)
 
 

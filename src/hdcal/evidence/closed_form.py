@@ -82,14 +82,14 @@ def integrate_noise(value, centre, rows, prior: Prior):
     """Integrate exp(value(log σ)) π(log σ) over log σ around a centre."""
     width = _WIDER / jnp.sqrt(2.0 * jnp.maximum(rows - 4.0, 2.0))
 
-    def at(node):
-        point, log_weight = node
+    def at(point, weight):
         log_sd = centre + np.sqrt(2.0) * width * point
         log_prior = distribution(prior).log_prob(jnp.exp(log_sd)) + log_sd
-        return value(log_sd) + log_prior + log_weight + point**2
+        return value(log_sd) + log_prior + np.log(weight) + point**2
 
-    nodes = jnp.asarray(_POINTS), jnp.log(_WEIGHTS)
-    return logsumexp(jax.lax.map(at, nodes), axis=0) + 0.5 * jnp.log(2.0 * width**2)
+    # One after the other in the program's text: a loop would take twice as long.
+    each = jnp.stack([at(*node) for node in zip(_POINTS, _WEIGHTS, strict=True)])
+    return logsumexp(each, axis=0) + 0.5 * jnp.log(2.0 * width**2)
 
 
 def most_probable_noise(step, start):
@@ -119,24 +119,31 @@ def _log_cell(precision, pull, cells: AmplitudeCells):
     return value, centre, 1.0 / root
 
 
-def _without_tolerance(products: PieceProducts, cells: AmplitudeCells, log_sd):
+def _of_cells(products: PieceProducts, cells: AmplitudeCells) -> PieceProducts:
+    """Return the products of each cell's piece, a last axis moved to the front."""
+    lengths, tolerance = products[:3], products[3:]
+    first = (jnp.moveaxis(leaf, -1, 0) for leaf in tolerance)
+    return PieceProducts(*(leaf[..., cells.piece] for leaf in (*lengths, *first)))
+
+
+def _without_tolerance(own: PieceProducts, cells: AmplitudeCells, log_sd):
     """Integrate the tolerance out: return log factor, eVe, eVu and uVu."""
-    own = jax.tree.map(lambda leaf: leaf[:, cells.piece], products)
-    loose = ((cells.tolerance * cells.size) ** 2 * jnp.exp(-2.0 * log_sd))[..., None]
-    factor = loose / (1.0 + loose * own.spread)
-    return (
-        -0.5 * jnp.sum(jnp.log1p(loose * own.spread), axis=-1),
-        own.ee - jnp.sum(factor * own.te**2, axis=-1),
-        own.eu - jnp.sum(factor * own.te * own.tu, axis=-1),
-        own.uu - jnp.sum(factor * own.tu**2, axis=-1),
-    )
+    loose = (cells.tolerance * cells.size) ** 2 * jnp.exp(-2.0 * log_sd)
+    volume, ee, eu, uu = 1.0, own.ee, own.eu, own.uu
+    # Written out it is one pass over the cells.
+    for spread, te, tu in zip(own.spread, own.te, own.tu, strict=True):
+        inside = 1.0 + loose * spread
+        factor = loose / inside
+        volume *= inside
+        ee, eu, uu = ee - factor * te**2, eu - factor * te * tu, uu - factor * tu**2
+    return -0.5 * jnp.log(volume), ee, eu, uu
 
 
-def _noise_of_cells(common: CommonTerms, products: PieceProducts, cells):
+def _noise_of_cells(common: CommonTerms, own: PieceProducts, cells: AmplitudeCells):
     """Return log of the most probable noise sd of each cell."""
 
     def step(log_sd):
-        _, ee, eu, uu = _without_tolerance(products, cells, log_sd)
+        _, ee, eu, uu = _without_tolerance(own, cells, log_sd)
         variance = jnp.exp(2.0 * log_sd)
         whole = uu / variance + cells.precision + TINY
         drawn = eu / variance + cells.precision * cells.mean
@@ -144,22 +151,22 @@ def _noise_of_cells(common: CommonTerms, products: PieceProducts, cells):
         left = ee - 2.0 * size * eu + size**2 * uu
         return 0.5 * jnp.log(jnp.maximum(left, 1e-9 * variance) / common.rows)
 
-    start = 0.5 * jnp.log(products.ee[:, cells.piece] / common.rows)
-    return most_probable_noise(step, start)
+    return most_probable_noise(step, 0.5 * jnp.log(own.ee / common.rows))
 
 
 @program
 def _cell_evidence(common, products, cells, sigma: Prior):
-    centre = _noise_of_cells(common, products, cells)
+    own = _of_cells(products, cells)
+    centre = _noise_of_cells(common, own, cells)
 
     def value(log_sd):
-        factor, ee, eu, uu = _without_tolerance(products, cells, log_sd)
+        factor, ee, eu, uu = _without_tolerance(own, cells, log_sd)
         variance = jnp.exp(2.0 * log_sd)
         cell, _, _ = _log_cell(uu / variance, eu / variance, cells)
         return factor - common.rows * log_sd - 0.5 * ee / variance + cell
 
     total = integrate_noise(value, centre, common.rows, sigma)
-    _, _, eu, uu = _without_tolerance(products, cells, centre)
+    _, _, eu, uu = _without_tolerance(own, cells, centre)
     variance = jnp.exp(2.0 * centre)
     _, mean, sd = _log_cell(uu / variance, eu / variance, cells)
     constant = common.constant[:, None] - 0.5 * common.rows * LOG_2PI

@@ -94,6 +94,9 @@ def _without_pairs(
     noisy: Library,
 ) -> CaseEvidence:
     """Return the evidence of none, of each effect alone and of unknown structure."""
+    noise = {
+        n: noise_evidence(e, prepared) for n, e in noisy.items() if n != QUANTISATION
+    }
     single = single_evidence(prepared.rows, piecewise, prepared.priors["sigma"])
     kernels, log_counts = unknown_kernels(prepared, piecewise, effects.values())
     subspaces = evidence_of_subspaces(prepared, single.common, effects, kernels)
@@ -101,9 +104,6 @@ def _without_pairs(
     table |= {name: single.by_correlation(name) for name in single.names}
     table |= {name: subspaces.by_correlation(name) for name in effects}
     table[UNKNOWN] = unknown_evidence(subspaces, log_counts, single.none)
-    noise = {
-        n: noise_evidence(e, prepared) for n, e in noisy.items() if n != QUANTISATION
-    }
     table |= _noise_table(prepared, noise, single.none)
     step = 0.0
     if QUANTISATION in noisy:

@@ -6,7 +6,7 @@ exact but for σ.
 """
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 import jax
 import jax.numpy as jnp
@@ -26,9 +26,11 @@ from hdcal.programs.program import program
 from hdcal.programs.shapes import Float
 
 _AMPLITUDES, _SHAPES = 10, 3
-_STEPS = 15
+_STEPS = 40
 # Newton steps below this, in prior sds and log σ, change no evidence.
 _STILL = 1e-7
+# A step that leads higher is tried again, so much shorter.
+_SHORTER = 0.3
 # Digits of −log density that are more than rounding.
 _DIGITS = 8
 # Curvatures below this, some of the prior's own, are taken as this: a search that ends
@@ -38,17 +40,42 @@ _LEAST_CURVATURE = 0.3
 
 @dataclass(frozen=True)
 class NoiseEvidence:
-    """One effect on the noise.
+    """One effect on the noise, which XLA goes on to weigh until something is asked.
 
     Attributes:
-        log_factor: log evidence less that without it, both at no correlation.
-        relative_sd: effective noise sd of each row, relative to its mean.
-        amplitude: posterior quantiles .05, .5, .95 of the amplitude.
+        values: of the amplitude at each point, the last one that of plain noise.
+        at_points: log evidence at each point.
+        precision: effective precision of each row at each point [1/N²], and padding.
+        rows: that were measured.
     """
 
-    log_factor: float
-    relative_sd: Float[np.ndarray, " n"]
-    amplitude: tuple[float, float, float]
+    values: Float[np.ndarray, " k"]
+    at_points: Float[Array, " k"]
+    precision: Float[Array, "k p"]
+    rows: int
+
+    @cached_property
+    def log_factor(self) -> float:
+        """Log evidence less that of plain noise, both at no correlation."""
+        *found, plain = np.asarray(self.at_points)
+        return float(np.logaddexp.reduce(found) - np.log(len(found)) - plain)
+
+    @cached_property
+    def relative_sd(self) -> Float[np.ndarray, " n"]:
+        """Effective noise sd of each row, relative to its mean."""
+        precision = np.asarray(self.precision)[:-1, : self.rows]
+        relative = 1.0 / np.sqrt(self._weight @ precision)
+        return relative / np.exp(np.mean(np.log(relative)))
+
+    @cached_property
+    def amplitude(self) -> tuple[float, float, float]:
+        """Posterior quantiles .025, .5 and .975 of the amplitude."""
+        return weighted_quantiles(self.values[:-1], self._weight)
+
+    @cached_property
+    def _weight(self) -> np.ndarray:
+        found = np.asarray(self.at_points)[:-1]
+        return np.exp(found - np.logaddexp.reduce(found))
 
 
 class NoiseProblem(Node):
@@ -109,28 +136,33 @@ def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
         height, slope = jax.value_and_grad(minus)(point)
         return slope, (height, slope)
 
-    def step(state):
-        count, point, *_ = state
+    def look(point):
+        """Return height, Newton's move and log determinant at a point."""
         hessian, (height, slope) = jax.jacfwd(slope_of, has_aux=True)(point)
         strength, axes = jnp.linalg.eigh(hessian)
         log_det = jnp.sum(jnp.log(jnp.maximum(strength, _LEAST_CURVATURE)))
         move = axes @ (
             (axes.T @ slope) / jnp.maximum(jnp.abs(strength), _LEAST_CURVATURE)
         )
-        tries = jnp.stack([point - move * s for s in (1.0, 0.3, 0.1, 0.0)])
-        heights = jnp.append(jax.vmap(minus)(tries[:-1]), height)
-        heights = jnp.where(jnp.isfinite(heights), heights, jnp.inf)
-        # What rounding decides is no descent: then the full step, which converges.
-        after = tries[jnp.argmin(jnp.round(heights, _DIGITS))]
-        return count + 1, after, jnp.max(jnp.abs(move)), (point, height, log_det)
+        return height, move, log_det
+
+    def step(state):
+        count, share, *here = state
+        point, height, move, _ = here
+        there = point - share * move
+        there = (there, *look(there))
+        # What rounding decides is no ascent: near the mode full steps converge.
+        lower = jnp.round(there[1], _DIGITS) <= jnp.round(height, _DIGITS)
+        here = [jnp.where(lower, *both) for both in zip(there, here, strict=True)]
+        return count + 1, jnp.where(lower, 1.0, _SHORTER * share), *here
 
     def goes_on(state):
-        return (state[0] <= _STEPS) & (state[2] > _STILL)
+        count, moves = state[0], jnp.max(jnp.abs(state[4])) > _STILL
+        return (count == 0) | ((count < _STEPS) & moves)
 
-    # The last step only looks at where those before have led.
-    nothing = jnp.inf, (start, 0.0, 0.0)
-    *_, found = jax.lax.while_loop(goes_on, step, (0, start, *nothing))
-    best, height, log_det = found
+    # The first step looks where it begins.
+    begin = 0, 1.0, start, jnp.inf, jnp.zeros_like(start), 0.0
+    *_, best, height, _, log_det = jax.lax.while_loop(goes_on, step, begin)
     evidence = (
         -height
         + 0.5 * jnp.sum(jnp.log(problem.precision))
@@ -179,18 +211,9 @@ def noise_evidence(
     values, amplitude = _grid(effect, case)
     sigma, problem = case.priors["sigma"], _noise_problem(case, beside)
     start = _least_squares(problem, case.noise_sd)
-    log_evidence, precision = map(
-        np.asarray, _laplace(effect(**values), problem, sigma, start)
-    )
-    # The last point is that of plain noise.
-    found, plain = log_evidence[:-1], log_evidence[-1]
-    weight = np.exp(found - np.logaddexp.reduce(found))
-    relative = 1.0 / np.sqrt(weight @ precision[:-1, : problem.count])
-    return NoiseEvidence(
-        float(np.logaddexp.reduce(found) - np.log(len(found)) - plain),
-        relative / np.exp(np.mean(np.log(relative))),
-        weighted_quantiles(values[amplitude][:-1], weight),
-    )
+    at_points, precision = _laplace(effect(**values), problem, sigma, start)
+    rows = len(case.rows.reading)
+    return NoiseEvidence(values[amplitude], at_points, precision, rows)
 
 
 def _grid(

@@ -18,7 +18,7 @@ from hdcal.evidence.closed_form import subspace_evidence
 from hdcal.evidence.hypothesis_design import fitted_curve
 from hdcal.evidence.inner_products import subspace_products
 from hdcal.evidence.linear_rows import LinearRows
-from hdcal.evidence.noise_evidence import noise_evidence
+from hdcal.evidence.noise_evidence import NoiseEvidence, noise_evidence
 from hdcal.evidence.piecewise_pairs import piecewise_pair_evidence
 from hdcal.evidence.single_evidence import SingleEvidence, single_evidence
 from hdcal.evidence.subspaces import mean_evidence
@@ -38,11 +38,13 @@ def pair_evidence(
         noisy: effects on the noise by name.
     """
     table = evidence.table
+    mean = [*evidence.single.names, *evidence.subspace_effects]
+    # Begun first, read last: XLA goes on meanwhile.
+    beside = _noise_beside_best(evidence, noisy, mean)
     pairs = _piecewise_pairs(evidence)
     for name in evidence.subspace_effects:
         pairs |= _pairs_with_subspace(evidence, name)
-    mean = [*evidence.single.names, *evidence.subspace_effects]
-    pairs |= _noise_pairs(evidence, noisy, mean)
+    pairs |= _noise_pairs(evidence, beside, mean)
     if QUANTISATION in table:
         # Rounding gains as much beside any effect as it does alone.
         gain = table[QUANTISATION] - table[NONE]
@@ -118,24 +120,35 @@ def _with_subspace(evidence: CaseEvidence, name: str) -> LinearRows:
     )
 
 
-def _noise_pairs(
+def _noise_beside_best(
     evidence: CaseEvidence, noisy: Mapping[str, type[Effect]], mean: list[str]
+) -> dict[str, dict[str, NoiseEvidence]]:
+    """Return the evidence of each effect on the noise beside each of the likeliest."""
+    whole = {name: np.logaddexp.reduce(evidence.table[name]) for name in mean}
+    best = sorted(mean, key=lambda name: -whole[name])[:_BESIDE]
+    curves = {name: fitted_curve(evidence, name) for name in best}
+    return {
+        name: {
+            other: noise_evidence(noisy[name], evidence.prepared, curve)
+            for other, curve in curves.items()
+        }
+        for name in evidence.noise
+    }
+
+
+def _noise_pairs(
+    evidence: CaseEvidence,
+    beside: Mapping[str, Mapping[str, NoiseEvidence]],
+    mean: list[str],
 ) -> dict[str, np.ndarray]:
     """Return pairs of an effect on the noise with any other.
 
     Noise takes up what structure the mean has left, so that its evidence is found
     anew beside each of the likeliest effects; beside others the least of these counts.
     """
-    table, noise = evidence.table, evidence.noise
-    whole = {name: np.logaddexp.reduce(table[name]) for name in mean}
-    best = sorted(mean, key=lambda name: -whole[name])[:_BESIDE]
-    curves = {name: fitted_curve(evidence, name) for name in best}
-    pairs = {}
+    table, noise, pairs = evidence.table, evidence.noise, {}
     for name, alone in noise.items():
-        factor = {
-            other: noise_evidence(noisy[name], evidence.prepared, curve).log_factor
-            for other, curve in curves.items()
-        }
+        factor = {other: found.log_factor for other, found in beside[name].items()}
         least = min([alone.log_factor, *factor.values()])
         for other in mean:
             gain = factor.get(other, least)
