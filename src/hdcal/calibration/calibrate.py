@@ -195,7 +195,11 @@ def calibrate(
     kept = ArrayTree({**arrays.groups, laplace.GROUP: laplace.to_group(fitted)})
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
     settings |= {LOOP: True} | run_settings(found, began)
-    return Posterior(case, theory, chosen, priors, kept, diagnoses, checks, settings)
+    parts = case, theory, chosen, priors, kept, diagnoses, checks, settings
+    posterior = Posterior(*parts)
+    # A million rows are not compressed anew.
+    vars(posterior)["problem"] = problem
+    return posterior
 
 
 def _chosen(

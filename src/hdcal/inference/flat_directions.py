@@ -68,7 +68,12 @@ def flat_directions(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[
         for name in unseen
     ]
     seen = {name: column for name, column in scaled.items() if name not in unseen}
-    return sentences + [_sentence(names) for names in _inseparable(seen)]
+    if not seen:
+        return sentences
+    # As few numbers as have the same inner products.
+    few = np.linalg.qr(np.stack([*seen.values()], axis=1), mode="r")
+    inseparable = _inseparable(dict(zip(seen, np.transpose(few), strict=True)))
+    return sentences + [_sentence(names) for names in inseparable]
 
 
 def _strengths(columns) -> tuple[np.ndarray, np.ndarray]:

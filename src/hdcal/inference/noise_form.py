@@ -81,11 +81,12 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
         size = np.abs(scaled)
         shapes += [records.sense * size, records.sense * size**2]
         shapes += [*loop_cells(records, _REACHES)]
-    table = np.stack([*own, *shapes, np.asarray(records.force)], axis=1)
     count = np.bincount(records.run)
-    means = np.stack([np.bincount(records.run, c) / count for c in table.T], axis=1)
-    table = table - means[records.run]
-    design, force = table[:, :-1], table[:, -1]
+    table = [
+        column - (np.bincount(records.run, column) / count)[records.run]
+        for column in (*own, *shapes, np.asarray(records.force))
+    ]
+    design, force = np.array(table[:-1]).T, table[-1]
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
     free = max(len(force) - len(count) - int(rank), 1)

@@ -32,12 +32,13 @@ def check_padding(
     Raises:
         InputError: with every effect that does.
     """
+    foreign = [effect for effect in effects if effect not in EFFECTS.values()]
+    if not foreign:
+        return
     rows, short = len(records.force), pad_records(records)
     long = repeat_last_row(records, bucket_size(len(short.force) + 1))
     findings = []
-    for effect in effects:
-        if effect in EFFECTS.values():
-            continue
+    for effect in foreign:
         few, many = (
             np.stack(_reading(padded, reading, effect=effect))[..., :rows]
             for padded in (short, long)
