@@ -29,7 +29,7 @@ def told(script: str, flags: str | None = None) -> str:
     ).stdout
 
 
-@pytest.mark.parametrize("flags", [None, "--xla_cpu_use_fusion_emitters=false"])
+@pytest.mark.parametrize("flags", [None, "--xla_backend_optimization_level=1"])
 @pytest.mark.parametrize("before", ["", "import jax\n"])
 def test_a_loop_is_one_kernel(before, flags):
     """Whatever else the user asks of XLA; and of two gears the second says nothing."""

@@ -222,8 +222,6 @@ def test_the_command_writes_what_the_library_found(
     code, posterior, failed, tmp_path, capsys, monkeypatch
 ):
     found = [posterior, failed][code]
-    # A file is no folder for a cache: JAX' own settings stay as they are.
-    monkeypatch.setenv("HDCAL_CACHE_DIR", __file__)
     monkeypatch.setattr(calibration, "calibrate_dynamic", lambda *_, **__: found)
     folder = write_moving(moving_case(0), tmp_path / "released")
     out = tmp_path / "result"

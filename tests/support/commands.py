@@ -46,8 +46,6 @@ def here(
     """Run hdcal in this process, which has compiled already what others need."""
     from hdcal.__main__ import main
 
-    # A file is no folder for a cache: JAX' own settings stay as they are.
-    monkeypatch.setenv("HDCAL_CACHE_DIR", __file__)
     monkeypatch.chdir(tmp_path)
     before = signal.getsignal(signal.SIGTERM)
 

@@ -8,6 +8,8 @@ from pathlib import Path
 import click
 from click.core import ParameterSource
 
+from hdcal.cli.console import Console
+
 # In the context of a command: that it loads ahead.
 _ASKED = f"{__name__}.asked"
 
@@ -28,25 +30,34 @@ def keep_compilations() -> None:
     the same results. What has code of a user's own effects is traced anew.
 
     The folder is the user's cache folder, or what the environment variable
-    HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept. JAX' own
-    compilation cache, which cannot serve beside it, is switched off for the process.
+    HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept, and a command
+    says so. JAX' own compilation cache, which cannot serve beside it, is switched off
+    for the process.
     """
-    folder = _writable_folder()
-    if folder is None:
-        return
-    from hdcal.programs.files import keep_in
+    chosen = _cache_folder()
+    kept = _is_writable(chosen)
+    if kept:
+        from hdcal.programs.files import folder, keep_in
 
-    keep_in(str(folder))
+        keep_in(str(chosen))
+        kept = folder() is not None
     command = click.get_current_context(silent=True)
-    if command is not None and _ASKED not in command.meta:
+    if command is None or _ASKED in command.meta:
+        return
+    command.meta[_ASKED] = True
+    if kept:
         _load_ahead(command)
+    elif (console := command.find_object(Console)) is not None:
+        console.words(
+            f"{chosen}: nothing can be kept here, so that each run takes seconds "
+            "longer. HDCAL_CACHE_DIR names another folder."
+        )
 
 
 def _load_ahead(command: click.Context) -> None:
     """Load what the command needed the last time that these options were given."""
     from hdcal.programs import ahead
 
-    command.meta[_ASKED] = True
     own = ParameterSource.COMMANDLINE
     given = [n for n in command.params if command.get_parameter_source(n) is own]
     task = "-".join([*command.command_path.split(), *sorted(given)])
@@ -54,11 +65,14 @@ def _load_ahead(command: click.Context) -> None:
     ahead.begin(task)
 
 
-def _writable_folder() -> Path | None:
+def _cache_folder() -> Path:
     import platformdirs
 
     named = os.environ.get("HDCAL_CACHE_DIR")
-    folder = Path(named or platformdirs.user_cache_dir("hdcal", False)) / "compiled"
+    return Path(named or platformdirs.user_cache_dir("hdcal", False)) / "compiled"
+
+
+def _is_writable(folder: Path) -> bool:
     trial = folder / f".trial-{secrets.token_hex(4)}"
     try:
         # Nobody else may write what is run.
@@ -66,5 +80,5 @@ def _writable_folder() -> Path | None:
         trial.touch()
         trial.unlink()
     except (OSError, ValueError, RuntimeError):
-        return None
-    return folder
+        return False
+    return True
