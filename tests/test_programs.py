@@ -365,6 +365,8 @@ from hdcal.programs import compiling, program
 from hdcal.programs.files import keep_in
 from test_programs import doubled
 keep_in(sys.argv[1])
+if sys.argv[3:]:
+    program.lowered = None  # Nothing may be compiled.
 places = jax.devices()
 place = places[int(sys.argv[2])]
 program.computing_device = compiling.computing_device = lambda: place
@@ -382,8 +384,9 @@ def test_programs_run_on_their_device_and_not_where_jax_would(tmp_path):
     env = os.environ | {"XLA_FLAGS": "--xla_force_host_platform_device_count=2"}
     env["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parent), *sys.path])
     told = []
-    for place in ("0", "1", "1"):
-        command = [sys.executable, "-c", _BESIDE_ANOTHER, str(tmp_path / place), place]
+    for place, *only_loaded in (("0",), ("1",), ("1", "loaded")):
+        given = [str(tmp_path / place), place, *only_loaded]
+        command = [sys.executable, "-c", _BESIDE_ANOTHER, *given]
         done = subprocess.run(
             command, capture_output=True, text=True, env=env, check=False
         )
@@ -391,6 +394,16 @@ def test_programs_run_on_their_device_and_not_where_jax_would(tmp_path):
         told.append(done.stdout)
     assert told[0] == told[1] == told[2]
     assert kept(tmp_path / "1")
+
+
+def test_a_processor_that_is_not_here_is_refused(monkeypatch):
+    monkeypatch.setenv("JAX_PLATFORMS", "abacus")
+    script = "from hdcal.__main__ import main; main(['fleet', 'datasets/fleet-demo'])"
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("hdcal: JAX_PLATFORMS: names 'abacus', ")
+    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(("asked", "chosen"), [(None, "cpu"), ("cuda,cpu", "cuda,cpu")])

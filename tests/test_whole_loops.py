@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 
 import pytest
 
@@ -34,7 +35,9 @@ def told(script: str, flags: str | None = None) -> str:
 def test_a_loop_is_one_kernel(before, flags):
     """Whatever else the user asks of XLA; and of two gears the second says nothing."""
     assert told(before + GEAR + GEAR + LOOP, flags) == "True\n"
-    assert told(before + LOOP, flags) == "False\n"
+    # Later ones compile this one whole without being asked.
+    if version("jaxlib").startswith("0.10."):
+        assert told(before + LOOP, flags) == "False\n"
 
 
 @pytest.mark.parametrize(

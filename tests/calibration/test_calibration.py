@@ -42,6 +42,13 @@ def posterior():
 
 
 @pytest.mark.thorough
+def test_what_was_sampled_is_what_would_be_built_anew(posterior):
+    sampled, built = vars(posterior)["problem"], replace(posterior).problem
+    assert jax.tree.structure(sampled) == jax.tree.structure(built)
+    for one, other in zip(*map(jax.tree.leaves, (sampled, built)), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_the_same_seed_gives_the_same_draws(posterior):
     case = posterior.case
     again, other = (calibrate(case, seed=seed, **SHORT) for seed in (4, 5))

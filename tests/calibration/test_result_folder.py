@@ -214,7 +214,9 @@ def test_without_a_writable_cache_it_works_too(
     asked = ["predict", calibrated[1], "--deformation", "0.1"]
     done = hdcal(*asked, env={"HDCAL_CACHE_DIR": str(tmp_path / "file")})
     assert done.returncode == 0
-    assert done.stderr.startswith(f"hdcal: {tmp_path / 'file' / 'compiled'}: nothing ")
+    assert done.stderr.startswith(
+        f"hdcal: {tmp_path / 'file' / 'compiled'}: nothing is kept"
+    )
     assert done.stderr.count("\n") == 1
 
 

@@ -30,7 +30,7 @@ def test_every_hypothesis_of_five_per_cent_is_kept_whatever_the_verdict():
     run, asked = calibrated()
     chances = {"none": 0.009, "a": 0.55, "a+b": 0.2, "c": 0.06, "unknown": 0.17}
     found = weighed(chances | {"d": 0.011}, run)
-    assert asked == ["a", "a+b", "unknown", "c"]
+    assert sorted(asked) == sorted(["a", "a+b", "unknown", "c"])
     assert sum(shares(found).values()) == pytest.approx(1.0)
     # 2 % and less is left out, said, and given to what bends wherever data let it.
     assert found.left_out.probability == pytest.approx(0.02)
@@ -44,7 +44,7 @@ def test_more_than_two_per_cent_calls_for_the_unknown():
     run, asked = calibrated()
     chances = {"a": 0.74, "b": 0.08, "none": 0.06, "unknown": 0.02}
     found = weighed(chances | dict.fromkeys("cdefghij", 0.0125), run)
-    assert asked == ["a", "b", "none", "unknown"]
+    assert sorted(asked) == sorted(["a", "b", "none", "unknown"])
     assert found.left_out.probability == pytest.approx(0.1)
     assert shares(found)["unknown"] == pytest.approx(0.12)
     assert shares(found)["a"] == 0.74
@@ -55,7 +55,7 @@ def test_pairs_with_the_likeliest_effect_are_no_gap_without_it():
     chances |= {f"a+{name}": 0.04 for name in "defg"}
     run, asked = calibrated()
     found = weighed(chances, run)
-    assert asked == ["a", "none", "unknown", "a+unknown"]
+    assert sorted(asked) == sorted(["a", "none", "unknown", "a+unknown"])
     assert found.left_out.counted_as == "a+unknown"
     expected = {"a": 0.7, "none": 0.06, "unknown": 0.06, "a+unknown": 0.18}
     assert shares(found) == pytest.approx(expected)

@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 from hdcal.cli.console import Console
+from hdcal.errors import Finding, InputError, quoted
 
 # In the context of a command: that it loads ahead.
 _ASKED = f"{__name__}.asked"
@@ -33,7 +34,12 @@ def keep_compilations() -> None:
     HDCAL_CACHE_DIR names; where it cannot be written, nothing is kept, and a command
     says so. JAX' own compilation cache, which cannot serve beside it, is switched off
     for the process.
+
+    Raises:
+        InputError: JAX is told to use a processor that is not here.
     """
+    if os.environ.get("JAX_PLATFORMS", "cpu") != "cpu":
+        _require_platform()
     chosen = _cache_folder()
     kept = _is_writable(chosen)
     if kept:
@@ -49,8 +55,9 @@ def keep_compilations() -> None:
         _load_ahead(command)
     elif (console := command.find_object(Console)) is not None:
         console.words(
-            f"{chosen}: nothing can be kept here, so that each run takes seconds "
-            "longer. HDCAL_CACHE_DIR names another folder."
+            f"{chosen}: nothing is kept here, where you, and nobody else, should be "
+            "able to write; each run takes seconds longer. HDCAL_CACHE_DIR names "
+            "another folder."
         )
 
 
@@ -63,6 +70,17 @@ def _load_ahead(command: click.Context) -> None:
     task = "-".join([*command.command_path.split(), *sorted(given)])
     command.call_on_close(partial(ahead.end, task))
     ahead.begin(task)
+
+
+def _require_platform() -> None:
+    import jax
+
+    try:
+        jax.devices()
+    except (RuntimeError, AssertionError):
+        words = f"names {quoted(os.environ['JAX_PLATFORMS'])}, which JAX has not here"
+        remedy = "Unset it, or name what is here, such as cpu"
+        raise InputError([Finding("JAX_PLATFORMS", words, remedy)]) from None
 
 
 def _cache_folder() -> Path:

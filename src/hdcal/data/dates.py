@@ -100,7 +100,7 @@ def _readings(texts: Sequence[str] | np.ndarray) -> list[np.ndarray]:
             read = pd.to_datetime(plain[rest], format=day + time, errors="coerce")
             times[rest] = read.astype("datetime64[s]")
         each = times.to_numpy().astype("datetime64[s]")
-        each[~((each > _EARLIEST) & (each < _LATEST))] = np.datetime64("NaT")
+        each[~((each > _EARLIEST) & (each < _LATEST))] = np.datetime64("NaT", "s")
         found.append(each)
     # The way in which the fewest are left unread, and all others that leave as few.
     least = min(int(np.isnat(times).sum()) for times in found)

@@ -28,7 +28,7 @@ class Contrast:
         covariate: with which it goes.
         column: how, shape (n,).
         ways: the words for {way} where the coefficient is positive, and negative.
-        words: a statement with {way} and {size}.
+        words: a statement with {way} and {size}, to be formatted.
         beside: over which it is the swing off a straight line; None for its own.
         share: of the swing that is told.
     """
@@ -222,7 +222,8 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
                 "which moves the force by {size}",
                 beside=x,
             )
-    runs, gears = case.run_labels, case.specimen_labels
+    runs = [*map(_literally, case.run_labels)]
+    gears = [*map(_literally, case.specimen_labels)]
     for k in range(1, len(runs) if len(runs) <= _MOST_MEMBERS else 0):
         yield Contrast(
             "run",
@@ -247,3 +248,8 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             "which moves its force by {size}",
             beside=x,
         )
+
+
+def _literally(label: str) -> str:
+    """Return a label that formatting leaves as it was."""
+    return label.replace("{", "{{").replace("}", "}}")

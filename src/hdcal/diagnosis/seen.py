@@ -170,9 +170,9 @@ def _seen(contrast: Contrast, found: Structure, scale: float, quantile: float) -
     swing = abs(found.coefficient) * contrast.swing
     half = quantile * found.error * contrast.swing
     size = Interval(swing, max(swing - half, 0.0), swing + half)
-    words = contrast.words.replace("{way}", contrast.ways[found.coefficient < 0.0])
+    way = contrast.ways[found.coefficient < 0.0]
     return Seen(
-        statement=words.replace("{size}", newton(size.median)),
+        statement=contrast.words.format(way=way, size=newton(size.median)),
         covariate=contrast.covariate,
         size_N=size,
         p_value=found.p_value,

@@ -151,7 +151,7 @@ def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
         point, height, move, _ = here
         there = point - share * move
         there = (there, *look(there))
-        # What rounding decides is no ascent: near the mode full steps converge.
+        # What rounding decides counts as lower: near the mode full steps converge.
         lower = jnp.round(there[1], _DIGITS) <= jnp.round(height, _DIGITS)
         here = [jnp.where(lower, *both) for both in zip(there, here, strict=True)]
         return count + 1, jnp.where(lower, 1.0, _SHORTER * share), *here

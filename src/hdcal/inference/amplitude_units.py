@@ -49,6 +49,8 @@ def amplitude_units(
             for field, prior in own.items()
             if prior.family == "half_normal"
         }
+        if not widest:
+            continue
         slopes = _slopes(base, values, widest, padded, reading, effect=effect)
         for field, column in slopes.items():
             column = np.asarray(column)[: len(columns)]

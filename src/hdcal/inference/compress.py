@@ -77,10 +77,11 @@ class CompressedRows(Node):
 
 def group_rows(run, specimen, *known_sd) -> tuple[np.ndarray, np.ndarray]:
     """Return the distinct (run, specimen, sd, …) and the group of each row."""
-    keys = np.stack([run, specimen, *known_sd], axis=1).astype(float)
-    if (keys == keys[0]).all():
-        return keys[:1], np.zeros(len(keys), dtype=int)
-    distinct, group = np.unique(keys, axis=0, return_inverse=True)
+    keys = [np.asarray(key, float) for key in (run, specimen, *known_sd)]
+    if all((key == key[0]).all() for key in keys):
+        return np.stack(keys, axis=1)[:1], np.zeros(len(keys[0]), dtype=int)
+    table = np.stack(keys, axis=1)
+    distinct, group = np.unique(table, axis=0, return_inverse=True)
     return distinct, group.reshape(-1)
 
 

@@ -91,13 +91,16 @@ def _inseparable(seen: dict[str, np.ndarray]) -> list[list[str]]:
         return []
     strength, vectors = _strengths(list(seen.values()))
     flat = int(np.sum(strength < 1.0))
+    # Of directions that are alike to rounding the first is told.
     weakest = {
-        pair: _strengths([seen[name] for name in pair])[0][-1]
+        pair: round(float(_strengths([seen[name] for name in pair])[0][-1]), 9)
         for pair in combinations(seen, 2)
     }
     groups: list[list[str]] = []
     linked: dict[str, set[str]] = {name: {name} for name in seen}
-    for (one, other), least in sorted(weakest.items(), key=lambda item: item[1]):
+    for (one, other), least in sorted(
+        weakest.items(), key=lambda item: round(item[1], 9)
+    ):
         if least >= 1.0 or len(groups) == flat:
             break
         # A pair that others already link is no further direction.

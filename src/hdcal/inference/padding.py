@@ -50,7 +50,10 @@ def repeat_last_row(tree: Tree, size: int) -> Tree:
 
     def padded(array) -> np.ndarray:
         array = np.asarray(array)
-        return array[np.minimum(np.arange(size), len(array) - 1)]
+        whole = np.empty((size, *array.shape[1:]), array.dtype)
+        whole[: len(array)] = array
+        whole[len(array) :] = array[-1]
+        return whole
 
     return jax.tree.map(padded, tree)
 

@@ -4,6 +4,7 @@ import os
 import pickle
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache, partial
 from typing import Any
 
@@ -54,10 +55,13 @@ def computing_device() -> Any:
 
     Beside an H200 a calibration took 35 times as long on it as on one core: each of
     thousands of small steps waits for the one before. `JAX_PLATFORMS` tells JAX
-    otherwise.
+    otherwise; of several the first that is there counts.
     """
     asked = jax.config.jax_platforms  # pyright: ignore[reportAttributeAccessIssue]
-    return (jax.devices() if asked else jax.devices("cpu"))[0]
+    for name in (asked or "cpu").split(","):
+        with suppress(RuntimeError):
+            return jax.devices(name)[0]
+    return jax.devices()[0]
 
 
 def is_tracing() -> bool:
@@ -77,16 +81,21 @@ def lowered(function: Callable, name: str, arguments: Sequence) -> Any:
         name: for logs and profiles.
         arguments: arrays, or what has their shape and type.
     """
-    jitted = jax.jit(_named(function, name), compiler_options=_options())
+    # Told by what comes out as well: a program may use none of its arguments.
+    options = {"compiler_options": _options(), "out_shardings": _elsewhere()}
+    jitted: Any = jax.jit(_named(function, name), **options)
     return jitted.lower(*[_alike(a.shape, a.dtype) for a in arguments])
 
 
 def _alike(shape: tuple[int, ...], dtype: Any) -> jax.ShapeDtypeStruct:
     """Return what stands for an array on the device that programs run on."""
+    return jax.ShapeDtypeStruct(shape, dtype, sharding=_elsewhere())
+
+
+def _elsewhere() -> SingleDeviceSharding | None:
+    """Return where programs run, None where JAX would run them: bound to no device."""
     device = computing_device()
-    # What JAX places itself is not bound to its device.
-    own = None if device == jax.devices()[0] else SingleDeviceSharding(device)
-    return jax.ShapeDtypeStruct(shape, dtype, sharding=own)
+    return None if device == jax.devices()[0] else SingleDeviceSharding(device)
 
 
 def to_keep(program: Any, compiled: Any) -> bytes | None:

@@ -48,6 +48,7 @@ class _Kind(NamedTuple):
     fixed: tuple
     arrays: tuple
     settings: tuple
+    device: Any
     folder: Path | None
 
 
@@ -79,7 +80,7 @@ class Program:
         # Inside of another trace a program is part of it.
         if placed or is_tracing() or _is_debugged():
             return self._jitted(*args, **named, **fixed)
-        leaves = [_at_hand(leaf, device) for leaf in leaves]
+        leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         kind = _Kind(
             structure,
             tuple((name, type(value), value) for name, value in fixed.items()),
@@ -89,6 +90,7 @@ class Program:
                 os.environ.get("XLA_FLAGS"),
                 *(getattr(jax.config, name) for name in _SETTINGS),
             ),
+            device,
             folder(),
         )
         if kind not in self._ready:
@@ -127,8 +129,7 @@ class Program:
     def _file(self, kind: _Kind) -> Path | None:
         """Return where the program is kept; None where it cannot be."""
         name = f"{self.__module__}.{self._function.__qualname__}"
-        device = computing_device().device_kind
-        held = _text(kind.fixed), kind.arrays, kind.settings, device
+        held = _text(kind.fixed), kind.arrays, kind.settings, kind.device.device_kind
         told = repr((name, _outline(kind.structure), *held))
         # A function that another one made, or what is told by its place in this
         # process' memory, has no name elsewhere.
@@ -187,13 +188,6 @@ def _is_placed(leaf: Any, device: Any) -> bool:
     if isinstance(leaf, Tracer):
         return True
     return getattr(leaf, "committed", False) and leaf.devices() != {device}
-
-
-def _at_hand(leaf: Any, device: Any) -> Any:
-    """Return an argument as an array that a program of this device takes."""
-    if not isinstance(leaf, jax.Array):
-        return np.asarray(leaf)
-    return leaf if leaf.devices() == {device} else jax.device_put(leaf, device)
 
 
 def _is_foreign(kind: _Kind) -> bool:
