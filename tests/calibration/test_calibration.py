@@ -41,7 +41,6 @@ def posterior():
     return calibrate(make_case(with_force(ramp(40))), seed=4, **SHORT)
 
 
-@pytest.mark.thorough
 def test_what_was_sampled_is_what_would_be_built_anew(posterior):
     sampled, built = vars(posterior)["problem"], replace(posterior).problem
     assert jax.tree.structure(sampled) == jax.tree.structure(built)
@@ -49,6 +48,7 @@ def test_what_was_sampled_is_what_would_be_built_anew(posterior):
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_draws(posterior):
     case = posterior.case
     again, other = (calibrate(case, seed=seed, **SHORT) for seed in (4, 5))

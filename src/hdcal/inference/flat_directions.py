@@ -98,9 +98,7 @@ def _inseparable(seen: dict[str, np.ndarray]) -> list[list[str]]:
     }
     groups: list[list[str]] = []
     linked: dict[str, set[str]] = {name: {name} for name in seen}
-    for (one, other), least in sorted(
-        weakest.items(), key=lambda item: round(item[1], 9)
-    ):
+    for (one, other), least in sorted(weakest.items(), key=lambda item: item[1]):
         if least >= 1.0 or len(groups) == flat:
             break
         # A pair that others already link is no further direction.
