@@ -20,7 +20,6 @@ CONTRACTS = {
 # contract -> (module that sins, what it imports); one entry for every contract
 VIOLATIONS = {
     "rooms": ("data/records.py", "import hdcal.physics.chain"),
-    "blind": ("blind/answer.py", "import hdcal.design.sizes"),
     "shared_causes": ("shared_causes/summary.py", "import hdcal.design.sizes"),
     "diagnosis": ("diagnosis/library.py", "import hdcal.tracking.tracker"),
     "engine": (
@@ -29,7 +28,6 @@ VIOLATIONS = {
     ),
     "calibration": ("calibration/summary.py", "import hdcal.classical.fit.fit"),
     "moving": ("motion/summary.py", "import hdcal.classical.fit.fit"),
-    "virtual_rig": ("blind/virtual_rig/paths.py", "import hdcal.physics.theory"),
     "effects": (
         "physics/effects/outliers.py",
         "import hdcal.physics.effects.coulomb_friction",

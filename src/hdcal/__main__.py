@@ -13,7 +13,6 @@ from types import FrameType
 
 import click
 
-from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
@@ -88,7 +87,6 @@ for _command in (
     check,
     effects,
     audit,
-    blind,
     show_topic,
     show_completion,
 ):

@@ -16,7 +16,6 @@ WRITING = [
     ["audit"],
     ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
     ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
-    ["blind", "make", "--cases", "1000", "--mix", "prior", "--key", "key"],
 ]
 
 

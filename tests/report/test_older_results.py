@@ -64,11 +64,6 @@ OLD = {
         *("margin.json", "hdcal.margin/1", "margin.svg", "margin.png"),
         *("tornado.svg", "tornado.png", "report.html"),
     ),
-    "blind": (
-        *("scores.json", "hdcal.blind-scores/1", "opening.json", "labels.json"),
-        *("bar.svg", "bar.png", "confusion.svg", "confusion.png", "detection.svg"),
-        *("detection.png", "reliability.svg", "reliability.png", "report.html"),
-    ),
 }
 
 
