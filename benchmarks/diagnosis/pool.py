@@ -6,15 +6,12 @@ from functools import partial
 from multiprocessing import get_context
 
 from benchmarks.diagnosis.score import Task, score
-from hdcal.cli.compilation_cache import keep_compilations
 
 
 def run(tasks: list[Task], seed: int, processes: int) -> list[dict]:
     """Score every task; the rows come in the order of the tasks."""
     rows = []
-    with ProcessPoolExecutor(
-        processes, get_context("spawn"), initializer=keep_compilations
-    ) as pool:
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         for row in pool.map(partial(score, seed=seed), tasks, chunksize=4):
             rows.append(row)
             if len(rows) % 20 == 0:

@@ -151,9 +151,6 @@ def answer_there(
     task: CaseTask, csv: bytes, gear: bytes, material: bytes | None
 ) -> CaseOutcome:
     """Answer a case on a worker of a cluster, which shares no disk with anyone."""
-    from hdcal.cli.compilation_cache import keep_compilations
-
-    keep_compilations()
     return answer_bytes(task, csv, gear, material)
 
 

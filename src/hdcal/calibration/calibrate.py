@@ -16,7 +16,6 @@ from hdcal.inference import laplace
 from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
-from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.held import LOOP, PILOT_NOISE
 from hdcal.inference.linearisation import linearise
@@ -176,7 +175,6 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
     # Readings showed that noise grows, and nobody asked for it.
     shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in effects

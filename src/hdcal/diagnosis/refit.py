@@ -9,7 +9,6 @@ least.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -29,8 +28,6 @@ from hdcal.report.parameters import credible_interval
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
-# Calibrations at a time: while one samples, the next is prepared.
-_AT_ONCE = 2
 
 
 @dataclass(frozen=True)
@@ -119,12 +116,7 @@ def weighed(
         calibrated: returns the posterior of one.
     """
     chosen = _probable(probabilities)
-    pool = ThreadPoolExecutor(_AT_ONCE)
-    try:
-        fits = dict(zip(chosen, pool.map(calibrated, chosen), strict=True))
-    finally:
-        # Who interrupts does not wait for the other one.
-        pool.shutdown(wait=False, cancel_futures=True)
+    fits = {name: calibrated(name) for name in chosen}
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)

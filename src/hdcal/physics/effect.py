@@ -9,9 +9,10 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import Any, ClassVar, Literal
 
+import equinox as eqx
+from jaxtyping import Float
+
 from hdcal.data.records import Array, Records
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 Stage = Literal["deformation", "force", "sensor", "noise"]
 
@@ -42,7 +43,7 @@ def parameter(
     )
 
 
-class Rows(Node):
+class Rows(eqx.Module):
     """What an effect may look at: the records and what earlier stages made of them.
 
     Attributes:
@@ -59,7 +60,7 @@ class Rows(Node):
     deformation: Float[Array, " n"]
 
 
-class Noise(Node):
+class Noise(eqx.Module):
     """Reading noise as a mixture of normals, one column per row of the data.
 
     Attributes:
@@ -71,7 +72,7 @@ class Noise(Node):
     sd: Float[Array, "c n"]
 
 
-class Effect(Node, ABC):
+class Effect(eqx.Module, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
     Class attributes:

@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, ClassVar, Literal, final
 
 import jax.numpy as jnp
 from jax.scipy.special import ndtri
+from jaxtyping import Float, Int
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows
-from hdcal.programs.shapes import Float, Int
 
 Kind = Literal["run", "specimen"]
 # Multiples of it fill the unit interval evenly, whatever their number.

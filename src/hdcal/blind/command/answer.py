@@ -3,7 +3,6 @@
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 
@@ -31,8 +30,6 @@ _INTERRUPTED = 130
 @click.pass_obj
 def answer(console: Console, folder, **settings) -> int:
     """Answer every case of DIR; an interrupted run goes on when it is run again."""
-    one_thread_for_algebra()
-    keep_compilations()
     from hdcal.blind.answer import FrozenAnswer
     from hdcal.blind.answering import answer_set
     from hdcal.cli.progress import progress_bar

@@ -9,7 +9,6 @@ import click
 
 from hdcal.blind.command.forms import check_forms
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import force_option, json_option
 from hdcal.errors import said_if_interrupted
@@ -42,7 +41,6 @@ _HELP = {
 @click.pass_obj
 def make(console: Console, source, out, key, force, **given) -> None:
     """Seal cases drawn from a mix, or one measurement with a stated cause."""
-    one_thread_for_algebra()
     check_forms(real=source is not None)
     from hdcal.blind.answer import SetAnswer
     from hdcal.blind.sealed_set import write_set

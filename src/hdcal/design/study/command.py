@@ -6,7 +6,6 @@ import click
 
 from hdcal.cli import options
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import LENGTH, read_grid, read_named
 from hdcal.errors import Finding
@@ -48,7 +47,6 @@ def study(console: Console, run, gear, article, out, force, **asked):
     """
     if article:
         return _article(console, run)
-    keep_compilations()
     from hdcal.design.sources import open_source
     from hdcal.design.study.study import study as run_study
     from hdcal.design.study.summary import study_report

@@ -2,8 +2,10 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -28,15 +30,13 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.
 _CHUNK, _MOST_STATES = 250, 1_000_000
 
 
-class _Leftover(Node):
+class _Leftover(eqx.Module):
     """What the model leaves of the force of one draw, none at the unloaded gear."""
 
     problem: Problem
@@ -76,7 +76,7 @@ def _with_values(effect: type[Effect], values) -> Effect:
     return effect(**own)
 
 
-@program(static=("kept", "with_damping"))
+@partial(jax.jit, static_argnames=("kept", "with_damping"))
 def _each(
     values,
     reading,

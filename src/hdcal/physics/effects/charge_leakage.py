@@ -2,10 +2,11 @@
 
 from typing import ClassVar, Literal
 
+from jaxtyping import Float
+
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import fading
-from hdcal.programs.shapes import Float
 
 
 class ChargeLeakage(Effect):

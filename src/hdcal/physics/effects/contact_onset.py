@@ -3,10 +3,10 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # The corner is rounded over this share of the onset, and no less than [mm].
 _ROUNDED, _LEAST = 0.02, 1e-4

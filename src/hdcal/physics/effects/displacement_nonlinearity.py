@@ -2,9 +2,10 @@
 
 from typing import ClassVar, Literal
 
+from jaxtyping import Float
+
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 
 class DisplacementNonlinearity(Effect):

@@ -3,10 +3,10 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # Below this x the series of tanh(√x)/√x, cut after x³, is exact in double precision.
 _SMALL = 1e-3

@@ -4,11 +4,11 @@ from typing import ClassVar, Literal
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import stop_cells
-from hdcal.programs.shapes import Float
 
 # Where the cells slip, in reaches. Evenly spread, so the loop bends gradually.
 _SPREAD = np.array([0.25, 0.5, 0.75, 1.0])

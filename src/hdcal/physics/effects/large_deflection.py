@@ -2,9 +2,10 @@
 
 from typing import ClassVar, Literal
 
+from jaxtyping import Float
+
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # Series of the inextensible elastic ring under two opposed loads, in ω/R.
 _FIRST, _SECOND = -1.543, 3.35

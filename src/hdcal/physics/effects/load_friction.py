@@ -3,10 +3,10 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 
 class LoadFriction(Effect):

@@ -3,10 +3,10 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Noise, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # A fraction of exactly zero has no logarithm. This one is nothing in double precision
 # for readings up to 26 sds out, and the slope at zero stays right.

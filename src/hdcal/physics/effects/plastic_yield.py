@@ -3,11 +3,11 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import play
-from hdcal.programs.shapes import Float
 
 
 class PlasticYield(Effect):

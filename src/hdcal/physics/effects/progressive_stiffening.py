@@ -3,10 +3,10 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # Rounding radius of |ω| at zero [mm], far below any reading.
 _CORNER = 1e-4

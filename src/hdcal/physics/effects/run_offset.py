@@ -3,11 +3,11 @@
 from typing import ClassVar, Literal
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Rows, Stage, parameter
 from hdcal.physics.scatter import Kind, Scatter
-from hdcal.programs.shapes import Float
 
 
 class RunOffset(Scatter):

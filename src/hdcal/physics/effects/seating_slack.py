@@ -2,9 +2,10 @@
 
 from typing import ClassVar
 
+from jaxtyping import Float
+
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
-from hdcal.programs.shapes import Float
 
 # Smallest clearance that is told from none [mm]; keeps the gradient finite at rest.
 _NEGLIGIBLE = 1e-6

@@ -2,10 +2,11 @@
 
 from typing import ClassVar
 
+from jaxtyping import Float
+
 from hdcal.data.records import Array
 from hdcal.physics.effect import Rows, Stage, parameter
 from hdcal.physics.scatter import Kind, Scatter
-from hdcal.programs.shapes import Float
 
 
 class SpecimenVariation(Scatter):

@@ -3,11 +3,11 @@
 from typing import ClassVar
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Effect, Rows, Stage, parameter
 from hdcal.physics.history import load_cycle
-from hdcal.programs.shapes import Float
 
 
 class StiffnessFatigue(Effect):

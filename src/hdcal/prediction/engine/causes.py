@@ -3,10 +3,11 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Literal
 
+import jax
 import numpy as np
 
 from hdcal.data.prior import Prior
@@ -28,7 +29,6 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, without_texts
 from hdcal.inference.values import POSITIVE, Values
 from hdcal.prediction.engine.models import Models, model_pairs
-from hdcal.programs.program import program
 from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
@@ -217,7 +217,7 @@ def sample_prior(prior: Prior, name: str, key, count: int) -> np.ndarray:
     return np.asarray(_drawn(known, key, positive=name in POSITIVE, count=count))
 
 
-@program(static=("positive", "count"))
+@partial(jax.jit, static_argnames=("positive", "count"))
 def _drawn(prior: Prior, key, *, positive: bool, count: int):
     return distribution(prior, positive=positive).sample(key, (count,))
 
