@@ -36,7 +36,6 @@ PUBLIC = [
     "fleet",
     "force",
     "inverse_design",
-    "keep_compilations",
     "margin",
     "parameter",
     "predict",

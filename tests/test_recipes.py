@@ -285,24 +285,3 @@ def test_a_command(tree: Path):
     assert "weight" in run(tree, "-m", "hdcal", "--help")
     script = "import sys; from importlinter.cli import lint_imports_command as c; c()"
     run(tree, "-c", script, "--no-cache", "--contract", "rooms")
-
-
-def test_a_section_of_a_report(tree: Path):
-    name = "src/hdcal/classical/audit/document.py"
-    text = (tree / name).read_text("utf-8")
-    text += dedent(
-        """
-
-        def _moral() -> Section:
-            return Section("Moral", [Text("Print the data beside the claims.")], True)
-        """
-    )
-    text = text.replace(
-        "        sections=[", "        sections=[\n            _moral(),", 1
-    )
-    assert listed("A section of a report", room="classical/audit") == {name}
-    follow(tree, {name: text})
-    said = run(tree, "-m", "hdcal", "audit", "--out", "made")
-    assert "Moral" in said and "Print the data beside the claims." in said
-    page = (tree / "made" / "report.html").read_text("utf-8")
-    assert "<summary>Moral</summary>" in page
