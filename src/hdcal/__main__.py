@@ -18,7 +18,6 @@ from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
-from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
@@ -87,7 +86,6 @@ for _command in (
     init,
     check,
     effects,
-    audit,
     blind,
     show_topic,
     show_completion,
