@@ -18,11 +18,10 @@ from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
-from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
-from hdcal.cli.topics import COMPLETE, show_completion, show_topic
+from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
@@ -107,10 +106,8 @@ for _command in (
     init,
     check,
     effects,
-    audit,
     blind,
     show_topic,
-    show_completion,
 ):
     hdcal.add_command(_command)
 
@@ -118,7 +115,7 @@ for _command in (
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every outcome is an exit code and plain words."""
     given = sys.argv[1:] if arguments is None else arguments
-    if COMPLETE in os.environ:
+    if "_HDCAL_COMPLETE" in os.environ:
         # A shell asks for what may follow, and click answers and ends the process.
         hdcal.main([], "hdcal")
     for name, value in _environment():

@@ -13,7 +13,6 @@ WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
     ["fit", XB1],
-    ["audit"],
     ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
     ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
     ["blind", "make", "--cases", "1000", "--mix", "prior", "--key", "key"],
@@ -46,11 +45,11 @@ def test_an_interruption_after_the_end_says_what_is_written(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     def interrupted(*_) -> None:
-        assert (tmp_path / "run" / "audit.json").exists()
+        assert (tmp_path / "run" / "fit.json").exists()
         raise KeyboardInterrupt
 
     monkeypatch.setattr("hdcal.report.terminal.terminal_lines", interrupted)
-    done = here("audit", "--out", "run")
+    done = here("fit", XB1, "--out", "run")
     assert done.returncode == 130 and not done.stdout
     assert done.stderr.strip() == "hdcal: interrupted: run is written"
     assert {path.name for path in tmp_path.iterdir()} == {"run"}
@@ -59,21 +58,21 @@ def test_an_interruption_after_the_end_says_what_is_written(
 def test_what_appears_meanwhile_is_kept_and_told(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
-    from hdcal.classical.audit import audit
+    from hdcal.classical.fit import summary
 
-    check_claims = audit.audit
+    report = summary.fit_report
 
-    def slow():
-        (tmp_path / "run").mkdir()
-        (tmp_path / "run" / "thesis.txt").write_text("years of work")
-        return check_claims()
+    def slow(*given, **named):
+        (tmp_path / "made").mkdir()
+        (tmp_path / "made" / "thesis.txt").write_text("years of work")
+        return report(*given, **named)
 
-    monkeypatch.setattr(audit, "audit", slow)
-    done = here("audit", "--out", "run", "--force", "--json")
+    monkeypatch.setattr(summary, "fit_report", slow)
+    done = here("fit", XB1, "--out", "made", "--force", "--json")
     assert done.returncode == 2
     (finding,) = json.loads(done.stdout)["findings"]
-    assert finding["file"] == "run" and "'run-2'" in finding["problem"]
-    assert {path.name for path in tmp_path.iterdir()} == {"run", "run-2"}
-    assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.txt"]
-    answer = json.loads((tmp_path / "run-2" / "audit.json").read_text("utf-8"))
-    assert answer["schema"] == "hdcal.audit/1"
+    assert finding["file"] == "made" and "'made-2'" in finding["problem"]
+    assert {path.name for path in tmp_path.iterdir()} == {"made", "made-2"}
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["thesis.txt"]
+    answer = json.loads((tmp_path / "made-2" / "fit.json").read_text("utf-8"))
+    assert answer["schema"] == "hdcal.fit/1"

@@ -207,9 +207,10 @@ def test_a_command_names_the_input_that_went_away(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     monkeypatch.setattr(
-        "hdcal.classical.audit.audit.audit", (tmp_path / "data.csv").read_bytes
+        "hdcal.classical.fit.summary.fit_report",
+        lambda *_, **__: (tmp_path / "data.csv").read_bytes(),
     )
-    done = here("audit", "--out", "run", "--json")
+    done = here("fit", XB1, "--out", "run", "--json")
     assert done.returncode == 1 and not any(tmp_path.iterdir())
     words = "the system refused: No such file or directory: "
     assert f"{words}{tmp_path / 'data.csv'}" in done.stderr

@@ -50,7 +50,6 @@ OLD = {
         *("response.json", "hdcal.response/1", "response.csv", "response.svg"),
         *("response.png", "report.html"),
     ),
-    "audit": ("audit.json", "hdcal.audit/1", "report.html"),
     "fit": ("fit.json", "hdcal.fit/1", "fit.svg", "fit.png", "report.html"),
     "design": (
         *("design.json", "hdcal.design/1", "design.svg", "design.png"),
