@@ -24,7 +24,7 @@ from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.report.answer import Answer
-from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving import MARKER
 
 WALL = "wall_thickness_mm=0.5:0.8"
 FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
@@ -71,7 +71,7 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     said = valid(done.stdout, GeneratorAnswer)
     folder = tmp_path / "xb1-100-80-design"
     files = {path.name for path in folder.iterdir()}
-    assert files == {"design.json", "report.html", STAMP, *FIGURES}
+    assert files == {"design.json", "report.html", MARKER, *FIGURES}
     assert json.loads((folder / "design.json").read_text("utf-8")) == said
     assert (said["schema"], said["kind"]) == ("hdcal.design/1", "wave_generator")
     assert said["spring"]["probability"] >= 0.99
@@ -115,7 +115,7 @@ def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
     folder = tmp_path / "xb1-100-80-study"
     names = {path.name for path in folder.iterdir()}
     files = {"study.csv", "study.json", "study.svg", "study.png", "report.html"}
-    assert names == files | {STAMP}
+    assert names == files | {MARKER}
     with (folder / "study.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 15

@@ -36,7 +36,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     DATA may be a folder with a file, or a folder, for each gear too.
     """
     from hdcal.data.reading import UNSIZED
-    from hdcal.report.saving.reserve import reserve_file
+    from hdcal.report.saving import Target
 
     with console.wrong:
         case = read_whole(console, given)
@@ -51,7 +51,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         places = {}
         for name, text in asked.items():
             if name is not None:
-                reserve = partial(reserve_file, name, force=force, beginning=text)
+                reserve = partial(Target, name, force, beginning=text)
                 places[name] = console.hold(reserve)
     assert case is not None
     from hdcal.calibration.check.document import check_document
@@ -60,13 +60,15 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     found = check_answer(case)
     code = console.answer(check_document(found, lacking=effects), found)
     if write_gear:
-        places[write_gear].write(gear_file(case).encode())
+        with places[write_gear].filled() as path:
+            path.write_text(gear_file(case), "utf-8")
         console.words(f"the gear file: {write_gear}. Add what it does not know yet")
     if plot:
         from hdcal.calibration.check.figure import readings_figure
         from hdcal.report.canvas import render
 
         kind = "svg" if beginning == _SVG else "png"
-        places[plot].write(render(readings_figure(case), kind, case.name))
+        with places[plot].filled() as path:
+            path.write_bytes(render(readings_figure(case), kind, case.name))
         console.words(f"the picture: {plot}")
     return code

@@ -151,7 +151,7 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
     Raises:
         InputError: one of them is there already, or cannot be written.
     """
-    from hdcal.report.saving.reserve import reserve_file
+    from hdcal.report.saving import Target
 
     made = not folder.exists()
     if made and not folder.parent.is_dir():
@@ -166,11 +166,13 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
         folder.mkdir()
     try:
         with ExitStack() as held:
-            places = {
-                name: held.enter_context(reserve_file(folder / name)) for name in files
+            targets = {
+                name: held.enter_context(Target(str(folder / name), beginning=b""))
+                for name in files
             }
             for name, content in files.items():
-                places[name].write(content)
+                with targets[name].filled() as path:
+                    path.write_bytes(content)
     except BaseException:
         if made and not any(folder.iterdir()):
             folder.rmdir()
