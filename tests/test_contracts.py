@@ -30,10 +30,6 @@ VIOLATIONS = {
     "calibration": ("calibration/summary.py", "import hdcal.classical.fit.fit"),
     "moving": ("motion/summary.py", "import hdcal.classical.fit.fit"),
     "virtual_rig": ("blind/virtual_rig/paths.py", "import hdcal.physics.theory"),
-    "effects": (
-        "physics/effects/outliers.py",
-        "import hdcal.physics.effects.coulomb_friction",
-    ),
     "physics": ("physics/chain.py", "import xarray"),
     "numpyro": ("data/records.py", "import numpyro.distributions"),
     "diffrax": ("inference/model.py", "import diffrax"),

@@ -64,33 +64,23 @@ def run(tree: Path, *arguments: str) -> str:
 @pytest.mark.thorough
 def test_an_effect(tree: Path):
     code = '''
-        """Grease that clings to the plunger."""
-
-        from typing import ClassVar, Literal
-
-        from jaxtyping import Float
-
-        from hdcal.data.records import Array
-        from hdcal.physics.effect import Effect, Rows, Stage, parameter
-
-
-        class GreaseCling(Effect):
+        class GreaseCling(
+            Effect,
+            stage="sensor",
+            groups=("zero over temperature",),
+            needs=("temperature",),
+            symmetry="even",
+        ):
             """F → F + g (T − T_ref)².
 
             Source: made up for this test.
             """
 
-            name: ClassVar[str] = "grease_cling"
-            stage: ClassVar[Stage] = "sensor"
-            groups: ClassVar[tuple[str, ...]] = ("zero over temperature",)
-            needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
-            symmetry: ClassVar[Literal["odd", "even", "none"]] = "even"
-
-            pull: Float[Array, ""] | float = parameter(
+            pull: Scalar = parameter(
                 "N/K^2", "pull per squared kelvin", typical=1e-3, null=0.0
             )
 
-            def apply(self, signal: Float[Array, " n"], rows: Rows):
+            def apply(self, signal: PerRow, rows: Rows) -> PerRow:
                 """Return the force with the grease's pull."""
                 return signal + self.pull * rows.temperature_rise**2
         '''
@@ -105,22 +95,19 @@ def test_an_effect(tree: Path):
     new_row = "| [grease_cling](grease_cling.md) | sensor | pull | temperature |\n"
     index = index.replace(row, row + new_row)
     index = index.replace("\nforce_saturation\n", "\nforce_saturation\ngrease_cling\n")
-    registry = (tree / "src/hdcal/physics/registry.py").read_text("utf-8")
-    registry = registry.replace(
-        "from hdcal.physics.effects.heteroscedastic_noise",
-        "from hdcal.physics.effects.grease_cling import GreaseCling\n"
-        "from hdcal.physics.effects.heteroscedastic_noise",
-    ).replace(
-        "        ForceSaturation,", "        ForceSaturation,\n        GreaseCling,"
-    )
+    listed_after = "        sensor.ForceSaturation,\n"
+    registry = listed_after, listed_after + "        temperature.GreaseCling,\n"
+    marker = "class ThermalZeroDrift("
     changes = {
-        "src/hdcal/physics/effects/grease_cling.py": code,
+        "src/hdcal/physics/effects/temperature.py": (marker, dedent(code) + marker),
         "src/hdcal/physics/registry.py": registry,
         "priors/effects.toml": ("\n[force_saturation]", prior),
         "docs/effects/grease_cling.md": page,
         "docs/effects/index.md": index,
     }
-    assert changes.keys() == listed("An effect", name="grease_cling")
+    assert changes.keys() == listed(
+        "An effect", kind="temperature", name="grease_cling"
+    )
     follow(tree, changes)
     effects = json.loads(run(tree, "-m", "hdcal", "effects", "--json"))["effects"]
     assert "grease_cling" in [effect["name"] for effect in effects]
