@@ -17,8 +17,8 @@ from hdcal.data.records import Records
 from hdcal.inference.distributions import frozen
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.effects.scatter import Scatter, scores
 from hdcal.physics.registry import EFFECTS
-from hdcal.physics.scatter import Scatter, scores
 
 MOST = 4.0
 # Shape points, and steps of the amplitude among which r is sought.

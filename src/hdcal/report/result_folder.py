@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from hdcal.data.formula_cells import without_formula
 from hdcal.report.chart_drawing import images
 from hdcal.report.page import html_page
 from hdcal.report.result import Result
+from hdcal.report.table_files import columns_csv
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -43,22 +43,11 @@ def write_result(
     }
     for name, each in drawn.items():
         contents |= {f"{name}.{kind}": image for kind, image in each.items()}
-    contents |= {name: csv_file(table) for name, table in (tables or {}).items()}
+    contents |= {
+        name: columns_csv(dict(table)).encode()
+        for name, table in (tables or {}).items()
+    }
     contents |= {name: make() for name, make in (others or {}).items()}
     with target.filled() as folder:
         for name, content in contents.items():
             (folder / name).write_bytes(content)
-
-
-def csv_file(table: "pd.DataFrame") -> bytes:
-    """Return a table as CSV whose cells no spreadsheet takes for formulas."""
-    safe = table.rename(columns=without_formula)
-    for name, column in safe.items():
-        if column.dtype == bool:
-            safe[name] = column.map({True: "true", False: "false"})
-        elif column.dtype.kind not in "iuf":
-            safe[name] = column.map(without_formula, na_action="ignore")
-    # Nine digits: a millionth of a newton is far below any reading. Cells that hold an
-    # end of line are quoted, whichever of the two characters it is.
-    text = safe.to_csv(index=False, float_format="%.9g", lineterminator="\r\n")
-    return text.replace("\r\n", "\n").encode()
