@@ -13,8 +13,6 @@ from moving import still_posterior
 
 import hdcal
 from hdcal.__main__ import hdcal as program
-from hdcal.blind.answering import answer_set
-from hdcal.blind.virtual_rig.cases import draw_cases
 from hdcal.classical.fit.summary import fit_report
 from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
@@ -196,11 +194,10 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("at",),
     ),
     (
-        lambda _, cases=1, seed=1: next(draw_cases("no mix", cases, seed)),
+        lambda run, **asked: hdcal.causes(run.case, **{"seed": -1, **asked}),
         {},
-        ("cases", "seed"),
+        ("jobs",),
     ),
-    (lambda _, jobs: answer_set("no set", jobs=jobs), {}, ("jobs",)),
     (lambda run, seed: hdcal.diagnose(_falling(run.case), seed=seed), {}, ("seed",)),
 ]
 SEVERAL = {
@@ -221,8 +218,6 @@ def asked_entries() -> Iterator[tuple[str, str, Callable]]:
             quantity = {"vary": "size"}.get(name, name)
             if function is hdcal.respond and name == "draws":
                 quantity = "gears"
-            if name == "seed" and "cases" in names:
-                quantity = "secret_seed"
 
             def ask(value, run, function=function, other=other, name=name):
                 given = SEVERAL.get(name, lambda v: v)(value)

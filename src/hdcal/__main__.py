@@ -13,7 +13,6 @@ from pathlib import Path
 import click
 import platformdirs
 
-from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
@@ -106,7 +105,6 @@ for _command in (
     init,
     check,
     effects,
-    blind,
     show_topic,
 ):
     hdcal.add_command(_command)

@@ -26,10 +26,6 @@ from hdcal.calibration.effects.answer import EffectsAnswer
         ["diagnose", "-h"],
         ["fit", "-h"],
         ["track", "-h"],
-        ["blind", "-h"],
-        ["blind", "make", "-h"],
-        ["blind", "answer", "-h"],
-        ["blind", "open", "-h"],
     ],
 )
 def test_help_is_given_without_heavy_imports(arguments):
