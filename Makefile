@@ -58,7 +58,8 @@ contracts: .venv/installed  ## who may import whom
 	$(BIN)/lint-imports --no-cache
 
 docs: .venv/installed  ## the documentation, in docs/_build/html
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/sphinx-build -W -q -b doctest -d docs/_build/doctrees docs docs/_build/doctest
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/doctrees docs docs/_build/html
 	@echo "The documentation: docs/_build/html/index.html"
 
 bench: .venv-bench/installed  ## compare speed and answers with other tools

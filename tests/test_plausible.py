@@ -21,7 +21,6 @@ from hdcal.data.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
 from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import InputError
-from hdcal.prediction.tolerance_factors import k_factor
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
 MATERIAL = """
@@ -185,11 +184,6 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("alarm_rows", "forget", "reopen", "seed"),
     ),
     (
-        lambda run, **asked: k_factor(**{"size": 3, **asked}),
-        {},
-        ("size", "content", "confidence"),
-    ),
-    (
         lambda run, **asked: hdcal.fit(run.case, **asked),
         {},
         ("degrees",),
@@ -221,7 +215,7 @@ def asked_entries() -> Iterator[tuple[str, str, Callable]]:
     """Yield the quantity, its parameter, and what asks with it."""
     for function, other, names in ASKED:
         for name in names:
-            quantity = {"vary": "size", "size": "sample"}.get(name, name)
+            quantity = {"vary": "size"}.get(name, name)
             if function is hdcal.respond and name == "draws":
                 quantity = "gears"
 

@@ -25,7 +25,6 @@ from hdcal.calibration.effects.answer import EffectsAnswer
         ["effects", "-h"],
         ["diagnose", "-h"],
         ["fit", "-h"],
-        ["audit", "-h"],
         ["track", "-h"],
     ],
 )

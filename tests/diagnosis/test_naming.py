@@ -1,4 +1,4 @@
-"""What a name is worth is counted where the truth is known, and said with each name."""
+"""Counts of right and wrong names limit which effects a diagnosis names."""
 
 import pytest
 from diagnosis_cases import judged, rich, simulated

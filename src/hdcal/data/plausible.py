@@ -114,7 +114,6 @@ RANGES = {
     "seed": Range(0, 2**32 - 1, "", "32 bits"),
     "jobs": Range(1, 256, "", "processes of one machine"),
     "degree": Range(1, 9, "", "higher ones leave no digits"),
-    "sample": Range(2, 1e9, "", "one specimen has no spread"),
     "alarm_rows": Range(10.0, 1e9, "", "less is noise, more is never"),
     "forget": Range(0.5, 1.0, "", "0.999 keeps about the last thousand readings"),
     "reopen": Range(0.0, 1.0, "", "a share of the stiffness, such as 0.1"),

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,19 +9,18 @@ from shutil import rmtree
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.console import Console
-from hdcal.cli.meanwhile import imported_meanwhile
 from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, Findings, HdcalError, InputError
-from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving import MARKER
 
 Refused = Mapping[str, tuple[Finding, ...]]
 # What lies beside the folders of many cases.
 REFUSED = "refused.json"
-_OWN_FILES = {STAMP, REFUSED}
+_OWN_FILES = {MARKER, REFUSED}
 
 
 @dataclass(frozen=True)
@@ -168,8 +166,7 @@ def _diagnose_one(
     effects = choose_library(library, EFFECTS)
     settings = {"quick": quick, "seed": seed}
     try:
-        with imported_meanwhile("hdcal.report.canvas") if report else nullcontext():
-            verdict = diagnose(case, library=effects, progress=progress, **settings)
+        verdict = diagnose(case, library=effects, progress=progress, **settings)
         return write_verdict(verdict, folder, command, report=report)
     except InputError as error:
         return error.findings
