@@ -6,6 +6,7 @@ from typing import Literal
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from pydantic import ValidationError
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from hdcal.report import sentences
 from hdcal.report.chart_spec import Chart, Line, Panel
 from hdcal.report.result import Draws, Interval, Item, Result, quantity
+from hdcal.report.result_folder import csv_file
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"
 BODY = """\
@@ -113,6 +115,27 @@ def test_the_table_has_the_ends_of_intervals_and_no_empty_column():
     assert list(frame.columns) == ["gear", "force_N", "force_lo", "force_hi"]
     assert frame.force_lo.tolist() == [1.0, 1.0] and frame.force_hi.isna().all()
     assert forces(2).to_datatree()["force_N"].dims == ("row",)
+
+
+def test_a_table_of_items_by_name_has_their_names():
+    class Named(Forces):
+        table = "named"
+
+        @property
+        def named(self):
+            return {"K": Interval(median=2.0, lo=1.0, hi=3.0)}
+
+    frame = Named(rows=(), draws=np.zeros(3)).to_frame()
+    assert frame.to_dict("records") == [{"name": "K", "median": 2, "lo": 1, "hi": 3}]
+
+
+def test_csv_has_no_formula_and_no_broken_row():
+    columns = {"=a": ["=1+1", "x\ry,z", None], "n": [1.0, np.nan, 1 / 3]}
+    columns["ok"] = [True, False, True]
+    text = csv_file(pd.DataFrame(columns)).decode()
+    assert text.split("\n") == [
+        *["'=a,n,ok", "'=1+1,1,true", '"x\ry,z",,false', ",0.333333333,true", ""]
+    ]
 
 
 def test_texts_from_files_are_shown_as_they_are():
