@@ -53,12 +53,6 @@ def test_a_table_of_others_is_kept(here: Hdcal, calibrated, tmp_path: Path):
     assert set(os.listdir(tmp_path)) == {"readings.csv", "bands.csv"}
 
 
-def test_a_result_is_replaced_with_force(here: Hdcal, tmp_path: Path):
-    for more, code in (([], 0), ([], 2), (["--force"], 0)):
-        assert here("audit", "--out", "run", *more).returncode == code
-        assert os.listdir(tmp_path) == ["run"]
-
-
 def test_an_interruption_after_the_end_says_what_is_written(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
