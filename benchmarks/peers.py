@@ -24,7 +24,6 @@ def hdcal(_: Path) -> None:
     """Also compares with the priors and checks the residuals."""
     import hdcal
 
-    hdcal.keep_compilations()
     found = hdcal.calibrate(hdcal.read_case(CASE))
     for name, diagnosis in found.diagnoses.items():
         print(name, found.draws[name].mean(), diagnosis)
@@ -34,7 +33,6 @@ def numpyro(numbers: Path) -> None:
     import jax
 
     jax.config.update("jax_enable_x64", True)
-    jax.config.update("jax_compilation_cache_dir", str(numbers.parent / "jax"))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
     import arviz_base

@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
     from hdcal.classical.fit.fit import fit
-    from hdcal.cli.compilation_cache import keep_compilations
     from hdcal.comparison.compare import compare
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
@@ -64,7 +63,6 @@ _HOMES = {
     "fleet": "fleets.fleet",
     "force": "physics.chain",
     "inverse_design": "design.inverse_design",
-    "keep_compilations": "cli.compilation_cache",
     "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
     "predict": "prediction.bands.bands",

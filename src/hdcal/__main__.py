@@ -3,26 +3,24 @@
 Heavy imports stay inside the commands, so that `hdcal --help` answers at once.
 """
 
-import gc
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from types import FrameType
 
 import click
+import platformdirs
 
-from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
-from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
-from hdcal.cli.topics import COMPLETE, show_completion, show_topic
+from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
@@ -49,12 +47,32 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
         context.exit()
 
 
+# Former commands, and what to use instead.
+REMOVED = {
+    "audit": "the page 'The article against its own numbers' of the documentation",
+    "blind": "'make blind' in a clone of the project",
+}
+
+
+class _Commands(click.Group):
+    """The commands; a former one is answered with what to use instead."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]):
+        if args[0] in REMOVED:
+            ctx.fail(f"'{args[0]}' is no command any more; use {REMOVED[args[0]]}")
+        return super().resolve_command(ctx, args)
+
+
 _EPILOG = (
     "Exit codes: 0 done, 1 no result that may be used, 2 bad input, 130 interrupted."
 )
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_EPILOG,
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -87,36 +105,22 @@ for _command in (
     init,
     check,
     effects,
-    audit,
-    blind,
     show_topic,
-    show_completion,
 ):
     hdcal.add_command(_command)
-
-
-# Objects after which some are looked for that can go: a command makes many by loading
-# what it needs, all of them stay, and looking at them took a tenth of its time.
-_MADE_AND_KEPT = 100_000
-# Until an interruption that came within an import is tried again [s].
-_A_MOMENT = 0.02
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every outcome is an exit code and plain words."""
     given = sys.argv[1:] if arguments is None else arguments
-    if COMPLETE in os.environ:
+    if "_HDCAL_COMPLETE" in os.environ:
         # A shell asks for what may follow, and click answers and ends the process.
         hdcal.main([], "hdcal")
-    gc.set_threshold(_MADE_AND_KEPT)
-    # A program that may call back into its process, to raise an error, is not kept:
-    # what is wrong is no number instead, and looked for in what comes out.
-    os.environ.setdefault("EQX_ON_ERROR", "nan")
-    # A graphics processor that is only looked for costs time and most of its memory.
-    os.environ.setdefault("JAX_PLATFORMS", "cpu")
+    for name, value in _environment():
+        os.environ.setdefault(name, value)
     console = Console(json="--json" in given)
     console.prepare()
-    _hear_interruptions()
+    _interrupt_once()
     code = _run(given, console)
     sys.exit(NOBODY_READS if code == DONE and console.unread else code)
 
@@ -189,54 +193,38 @@ def _failed(error: Exception, words: str, console: Console) -> int:
     return NOT_TO_BE_USED
 
 
-def _hear_interruptions() -> None:
-    """Clean up on SIGINT and on SIGTERM, and do not let a second one disturb that."""
+def _environment() -> Iterator[tuple[str, str]]:
+    """Yield variables of the environment that libraries read when they are imported.
+
+    A value set by the user stands.
+    """
+    # Thousands of small steps run 35 times as fast on one core as beside an H200.
+    yield "JAX_PLATFORMS", "cpu"
+    folder = platformdirs.user_cache_dir("hdcal", False)
+    yield "JAX_COMPILATION_CACHE_DIR", os.environ.get("HDCAL_CACHE_DIR", folder)
+    yield "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0"
+    yield "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1"
+    # JAX caches no program that may call back to raise an error: NaN is looked for.
+    yield "EQX_ON_ERROR", "nan"
+    # A diagnosis solves thousands of small systems, for which threads only wait.
+    yield "OPENBLAS_NUM_THREADS", "1"
+
+
+def _interrupt_once() -> None:
+    """Clean up on SIGINT and on SIGTERM, and let a second one not disturb that."""
     heard = [signal.SIGTERM]
-    # What runs in the background of a script, or under nohup, ignores the keyboard.
+    # In the background of a script, or under nohup, SIGINT is ignored.
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         heard.append(signal.SIGINT)
 
-    def stop(_, frame: FrameType | None) -> None:
-        if _is_importing(frame):
-            signal.setitimer(signal.ITIMER_REAL, _A_MOMENT)
-            return
+    def stop(*_) -> None:
         for each in heard:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for each in (*heard, signal.SIGALRM):
+    for each in heard:
         signal.signal(each, stop)
 
 
-def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a module is being imported.
-
-    To interrupt that may be swallowed, leave a lock held for which other threads wait,
-    or end the process from within an extension.
-    """
-    while frame is not None:
-        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
-            return True
-        frame = frame.f_back
-    return False
-
-
-def run() -> None:
-    """Run the command line as a process of its own, which ends at once.
-
-    Python would take up to a second to forget what was made, one by one.
-    """
-    try:
-        main()
-    except SystemExit as ended:
-        try:
-            sys.stdout.flush()
-            sys.stderr.flush()
-        except OSError:
-            # Where nobody reads, Python's own way out is a quiet one.
-            raise ended from None
-        os._exit(int(ended.code or DONE))
-
-
 if __name__ == "__main__":
-    run()
+    main()

@@ -15,7 +15,6 @@ WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
     ["fit", XB1],
-    ["audit"],
     ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
     ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
 ]
@@ -53,44 +52,53 @@ def test_a_table_of_others_is_kept(here: Hdcal, calibrated, tmp_path: Path):
     assert set(os.listdir(tmp_path)) == {"readings.csv", "bands.csv"}
 
 
+def test_a_result_is_replaced_with_force(here: Hdcal, tmp_path: Path):
+    for more, code in (([], 0), ([], 2), (["--force"], 0)):
+        assert here("fit", XB1, "--out", "run", *more).returncode == code
+        assert os.listdir(tmp_path) == ["run"]
+
+
 def test_an_interruption_after_the_end_says_what_is_written(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     def interrupted(*_) -> None:
-        assert (tmp_path / "run" / "audit.json").exists()
+        assert (tmp_path / "run" / "fit.json").exists()
         raise KeyboardInterrupt
 
     monkeypatch.setattr("hdcal.report.terminal.terminal_lines", interrupted)
-    done = here("audit", "--out", "run")
+    done = here("fit", XB1, "--out", "run")
     assert done.returncode == 130 and not done.stdout
     assert done.stderr.strip() == "hdcal: interrupted: run is written"
     assert os.listdir(tmp_path) == ["run"]
 
 
-def test_what_appears_during_the_work_is_kept(here: Hdcal, monkeypatch, tmp_path: Path):
-    from hdcal.classical.audit import audit
+def test_what_appears_meanwhile_is_kept_and_told(
+    here: Hdcal, monkeypatch, tmp_path: Path
+):
+    from hdcal.classical.fit import summary
 
-    check_claims = audit.audit
+    report = summary.fit_report
 
-    def slow():
-        (tmp_path / "run").mkdir()
-        (tmp_path / "run" / "thesis.txt").write_text("years of work")
-        return check_claims()
+    def slow(*given, **named):
+        (tmp_path / "made").mkdir()
+        (tmp_path / "made" / "thesis.txt").write_text("years of work")
+        return report(*given, **named)
 
-    monkeypatch.setattr(audit, "audit", slow)
-    done = here("audit", "--out", "run", "--force", "--json")
+    monkeypatch.setattr(summary, "fit_report", slow)
+    done = here("fit", XB1, "--out", "made", "--force", "--json")
     assert done.returncode == 2
     (finding,) = json.loads(done.stdout)["findings"]
-    assert finding["file"] == "run" and "'run-2'" in finding["problem"]
-    assert os.listdir(tmp_path / "run") == ["thesis.txt"]
-    assert set(os.listdir(tmp_path)) == {"run", "run-2"}
-    assert "audit.json" in os.listdir(tmp_path / "run-2")
+    assert finding["file"] == "made" and "'made-2'" in finding["problem"]
+    assert {path.name for path in tmp_path.iterdir()} == {"made", "made-2"}
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["thesis.txt"]
+    answer = json.loads((tmp_path / "made-2" / "fit.json").read_text("utf-8"))
+    assert answer["schema"] == "hdcal.fit/1"
 
 
 def test_a_disk_that_is_full_keeps_the_older_result(tmp_path: Path):
     def run(*more: str, blocks: str = "unlimited") -> subprocess.CompletedProcess[str]:
         limited = ["sh", "-c", f'ulimit -f {blocks}; exec "$@"', "sh"]
-        command = [*limited, *MAIN, "audit", "--out", "run", *more]
+        command = [*limited, *MAIN, "fit", str(XB1), "--out", "run", *more]
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
 
     assert run().returncode == 0

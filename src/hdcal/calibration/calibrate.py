@@ -16,7 +16,6 @@ from hdcal.inference import laplace
 from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
-from hdcal.inference.executables import bound_executables
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.held import LOOP, PILOT_NOISE
 from hdcal.inference.linearisation import linearise
@@ -32,9 +31,9 @@ from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
+from hdcal.physics.effects.noise import HeteroscedasticNoise
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
-from hdcal.physics.scatter import Scatter
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
 _SHARE = f"{HeteroscedasticNoise.name}.share"
@@ -176,7 +175,6 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    bound_executables()
     case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
     # Readings showed that noise grows, and nobody asked for it.
     shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in effects

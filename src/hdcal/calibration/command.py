@@ -5,16 +5,15 @@ from typing import Any
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
     case_options,
     folder_options,
     json_option,
     read_given,
+    sampling_options,
     take_reading,
 )
-from hdcal.cli.sampling_options import sampling_options
 from hdcal.errors import Finding
 
 
@@ -52,8 +51,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     With --dynamic the rows are a time series (time_s, deformation_mm, force_N) of one
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
-    keep_compilations()
-    from hdcal.cli.meanwhile import imported_meanwhile
     from hdcal.cli.progress import progress_bar
     from hdcal.inference.sample import check_settings
 
@@ -90,6 +87,6 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
         settings["adapt_noise"] = not settings.pop("constant_noise")
     for note in case.notes:
         console.words(note)
-    with progress_bar() as progress, imported_meanwhile("hdcal.report.canvas"):
+    with progress_bar() as progress:
         posterior: Any = sample(case, progress=progress, **settings)
     return console.report(report(posterior, console.command))

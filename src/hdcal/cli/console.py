@@ -20,6 +20,7 @@ from hdcal.report.plain import as_json, printable
 if TYPE_CHECKING:
     from hdcal.report.answer import Answer
     from hdcal.report.document import Document
+    from hdcal.report.result import Result
     from hdcal.report.saving import Target
     from hdcal.report.write import Report
 
@@ -136,6 +137,26 @@ class Console:
         if self.json:
             self.data(answer)
         return 0 if answer.status == "ok" else 1
+
+    def show(self, result: "Result", **files: Any) -> int:
+        """Write the reserved folder if there is one, print a result, return its code.
+
+        Args:
+            result: what to write and print.
+            files: what `write_result` takes: names and content of the files.
+        """
+        from hdcal.report.terminal_text import terminal_parts
+
+        folder = None
+        if self.folder is not None:
+            from hdcal.report.result_folder import write_result
+
+            write_result(result, self.folder, command=self.command, **files)
+            folder = self.folder.name
+        self.table(*terminal_parts(result, folder))
+        if self.json:
+            self._print(result.to_json().rstrip(), to_error=False)
+        return 0 if result.status == "ok" else 1
 
     def report(self, report: "Report[Answer]") -> int:
         """Write the reserved folder if there is one, show the answer, return its code.

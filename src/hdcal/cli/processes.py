@@ -10,7 +10,6 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing.connection import wait
 from typing import Any
 
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 
 
@@ -76,7 +75,6 @@ def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Console(json=False).prepare()
     sys.stdout = open(os.devnull, "w")  # noqa: SIM115, lives as long as the process
-    keep_compilations()
 
 
 def _end_with_parent() -> None:

@@ -14,9 +14,6 @@ def load_posterior(run: str) -> "Posterior":
         InputError: there is none, or it was changed.
         NotUsable: it failed its checks.
     """
-    from hdcal.cli.compilation_cache import keep_compilations
-
-    keep_compilations()
     from hdcal.inference.posterior import Posterior
 
     posterior = Posterior.load(run)
@@ -30,9 +27,6 @@ def load_gear(path: str) -> "Gear":
     Raises:
         InputError: it cannot be used.
     """
-    from hdcal.cli.compilation_cache import keep_compilations
-
-    keep_compilations()
     from hdcal.data.gear import read_gear
 
     return read_gear(path)

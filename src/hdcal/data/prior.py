@@ -1,9 +1,8 @@
 """What is believed about one parameter, as a typed pytree."""
 
+import equinox as eqx
 from jax import Array
-
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float
+from jaxtyping import Float
 
 # family -> the numbers it needs, in the order of the distribution's arguments
 FAMILIES: dict[str, tuple[str, ...]] = {
@@ -16,7 +15,7 @@ FAMILIES: dict[str, tuple[str, ...]] = {
 }
 
 
-class Prior(Node):
+class Prior(eqx.Module):
     """What is believed about one parameter before the data, in code units.
 
     Attributes:
@@ -26,10 +25,10 @@ class Prior(Node):
         source: where the numbers come from.
     """
 
-    family: str = static()
+    family: str = eqx.field(static=True)
     numbers: tuple[Float[Array, ""] | float, ...]
-    unit: str = static(default="")
-    source: str = static(default="")
+    unit: str = eqx.field(static=True, default="")
+    source: str = eqx.field(static=True, default="")
 
 
 def scaled(prior: Prior, factor) -> Prior:

@@ -6,55 +6,26 @@ are consistent, so nothing below the reading edge converts.
 
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
-from jax.core import Tracer
+from jaxtyping import Float, Int
 
-from hdcal.programs.compiling import compile_loops_whole, is_tracing
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float, Int
+from hdcal.jax_settings import use_double_precision
 
 # Measured on the reading edge as NumPy arrays, traced as JAX arrays.
 Array = jax.Array | np.ndarray
 
 
-def _use_double_precision(made: Node) -> None:
-    """Switch JAX to double precision for the whole process, unless it already is.
-
-    If it has computed nothing yet it is also told how to compile loops.
-
-    A product of stiffness and deformation with relative error 1e-7 is larger than the
-    posterior sd at a million rows. Importing hdcal changes nothing: every computation
-    begins with a `Geometry` or `Records`, and making one of those calls this.
-
-    Args:
-        made: the object that is being made, or that another process has sent.
-
-    Raises:
-        RuntimeError: it is made within what JAX compiles or differentiates, whose
-            arguments are in single precision already.
-    """
-    compile_loops_whole()
-    if jax.config.read("jax_enable_x64"):
-        return
-    if is_tracing() or any(isinstance(x, Tracer) for x in jax.tree.leaves(made)):
-        raise RuntimeError(
-            f"a {type(made).__name__} switches JAX to double precision, too late "
-            "within what is compiled or differentiated: make one before, or call "
-            'jax.config.update("jax_enable_x64", True)'
-        )
-    jax.config.update("jax_enable_x64", True)
-
-
-class _InDoublePrecision(Node):
+class _InDoublePrecision(eqx.Module):
     """What computations begin with, made here or sent by another process."""
 
     def __post_init__(self) -> None:
-        _use_double_precision(self)
+        use_double_precision(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
-        _use_double_precision(self)
+        use_double_precision(self)
 
 
 class Geometry(_InDoublePrecision):
@@ -111,4 +82,4 @@ class Records(_InDoublePrecision):
     specimen: Int[Array, " n"]
     force: Float[Array, " n"]
     force_sd: Float[Array, " n"]
-    known: frozenset[str] = static()
+    known: frozenset[str] = eqx.field(static=True)

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import ceil
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
 from hdcal.design.answer import LimitAsked
@@ -19,11 +21,9 @@ from hdcal.physics.profile import peak_stress
 from hdcal.physics.theory import Scalar
 from hdcal.prediction.engine.sampled_gears import SampledGears
 from hdcal.prediction.engine.sizes import SIZES
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float
 
 
-class LimitedGear(Node):
+class LimitedGear(eqx.Module):
     """The next gear at the worst of some temperatures, beside what it has to keep.
 
     Its methods take a place: what differs from the tested gear, by name. That may be
@@ -48,7 +48,7 @@ class LimitedGear(Node):
     temperatures: Float[Array, " t"]
     limit_force: float
     limit_stress: Float[Array, " draw"]
-    rank: int = static()
+    rank: int = eqx.field(static=True)
 
     @classmethod
     def of(cls, draws: DesignDraws, gear: NextGear, asked: LimitAsked) -> "LimitedGear":

@@ -3,7 +3,6 @@
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
     asked_reading,
@@ -49,8 +48,6 @@ def diagnose(console: Console, cases, out, force, **settings):
 
     Of one CASE the result is DIR itself, of several DIR/NAME each.
     """
-    one_thread_for_algebra()
-    keep_compilations()
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library
     from hdcal.diagnosis.many_cases import diagnose_all, read_cases, tell_notes

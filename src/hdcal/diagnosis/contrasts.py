@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 
 from hdcal.data.case import Case
@@ -10,7 +11,6 @@ from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
 from hdcal.inference.loop_cells import loop_cells
 from hdcal.physics.history import load_cycle
-from hdcal.programs.program import program
 
 # Ends of the curve, as shares of the largest deformation.
 _TOE, _HEAD = 0.25, 0.75
@@ -175,7 +175,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
     )
 
 
-@program
+@jax.jit
 def _load_cycle(records: Records):
     return load_cycle(records.sense, records.run, records.specimen)
 

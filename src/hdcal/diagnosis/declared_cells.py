@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.loading import movement_words
 from hdcal.data.records import Array, Records
-from hdcal.programs.shapes import Float
 
 # A mean of fewer rows says little.
 _FEWEST = 3

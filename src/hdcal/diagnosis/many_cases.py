@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +9,6 @@ from shutil import rmtree
 
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.console import Console
-from hdcal.cli.meanwhile import imported_meanwhile
 from hdcal.cli.processes import run_all
 from hdcal.cli.progress import progress_bar
 from hdcal.data.case import Case
@@ -168,8 +166,7 @@ def _diagnose_one(
     effects = choose_library(library, EFFECTS)
     settings = {"quick": quick, "seed": seed}
     try:
-        with imported_meanwhile("hdcal.report.canvas") if report else nullcontext():
-            verdict = diagnose(case, library=effects, progress=progress, **settings)
+        verdict = diagnose(case, library=effects, progress=progress, **settings)
         return write_verdict(verdict, folder, command, report=report)
     except InputError as error:
         return error.findings

@@ -9,9 +9,7 @@ least.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -29,8 +27,6 @@ from hdcal.report.parameters import credible_interval
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.
 LEAST_SHARE, MOST_LEFT_OUT = 0.05, 0.02
-# Calibrations at a time: while one samples, the next is prepared.
-_AT_ONCE = 2
 
 
 @dataclass(frozen=True)
@@ -77,10 +73,17 @@ def refit(
     if quick:
         return Refits({}, None, {})
 
-    together = progress and _Together(progress, len(_probable(posterior.probabilities)))
+    count, finished = len(_probable(posterior.probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
-        own = parts_of(name)
+        nonlocal finished
+        own, before = parts_of(name), finished
+
+        def tell(done: int, total: int) -> None:
+            assert progress is not None
+            progress(before * total + done, total * max(count, before + 1))
+
+        finished += 1
         return calibrate(
             case,
             effects=tuple(sorted(own - {UNKNOWN})),
@@ -88,25 +91,10 @@ def refit(
             adapt_noise=False,
             seed=seed,
             registry=library,
-            progress=together and partial(together, name),
+            progress=progress and tell,
         )
 
     return weighed(posterior.probabilities, calibrated)
-
-
-class _Together:
-    """Tells of calibrations that run side by side as of one."""
-
-    def __init__(self, progress: Progress, many: int):
-        self._progress, self._many = progress, many
-        self._done: dict[str, int] = {}
-
-    def __call__(self, name: str, done: int, total: int) -> None:
-        """Tell how far one of them has come; the others take as long as it does."""
-        self._done[name] = done
-        self._progress(
-            sum(self._done.values()), total * max(self._many, len(self._done))
-        )
 
 
 def weighed(
@@ -119,12 +107,7 @@ def weighed(
         calibrated: returns the posterior of one.
     """
     chosen = _probable(probabilities)
-    pool = ThreadPoolExecutor(_AT_ONCE)
-    try:
-        fits = dict(zip(chosen, pool.map(calibrated, chosen), strict=True))
-    finally:
-        # Who interrupts does not wait for the other one.
-        pool.shutdown(wait=False, cancel_futures=True)
+    fits = {name: calibrated(name) for name in chosen}
     carrier = UNKNOWN
     if _missing(probabilities, fits) > MOST_LEFT_OUT:
         carrier = _open_model(probabilities, fits)

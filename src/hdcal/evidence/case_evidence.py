@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.evidence.noise_evidence import NoiseEvidence
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
@@ -12,7 +13,6 @@ from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.evidence.subspaces import SubspaceEvidence
 from hdcal.inference.hypotheses import NONE as NONE
 from hdcal.inference.hypotheses import UNKNOWN as UNKNOWN
-from hdcal.programs.shapes import Float
 
 QUANTISATION = "quantisation"
 # Squared length in noise sds below which an effect of large physical size is unseen.

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import logsumexp
+from jaxtyping import Float, Int
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -27,8 +28,6 @@ from hdcal.evidence.inner_products import (
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
 from hdcal.inference.padding import bucket_size, repeat_last_row
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float, Int
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 # Gauss–Hermite nodes for log σ: its posterior is close to normal.
@@ -154,7 +153,7 @@ def _noise_of_cells(common: CommonTerms, own: PieceProducts, cells: AmplitudeCel
     return most_probable_noise(step, 0.5 * jnp.log(own.ee / common.rows))
 
 
-@program
+@jax.jit
 def _cell_evidence(common, products, cells, sigma: Prior):
     own = _of_cells(products, cells)
     centre = _noise_of_cells(common, own, cells)
@@ -194,7 +193,7 @@ def cell_evidence(
     return evidence, mean, sd
 
 
-@program
+@jax.jit
 def _subspace_evidence(common, products, scale, log_weight, sigma: Prior):
     def parts(log_sd):
         loose = (scale**2 * jnp.exp(-2.0 * log_sd))[..., None]

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.evidence.linear_rows import LinearRows, whiten
-from hdcal.programs.shapes import Float
 
 
 @dataclass(frozen=True)

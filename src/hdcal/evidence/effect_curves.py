@@ -9,7 +9,6 @@ from hdcal.data.records import Records
 from hdcal.inference.padding import pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.programs.program import program
 
 # Points predicted at a time, always as many: one executable serves all grids. With
 # many rows fewer, 2**22 numbers of eight bytes being 32 MB.
@@ -25,7 +24,7 @@ def padded_records(records: Records) -> Records:
     return pad_records(replace(records, known=frozenset()))
 
 
-@program
+@jax.jit
 def _base_reading(base: Base, records: Records, reading: Reading):
     return predict_reading(base, (), records, reading)[0]
 
@@ -36,7 +35,7 @@ def base_reading(base: Base, records: Records, reading: Reading) -> np.ndarray:
     return np.asarray(found)[: len(records.force)]
 
 
-@program
+@jax.jit
 def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.evidence.linear_rows import (
@@ -12,7 +13,6 @@ from hdcal.evidence.linear_rows import (
     project,
     remove_base,
 )
-from hdcal.programs.shapes import Float
 
 
 class CommonTerms(NamedTuple):

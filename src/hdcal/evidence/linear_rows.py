@@ -4,11 +4,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float, Int
 from scipy.linalg import cho_solve
 
 from hdcal.data.records import Array
 from hdcal.inference import serial_correlation
-from hdcal.programs.shapes import Float, Int
 
 # AR(1) coefficients of the noise within a run that are always integrated over; more
 # would explain slow physics as noise where a half cycle has few rows.

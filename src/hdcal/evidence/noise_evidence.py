@@ -8,9 +8,11 @@ exact but for σ.
 from dataclasses import dataclass
 from functools import cached_property, partial
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -21,9 +23,6 @@ from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
 from hdcal.physics.effect import Effect, Noise, Rows, parameters
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 _AMPLITUDES, _SHAPES = 10, 3
 _STEPS = 40
@@ -78,7 +77,7 @@ class NoiseEvidence:
         return np.exp(found - np.logaddexp.reduce(found))
 
 
-class NoiseProblem(Node):
+class NoiseProblem(eqx.Module):
     """Rows with a linear mean and noise of any shape, padded to a shared length.
 
     Attributes:
@@ -123,7 +122,7 @@ def _row_precision(point, effect, problem: NoiseProblem):
     return row_precision(error, noise)
 
 
-@program
+@jax.jit
 @partial(jax.vmap, in_axes=(0, None, None, None))
 def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
     """Return log evidence and effective precision of each row, of each effect."""

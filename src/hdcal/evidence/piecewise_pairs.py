@@ -7,6 +7,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array
@@ -23,8 +24,6 @@ from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.inference.likelihood import log_interval
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Cells of each effect that take part: the most probable ones alone, and some across
 # its prior for what only shows beside another effect.
@@ -90,7 +89,7 @@ def _amplitudes(pairs: CellPairs, log_sd):
     return det, drawn, mean, (cov11, cov12, cov22)
 
 
-@program
+@jax.jit
 def _cell_pair_evidence(constant, rows, pairs: CellPairs, sigma: Prior):
     def step(log_sd):
         mean = jnp.clip(_amplitudes(pairs, log_sd)[2], pairs.low, pairs.high)

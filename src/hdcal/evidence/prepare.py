@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from jaxtyping import Bool
 
 from hdcal.data.case import Case
 from hdcal.data.certificates import GAINS
@@ -24,7 +25,6 @@ from hdcal.inference.problem import case_reading, problem_priors
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Base, Reading
 from hdcal.physics.theory import THEORIES
-from hdcal.programs.shapes import Bool
 
 # Noise below this share of the largest force is taken as this.
 _LEAST_NOISE = 1e-6

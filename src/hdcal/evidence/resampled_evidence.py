@@ -1,6 +1,7 @@
 """The evidence on resampled half cycles: does the name depend on a few rows?"""
 
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.closed_form import base_evidence, cell_evidence
@@ -8,7 +9,6 @@ from hdcal.evidence.inner_products import CommonTerms, PieceProducts
 from hdcal.evidence.linear_rows import whiten
 from hdcal.evidence.row_features import half_cycle_blocks
 from hdcal.evidence.single_evidence import CellEvidence
-from hdcal.programs.shapes import Float
 
 _SAMPLES = 20
 

@@ -7,11 +7,11 @@ that the simulated band holds for all cells at once, whatever their correlation.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float, Int
 from scipy.linalg import solve_banded
 
 from hdcal.evidence.linear_rows import LinearRows, whiten
 from hdcal.evidence.prepare import PreparedCase
-from hdcal.programs.shapes import Float, Int
 
 # How the false-alarm rate is divided between declared directions of the mean, members
 # of a label all together, stretches and periods, and the noise.

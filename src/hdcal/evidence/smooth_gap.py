@@ -7,11 +7,11 @@ Gibbs sampling of weights, scales and noise in whitened rows.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from hdcal.evidence.kernels import kernel_columns, visible_kernels
 from hdcal.evidence.linear_rows import project, restore_base
 from hdcal.evidence.prepare import PreparedCase
-from hdcal.programs.shapes import Float, Int
 
 # Which covariate each kernel belongs to.
 COVARIATES = {

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 from scipy.special import erf
 
@@ -19,15 +20,14 @@ from hdcal.evidence.parameter_grid import (
 )
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
-from hdcal.physics.scatter import Scatter, scores
-from hdcal.programs.program import program
+from hdcal.physics.effects.scatter import Scatter, scores
 
 # Columns of a subspace; members beyond it are kept by their largest directions.
 WIDTH = 24
 # Steps of the scale of a subspace of unknown size, as factors of its prior sd.
 _STEPS = 2.0 ** np.arange(-5.0, 5.0)
 
-_scores = program(scores)
+_scores = jax.jit(scores)
 
 
 @dataclass(frozen=True)

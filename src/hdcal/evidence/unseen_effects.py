@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 from scipy.special import gammainc
 
 from hdcal.evidence.case_evidence import (
@@ -24,7 +25,6 @@ from hdcal.evidence.prepare import PreparedCase, with_relative_noise
 from hdcal.evidence.remainder_evidence import beside_effects
 from hdcal.evidence.single_evidence import SingleEvidence, single_evidence
 from hdcal.inference.likelihood import log_interval
-from hdcal.programs.shapes import Float
 
 # Effects that are less probable hardly stand in a pair that is; the likeliest of them
 # are enough.

@@ -3,7 +3,6 @@
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, LENGTH
 from hdcal.cli.options import (
@@ -98,7 +97,6 @@ def fleet(
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None
-    keep_compilations()
     asked = {"seed": seed, "force_tolerance": force_tolerance}
     asked |= {"gears": gears, "skip_bad": skip_bad}
     from hdcal.fleets.fleet import fleet as fit_fleet

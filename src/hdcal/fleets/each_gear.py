@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Key
 
 from hdcal.data.records import Array
 from hdcal.fleets.off_in import noise_chance, zero_chance
@@ -13,7 +14,6 @@ from hdcal.inference.population_problem import (
     draw_gears,
     gear_centres,
 )
-from hdcal.programs.shapes import Key
 
 # Draws of the population for which every gear is drawn too: more for few gears, as many
 # as make a million.

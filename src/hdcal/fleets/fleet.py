@@ -26,7 +26,6 @@ from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
-from hdcal.inference.executables import bound_executables
 from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
@@ -217,7 +216,6 @@ def fleet(
     if since is not None:
         readings = readings.since(since)
     readings, ratio = usable(readings, gears, skip_bad=skip_bad)
-    bound_executables()
     readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)
     of_draws, of_gears = separate_keys(seed, count=2)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Key
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
@@ -13,7 +14,6 @@ from hdcal.inference.independence import MAX_SHAPE, sample_independently
 from hdcal.inference.mixing import mixing
 from hdcal.inference.population_problem import PopulationProblem
 from hdcal.inference.sample import Progress, sample
-from hdcal.programs.shapes import Key
 
 
 class SampledPopulation(NamedTuple):

@@ -1,6 +1,7 @@
 """How finely the data see each amplitude: the unit of its sampling coordinate."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import jax
 import numpy as np
@@ -11,7 +12,6 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
-from hdcal.programs.program import program
 
 
 def amplitude_units(
@@ -76,7 +76,7 @@ def finest(
     return min(widest, unit) or widest
 
 
-@program(static=("effect",))
+@partial(jax.jit, static_argnames=("effect",))
 def _slopes(base: Base, values, prior_sds, records, reading, *, effect):
     """Return the derivative of the reading by each amplitude near its null."""
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Key
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
@@ -26,7 +27,6 @@ from hdcal.inference.posterior_tree import build_tree
 from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.programs.shapes import Key
 
 
 @dataclass(frozen=True)

@@ -9,21 +9,21 @@ Where neighbours err alike, so do rows and the rows before them, kept side by si
 from dataclasses import replace
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import append_zeros, bucket_size, pad_records
 from hdcal.inference.serial_correlation import log_volume, previous_rows
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float, Int
 
 # Up to this many rows of triangular factors cost little, whatever they replace.
 _MANY_FACTOR_ROWS = 10_000
 
 
-class CompressedRows(Node):
+class CompressedRows(eqx.Module):
     """Triangular factors, one for each group of rows that share their noise.
 
     Attributes:

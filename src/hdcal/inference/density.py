@@ -5,6 +5,7 @@ from functools import partial, singledispatch
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference import compress
@@ -24,8 +25,6 @@ from hdcal.inference.values import (
     with_rounding,
 )
 from hdcal.physics.effect import Noise
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 
 def pointwise_log_likelihood(
@@ -94,7 +93,7 @@ def densities(problem: Sampled, draws: Values) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(of_prior), np.asarray(of_data)
 
 
-@program
+@jax.jit
 def _densities(problem: Sampled, values):
     def both(one):
         return log_prior(problem, one), log_likelihood(problem, one)

@@ -8,16 +8,17 @@ It knows no temperature.
 """
 
 from collections.abc import Sequence
+from functools import partial
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
-from hdcal.programs.node import Node, static
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Number of eigenfunctions and half-width of their interval, in half-ranges of the
 # tested deformation: enough for length-scales down to a tenth of the range.
@@ -31,7 +32,7 @@ BOUNDARY = 2.0
 _DIRECTION = {"unloading", "rates"}
 
 
-class Discrepancy(Node):
+class Discrepancy(eqx.Module):
     """Smooth functions of deformation, orthogonal to offset and slope at tested rows.
 
     Attributes:
@@ -45,7 +46,7 @@ class Discrepancy(Node):
     centre: float
     half_range: float
     absorbed: Float[Array, "2 m"]
-    directed: bool = static(default=False)
+    directed: bool = eqx.field(static=True, default=False)
     loop: float = 1.0
 
     @property
@@ -99,7 +100,7 @@ def _is_directed(records: Records, loop: bool) -> bool:
     return loop and "unloading" in records.known
 
 
-@program(static=("directed",))
+@partial(jax.jit, static_argnames=("directed",))
 def _functions(scaled, movement, *, directed: bool):
     """Return the functions before anything is projected off, shape (n, m)."""
     smooth = _basis(scaled)
@@ -116,7 +117,7 @@ def _basis(scaled):
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
-@program
+@jax.jit
 def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
@@ -163,7 +164,7 @@ def discrepancy_columns(
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))
 
 
-@program
+@jax.jit
 def _columns(discrepancy: Discrepancy, deformation, movement):
     return discrepancy.columns(deformation, movement)
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 
+import jax
+
 from hdcal.data.case import Case, Gear
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import effect_priors
@@ -10,8 +12,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.problem import case_reading, influence_prior
 from hdcal.physics.dynamics import ring_mass
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
-from hdcal.programs.program import program
+from hdcal.physics.effects.loops import CoulombFriction
 
 # In the order in which they are sampled and reported; K and E0 come first.
 SITES = (
@@ -23,7 +24,7 @@ SITES = (
     "initial_velocity",
     "deformation_sigma",
 )
-_ring_mass = program(ring_mass, static=("radial_per_read",))
+_ring_mass = jax.jit(ring_mass, static_argnames=("radial_per_read",))
 FRICTION = f"{CoulombFriction.name}.force"
 
 

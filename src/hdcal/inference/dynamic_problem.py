@@ -7,8 +7,10 @@ the output, read with a zero of its own and white noise.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.case import Case
 from hdcal.data.prior import Prior
@@ -30,8 +32,6 @@ from hdcal.physics.dynamics import natural_frequency
 from hdcal.physics.effect import Effect
 from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
-from hdcal.programs.node import static
-from hdcal.programs.shapes import Float
 
 # Where the gear would stop, had it begun in balance: a coordinate of the sampler.
 STOP = "_initial_stop"
@@ -64,7 +64,7 @@ class DynamicProblem(Sampled):
     force: Float[Array, " n"]
     deformation: Float[Array, " n"]
     count: int
-    effects: tuple[type[Effect], ...] = static(default=())
+    effects: tuple[type[Effect], ...] = eqx.field(static=True, default=())
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""

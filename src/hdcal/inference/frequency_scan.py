@@ -14,7 +14,6 @@ from hdcal.inference.distributions import frozen
 from hdcal.inference.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.inference.padding import measured
 from hdcal.physics.linear_response import LinearGear, linear_response
-from hdcal.programs.program import program
 
 _RATIOS = np.array([0.005, 0.03, 0.2])
 # Frequencies are scanned in steps of this share of one over the duration.
@@ -26,7 +25,7 @@ _WINDOW, _WHOLE_BLOCK = 2048, 4
 _NEAR = np.linspace(-1.0, 1.0, 9)
 
 
-@program
+@jax.jit
 def _residual(problem: DynamicProblem, frequency, ratio):
     """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and zero of the best fit."""
     real = measured(len(problem.time), problem.count)

@@ -3,18 +3,18 @@
 from dataclasses import replace
 from typing import TypeVar
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from hdcal.data.records import Array
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float, Int
 
 # Share of squares that rounding alone leaves.
 _NOTHING = 1e-12
 
 
-class MountingSums(Node):
+class MountingSums(eqx.Module):
     """What the readings of each mounting say, one entry each.
 
     Attributes:
@@ -40,7 +40,7 @@ class MountingSums(Node):
     rig: Int[Array, " m"]
 
 
-class GearSums(Node):
+class GearSums(eqx.Module):
     """What the readings of each gear say, with mountings that are alike together.
 
     They have equally many rows, the same operator and the same rig: whatever the law of

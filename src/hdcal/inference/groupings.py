@@ -12,15 +12,15 @@ Source:
 
 from collections.abc import Mapping
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 
-class Grouping(Node):
+class Grouping(eqx.Module):
     """Where groups seem to be, which shapes the sampler's coordinates only.
 
     Attributes:

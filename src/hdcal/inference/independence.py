@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
 from hdcal.inference.laplace import Whitening, potential, values_at
@@ -24,8 +25,6 @@ from hdcal.inference.mixing import have_mixed
 from hdcal.inference.pareto import pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float, Key
 
 # Proposals of a round; rounds end when such a share of the last ones is worth a draw.
 _ROUNDS, _EFFICIENT, _LIGHT = (1000, 2000, 4000, 4000), 0.4, 0.5
@@ -158,7 +157,7 @@ def _log_densities(
     return np.concatenate(found)
 
 
-@program
+@jax.jit
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
@@ -169,13 +168,9 @@ def _potentials(
     return jax.lax.map(one, standard)
 
 
-@program
+@jax.jit
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
     def one(place):
         return values_at(problem, whitening.position(place))
 
     return jax.vmap(lambda chain: jax.lax.map(one, chain))(standard)
-
-
-# What is compiled anew for each kind of problem.
-COMPILED = (_potentials, _named)

@@ -4,6 +4,7 @@ from functools import singledispatch
 from typing import Any
 
 import jax.numpy as jnp
+from jaxtyping import Float, Key
 
 from hdcal.data.records import Array
 from hdcal.inference import compress
@@ -25,7 +26,6 @@ from hdcal.inference.values import (
     with_rounding,
 )
 from hdcal.physics.chain import linear_coefficients
-from hdcal.programs.shapes import Float, Key
 
 
 def linear_part(problem: Problem, values: Values) -> Linear:

@@ -3,19 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
 from hdcal.inference.trust_region import expansion, minimise
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 Position = dict[str, Any]
 
@@ -27,7 +26,7 @@ GROUP = "laplace"
 _STEPS, _LEAST_GAIN = 12, 1e-3
 
 
-class Whitening(Node):
+class Whitening(eqx.Module):
     """Affine map from standard to unconstrained coordinates: x = centre + factor·e.
 
     Attributes:
@@ -45,7 +44,7 @@ class Whitening(Node):
         return unravel(flat + self.factor @ standard)
 
 
-@program
+@jax.jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     from numpyro.infer.util import potential_energy
@@ -60,7 +59,7 @@ def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
-@program
+@jax.jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrained(problem, position)
@@ -98,7 +97,7 @@ def _unflatten(like: Position, flat: np.ndarray) -> Position:
     return jax.tree.unflatten(structure, shaped)
 
 
-@program
+@jax.jit
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian.
 
@@ -121,7 +120,7 @@ def _middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@program
+@jax.jit
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
     from numpyro.distributions import biject_to
@@ -135,17 +134,13 @@ def _prior_middle(problem: Sampled) -> Position:
     }
 
 
-@program
+@jax.jit
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
     from numpyro.infer.util import constrain_fn, unconstrain_fn
 
     known = constrain_fn(model, (problem,), {}, position) | values
     return unconstrain_fn(model, (problem,), {}, known)
-
-
-# What is compiled anew for each kind of problem and takes many memory mappings.
-COMPILED = (_expand, _prior_middle, _moved)
 
 
 def fit(
@@ -212,7 +207,7 @@ def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     return {name: float(value) for name, value in _sites(problem, position).items()}
 
 
-@program
+@jax.jit
 def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
     from numpyro.infer.util import constrain_fn
 

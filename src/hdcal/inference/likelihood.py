@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import erfc as jax_erfc
 from jax.scipy.special import logsumexp
+from jaxtyping import Float, Key
 from scipy import special
 
 from hdcal.data.records import Array
 from hdcal.physics.effect import Noise
-from hdcal.programs.shapes import Float, Key
 
 # Further out the cube of Φ, in second derivatives, would come near what underflows; the
 # series is off by 4e-9 at most.

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import numpy as np
@@ -12,7 +13,6 @@ from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import predict_rows
-from hdcal.programs.program import program
 
 # Parameters of the mean that are compared; sigma is not one of them, nor is any
 # parameter of an effect on the noise.
@@ -78,7 +78,7 @@ def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
     )
 
 
-@program(static=("names",))
+@partial(jax.jit, static_argnames=("names",))
 def _derivatives(problem: Problem, values, records: Records, columns, *, names):
     """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
 
@@ -115,6 +115,6 @@ def _members(problem: Problem, values, records: Records, columns, stiffening):
     return np.concatenate(table, axis=1), np.concatenate(place)
 
 
-@program
+@jax.jit
 def _prior_sd(discrepancy: Discrepancy, sd, length):
     return discrepancy.prior_sd(sd, length)

@@ -13,16 +13,16 @@ they are eliminated one by one, at a cost that grows with their number, not its 
 That they sum to zero is one observation more, of zero and without noise.
 """
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
+from jaxtyping import Float, Int, Key
 
 from hdcal.data.records import Array
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float, Int, Key
 
 
-class Grouped(Node):
+class Grouped(eqx.Module):
     """Members of which each row has one and which sum to zero: runs, or specimens.
 
     Attributes:
@@ -35,7 +35,7 @@ class Grouped(Node):
     index: Int[Array, " b"]
     column: Float[Array, " r"]
     sd: Float[Array, ""]
-    count: int = static()
+    count: int = eqx.field(static=True)
 
     @property
     def _block(self) -> int:
@@ -55,7 +55,7 @@ class Grouped(Node):
         return jax.ops.segment_sum(blocks, self.index, self.count)
 
 
-class _Remainder(Node):
+class _Remainder(eqx.Module):
     """What is left of design and residual, its last column, without the members.
 
     Attributes:
@@ -83,7 +83,7 @@ class _Remainder(Node):
         return sum((jnp.sum(rows**2) for rows in left), start=jnp.zeros(()))
 
 
-class Linear(Node):
+class Linear(eqx.Module):
     """A linear-Gaussian residual; rows may be compressed ones.
 
     Attributes:

@@ -12,9 +12,9 @@ from typing import TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Bool
 
 from hdcal.data.records import Array, Records
-from hdcal.programs.shapes import Bool
 
 Tree = TypeVar("Tree")
 

@@ -1,7 +1,9 @@
 """Effects from outside must bear padded rows: a load that is held at the end."""
 
 from collections.abc import Sequence
+from functools import partial
 
+import jax
 import numpy as np
 
 from hdcal.data.records import Records
@@ -10,7 +12,6 @@ from hdcal.inference.padding import bucket_size, pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.programs.program import program
 
 # A gear of ordinary stiffness without noise to hide behind [N/mm, N].
 _BASE = (200.0, 0.0, 0.0, 0.0, 1.0)
@@ -52,7 +53,7 @@ def check_padding(
         raise InputError(findings)
 
 
-@program(static=("effect",))
+@partial(jax.jit, static_argnames=("effect",))
 def _reading(records: Records, reading: Reading, *, effect: type[Effect]):
     """Return mean and noise of the rows with the effect at its typical size."""
     sizes = {name: about.typical for name, about in parameters(effect).items()}

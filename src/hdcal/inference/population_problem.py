@@ -15,6 +15,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
@@ -22,8 +23,6 @@ from hdcal.inference.density import log_likelihood
 from hdcal.inference.gear_sums import GearSums, line_noise, stretched
 from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
 _NODES = 4
@@ -229,7 +228,7 @@ class DrawnGears(NamedTuple):
     chance: Float[Array, "t g"]
 
 
-@program(returns=DrawnGears)
+@jax.jit
 def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
     """Draw every gear from what is known of it given each draw of the population.
 

@@ -14,7 +14,6 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.serial_correlation import previous_rows
-from hdcal.programs.program import program
 
 # Above this many numbers the log likelihood of every row and draw is not kept.
 MOST_LOG_LIKELIHOODS = 8_000_000
@@ -89,7 +88,7 @@ def force_log_likelihood(
     return {"force": np.asarray(each)[..., :rows]}
 
 
-@program
+@jax.jit
 def _pointwise(problem, values, records, columns, before):
     def one(value):
         return pointwise_log_likelihood(problem, value, records, columns, before)

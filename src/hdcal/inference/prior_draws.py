@@ -1,6 +1,7 @@
 """Draws of each parameter from its prior."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import jax
 import numpy as np
@@ -9,7 +10,6 @@ from hdcal.data.priors import Prior
 from hdcal.inference.distributions import distribution
 from hdcal.inference.problem import without_texts
 from hdcal.inference.values import POSITIVE
-from hdcal.programs.program import program
 
 _PRIOR_DRAWS = 2000
 
@@ -22,7 +22,7 @@ def draw_priors(priors: Mapping[str, Prior], key) -> dict[str, np.ndarray]:
     }
 
 
-@program(static=("names",))
+@partial(jax.jit, static_argnames=("names",))
 def _draws(priors: tuple[Prior, ...], key, *, names: tuple[str, ...]):
     keys = jax.random.split(key, len(names))
     return [

@@ -2,7 +2,10 @@
 
 from collections.abc import Mapping, Sequence
 
+import equinox as eqx
+import jax
 import numpy as np
+from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
 from hdcal.data.certificates import is_stated
@@ -26,13 +29,10 @@ from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.scatter import Scatter
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
-from hdcal.programs.node import static
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float, Int
 
-_base_columns = program(linear_columns)
+_base_columns = jax.jit(linear_columns)
 
 
 class Problem(Sampled):
@@ -71,15 +71,15 @@ class Problem(Sampled):
     columns: Float[Array, "n m"] | None
     discrepancy: Discrepancy | None
     step: Float[Array, ""] | float
-    effects: tuple[type[Effect], ...] = static()
-    rounded: bool = static()
-    runs: int = static()
-    specimens: int = static()
-    integrated: tuple[str, ...] = static()
+    effects: tuple[type[Effect], ...] = eqx.field(static=True)
+    rounded: bool = eqx.field(static=True)
+    runs: int = eqx.field(static=True)
+    specimens: int = eqx.field(static=True)
+    integrated: tuple[str, ...] = eqx.field(static=True)
     count: int = 0
     before: Int[Array, " n"] | None = None
-    correlated: bool = static(default=False)
-    zero_stated: bool = static(default=False)
+    correlated: bool = eqx.field(static=True, default=False)
+    zero_stated: bool = eqx.field(static=True, default=False)
 
     def priors_given(self, values: Mapping) -> dict[str, Prior]:
         """Return the prior of each parameter given how mountings differ in a draw.

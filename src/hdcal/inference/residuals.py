@@ -26,7 +26,6 @@ from hdcal.inference.residual_shapes import (
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
 from hdcal.notebook import Shown
-from hdcal.programs.program import program
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
@@ -112,7 +111,7 @@ def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: values[::every] for name, values in draws.items()}
 
 
-@program
+@jax.jit
 def _fit(problem, values, records, columns):
     """Return the posterior mean of each row's mean reading [N], draw after draw."""
 

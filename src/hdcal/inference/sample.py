@@ -12,6 +12,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Key
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array
@@ -20,8 +21,6 @@ from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Key
 
 # Called with (iterations done, iterations in all).
 Progress = Callable[[int, int], None]
@@ -82,7 +81,7 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@program(static=("warmup", "chains"))
+@partial(jax.jit, static_argnames=("warmup", "chains"))
 def _start(problem, whitening, key, target, *, warmup, chains):
     """Return the states of chains at their start, as the leaves of NUTS' own."""
     keys = jax.random.split(key, chains)
@@ -99,7 +98,7 @@ def _states(problem, whitening, keys, target, warmup):
     return jax.vmap(one)(keys)
 
 
-@program(static=("warmup", "length"))
+@partial(jax.jit, static_argnames=("warmup", "length"))
 def _advance(problem, whitening, leaves, target, *, warmup, length):
     """Return the states after so many steps, as leaves, and what is kept of each."""
     start, step = _kernel(problem, whitening, warmup, target)
@@ -126,7 +125,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
     return jax.tree.leaves(states), kept
 
 
-@program
+@jax.jit
 def _constrain(problem, whitening, standard, key):
     keys = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
 
@@ -137,10 +136,6 @@ def _constrain(problem, whitening, standard, key):
 
     # One draw after the other: side by side members by the thousand fill the memory.
     return jax.vmap(partial(jax.lax.map, one))((standard, keys))
-
-
-# What is compiled anew for each kind of problem and takes many memory mappings.
-COMPILED = (_start, _advance, _constrain)
 
 
 def sample(

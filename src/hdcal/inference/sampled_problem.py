@@ -7,11 +7,12 @@ was traced before draws without it.
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import equinox as eqx
+
 from hdcal.data.priors import Prior
-from hdcal.programs.node import Node
 
 
-class Sampled(Node):
+class Sampled(eqx.Module):
     """A pytree of data and priors that declares its density.
 
     Another kind of problem subclasses this; sampler, whitening and checks then serve it

@@ -8,9 +8,9 @@ log |dz/de| = −½ m log(1 − ρ²) with m the rows that follow another one.
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float, Int
 
 from hdcal.data.records import Array, Records
-from hdcal.programs.shapes import Float, Int
 
 # Its site in the model.
 CORRELATION = "noise_correlation"

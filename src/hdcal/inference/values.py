@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.case import Case
 from hdcal.data.records import Array, Records
@@ -15,7 +16,6 @@ from hdcal.inference.problem import Problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
-from hdcal.programs.shapes import Float
 
 # Float scalars and arrays by site name; what each one is depends on the name.
 Values = Mapping[str, Any]

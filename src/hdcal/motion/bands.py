@@ -8,7 +8,6 @@ import numpy as np
 
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
-from hdcal.programs.program import program
 from hdcal.report.parameters import INTERVAL
 
 # Draws from which the bands of a record are made.
@@ -48,7 +47,7 @@ class MotionBands:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-@program
+@jax.jit
 def _predict(problem: DynamicProblem, values, seed):
     keys = jax.random.split(jax.random.key(seed), len(values["mass"]))
 

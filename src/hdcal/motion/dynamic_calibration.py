@@ -16,7 +16,6 @@ from hdcal.inference.density import densities
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.executables import bound_executables
 from hdcal.inference.frequency_scan import scan
 from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
@@ -36,7 +35,6 @@ from hdcal.motion.loss import (
     loss_effects,
     noise_probability,
 )
-from hdcal.programs.program import program
 
 FEWEST_ROWS = 20
 _PEAKS = 3
@@ -84,7 +82,6 @@ def calibrate_dynamic(
     check_settings(chains, warmup, draws, seed)
     loss_effects(effects or ())
     check_motion(case)
-    bound_executables()
     began = time.perf_counter()
     theory = theory or case.gear.theory
     chosen, rival = _chosen(case, theory, effects)
@@ -188,7 +185,7 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     return best, Check(name, "passed", "the search from several ends in one place")
 
 
-@program
+@jax.jit
 def _pointwise(problem: DynamicProblem, values):
     # Chains side by side, draws one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)

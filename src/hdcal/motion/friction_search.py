@@ -22,7 +22,6 @@ from hdcal.inference.dynamic_problem import (
     predict_motion,
     stopping_distance,
 )
-from hdcal.programs.program import program
 
 # Shares of the largest swing down to which the record is looked at, one by one.
 _SHARES = (0.5, 0.25, 0.1)
@@ -89,7 +88,7 @@ def motion_slopes(problem: DynamicProblem, values) -> dict[str, np.ndarray]:
     return {n: np.asarray(slope)[: problem.count] for n, slope in slopes.items()}
 
 
-@program
+@jax.jit
 def _slopes(problem: DynamicProblem, values, free):
     def mean(moved):
         return predict_motion(problem, {**values, **moved})
@@ -97,7 +96,7 @@ def _slopes(problem: DynamicProblem, values, free):
     return jax.jacfwd(mean)(free)
 
 
-predict = program(predict_motion)
+predict = jax.jit(predict_motion)
 
 
 def swing(problem: DynamicProblem, values) -> float:

@@ -6,18 +6,18 @@ with any set of effects on their stages; an effect never knows another.
 
 from collections.abc import Sequence
 
+import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.effect import Effect, Noise, Rows, Stage
 from hdcal.physics.theory import THEORIES
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 Value = Float[Array, ""] | Float[Array, " n"] | float
 
 
-class Base(Node):
+class Base(eqx.Module):
     """The force model without effects; entries may differ from row to row.
 
     Attributes:
@@ -35,7 +35,7 @@ class Base(Node):
     sigma: Value
 
 
-class Reading(Node):
+class Reading(eqx.Module):
     """How the rig reads: fixed by the gear file, never inferred.
 
     Attributes:

@@ -10,16 +10,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import diffrax
+import equinox as eqx
+import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry, Records
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
 from hdcal.physics.theory import RING_SERIES
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 Scalar = Float[Array, ""] | float
 
@@ -64,7 +64,7 @@ def ring_mass(geometry: Geometry, density: Scalar, radial_per_read: float) -> Sc
     return radial / 2.0 + whole / 4.0
 
 
-class Oscillator(Node):
+class Oscillator(eqx.Module):
     """One set of parameters of the dynamic model, per millimetre as read.
 
     Attributes:
@@ -132,11 +132,11 @@ def acting(
     effects: Sequence[type[Effect]],
 ) -> tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]:
     """Part effects into those that the dynamic model holds and those left out."""
-    kept = tuple(effect for effect in effects if effect.acts_at_once)
-    return kept, tuple(effect for effect in effects if not effect.acts_at_once)
+    kept = tuple(effect for effect in effects if effect.instantaneous)
+    return kept, tuple(effect for effect in effects if not effect.instantaneous)
 
 
-@program
+@jax.jit
 def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     """Return √(k/m)/2π of the undamped linear model [Hz]."""
     return jnp.sqrt(stiffness / mass) / (2.0 * jnp.pi)

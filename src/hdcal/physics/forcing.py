@@ -2,16 +2,16 @@
 
 from abc import ABC, abstractmethod
 
+import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 Scalar = Float[Array, ""] | float
 
 
-class Forcing(Node, ABC):
+class Forcing(eqx.Module, ABC):
     """A force as a function of time."""
 
     @abstractmethod

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.physics.linear_response import LinearGear, Scalar, decay_entries
-from hdcal.programs.shapes import Float
 
 # Steps towards the time of a turn before the last one: enough also where the force
 # jumps from row to row. One is enough for a gear that swings freely.

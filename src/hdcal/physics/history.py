@@ -2,9 +2,9 @@
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
 
 from hdcal.data.records import Array
-from hdcal.programs.shapes import Bool, Float, Int
 
 
 def leaky_sum(

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.programs.shapes import Float
 
 Scalar = Float[Array, ""] | float
 # Below this |x| the functions of √x are summed as series, smooth through zero.

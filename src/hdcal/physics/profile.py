@@ -4,18 +4,18 @@
 inside, as a wave generator does; with the other sign of ω everything changes sign.
 """
 
+import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
 from hdcal.physics.theory import RING_SERIES, Scalar
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 # Σ 1/(n²−1) over n = 2, 4, …: curvature under the load per coefficient A.
 _AT_LOAD = 0.5
 
 
-class Profile(Node):
+class Profile(eqx.Module):
     """A deformed ring, angle by angle.
 
     Attributes:

@@ -3,7 +3,6 @@
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations, one_thread_for_algebra
 from hdcal.cli.console import Console
 from hdcal.cli.options import (
     case_options,
@@ -39,8 +38,6 @@ def causes(
 
     DATA names the gear of each row in a column `specimen`, also called gear or serial.
     """
-    one_thread_for_algebra()
-    keep_compilations()
     from hdcal.cli.progress import progress_bar
     from hdcal.data.plausible import implausible
     from hdcal.diagnosis.library import choose_library

@@ -14,9 +14,8 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
+from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.prediction.engine.forces import grid_records
-from hdcal.programs.program import program
 from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import StreamPrior
 
@@ -139,7 +138,7 @@ def _draws(posterior: Posterior, chosen: np.ndarray) -> Draws:
     return values["alpha"], values["deformation_offset"], effects
 
 
-@program
+@jax.jit
 def _readings(draws: Draws, reading: Reading, stiffness, rows):
     """Return the mean reading [N], shape (stiffness, draw, row).
 
@@ -164,7 +163,7 @@ def _readings(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(over_draws, in_axes=(0, None))(stiffness, draws)
 
 
-@program
+@jax.jit
 def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     """Return the same of rows that know nothing of each other."""
 
@@ -174,7 +173,7 @@ def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(one, out_axes=2)(rows)
 
 
-@program
+@jax.jit
 def _columns(draws: Draws, reading: Reading, ends, row):
     """Return the first columns of `Particles` at one row, shape (3, particle)."""
     low, high = _readings(draws, reading, ends, row[None, :])[:, :, 0]

@@ -1,6 +1,5 @@
 """`hdcal check`: read and validate, compute nothing."""
 
-import sys
 from functools import partial
 
 import click
@@ -26,7 +25,7 @@ _GEAR, _PNG, _SVG = b"[gear]\n", b"\x89PNG", b"<?xml"
 @click.option(
     "--plot",
     metavar="FILE.png",
-    help="Draw the readings there (.png or .svg) instead of in the terminal.",
+    help="Draw the readings there (.png or .svg).",
 )
 @force_option
 @json_option
@@ -59,8 +58,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     from hdcal.calibration.check.summary import check_answer, gear_file
 
     found = check_answer(case)
-    drawn = None if plot or not _shows_braille() else case.records
-    code = console.answer(check_document(found, drawn, lacking=effects), found)
+    code = console.answer(check_document(found, lacking=effects), found)
     if write_gear:
         with places[write_gear].filled() as path:
             path.write_text(gear_file(case), "utf-8")
@@ -74,12 +72,3 @@ def check(console: Console, effects, write_gear, plot, force, **given):
             path.write_bytes(render(readings_figure(case), kind, case.name))
         console.words(f"the picture: {plot}")
     return code
-
-
-def _shows_braille() -> bool:
-    """Tell whether standard output takes letters beyond those of its language."""
-    try:
-        "\u2801".encode(sys.stdout.encoding or "utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True

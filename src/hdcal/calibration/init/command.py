@@ -12,12 +12,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    column_option,
-    is_refused,
-    json_option,
-    sheet_option,
-)
+from hdcal.cli.options import column_option, json_option, sheet_option
 from hdcal.data.theory_names import READINGS
 from hdcal.errors import Finding, InputError, quoted
 
@@ -105,7 +100,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
             console.wrong.attempt(read_gear, tables)
         elif Path(data).is_dir():
             raise InputError([Finding("data", "is a folder", "Name a file")])
-        elif not (columns is None or is_refused(console, "--sheet")):
+        elif columns is not None:
             how = {"columns": columns, "sheet": sheet}
             case = console.wrong.attempt(read_case, data, tables, **how)
     measured = {

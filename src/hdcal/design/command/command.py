@@ -4,7 +4,6 @@ import click
 
 from hdcal.cli import options
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import Parsed, read_window
 from hdcal.design.command.options import (
@@ -40,7 +39,6 @@ def design(console: Console, run, gear, out, force, **given):
     With --window: the softest spring of an elastic wave generator that keeps the gear
     inside. With --limit-force: the sizes nearest to the tested ones that keep it.
     """
-    keep_compilations()
     from hdcal.design.inverse_design import inverse_design
     from hdcal.design.sources import open_source
     from hdcal.design.summary import generator_report, inverse_report

@@ -6,7 +6,6 @@ from typing import Any
 import click
 
 from hdcal.cli.command import Command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.options import is_given
 from hdcal.errors import Finding
@@ -31,7 +30,6 @@ _REMEDIES = {"required_probability": "Ask for that share as `content`"}
 
 @click.pass_context
 def _margin(context: click.Context, run: str, **asked):
-    keep_compilations()
     from hdcal.inference.posterior_file import FLEET, kind_of
 
     if kind_of(run) is FLEET:

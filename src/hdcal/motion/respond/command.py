@@ -5,7 +5,6 @@ from pathlib import Path
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.force_options import force_options, read_drive
 from hdcal.cli.options import json_option, seed_option
@@ -51,7 +50,6 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     with console.wrong:
         console.reserve_folder(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
-    keep_compilations()
     from hdcal.inference.dynamic_posterior import load_any
     from hdcal.motion.respond.respond import respond as ask
     from hdcal.motion.respond.summary import response_report, with_columns

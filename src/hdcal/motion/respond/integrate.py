@@ -2,13 +2,14 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hdcal.errors import Finding, InputError
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
@@ -28,15 +29,13 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
 
 # Draws integrated side by side: all wait for the slowest. With many times they are
 # fewer, so that no more numbers than this are in memory at once.
 _CHUNK, _MOST_STATES = 250, 1_000_000
 
 
-class _Leftover(Node):
+class _Leftover(eqx.Module):
     """What the model leaves of the force of one draw, none at the unloaded gear."""
 
     problem: Problem
@@ -64,10 +63,7 @@ def unseen(posterior: Posterior, values: dict, mass, seed: int):
     else:
         radial = case_reading(posterior.case).radial_per_read
         moved = sample_prior(mass_prior(gear, radial), "mass", of_mass, count)
-    ratio = gear.dynamic_priors.get("damping_ratio")
-    if ratio is None:
-        words = "this older result holds no prior of the damping"
-        raise InputError([Finding(posterior.case.name, words, "Calibrate again")])
+    ratio = gear.dynamic_priors["damping_ratio"]
     return moved, sample_prior(ratio, "damping_ratio", of_ratio, count)
 
 
@@ -76,7 +72,7 @@ def _with_values(effect: type[Effect], values) -> Effect:
     return effect(**own)
 
 
-@program(static=("kept", "with_damping"))
+@partial(jax.jit, static_argnames=("kept", "with_damping"))
 def _each(
     values,
     reading,

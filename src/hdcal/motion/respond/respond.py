@@ -26,7 +26,6 @@ from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.physics.forcing import Forcing
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.prediction.engine.gear_forces import evenly, gear_values
-from hdcal.programs.program import program
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
@@ -169,7 +168,7 @@ def _move(
     )
 
 
-@program
+@jax.jit
 def _forces(force: Forcing, times):
     return jax.vmap(force)(times)
 

@@ -5,7 +5,6 @@ from functools import partial
 import click
 
 from hdcal.cli.command import command
-from hdcal.cli.compilation_cache import keep_compilations
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import DEFORMATIONS, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
@@ -44,7 +43,6 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
     could not tell apart are averaged over by their probability.
     """
-    keep_compilations()
     from hdcal.prediction.engine.causes import averaging_words, causes_of, read_models
     from hdcal.report.saving import Target
 

@@ -15,7 +15,6 @@ from jax.tree_util import Partial, all_leaves
 from scipy.special import ndtri, stdtrit
 
 from hdcal.prediction.budget.inputs import InputGroup
-from hdcal.programs.program import program
 
 # Digits of a standard uncertainty that count.
 _DIGITS = 2
@@ -72,7 +71,7 @@ def coverage_factor(dof: float, coverage: float = 0.95) -> float:
     return float(stdtrit(dof, share) if dof < 1e9 else ndtri(share))
 
 
-@program
+@jax.jit
 def _tangent(model, at):
     return jax.value_and_grad(model)(at)
 

@@ -3,8 +3,10 @@
 import math
 from typing import Literal, get_args
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.plausible import implausible
@@ -13,8 +15,6 @@ from hdcal.errors import Finding
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.sizes import StiffnessStrata
 from hdcal.prediction.engine.untested import Untested
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -31,7 +31,7 @@ _OFF = 100.0
 _MOST_LOSS = 0.5
 
 
-class Conditions(Node):
+class Conditions(eqx.Module):
     """Under which conditions a force is asked for.
 
     Attributes:
@@ -52,7 +52,7 @@ class Conditions(Node):
     scale: Float[Array, ""] | float
     strata: StiffnessStrata
     loading: Float[Array, ""] | float
-    down: bool = static()
+    down: bool = eqx.field(static=True)
 
     @property
     def low(self) -> Float[Array, ""] | float:

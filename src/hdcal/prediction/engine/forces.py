@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.gauges import acting, shown
@@ -15,7 +16,6 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values, build_effects, member_base
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
-from hdcal.programs.shapes import Float
 
 # A reading is what the rig's force gauge shows, its zero and errors included; the
 # load is what acts on the gear.

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.inference.gauges import acting, shown
@@ -18,8 +19,6 @@ from hdcal.prediction.engine.untested import (
     Untested,
     untested_of,
 )
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Sites of a draw: which of the causes it is of, and its modulus over that of the tested
 # gear where another material was drawn.
@@ -65,7 +64,7 @@ def evenly(total: int, count: int) -> np.ndarray:
     return np.linspace(0, total - 1, min(count, total)).astype(int)
 
 
-@program
+@jax.jit
 def gear_forces(
     problem: Problem,
     values: Values,

@@ -9,8 +9,11 @@ starts at the far end of the tested range, so that its size at this end is learn
 
 from dataclasses import dataclass
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from scipy.special import softmax
 
 from hdcal.data.records import Array, Records
@@ -19,9 +22,6 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values, predict_rows, with_rounding
 from hdcal.prediction.engine.causes import Cause
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Rows nearer to each other than this part of the range are one: the bend is smooth.
 _KNOTS = 48
@@ -37,7 +37,7 @@ _FADE = 0.1
 _POWERS = np.arange(3)[:, None, None]
 
 
-class Growth(Node):
+class Growth(eqx.Module):
     """What the tested rows say of a bend beyond one of their ends.
 
     Attributes:
@@ -91,7 +91,7 @@ class Growth(Node):
         return found, self.line + size**2 * (self.ties / spread) @ self.ties.T
 
 
-class BendLaw(Node):
+class BendLaw(eqx.Module):
     """The law of a bend of known size beyond one end.
 
     Attributes:
@@ -201,7 +201,7 @@ def _fitted(end: float, far: float, deformation, weight, error, change) -> Fitte
     return FittedGrowth(growth, pairs, chances)
 
 
-@program
+@jax.jit
 def _left(problem: Problem, values: Values, records: Records):
     """Return what a straight model leaves of each row [N], and its precision."""
     mean, noise = predict_rows(problem, values, records, None)

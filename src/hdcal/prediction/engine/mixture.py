@@ -8,15 +8,15 @@ exact, far into the tails, and differentiable.
 from collections.abc import Sequence
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import erfc, ndtri
 from jax.scipy.stats import norm
+from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 # What does not scatter at all still needs a width [N]: far below any reading.
 _LEAST_SD = 1e-9
@@ -25,7 +25,7 @@ _MOST_STEPS = 80
 _CLOSE = 1e-8
 
 
-class Mixture(Node):
+class Mixture(eqx.Module):
     """Normal components; leading axes, such as the draws, are a batch.
 
     Attributes:

@@ -2,18 +2,18 @@
 
 from typing import Literal, get_args
 
+import equinox as eqx
 import numpy as np
 
 from hdcal.errors import Finding
 from hdcal.inference.problem import Problem
 from hdcal.prediction.engine.forces import Quantity
-from hdcal.programs.node import Node, static
 
 Population = Literal["readings", "mountings", "specimens"]
 POPULATIONS: tuple[Population, ...] = get_args(Population)
 
 
-class Whose(Node):
+class Whose(eqx.Module):
     """Whose force is asked for.
 
     Attributes:
@@ -22,9 +22,9 @@ class Whose(Node):
         rounded: whether it is read in steps.
     """
 
-    population: Population = static()
-    quantity: Quantity = static()
-    rounded: bool = static()
+    population: Population = eqx.field(static=True)
+    quantity: Quantity = eqx.field(static=True)
+    rounded: bool = eqx.field(static=True)
 
     def tested_gears(self, problem: Problem) -> int:
         """Return how many gears tell of a new one; 0 where the gear is a tested one."""

@@ -38,7 +38,6 @@ from hdcal.prediction.engine.untested import (
     Untested,
     untested_of,
 )
-from hdcal.programs.program import program
 
 # More draws than this change no digit that is printed.
 MOST_DRAWS = 8000
@@ -150,7 +149,7 @@ def _with_scores(cause: Cause, seed: int) -> tuple[dict[str, np.ndarray], Untest
     return {**values, SCORES: ndtri(levels[:, :2]), **open_sites}, untested
 
 
-@program(returns=Mixture)
+@jax.jit
 def mixtures(
     problem: Problem, values: Values, whose: Whose, conditions: Conditions
 ) -> Mixture:
@@ -250,7 +249,7 @@ def bend_law(force: PopulationForce) -> tuple[float, float]:
     return float(np.mean(mean)), float(np.sqrt(np.mean(sd**2) + np.var(mean)))
 
 
-@program
+@jax.jit
 def _bends(untested: Untested, values: Values, deformation):
     """Return mean and sd of the bend of each draw [N]."""
     at = jnp.reshape(deformation, 1)

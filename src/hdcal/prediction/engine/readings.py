@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float, Key
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.problem import Problem
@@ -10,11 +11,9 @@ from hdcal.physics.effect import Noise
 from hdcal.prediction.engine.forces import force_of
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.untested import Untested
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float, Key
 
 
-@program
+@jax.jit
 def readings(
     problem: Problem,
     values: Values,

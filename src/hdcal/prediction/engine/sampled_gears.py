@@ -6,7 +6,9 @@ of a whole population under one condition cannot answer.
 
 from collections.abc import Mapping
 
+import equinox as eqx
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from hdcal.data.case import Theory
 from hdcal.data.records import Array, Geometry
@@ -15,11 +17,9 @@ from hdcal.physics.theory import Scalar
 from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
 from hdcal.prediction.engine.untested import Untested
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float
 
 
-class SampledGears(Node):
+class SampledGears(eqx.Module):
     """A gear for each draw, none of them tested; differentiable in the drawing.
 
     Attributes:
@@ -38,7 +38,7 @@ class SampledGears(Node):
     deviation: Float[Array, " draw"]
     shifts: Mapping[str, Float[Array, " draw"]]
     untested: Untested | None
-    theory: Theory = static()
+    theory: Theory = eqx.field(static=True)
 
     def made(self, drawing: Geometry) -> Geometry:
         """Return the gears as made: the drawing and each one's deviations from it."""

@@ -6,8 +6,10 @@ All of them act through one number, the stiffness over that of the calibrated ge
 from collections.abc import Mapping
 from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Array, Geometry
@@ -15,8 +17,6 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.even_points import spread_evenly
-from hdcal.programs.node import Node
-from hdcal.programs.shapes import Float
 
 # The sizes that may change or have a tolerance, as people name them, and their field.
 SIZES = {
@@ -32,7 +32,7 @@ _LOG2_GEARS, _STRATA = 13, 32
 _LARGEST = 0.5
 
 
-class StiffnessStrata(Node):
+class StiffnessStrata(eqx.Module):
     """The distribution of the factor of the stiffness, in strata.
 
     Attributes:

@@ -6,8 +6,11 @@ tested temperatures the rig may drift, for every member alike.
 
 from dataclasses import replace
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from scipy.special import ndtri
 
 from hdcal.data.full_scale import REFERENCE
@@ -17,14 +20,10 @@ from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.distributions import moments
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
-from hdcal.physics.effects.thermal_expansion import ThermalExpansion
-from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
+from hdcal.physics.effects.temperature import ThermalExpansion, ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Sites of a draw beside those of the posterior: size of the bend and its noise beyond
 # each end, and standard normal scores of the bend, the zero and the frame.
@@ -33,7 +32,7 @@ BENDS, PLACES = "_bends", "_places"
 SITES = 4
 
 
-class Untested(Node):
+class Untested(eqx.Module):
     """What is not known of conditions beyond the tested ones.
 
     Attributes:
@@ -79,7 +78,7 @@ class Untested(Node):
         )
 
 
-class Bends(Node):
+class Bends(eqx.Module):
     """What may bend the force of one draw: computed once for all deformations.
 
     Attributes:
@@ -125,7 +124,7 @@ class Bends(Node):
         return bend, columns @ value["gap_weights"]
 
 
-@program
+@jax.jit
 def _outside(temperature, coldest, warmest):
     return temperature - jnp.clip(temperature, coldest, warmest)
 

@@ -15,7 +15,6 @@ from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
 from hdcal.prediction.engine.growth import Growth, bend_covariance
 from hdcal.prediction.engine.untested import BENDS, Untested, fitted_columns
-from hdcal.programs.program import program
 
 # Draws that tell: their sd is then known to some 5 %.
 _DRAWS = 256
@@ -162,19 +161,19 @@ def _powers(place: np.ndarray) -> np.ndarray:
     return place[:, None] ** np.arange(3)
 
 
-@program
+@jax.jit
 def _reach(growth: Growth, deformation):
     """Return how far beyond the end a deformation is, and the share of the bend."""
     return growth.beyond(deformation), growth.share(deformation)
 
 
-@program
+@jax.jit
 def _leftover(discrepancy: Discrepancy, growths: tuple[Growth, Growth], deformation):
     """Return the columns of the fitted leftover; growths below and above."""
     return _columns(discrepancy, growths, deformation, jnp.zeros_like(deformation))
 
 
-@program
+@jax.jit
 def _half_loop(discrepancy: Discrepancy, growths, deformation, weights):
     """Return the mean square over draws of what loading adds to the middle."""
     up, middle = (
@@ -192,7 +191,7 @@ def _columns(discrepancy: Discrepancy, growths, deformation, movement):
     return fitted_columns(discrepancy, ends, (deformation, movement), share)
 
 
-@program
+@jax.jit
 def _given(growth: Growth, sizes, cause):
     """Return what `Growth.given` says of every draw."""
 
@@ -202,7 +201,7 @@ def _given(growth: Growth, sizes, cause):
     return jax.vmap(one)(sizes, cause)
 
 
-@program
+@jax.jit
 def _drifts(problem: Problem, values: Values, untested: Untested, at, warm):
     """Return what the rig's drift adds to a reading in every draw [N]."""
     loading = jnp.where(at < 0.0, -1.0, 1.0)

@@ -33,7 +33,6 @@ from hdcal.prediction.margin.result import (
     ModelBound,
     sizes_needed,
 )
-from hdcal.programs.program import program
 
 # The least probability and the least distance to 1 that a number can hold.
 LEAST, LEAST_LEFT = np.finfo(float).tiny, np.finfo(float).epsneg
@@ -62,7 +61,7 @@ class PopulationDraws:
     predicted: np.ndarray
 
 
-@program
+@jax.jit
 def _each_draw(mixture: Mixture, sense, shares, limit):
     """Return quantiles [draw] at each share, centre and share above the limit.
 
@@ -76,7 +75,7 @@ def _each_draw(mixture: Mixture, sense, shares, limit):
     return (*found, mixture.centre(), above)
 
 
-@program
+@jax.jit
 def _predicted(parts, sense, rounding_sd, shown, exact):
     """Return quantiles of the law of all draws: as shown with rounding, and exact.
 

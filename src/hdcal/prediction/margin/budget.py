@@ -27,7 +27,6 @@ from hdcal.prediction.engine.causes import Cause, Driver, independent_draws
 from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.population_force import PopulationForce, member_force
 from hdcal.prediction.margin.force_model import DRIFTS, ForceModel
-from hdcal.programs.program import program
 
 # Sites of a draw that a certificate states, where the calibration has them.
 CERTIFIED = ("force_gain", "deformation_gain", "temperature_offset")
@@ -85,7 +84,7 @@ class ForceBudget:
         return sum(component.variance for component in self.components)
 
 
-@program
+@jax.jit
 def _scatter(problem, values, whose, conditions):
     """Return variance of the noise, mean and sd of the bend, of every draw [N², N]."""
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)

@@ -17,7 +17,6 @@ from hdcal.prediction.engine.mixture import Mixture, quantile_weights
 from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
 from hdcal.prediction.engine.reading_grid import ReadingGrid
 from hdcal.prediction.margin.request import Criteria
-from hdcal.programs.program import program
 
 # The search ends at this multiple of the tested deformation: what lies beyond rests
 # on nothing.
@@ -97,7 +96,7 @@ def deformation_reached(
     return DeformationReached(given, warm, ends, *numbers, tested)
 
 
-@program
+@jax.jit
 def _solve(problem, values, whose, conditions, given, shares, ends):
     """Return deformations [draw, 3]: at both shares and for the mean, [mm].
 

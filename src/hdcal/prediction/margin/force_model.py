@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from hdcal.data.case import Theory
 from hdcal.data.records import Array, Geometry
@@ -13,8 +15,6 @@ from hdcal.prediction.engine.conditions import Conditions
 from hdcal.prediction.engine.population import Whose
 from hdcal.prediction.engine.population_force import member_force
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
-from hdcal.programs.node import Node, static
-from hdcal.programs.shapes import Float
 
 # The rig's drifts with temperature, and where the untested conditions hold them; what
 # else simply adds to the force [N].
@@ -22,7 +22,7 @@ DRIFTS = {"zero_drift": "zero", "frame": "frame"}
 _ADDED = ("noise", "resolution", "mounting", "leftover")
 
 
-class ForceModel(Node):
+class ForceModel(eqx.Module):
     """The force as a function of the budget's inputs, deviations from their estimates.
 
     Attributes:
@@ -43,9 +43,9 @@ class ForceModel(Node):
     conditions: Conditions
     nominal: Geometry
     depend: Float[Array, "m m"]
-    sites: tuple[str, ...] = static()
-    names: tuple[str, ...] = static()
-    theory: Theory = static()
+    sites: tuple[str, ...] = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)
+    theory: Theory = eqx.field(static=True)
 
     def __call__(self, inputs: Float[Array, " n"]) -> Float[Array, ""]:
         """Return the force of one member [N]."""

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import equinox as eqx
 import jax
 import numpy as np
 
@@ -29,8 +30,6 @@ from hdcal.prediction.engine.sizes import (
     tolerance_strata,
 )
 from hdcal.prediction.margin.request import Criteria
-from hdcal.programs.node import Node, static
-from hdcal.programs.program import program
 
 # What scales the stiffness of every draw: its site, and code units in the unit shown.
 _MODULI = {"E0_GPa": ("E0", 1e3), "K": ("K", 1.0)}
@@ -57,7 +56,7 @@ class Gradient:
     bound_N_per_percent: float
 
 
-class Redesign(Node):
+class Redesign(eqx.Module):
     """The forces of a population as a function of the gear's sizes, modulus and K.
 
     Attributes:
@@ -78,7 +77,7 @@ class Redesign(Node):
     geometry: Geometry
     tolerances: dict[str, float]
     origin: dict[str, float]
-    theory: Theory = static()
+    theory: Theory = eqx.field(static=True)
 
     @classmethod
     def of(cls, force: PopulationForce, moduli: Mapping[str, float]) -> "Redesign":
@@ -123,13 +122,13 @@ class Redesign(Node):
         return mixtures(self.problem, self.values, self.whose, there)
 
 
-@program
+@jax.jit
 def _mean_slopes(gear: Redesign):
     """Return the derivative of the mean force, averaged over the draws, by input."""
     return jax.jacfwd(lambda point: gear.mixture(point).centre().mean())(gear.origin)
 
 
-@program
+@jax.jit
 def _bound_slopes(gear: Redesign, weights, content):
     """Return the derivative of a weighted sum of the draws' quantiles, by input.
 

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
+from jaxtyping import Float
 from scipy import special
 
 from hdcal.data.records import Array
@@ -39,9 +41,6 @@ from hdcal.prediction.engine.untested import (
     untested_of,
 )
 from hdcal.prediction.margin.sampling_laws import SamplingLaws
-from hdcal.programs.node import Node
-from hdcal.programs.program import program
-from hdcal.programs.shapes import Float
 
 # Points of a round; rounds whose points shape the laws, and rounds that count.
 _POINTS, _TRIALS, _COUNTED = 4096, 2, 2
@@ -85,7 +84,7 @@ _UNTOLD = 0.7
 _NOWHERE = Rare(0.0, np.nan, np.nan, np.nan)
 
 
-class _Target(Node):
+class _Target(eqx.Module):
     """What a point is weighed by: the posterior, and what exceeds the limit.
 
     A point is a whitened position followed by the scores of what is left open. A force
@@ -166,7 +165,7 @@ def _heavy(law: tuple[np.ndarray, ...], limit: float) -> np.ndarray:
     return total
 
 
-@program
+@jax.jit
 def _towards(target: _Target, point, sizes):
     """Return −log of density times tail, and its gradient."""
 
@@ -176,7 +175,7 @@ def _towards(target: _Target, point, sizes):
     return jax.value_and_grad(height)(point)
 
 
-@program
+@jax.jit
 def _weigh(target: _Target, points, sizes):
     """Return the terms of points, their leading axis."""
 

@@ -23,7 +23,6 @@ from hdcal.prediction.engine.population_force import (
 )
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio
 from hdcal.prediction.engine.untested import PLACES
-from hdcal.programs.program import program
 
 # Points of each input's sample; a power of two.
 _POINTS = 4096
@@ -50,7 +49,7 @@ class VarianceShare:
     driven_by: Driver
 
 
-@program
+@jax.jit
 def _mean_forces(problem, values, conditions):
     """Return the mean reading of every draw along the sense of loading [N].
 
@@ -64,7 +63,7 @@ def _mean_forces(problem, values, conditions):
     return jax.vmap(one)(values)
 
 
-@program
+@jax.jit
 def _member_forces(problem, values, whose, conditions, factor, level):
     """Return forces with their noise, each of draw, factor and level of its own.
 

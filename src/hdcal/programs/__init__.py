@@ -1,1 +1,0 @@
-"""Compiled functions that start fast: traced once, kept, and loaded ahead."""
