@@ -80,7 +80,7 @@ def posterior() -> Posterior:
     found = near_the_mode(problem)
     priors = problem_priors(case, (), shipped, theory)
     own = _specifics(case, problem, found)
-    parts = assemble(case, priors, problem, found, own, jax.random.key(2))
+    parts = assemble(case, priors, problem, found, own, 2)
     return Posterior(case, theory, (), priors, *parts, {"with_gap": False})
 
 

@@ -86,7 +86,7 @@ def _kinds(off_in: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def _influence(found: Fleet) -> np.ndarray:
     """Return draws of K of every gear: data tell its product with the modulus only."""
-    mean, sd = moments(found.case.gear.priors["E0"])
+    mean, sd = moments(found.case.gear.priors["E0"], "E0")
     rng = np.random.default_rng(int(str(found.settings["seed"])))
     modulus = 1.0 + sd / mean * rng.standard_normal((len(found.stiffness), 1))
     return found.stiffness / (found.unit * modulus)
