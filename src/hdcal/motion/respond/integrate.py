@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.errors import Finding, InputError
+from hdcal.inference.distributions import sample_prior
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
@@ -26,7 +27,6 @@ from hdcal.physics.dynamics import (
     natural_frequency,
 )
 from hdcal.physics.effect import Effect, parameters
-from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
 
