@@ -10,13 +10,14 @@ PART ?=
 
 BIN := .venv/bin
 BENCH := .venv-bench/bin
+BLIND := $(BIN)/python -m benchmarks.blind
 PIP_QUIET := --quiet --disable-pip-version-check
 COMPILE := $(UV) pip compile pyproject.toml --universal --python-version 3.11 \
 	--generate-hashes --custom-compile-command "make lock" --quiet
 
 .DEFAULT_GOAL := help
 .PHONY: help venv demo test thorough slow lint format types contracts docs bench \
-	bench-diagnosis blind attacks lock clean
+	blind attacks lock clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
@@ -57,26 +58,24 @@ contracts: .venv/installed  ## who may import whom
 	$(BIN)/lint-imports --no-cache
 
 docs: .venv/installed  ## the documentation, in docs/_build/html
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/sphinx-build -W -q -b doctest -d docs/_build/doctrees docs docs/_build/doctest
+	$(BIN)/sphinx-build -W --keep-going -q -b html -d docs/_build/doctrees docs docs/_build/html
 	@echo "The documentation: docs/_build/html/index.html"
 
 bench: .venv-bench/installed  ## compare speed and answers with other tools
 	$(BENCH)/python -m benchmarks $(ARGS)
 
-bench-diagnosis: .venv/installed  ## how often a diagnosis names the true cause (hours)
-	$(BIN)/python -m benchmarks.diagnosis $(ARGS)
-
-# An interrupted check goes on; hdcal itself refuses to mix answers of two versions.
+# An interrupted check goes on; answers of two versions are never mixed.
 blind: | .venv/installed  ## seal CASES cases, answer them blind, open and score (long)
 	@if test -e blind-check/opened.json; then \
 		echo "blind-check is opened already. For a new one remove or move both:"; \
 		echo "  rm -r blind-check blind-check.key"; exit 1; fi
 	@if test -e blind-check; then echo "Going on with blind-check ..."; else \
-		$(BIN)/hdcal blind make --cases $(CASES) --mix all --out blind-check; fi
+		$(BLIND) make --cases $(CASES) --mix all --out blind-check; fi
 	@for name in hdcal bic r2 none; do \
-		test -e blind-check/answers-$$name.json || $(BIN)/hdcal blind answer \
+		test -e blind-check/answers-$$name.json || $(BLIND) answer \
 			blind-check --by $$name --jobs $(WORKERS) || exit $$?; done
-	@$(BIN)/hdcal blind open blind-check --key blind-check.key
+	@$(BLIND) open blind-check --key blind-check.key
 
 lock:  ## pin the dependencies anew (needs uv)
 	$(COMPILE) --extra dev --extra docs --output-file requirements.lock

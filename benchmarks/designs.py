@@ -32,7 +32,7 @@ def measure(repeats: int) -> dict:
     from hdcal import read_case
     from hdcal.design.design_draws import design_draws
     from hdcal.design.study.study import force_quantiles, general_quantiles
-    from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
+    from hdcal.physics.effects.stiffness import ProgressiveStiffening
 
     line = design_draws(read_case(CASE).gear, draws=DRAWS)
     random = np.random.default_rng(0)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,17 +11,17 @@ import hdcal
 FOLDER = Path(__file__).parents[1] / "datasets" / "thermal-demo"
 
 
-class WarmFriction(hdcal.Effect):
+class WarmFriction(
+    hdcal.Effect,
+    stage="force",
+    groups=("loop",),
+    needs=("temperature", "unloading"),
+    symmetry="none",
+):
     """F → F + h s (T − T_ref): friction that grows with temperature.
 
     Source: made up for this example.
     """
-
-    name: ClassVar[str] = "warm_friction"
-    stage: ClassVar[str] = "force"
-    groups: ClassVar[tuple[str, ...]] = ("loop",)
-    needs: ClassVar[frozenset[str]] = frozenset({"temperature", "unloading"})
-    symmetry: ClassVar[str] = "none"
 
     slope: float = hdcal.parameter("N/K", "friction per kelvin", typical=0.02, null=0.0)
 

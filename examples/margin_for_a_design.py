@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy import stats
 
 import hdcal
-from hdcal.prediction.tolerance_factors import k_factor
 
 GEAR = Path(__file__).parents[1] / "datasets" / "xb1-100-80" / "gear.toml"
 AT, STIFFNESS, SPREAD, NOISE, GEARS = 0.4, 205.0, 0.03, 0.4, 6
@@ -44,7 +44,9 @@ def main() -> None:
         float(np.polyfit(records.deformation[rows], records.force[rows], 1)[0])
         for rows in (records.specimen == gear for gear in range(GEARS))
     ]
-    spread = k_factor(GEARS, 0.99, 0.95) * np.std(slopes, ddof=1)
+    root, quantile = np.sqrt(GEARS), stats.norm.ppf(0.99)
+    k = stats.nct.ppf(0.95, GEARS - 1, quantile * root) / root
+    spread = k * np.std(slopes, ddof=1)
     print(f"textbook, mean + k s: {AT * (np.mean(slopes) + spread):.1f} N")
     true = AT * STIFFNESS * (1.0 + 2.326 * SPREAD)
     print(f"true for 99 % of the gears: {true:.1f} N")

@@ -2,20 +2,16 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import ClassVar
 
 import numpy as np
 
 import hdcal
 
 
-class QuadraticGauge(hdcal.Effect):
+class QuadraticGauge(
+    hdcal.Effect, stage="deformation", groups=("curve up",), symmetry="even"
+):
     """A displacement gauge that is not quite linear: ω → ω + e ω²."""
-
-    name: ClassVar[str] = "quadratic_gauge"
-    stage: ClassVar[str] = "deformation"
-    groups: ClassVar[tuple[str, ...]] = ("curve up",)
-    symmetry: ClassVar[str] = "even"
 
     error: float = hdcal.parameter(
         "1/mm", "relative error of the gauge per mm", typical=0.02, null=0.0

@@ -1,52 +1,12 @@
-"""The public face of hdcal: these names, light to import, each documented."""
+"""The public names of hdcal load on first use."""
 
-import inspect
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 import hdcal
 
-PUBLIC = [
-    "Case",
-    "DynamicPosterior",
-    "EFFECTS",
-    "Effect",
-    "FleetPosterior",
-    "Gear",
-    "Geometry",
-    "HdcalError",
-    "InputError",
-    "Noise",
-    "NotUsable",
-    "Posterior",
-    "Prior",
-    "Records",
-    "Rows",
-    "Tracker",
-    "Verdict",
-    "calibrate",
-    "calibrate_dynamic",
-    "causes",
-    "compare",
-    "diagnose",
-    "fit",
-    "fleet",
-    "force",
-    "inverse_design",
-    "keep_compilations",
-    "margin",
-    "parameter",
-    "predict",
-    "read_case",
-    "residuals",
-    "respond",
-    "study",
-    "summarise",
-    "wave_generator",
-]
 LOADED = """
 import sys
 from pathlib import Path
@@ -56,27 +16,7 @@ print(*sorted({name.partition(".")[0] for name in set(sys.modules) - before}))
 """
 
 
-def test_the_public_names_are_frozen():
-    assert sorted(hdcal.__all__) == PUBLIC
-    assert dir(hdcal) == PUBLIC
-
-
-@pytest.mark.parametrize("name", PUBLIC)
-def test_every_name_is_documented(name):
-    public = getattr(hdcal, name)
-    items = public.values() if isinstance(public, dict) else [public]
-    assert items
-    for item in items:
-        # A dataclass without a docstring documents itself as its own signature.
-        text = item.__dict__.get("__doc__") if inspect.isclass(item) else item.__doc__
-        assert text
-        assert not text.startswith(f"{item.__name__}(")
-        first = text.splitlines()[0]
-        assert len(first) <= 80
-        assert first.endswith(".")
-
-
-@pytest.mark.parametrize("name", PUBLIC)
+@pytest.mark.parametrize("name", hdcal.__all__)
 def test_every_name_can_be_imported_by_itself(name):
     space = {}
     exec(f"from hdcal import {name}", space)
@@ -114,9 +54,3 @@ def test_the_force_can_be_differentiated_batched_and_compiled():
     assert slope.radius == pytest.approx(-3.0 * force / 40.0)
     assert slope.length == pytest.approx(force / 70.0)
     assert slope.poisson == pytest.approx(0.0, abs=1e-12)
-
-
-def test_the_page_of_the_library_tells_every_public_name():
-    told = (Path(__file__).parents[1] / "docs" / "api.md").read_text()
-    missing = [name for name in hdcal.__all__ if f"hdcal.{name}" not in told]
-    assert missing == []

@@ -13,8 +13,6 @@ from moving import still_posterior
 
 import hdcal
 from hdcal.__main__ import hdcal as program
-from hdcal.blind.answering import answer_set
-from hdcal.blind.virtual_rig.cases import draw_cases
 from hdcal.classical.fit.summary import fit_report
 from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
@@ -23,7 +21,6 @@ from hdcal.data.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
 from hdcal.data.units import COLUMN_UNITS
 from hdcal.errors import InputError
-from hdcal.prediction.tolerance_factors import k_factor
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
 MATERIAL = """
@@ -187,11 +184,6 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("alarm_rows", "forget", "reopen", "seed"),
     ),
     (
-        lambda run, **asked: k_factor(**{"size": 3, **asked}),
-        {},
-        ("size", "content", "confidence"),
-    ),
-    (
         lambda run, **asked: hdcal.fit(run.case, **asked),
         {},
         ("degrees",),
@@ -202,11 +194,10 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
         ("at",),
     ),
     (
-        lambda _, cases=1, seed=1: next(draw_cases("no mix", cases, seed)),
+        lambda run, **asked: hdcal.causes(run.case, **{"seed": -1, **asked}),
         {},
-        ("cases", "seed"),
+        ("jobs",),
     ),
-    (lambda _, jobs: answer_set("no set", jobs=jobs), {}, ("jobs",)),
     (lambda run, seed: hdcal.diagnose(_falling(run.case), seed=seed), {}, ("seed",)),
 ]
 SEVERAL = {
@@ -224,11 +215,9 @@ def asked_entries() -> Iterator[tuple[str, str, Callable]]:
     """Yield the quantity, its parameter, and what asks with it."""
     for function, other, names in ASKED:
         for name in names:
-            quantity = {"vary": "size", "size": "sample"}.get(name, name)
+            quantity = {"vary": "size"}.get(name, name)
             if function is hdcal.respond and name == "draws":
                 quantity = "gears"
-            if name == "seed" and "cases" in names:
-                quantity = "secret_seed"
 
             def ask(value, run, function=function, other=other, name=name):
                 given = SEVERAL.get(name, lambda v: v)(value)

@@ -11,24 +11,34 @@ from sphinx.util.docutils import SphinxDirective
 
 import hdcal
 from hdcal.report.answer import Answer, json_schema
+from hdcal.report.result import Result
 
 FOLDER = "schemas"
 
 
-def answers() -> dict[str, type[Answer]]:
+def answers() -> dict[str, type]:
     """Return every answer of the package by its format, and its kind if it has one."""
     for module in pkgutil.walk_packages(hdcal.__path__, "hdcal."):
-        if module.name.rpartition(".")[2] == "answer":
-            import_module(module.name)
-    waiting, found = [Answer], {}
+        import_module(module.name)
+    waiting, found = [Answer, Result], {}
     for answer in waiting:  # grows while it is walked along
         waiting += answer.__subclasses__()
-        schema = vars(answer).get("schema")
-        if isinstance(schema, str):
-            name = " ".join(filter(None, (schema, vars(answer).get("kind"))))
-            assert name not in found, f"two answers are called {name}"
+        # A class that inherits its format is no answer by itself.
+        if {"schema", "format"} & vars(answer).get("__annotations__", {}).keys():
+            fields = schema_of(answer)["properties"]
+            stated = [fields.get(key, {}).get("const") for key in ("schema", "kind")]
+            name = " ".join(filter(None, stated))
+            assert not name or name not in found, f"two answers are called {name}"
             found[name] = answer
+    del found[""]  # The two base classes.
     return dict(sorted(found.items()))
+
+
+def schema_of(answer: type) -> dict:
+    """Return the JSON Schema of an answer."""
+    if issubclass(answer, Result):
+        return answer.json_schema()
+    return json_schema(answer)
 
 
 def file_name(name: str) -> str:
@@ -57,7 +67,7 @@ def write_schemas(app: Sphinx, error: Exception | None) -> None:
     folder = Path(app.outdir) / FOLDER
     folder.mkdir(exist_ok=True)
     for name, answer in answers().items():
-        text = json.dumps(json_schema(answer), indent=2) + "\n"
+        text = json.dumps(schema_of(answer), indent=2) + "\n"
         (folder / file_name(name)).write_text(text, "utf-8")
 
 

@@ -13,16 +13,14 @@ from pathlib import Path
 import click
 import platformdirs
 
-from hdcal.blind.command.command import blind
 from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
-from hdcal.classical.audit.command import audit
 from hdcal.classical.fit.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
-from hdcal.cli.topics import COMPLETE, show_completion, show_topic
+from hdcal.cli.topics import show_topic
 from hdcal.comparison.command import compare
 from hdcal.design.command.command import design
 from hdcal.design.study.command import study
@@ -49,12 +47,32 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
         context.exit()
 
 
+# Former commands, and what to use instead.
+REMOVED = {
+    "audit": "the page 'The article against its own numbers' of the documentation",
+    "blind": "'make blind' in a clone of the project",
+}
+
+
+class _Commands(click.Group):
+    """The commands; a former one is answered with what to use instead."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]):
+        if args[0] in REMOVED:
+            ctx.fail(f"'{args[0]}' is no command any more; use {REMOVED[args[0]]}")
+        return super().resolve_command(ctx, args)
+
+
 _EPILOG = (
     "Exit codes: 0 done, 1 no result that may be used, 2 bad input, 130 interrupted."
 )
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]}, epilog=_EPILOG)
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=_EPILOG,
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -87,10 +105,7 @@ for _command in (
     init,
     check,
     effects,
-    audit,
-    blind,
     show_topic,
-    show_completion,
 ):
     hdcal.add_command(_command)
 
@@ -98,14 +113,14 @@ for _command in (
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every outcome is an exit code and plain words."""
     given = sys.argv[1:] if arguments is None else arguments
-    if COMPLETE in os.environ:
+    if "_HDCAL_COMPLETE" in os.environ:
         # A shell asks for what may follow, and click answers and ends the process.
         hdcal.main([], "hdcal")
     for name, value in _environment():
         os.environ.setdefault(name, value)
     console = Console(json="--json" in given)
     console.prepare()
-    _interrupt_on_sigterm()
+    _interrupt_once()
     code = _run(given, console)
     sys.exit(NOBODY_READS if code == DONE and console.unread else code)
 
@@ -185,7 +200,8 @@ def _environment() -> Iterator[tuple[str, str]]:
     """
     # Thousands of small steps run 35 times as fast on one core as beside an H200.
     yield "JAX_PLATFORMS", "cpu"
-    yield "JAX_COMPILATION_CACHE_DIR", platformdirs.user_cache_dir("hdcal", False)
+    folder = platformdirs.user_cache_dir("hdcal", False)
+    yield "JAX_COMPILATION_CACHE_DIR", os.environ.get("HDCAL_CACHE_DIR", folder)
     yield "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0"
     yield "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1"
     # JAX caches no program that may call back to raise an error: NaN is looked for.
@@ -194,14 +210,20 @@ def _environment() -> Iterator[tuple[str, str]]:
     yield "OPENBLAS_NUM_THREADS", "1"
 
 
-def _interrupt_on_sigterm() -> None:
-    """Clean up on SIGTERM as on SIGINT."""
+def _interrupt_once() -> None:
+    """Clean up on SIGINT and on SIGTERM, and let a second one not disturb that."""
+    heard = [signal.SIGTERM]
+    # In the background of a script, or under nohup, SIGINT is ignored.
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        heard.append(signal.SIGINT)
 
     def stop(*_) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)
+        for each in heard:
+            signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    signal.signal(signal.SIGTERM, stop)
+    for each in heard:
+        signal.signal(each, stop)
 
 
 if __name__ == "__main__":

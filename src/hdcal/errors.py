@@ -1,8 +1,7 @@
 """The errors a user can meet: every one carries words, none needs a traceback."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import ParamSpec, Self, TypeVar
 
@@ -99,16 +98,6 @@ class NotWritable(HdcalError):
 
 class NotUsable(HdcalError):
     """A result exists but failed its checks, so nothing may be derived from it."""
-
-
-@contextmanager
-def said_if_interrupted(words: str) -> Iterator[None]:
-    """Let an interruption of what is done within say what was written before."""
-    try:
-        yield
-    except KeyboardInterrupt as error:
-        error.add_note(words)
-        raise
 
 
 class Findings(list[Finding]):

@@ -8,6 +8,9 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
+
+from hdcal.errors import Finding, InputError, quoted
 
 # XLA on CPUs compiles a loop that touches fewer bytes per iteration as one kernel.
 _WHOLE_LOOPS = "xla_cpu_small_while_loop_byte_threshold=100000000"
@@ -24,13 +27,14 @@ def use_double_precision(made: Any) -> None:
         made: the pytree with which a computation begins.
 
     Raises:
+        InputError: JAX is told to use a device that is not here.
         RuntimeError: it is made inside a function that JAX compiles or differentiates,
             whose arguments are in single precision already.
     """
     if jax.config.read("jax_enable_x64"):
         return
     _compile_loops_whole()
-    if any(isinstance(x, jax.core.Tracer) for x in (*jax.tree.leaves(made), _zero())):
+    if any(isinstance(x, Tracer) for x in (*jax.tree.leaves(made), _zero())):
         raise RuntimeError(
             f"a {type(made).__name__} switches JAX to double precision, which is too "
             "late inside a function that is compiled or differentiated: make one "
@@ -40,8 +44,18 @@ def use_double_precision(made: Any) -> None:
 
 
 def _zero() -> jax.Array:
-    """Return an array, which is a tracer inside `jax.jit`."""
-    return jnp.zeros(())
+    """Return an array, which is a tracer inside `jax.jit`.
+
+    Raises:
+        InputError: JAX is told to use a device that is not here.
+    """
+    try:
+        return jnp.zeros(())
+    except (RuntimeError, AssertionError):
+        named = quoted(os.environ.get("JAX_PLATFORMS", ""))
+        words = f"names {named}, which JAX cannot use here"
+        remedy = "Unset it, or name a device that is here, such as cpu"
+        raise InputError([Finding("JAX_PLATFORMS", words, remedy)]) from None
 
 
 def _compile_loops_whole() -> None:

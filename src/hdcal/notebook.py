@@ -11,7 +11,6 @@ from typing import Any
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "Case": "calibration.check.summary.case_document",
-    "Comparison": "comparison.summary.comparison_report",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "FleetCauses": "shared_causes.summary.causes_report",
@@ -29,7 +28,6 @@ TELLERS = {
 TABLES = {
     "Bands": "report.tables.own_columns",
     "Case": "calibration.check.summary.reading_columns",
-    "Comparison": "comparison.summary.comparison_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "FleetCauses": "shared_causes.summary.cause_columns",
@@ -47,7 +45,6 @@ TABLES = {
 CHARTS = {
     "Bands": "prediction.bands.chart.bands_chart",
     "Case": "calibration.check.chart.case_chart",
-    "Comparison": "comparison.chart.comparison_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
     "InverseDesign": "design.chart.candidate_chart",

@@ -26,8 +26,8 @@ from hdcal.inference.integrated import draw_members
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.physics.effect import parameters
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
-from hdcal.physics.scatter import Scatter
 
 
 def with_force(records, sd=0.5):

@@ -25,12 +25,7 @@ from hdcal.calibration.effects.answer import EffectsAnswer
         ["effects", "-h"],
         ["diagnose", "-h"],
         ["fit", "-h"],
-        ["audit", "-h"],
         ["track", "-h"],
-        ["blind", "-h"],
-        ["blind", "make", "-h"],
-        ["blind", "answer", "-h"],
-        ["blind", "open", "-h"],
     ],
 )
 def test_help_is_given_without_heavy_imports(arguments):

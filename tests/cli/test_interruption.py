@@ -4,7 +4,6 @@ import os
 import pty
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -41,33 +40,3 @@ def test_an_interrupted_run_leaves_nothing(by: signal.Signals, tmp_path: Path):
     os.close(ours)
     assert b"interrupted" in said and b"Traceback" not in said
     assert not any(tmp_path.iterdir())
-
-
-IMPORTING = """
-import os, signal, sys, threading
-from hdcal.__main__ import _hear_interruptions
-_hear_interruptions()
-threading.Timer(0.3, os.kill, (os.getpid(), int(sys.argv[1]))).start()
-try:
-    import slow
-    print("imported", flush=True)
-    signal.pause()
-except KeyboardInterrupt:
-    print("heard")
-"""
-
-
-@pytest.mark.parametrize("one", [signal.SIGINT, signal.SIGTERM])
-def test_an_import_ends_before_an_interruption_is_heard(tmp_path: Path, one):
-    """Python would swallow it there, or leave a lock held that threads wait for."""
-    (tmp_path / "slow.py").write_text("import time\ntime.sleep(1.0)\n")
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    done = subprocess.run(
-        [sys.executable, "-c", IMPORTING, str(int(one))],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
-    assert done.stdout.split() == ["imported", "heard"], done.stderr

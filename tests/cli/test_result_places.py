@@ -1,79 +1,114 @@
-"""A command says where its result is, or who is in its way, and by which exit code."""
+"""A command refuses an impossible target before its work, and says what it wrote."""
 
 import json
+import os
+import subprocess
 from pathlib import Path
 
 import pytest
-from commands import XB1, Hdcal
+from commands import MAIN, XB1, Hdcal
 
-from hdcal.report.saving.reserve import reserve_folder
+from hdcal.report.saving import Target
 
-# What each command that writes is asked with --out; none gets so far as to read RUN.
+# With more work to do than a test could wait for.
 WRITING = [
     ["calibrate", XB1, "--draws", "1000000"],
     ["diagnose", XB1],
     ["fit", XB1],
-    ["audit"],
     ["study", "--gear", XB1 / "gear.toml", "--vary", "radius_mm=40"],
     ["design", "--gear", XB1 / "gear.toml", "--window", "0.3:0.5"],
-    ["blind", "make", "--cases", "1000", "--mix", "prior", "--key", "key"],
 ]
 
 
 @pytest.mark.parametrize("asked", WRITING, ids=lambda asked: asked[0])
-def test_a_second_command_is_told_at_once(asked: list, here: Hdcal, tmp_path: Path):
-    with reserve_folder("run"):
-        for more in ([], ["--force"]):
-            done = here(*asked, "--out", "run", *more, "--json")
-            assert done.returncode == 2
-            (finding,) = json.loads(done.stdout)["findings"]
-            assert finding["problem"].startswith("is being written by process ")
-    assert not any(tmp_path.iterdir())
+def test_a_target_that_cannot_be_written_is_refused_first(
+    asked: list, here: Hdcal, tmp_path: Path
+):
+    def problem(*more: str) -> str:
+        done = here(*asked, "--json", *more)
+        assert done.returncode == 2
+        (finding,) = json.loads(done.stdout)["findings"]
+        return finding["problem"]
+
+    with Target("run"):
+        assert problem("--out", "run") == "is being written by another process"
+        assert problem("--out", "run", "--force").startswith("is being written")
+    assert problem("--out", "none/run") == "its parent folder does not exist"
+    Path("mine").mkdir()
+    assert "exists already" in problem("--out", "mine")
+    assert "is not a result of hdcal" in problem("--out", "mine", "--force")
+    assert os.listdir(tmp_path) == ["mine"] and not os.listdir("mine")
 
 
-def test_a_table_has_one_writer_too(here: Hdcal, calibrated, tmp_path: Path):
-    asked = ["predict", calibrated[1], "--deformation", "0.1", "--out", "run"]
-    with reserve_folder("run"):
-        done = here(*asked)
-    assert done.returncode == 2 and "is being written by process" in done.stderr
+def test_a_table_of_others_is_kept(here: Hdcal, calibrated, tmp_path: Path):
+    asked = ["predict", calibrated[1], "--deformation", "0.1", "--out"]
     (tmp_path / "readings.csv").write_text("deformation_mm,force_N\n0.1,20\n")
-    done = here(*asked[:-1], "readings.csv", "--force")
-    assert done.returncode == 2 and "no table that hdcal wrote" in done.stderr
+    for more in ([], ["--force"]):
+        assert here(*asked, "readings.csv", *more).returncode == 2
     assert (tmp_path / "readings.csv").read_text().endswith("0.1,20\n")
+    assert here(*asked, "bands.csv").returncode == 0
+    assert here(*asked, "bands.csv").returncode == 2
+    assert here(*asked, "bands.csv", "--force").returncode == 0
+    assert set(os.listdir(tmp_path)) == {"readings.csv", "bands.csv"}
+
+
+def test_a_result_is_replaced_with_force(here: Hdcal, tmp_path: Path):
+    for more, code in (([], 0), ([], 2), (["--force"], 0)):
+        assert here("audit", "--out", "run", *more).returncode == code
+        assert os.listdir(tmp_path) == ["run"]
 
 
 def test_an_interruption_after_the_end_says_what_is_written(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
     def interrupted(*_) -> None:
-        assert (tmp_path / "run" / "audit.json").exists()
+        assert (tmp_path / "run" / "fit.json").exists()
         raise KeyboardInterrupt
 
     monkeypatch.setattr("hdcal.report.terminal.terminal_lines", interrupted)
-    done = here("audit", "--out", "run")
+    done = here("fit", XB1, "--out", "run")
     assert done.returncode == 130 and not done.stdout
     assert done.stderr.strip() == "hdcal: interrupted: run is written"
-    assert {path.name for path in tmp_path.iterdir()} == {"run"}
+    assert os.listdir(tmp_path) == ["run"]
 
 
 def test_what_appears_meanwhile_is_kept_and_told(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
-    from hdcal.classical.audit import audit
+    from hdcal.classical.fit import summary
 
-    check_claims = audit.audit
+    report = summary.fit_report
 
-    def slow():
-        (tmp_path / "run").mkdir()
-        (tmp_path / "run" / "thesis.txt").write_text("years of work")
-        return check_claims()
+    def slow(*given, **named):
+        (tmp_path / "made").mkdir()
+        (tmp_path / "made" / "thesis.txt").write_text("years of work")
+        return report(*given, **named)
 
-    monkeypatch.setattr(audit, "audit", slow)
-    done = here("audit", "--out", "run", "--force", "--json")
+    monkeypatch.setattr(summary, "fit_report", slow)
+    done = here("fit", XB1, "--out", "made", "--force", "--json")
     assert done.returncode == 2
     (finding,) = json.loads(done.stdout)["findings"]
-    assert finding["file"] == "run" and "'run-2'" in finding["problem"]
-    assert {path.name for path in tmp_path.iterdir()} == {"run", "run-2"}
-    assert [path.name for path in (tmp_path / "run").iterdir()] == ["thesis.txt"]
-    answer = json.loads((tmp_path / "run-2" / "audit.json").read_text("utf-8"))
-    assert answer["schema"] == "hdcal.audit/1"
+    assert finding["file"] == "made" and "'made-2'" in finding["problem"]
+    assert {path.name for path in tmp_path.iterdir()} == {"made", "made-2"}
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["thesis.txt"]
+    answer = json.loads((tmp_path / "made-2" / "fit.json").read_text("utf-8"))
+    assert answer["schema"] == "hdcal.fit/1"
+
+
+def test_a_disk_that_is_full_keeps_the_older_result(tmp_path: Path):
+    def run(*more: str, blocks: str = "unlimited") -> subprocess.CompletedProcess[str]:
+        limited = ["sh", "-c", f'ulimit -f {blocks}; exec "$@"', "sh"]
+        command = [*limited, *MAIN, "fit", str(XB1), "--out", "run", *more]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+
+    assert run().returncode == 0
+    before = (tmp_path / "run" / "hdcal-result.json").read_bytes()
+    for more in (["--force"], ["--force", "--json"]):
+        # The kernel refuses in the middle of report.html.
+        done = run(*more, blocks="16")
+        assert done.returncode == 1 and len(done.stderr.splitlines()) == 1
+        assert "run: cannot be written" in done.stderr
+        if "--json" in more:
+            assert json.loads(done.stdout)["status"] == "error"
+        assert (tmp_path / "run" / "hdcal-result.json").read_bytes() == before
+        assert os.listdir(tmp_path) == ["run"]

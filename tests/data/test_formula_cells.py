@@ -9,7 +9,7 @@ import pytest
 
 from hdcal.data.formula_cells import with_formula, without_formula
 from hdcal.data.measurements import read_measurements
-from hdcal.report.csv_table import columns_csv
+from hdcal.report.table_files import columns_csv
 
 FORMULAS = [
     "=1+1",

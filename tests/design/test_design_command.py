@@ -16,7 +16,7 @@ from schema_checks import obeys
 from hdcal.data.gear import read_gear
 from hdcal.design.answer import GeneratorAnswer, InverseAnswer
 from hdcal.design.inverse_design import inverse_design
-from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
+from hdcal.design.study.answer import StudyAnswer
 from hdcal.design.study.study import study
 from hdcal.design.study.summary import study_report
 from hdcal.design.summary import generator_report, inverse_report
@@ -24,7 +24,7 @@ from hdcal.design.wave_generator import wave_generator
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.report.answer import Answer
-from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving import MARKER
 
 WALL = "wall_thickness_mm=0.5:0.8"
 FIGURES = {"design.svg", "design.png", "profile.svg", "profile.png"}
@@ -71,7 +71,7 @@ def test_a_spring_is_designed(run: Path, here: Hdcal, tmp_path: Path):
     said = valid(done.stdout, GeneratorAnswer)
     folder = tmp_path / "xb1-100-80-design"
     files = {path.name for path in folder.iterdir()}
-    assert files == {"design.json", "report.html", STAMP, *FIGURES}
+    assert files == {"design.json", "report.html", MARKER, *FIGURES}
     assert json.loads((folder / "design.json").read_text("utf-8")) == said
     assert (said["schema"], said["kind"]) == ("hdcal.design/1", "wave_generator")
     assert said["spring"]["probability"] >= 0.99
@@ -115,7 +115,7 @@ def test_a_study_is_a_table(run: Path, here: Hdcal, tmp_path: Path):
     folder = tmp_path / "xb1-100-80-study"
     names = {path.name for path in folder.iterdir()}
     files = {"study.csv", "study.json", "study.svg", "study.png", "report.html"}
-    assert names == files | {STAMP}
+    assert names == files | {MARKER}
     with (folder / "study.csv").open(encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 15
@@ -149,22 +149,6 @@ def test_without_a_run_it_is_prior_only(here: Hdcal, tmp_path: Path):
     assert "No gear was measured." in page
 
 
-def test_the_article_needs_no_run_but_takes_one(run: Path, here: Hdcal):
-    rows = valid(here("study", "--article", "--json").stdout, ArticleAnswer)["rows"]
-    assert [row["table"] for row in rows] == [3] * 5 + [4] * 5
-    assert all(row["calibrated_N"] is None for row in rows)
-    done = here("study", run, "--article", "--json")
-    rows = valid(done.stdout, ArticleAnswer)["rows"]
-    assert "Table 4 of the article, forces in N" in done.stderr
-    assert "1137.64" in done.stderr and "95 % credible" in done.stderr
-    own = rows[6]["calibrated_N"]
-    # 92.08 N in Table 4, 78.4 N in its own Table 2.
-    assert rows[6]["revised_N"] == 92.08
-    assert own["lo"] < 83.76 < own["hi"] < 92.08
-    refused = here("study", "--article", "--vary", "radius_mm=38", "--out", "x")
-    assert refused.returncode == 2 and refused.stderr.count("no meaning") == 2
-
-
 def test_a_failed_calibration_gives_no_design(run: Path, here: Hdcal, tmp_path: Path):
     posterior = Posterior.load(run)
     bad = Check("R-hat", "failed", "it is 1.2")
@@ -175,7 +159,6 @@ def test_a_failed_calibration_gives_no_design(run: Path, here: Hdcal, tmp_path: 
         ["design", "failed", "--window", "0.38:0.42"],
         ["design", "failed", "--limit-force", "70", "--vary", WALL],
         ["study", "failed", "--vary", "radius_mm=38,40"],
-        ["study", "failed", "--article"],
     ):
         done = here(*asked)
         assert done.returncode == 1

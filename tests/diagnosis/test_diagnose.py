@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -36,12 +35,8 @@ LARGE = {
 LEFT_OUT = frozenset({"thermal_zero_drift", "thermal_expansion"})
 
 
-class Stick(Effect):
+class Stick(Effect, stage="force", groups=("curve up",)):
     """A user's own effect: a step of the force at half the range."""
-
-    name: ClassVar[str] = "stick"
-    stage: ClassVar[str] = "force"
-    groups: ClassVar[tuple[str, ...]] = ("curve up",)
 
     force: float = parameter("N", "height of the step", typical=2.0, null=0.0)
 

@@ -19,7 +19,7 @@ from hdcal.diagnosis.answer import RefusedAnswer, VerdictAnswer, VerdictsAnswer
 from hdcal.diagnosis.many_cases import AskedCases, diagnose_all
 from hdcal.diagnosis.summary import write_verdict
 from hdcal.errors import Finding, InputError
-from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving import MARKER
 
 FILES = {
     "report.html",
@@ -79,7 +79,7 @@ def names(folder: Path) -> set[str]:
 def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
     done = diagnose(cases["named"], "--out", "run", "--json", "--seed", "3")
     assert done.returncode == 0, done.stderr
-    assert names(tmp_path / "run") == FILES | {STAMP}
+    assert names(tmp_path / "run") == FILES | {MARKER}
     found = json.loads((tmp_path / "run" / "verdict.json").read_text("utf-8"))
     obeys(found, VerdictAnswer)
     assert json.loads(done.stdout) == found
@@ -90,7 +90,7 @@ def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
 
 def test_the_folder_is_named_after_the_case(diagnose, cases, tmp_path: Path):
     assert diagnose(cases["none"], "--no-report").returncode == 0
-    assert names(tmp_path / "none-diagnosis") == {"verdict.json", STAMP}
+    assert names(tmp_path / "none-diagnosis") == {"verdict.json", MARKER}
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -100,7 +100,7 @@ def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
     asked = [cases["named"], cases["none"], "a.csv", "--json", "--out", "all"]
     done = diagnose(*asked, "--report")
     assert done.returncode == 0, done.stderr
-    assert names(tmp_path / "all") == {"named", "none", "a", STAMP}
+    assert names(tmp_path / "all") == {"named", "none", "a", MARKER}
     for name in ("named", "none", "a"):
         assert names(tmp_path / "all" / name) == FILES
     asked.append("--no-report")
@@ -158,7 +158,7 @@ def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path
     asked = [*(cases[n] for n in ("none", "unknown", "refused", "named")), "none"]
     done = diagnose(*asked, "--no-report", "--out", "all", "--json")
     assert done.returncode == 2
-    assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
+    assert names(tmp_path / "all") == {"none", "named", "refused.json", MARKER}
     said = json.loads(done.stdout)
     obeys(said, VerdictsAnswer)
     assert list(said["cases"]) == ["none", "named"]
@@ -177,7 +177,7 @@ def test_a_refused_case_does_not_stop_the_others(diagnose, cases, tmp_path: Path
 def test_a_case_named_as_a_file_of_the_result_does_not_stop_the_others(
     diagnose, cases, tmp_path: Path
 ):
-    taken = [STAMP, "Refused.json"]
+    taken = [MARKER, "Refused.json"]
     for name in taken:
         (tmp_path / name).mkdir()
         for file in ("data.csv", "gear.toml"):
@@ -185,14 +185,14 @@ def test_a_case_named_as_a_file_of_the_result_does_not_stop_the_others(
     asked = [cases["none"], *taken]
     done = diagnose(*asked, "--no-report", "--out", "all", "--json")
     assert done.returncode == 2
-    assert names(tmp_path / "all") == {"none", "refused.json", STAMP}
+    assert names(tmp_path / "all") == {"none", "refused.json", MARKER}
     said = json.loads(done.stdout)
     assert list(said["cases"]) == ["none"] and list(said["refused"]) == taken
     for name in taken:
         words = f"is called '{name}', as is a file of the result"
         assert said["refused"][name][0]["problem"] == words
     # By itself it has no such neighbour.
-    assert diagnose(STAMP, "--no-report", "--out", "one").returncode == 0
+    assert diagnose(MARKER, "--no-report", "--out", "one").returncode == 0
 
 
 def test_where_every_case_is_refused_nothing_is_written(
@@ -226,7 +226,7 @@ def test_a_defect_in_one_case_does_not_stop_the_others(
         monkeypatch.setattr("hdcal.diagnosis.many_cases.read_case", unreadable)
     done = diagnose(cases["none"], broken, cases["named"], "--out", "all", "--json")
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert names(tmp_path / "all") == {"none", "named", "refused.json", STAMP}
+    assert names(tmp_path / "all") == {"none", "named", "refused.json", MARKER}
     said = json.loads(done.stdout)
     assert list(said["cases"]) == ["none", "named"]
     ((finding,),) = said["refused"].values()

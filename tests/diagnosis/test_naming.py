@@ -1,12 +1,9 @@
-"""What a name is worth is counted where the truth is known, and said with each name."""
+"""Counts of right and wrong names limit which effects a diagnosis names."""
 
 import pytest
-from benchmarks.naming import by_mechanism, called, lines
 from diagnosis_cases import judged, rich, simulated
-from handmade import said, truth
 from scipy.stats import binom
 
-from hdcal.blind.scoring.scored_case import match_answers
 from hdcal.diagnosis import which
 from hdcal.diagnosis.naming import Naming, Tally, naming
 from hdcal.diagnosis.summary import verdict_answer
@@ -75,41 +72,3 @@ def test_of_two_effects_each_has_to_be_one_that_may_be_named(monkeypatch):
         assert found.which.certificate is None
         words = " ".join(answer(verdict_answer(found)))
         assert "coulomb friction" in words and "relaxation" in words
-
-
-def cases():
-    """Return two names that are right, one for what was withheld, one for a burr."""
-    labels = [
-        truth("a"),
-        truth("b", names=("friction",)),
-        truth("c", names=("friction",), withheld=("friction", "slack")),
-        truth("d", kind="outside", names=("burr",), spanned=False),
-    ]
-    answers = [
-        said("a"),
-        said("b", effect="friction"),
-        said("c", verdict="group", effect="drift", describes_best=True),
-        said("d", verdict="group", effect="slack", group=("rig",)),
-    ]
-    return match_answers(labels, answers, name="hdcal", all_of_them=True)
-
-
-def test_whose_name_others_got_is_counted():
-    assert called(cases()) == {
-        "slack": Tally(1, 0),
-        "friction": Tally(1, 0),
-        "drift": Tally(1, 1),
-    }
-    text = "\n".join(lines(cases(), cases()))
-    assert "# Not named: drift." in text
-    text = "\n".join(lines(5 * cases(), cases()))
-    assert "drift = [5, 5]" in text
-    assert "names = [2, 0]" in text
-    # The group that is said of the burr is wrong, what was withheld is no part of it.
-    assert "groups = [1, 1]" in text
-    assert "Withheld: 0 of 1 named" in text
-
-
-def test_a_mechanism_is_wrong_where_one_of_its_cases_is():
-    twice = [*cases()[:2], *cases()[:2]]
-    assert by_mechanism(twice, [True, True, True, False]) == Tally(2, 1)

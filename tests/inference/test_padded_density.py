@@ -1,7 +1,6 @@
 """Padding counts for nothing: densities and gradients are those of the bare rows."""
 
 import dataclasses
-from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -141,10 +140,8 @@ def test_a_row_of_padding_that_counts_is_seen():
     assert abs(found - slow) > 1e-6 * abs(slow)
 
 
-class Cumulative(Centred):
+class Cumulative(Centred, stage="force", groups=("zero over temperature",)):
     """The same about the mean of the rows so far."""
-
-    name: ClassVar[str] = "cumulative"
 
     def apply(self, signal, rows):
         """Return the force and its share."""

@@ -18,8 +18,8 @@ from hdcal.inference import model
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem
 from hdcal.inference.values import MEMBER_SD, MEMBERS
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
-from hdcal.physics.scatter import Scatter
 
 SCATTER = [name for name, each in EFFECTS.items() if issubclass(each, Scatter)]
 scatter = pytest.mark.parametrize("name", SCATTER)

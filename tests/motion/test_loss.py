@@ -23,7 +23,7 @@ from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps
 from hdcal.motion.dynamic_calibration import highest_peak
 from hdcal.motion.summary import dynamic_answer, found_loss
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.physics.effects.loops import CoulombFriction
 
 # Enough to look at, far too few for their checks.
 FEW = {"chains": 2, "warmup": 100, "draws": 50}

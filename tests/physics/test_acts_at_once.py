@@ -24,8 +24,8 @@ def together_and_alone(name, base, records, reading):
     return whole, np.concatenate([reads(name, base, row, reading) for row in rows])
 
 
-@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.acts_at_once])
-def test_what_acts_at_once_remembers_nothing(name, base, loading, reading):
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.instantaneous])
+def test_what_instantaneous_remembers_nothing(name, base, loading, reading):
     whole, alone = together_and_alone(name, base, loading, reading)
     assert alone == pytest.approx(whole, rel=1e-12, abs=1e-12)
     assert EFFECTS[name].stage in ("deformation", "force")

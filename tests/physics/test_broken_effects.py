@@ -1,7 +1,5 @@
 """The tests of effects catch each an effect that breaks just their promise."""
 
-from typing import ClassVar
-
 import jax.numpy as jnp
 import pytest
 import test_effect_declarations
@@ -14,14 +12,10 @@ from hdcal import EFFECTS
 from hdcal.physics.effect import Effect, Noise, parameter
 
 
-class ThermalZero(Effect):
-    """A thermal zero that is right, to be spoiled."""
-
-    name: ClassVar[str] = "broken"
-    stage: ClassVar[str] = "sensor"
-    groups: ClassVar[tuple[str, ...]] = ("rig",)
-    needs: ClassVar[frozenset[str]] = frozenset({"temperature"})
-    symmetry: ClassVar[str] = "even"
+class Broken(
+    Effect, stage="sensor", groups=("rig",), needs=("temperature",), symmetry="even"
+):
+    """A thermal zero that is right; each subclass breaks one promise."""
 
     size: float = parameter("N/K", "an amplitude", typical=0.1, null=0.0)
 
@@ -29,50 +23,50 @@ class ThermalZero(Effect):
         return signal + self.size * rows.temperature_rise
 
 
-class NotNullAtNull(ThermalZero):
+class NotNullAtNull(Broken):
     def apply(self, signal, rows):
         return signal + (self.size + 1e-9) * rows.temperature_rise
 
 
-class KinkAtNull(ThermalZero):
+class KinkAtNull(Broken):
     def apply(self, signal, rows):
         return signal + jnp.sqrt(self.size**2) * rows.temperature_rise
 
 
-class WrongSlope(ThermalZero):
+class WrongSlope(Broken):
     def apply(self, signal, rows):
         # A step: its derivative is zero wherever it exists.
         return signal + jnp.round(100.0 * self.size) / 100.0 * rows.temperature_rise
 
 
-class NotEven(ThermalZero):
+class NotEven(Broken):
     def apply(self, signal, rows):
         return signal + self.size * rows.temperature_rise * rows.deformation
 
 
-class LooksAtTime(ThermalZero):
+class LooksAtTime(Broken):
     def apply(self, signal, rows):
         drift = 1e-3 * rows.records.time
         return signal + self.size * (rows.temperature_rise + drift)
 
 
-class NeedsNothing(ThermalZero):
+class NeedsNothing(Broken):
     def apply(self, signal, rows):
         return signal + 10.0 * self.size
 
 
-class OtherUnit(ThermalZero):
+class OtherUnit(Broken):
     def apply(self, signal, rows):
         return signal + self.size * rows.temperature_rise * rows.stiffness / 200.0
 
 
-class HardCoded(ThermalZero):
+class HardCoded(Broken):
     def apply(self, signal, rows):
         return signal + 0.1 * jnp.tanh(10.0 * self.size) * rows.temperature_rise
 
 
-class SpoilsOthers(ThermalZero):
-    stage: ClassVar[str] = "noise"
+class SpoilsOthers(Broken):
+    stage = "noise"
 
     def apply(self, signal, rows):
         # Forgets the components that other effects of the noise have made.
@@ -80,7 +74,7 @@ class SpoilsOthers(ThermalZero):
         return Noise(jnp.zeros(1), sd)
 
 
-class NotToBeFound(ThermalZero):
+class NotToBeFound(Broken):
     def apply(self, signal, rows):
         return signal + self.size
 
@@ -92,7 +86,7 @@ def register(monkeypatch, effect):
 def test_the_honest_one_passes(
     monkeypatch, scattered, loading, base, reading, differences
 ):
-    register(monkeypatch, ThermalZero)
+    register(monkeypatch, Broken)
     test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
     test_effects.test_at_its_typical_size_it_does_something(
         "broken", loading, base, reading
@@ -193,6 +187,6 @@ def test_not_to_be_found(monkeypatch, loading, base, reading):
     ],
 )
 def test_undocumented(monkeypatch, promise):
-    register(monkeypatch, ThermalZero)
+    register(monkeypatch, Broken)
     with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
         promise("broken")

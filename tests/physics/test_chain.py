@@ -17,12 +17,12 @@ from hdcal.physics.chain import (
     linear_columns,
     predict_reading,
 )
-from hdcal.physics.effects.charge_leakage import ChargeLeakage
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
-from hdcal.physics.effects.outliers import Outliers
-from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
-from hdcal.physics.effects.seating_slack import SeatingSlack
-from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
+from hdcal.physics.effects.contact import SeatingSlack
+from hdcal.physics.effects.loops import CoulombFriction
+from hdcal.physics.effects.noise import Outliers
+from hdcal.physics.effects.stiffness import ProgressiveStiffening
+from hdcal.physics.effects.temperature import ThermalZeroDrift
+from hdcal.physics.effects.time import ChargeLeakage
 from hdcal.physics.theory import THEORIES
 
 SLACK, GAIN, FRICTION, LEAK, DRIFT = 0.021, 0.37, 1.9, 2.3e-3, 0.11

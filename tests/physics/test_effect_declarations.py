@@ -1,8 +1,6 @@
-"""Every effect declares its stage, needs, units, prior, source and documentation."""
+"""Every effect declares its stage, needs, units and prior."""
 
 import dataclasses
-import re
-from pathlib import Path
 
 import numpy as np
 from effect_bench import BEYOND_RECORDS, everyone
@@ -13,7 +11,6 @@ from hdcal.data.units import to_code
 from hdcal.physics.effect import parameters
 from hdcal.physics.groups import GROUPS
 
-DOCS = Path(__file__).parents[2] / "docs" / "effects"
 STAGES = ("deformation", "force", "sensor", "noise")
 
 
@@ -36,13 +33,6 @@ def test_the_declaration_is_complete(name, loading):
 
 
 @everyone
-def test_the_docstring_states_its_source(name):
-    text = EFFECTS[name].__doc__
-    assert len(text.splitlines()[0]) <= 80
-    assert re.search(r"Source: \S+", text)
-
-
-@everyone
 def test_priors_exist_with_the_declared_unit(name):
     priors = effect_priors()
     for field, about in parameters(EFFECTS[name]).items():
@@ -57,29 +47,3 @@ def test_no_prior_without_an_effect():
         f"{name}.{field}" for name in EFFECTS for field in parameters(EFFECTS[name])
     }
     assert set(effect_priors()) == declared
-
-
-@everyone
-def test_the_documentation_has_a_page(name):
-    page = (DOCS / f"{name}.md").read_text("utf-8")
-    assert page.startswith(f"# {name}\n")
-    assert f"*{EFFECTS[name].stage.capitalize()} stage." in page
-    for field in parameters(EFFECTS[name]):
-        assert f"`{name}.{field}`" in page
-    reference = page.partition("## Reference\n")[2].strip()
-    assert len(reference) > 20
-    index = (DOCS / "index.md").read_text("utf-8")
-    fields = ", ".join(parameters(EFFECTS[name]))
-    needs = ", ".join(sorted(EFFECTS[name].needs)) or "–"
-    row = f"| [{name}]({name}.md) | {EFFECTS[name].stage} | {fields} | {needs} |"
-    assert row in index
-    assert f"\n{name}\n" in index
-
-
-def test_the_page_says_of_each_group_what_answers_say():
-    page = (DOCS / "index.md").read_text("utf-8")
-    for name, group in GROUPS.items():
-        own = [n for n, effect in EFFECTS.items() if name in effect.groups]
-        links = ", ".join(f"[{n}]({n}.md)" for n in own)
-        told = " | ".join((name, group.meaning, links, group.remedy, group.run))
-        assert f"| {told} |" in page

@@ -1,7 +1,7 @@
 """Every effect is null at null, differentiable, symmetric as declared, composable."""
 
 import dataclasses
-from typing import ClassVar
+import pickle
 
 import equinox as eqx
 import jax
@@ -27,7 +27,8 @@ from jax.flatten_util import ravel_pytree
 from hdcal import EFFECTS
 from hdcal.inference.padding import repeat_last_row
 from hdcal.physics.chain import predict_reading
-from hdcal.physics.effect import Effect, parameter, parameters
+from hdcal.physics.effect import Effect, parameters
+from hdcal.physics.effects.scatter import Scatter
 
 
 @everyone
@@ -181,13 +182,20 @@ def test_the_whole_library_composes(size, scattered, base, reading):
     assert np.isfinite(ravel_pytree(found)[0]).all()
 
 
-def test_an_effect_that_says_too_little_of_itself_is_none():
-    class Own(Effect):
-        name: ClassVar[str] = "own"
-        error: float = parameter("1", "", typical=1.0, null=0.0)
+@pytest.mark.parametrize("groups", [(), ("rig")])
+def test_groups_are_a_tuple_of_names(groups):
+    with pytest.raises(TypeError, match="Own: groups and needs are tuples"):
 
-        def apply(self, signal, rows):
-            return signal
+        class Own(Effect, stage="force", groups=groups): ...
 
-    with pytest.raises(TypeError, match="Own is no effect without stage, groups"):
-        Own(1.0)
+
+def test_abstract_effects_have_no_instances():
+    with pytest.raises(TypeError, match="abstract"):
+        Effect()
+    with pytest.raises(TypeError, match="abstract"):
+        Scatter()
+
+
+@everyone
+def test_pickled_and_copied(name):
+    assert eqx.tree_equal(pickle.loads(pickle.dumps(typical(name))), typical(name))

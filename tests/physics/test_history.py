@@ -8,7 +8,7 @@ import pytest
 from scipy import integrate
 
 from hdcal.physics.effect import Rows
-from hdcal.physics.effects.charge_leakage import ChargeLeakage
+from hdcal.physics.effects.time import ChargeLeakage
 from hdcal.physics.history import leaky_sum, play
 
 

@@ -8,12 +8,11 @@ import pytest
 from scipy import integrate, special
 
 from hdcal.physics.effect import Rows
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
-from hdcal.physics.effects.hysteresis import Hysteresis
-from hdcal.physics.effects.relaxation import Relaxation
-from hdcal.physics.effects.stiffness_fatigue import StiffnessFatigue
+from hdcal.physics.effects.loops import CoulombFriction, Hysteresis
+from hdcal.physics.effects.scatter import scores
+from hdcal.physics.effects.stiffness import StiffnessFatigue
+from hdcal.physics.effects.time import Relaxation
 from hdcal.physics.history import load_cycle, stop_cells
-from hdcal.physics.scatter import scores
 
 MIXED = np.arange(24).reshape(3, 8).T.ravel()
 

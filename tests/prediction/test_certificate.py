@@ -20,7 +20,7 @@ from hdcal.inference.checks import Check
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.certificate import certificate_page
 from hdcal.prediction.margin.summary import margin_answer, margin_report
-from hdcal.report.csv_table import columns_csv
+from hdcal.report.table_files import columns_csv
 
 ISSUED = date(2026, 11, 22)
 ASKED = {"limit_force": 90.0}

@@ -15,8 +15,8 @@ from hdcal.design.force_limit import LimitedGear
 from hdcal.design.next_gear import next_gear
 from hdcal.design.study.study import force_quantiles, general_quantiles, is_linear
 from hdcal.errors import InputError
-from hdcal.physics.effects.hysteresis import Hysteresis
-from hdcal.physics.effects.rig_compliance import RigCompliance
+from hdcal.physics.effects.loops import Hysteresis
+from hdcal.physics.effects.sensor import RigCompliance
 from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import stiffness_ratio
 

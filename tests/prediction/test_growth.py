@@ -3,12 +3,12 @@
 import jax
 import numpy as np
 import pytest
+from benchmarks.blind.rig.mechanisms import MECHANISMS
 from posteriors import regressed, single, with_leftover
 from pulled_further import OF_TIME, all_pulled_further
 from slices import slice_of
 
 import hdcal
-from hdcal.blind.virtual_rig.virtual_rig import MECHANISMS
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.growth import Growth, bend_covariance, fit_growths
 from hdcal.prediction.margin.margin import Margin

@@ -9,7 +9,7 @@ import xarray as xr
 from fleets import handmade, shared
 from matplotlib.figure import Figure
 from moving import still_posterior
-from posteriors import single, stiffer
+from posteriors import single
 from verdicts import named
 
 import hdcal
@@ -43,10 +43,6 @@ def results():
     gear, posterior = read_gear(GEAR), single()
     return {
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
-        "Comparison": (
-            hdcal.compare({"old": posterior, "new": stiffer(posterior, 1.1)}),
-            "% stiffer than old",
-        ),
         "Fleet": (handmade(), "% softer (95 %: "),
         "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
         "InverseDesign": (

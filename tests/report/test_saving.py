@@ -1,170 +1,232 @@
-"""A result folder appears whole or not at all."""
+"""A result appears whole or not at all, and replaces nothing but a result of hdcal."""
 
+import errno
 import json
 import os
+import subprocess
+import sys
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 
+import killed_writer
 import pytest
+from killed_writer import TABLE, content, write_file, write_folder
 
 from hdcal.errors import InputError, NotWritable
-from hdcal.report.saving.contents import STAMP
-from hdcal.report.saving.reserve import reserve_file, reserve_folder, write_whole
+from hdcal.report.saving import MARKER, Target
 
-STAMPED = f"run/{STAMP}"
-
-
-def names(folder: Path) -> list[str]:
-    """Return everything below a folder."""
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+FILES = {"summary.json", "case/verdict.json", MARKER}
 
 
-def write(target: Path, text: str = "{}", force: bool = False, **files: str) -> None:
-    """Write a result whose summary is a text."""
-    with reserve_folder(target, force=force) as place, place.filled() as building:
-        (building / "summary.json").write_text(text)
-        for name, content in files.items():
-            (building / name).mkdir()
-            (building / name / "verdict.json").write_text(content)
+def test_a_folder_is_there_only_when_it_is_complete(tmp_path: Path):
+    with Target(str(tmp_path / "run")) as target:
+        with target.filled() as folder:
+            (folder / "summary.json").write_text("{}")
+            assert not (tmp_path / "run").exists()
+        assert content(tmp_path / "run").keys() == {"summary.json", MARKER}
+    assert os.listdir(tmp_path) == ["run"]
 
 
-def test_nothing_is_seen_before_the_end(tmp_path: Path):
-    with reserve_folder(tmp_path / "run") as place, place.filled() as building:
-        (building / "summary.json").write_text("{}")
-        assert not (tmp_path / "run").exists()
-    assert names(tmp_path) == ["run", STAMPED, "run/summary.json"]
+def test_the_marker_lists_the_content(tmp_path: Path):
+    write_folder(tmp_path / "run", "new")
+    write_folder(tmp_path / "again", "new")
+    marker = (tmp_path / "run" / MARKER).read_bytes()
+    digest = sha256(b"new").hexdigest()
+    files = {"case": "folder", "case/verdict.json": digest, "summary.json": digest}
+    assert json.loads(marker)["files"] == files
+    assert (tmp_path / "again" / MARKER).read_bytes() == marker
 
 
-@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, SystemExit])
-def test_a_failure_leaves_nothing(error: type[BaseException], tmp_path: Path):
-    with (
-        pytest.raises(error),
-        reserve_folder(tmp_path / "run") as place,
-        place.filled() as building,
-    ):
-        (building / "summary.json").write_text("{}")
-        raise error
-    assert names(tmp_path) == []
-
-
-def test_a_failure_leaves_the_older_result(tmp_path: Path):
+@pytest.mark.parametrize("write", [write_folder, write_file])
+def test_a_result_is_replaced_with_force_only(write: Callable, tmp_path: Path):
     write(tmp_path / "run", "old")
+    with pytest.raises(InputError, match="exists already"):
+        write(tmp_path / "run", "new", force=False)
+    assert set(content(tmp_path).values()) & {"old", TABLE + "old"}
+    write(tmp_path / "run", "new")
+    assert set(content(tmp_path).values()) & {"new", TABLE + "new"}
+    assert os.listdir(tmp_path) == ["run"]
+
+
+@pytest.mark.parametrize("older", [False, True])
+@pytest.mark.parametrize("error", [ValueError(), KeyboardInterrupt(), FULL])
+def test_a_failure_changes_nothing(error: BaseException, older: bool, tmp_path: Path):
+    if older:
+        write_folder(tmp_path / "run", "old")
+    before = content(tmp_path)
     with (
-        pytest.raises(NotWritable, match="No space left"),
-        reserve_folder(tmp_path / "run", force=True) as place,
-        place.filled() as building,
+        pytest.raises(NotWritable if error is FULL else type(error)),
+        Target(str(tmp_path / "run"), force=True) as target,
+        target.filled() as folder,
     ):
-        (building / "summary.json").write_text("new")
-        raise OSError(28, "No space left on device")
-    assert names(tmp_path) == ["run", STAMPED, "run/summary.json"]
-    assert (tmp_path / "run" / "summary.json").read_text() == "old"
+        (folder / "summary.json").write_text("new")
+        raise error
+    assert content(tmp_path) == before
+    assert os.listdir(tmp_path) == ["run"] * older
 
 
-def test_force_replaces_the_whole_folder(tmp_path: Path):
-    write(tmp_path / "run", "old", inner="{}")
-    (tmp_path / "run" / "inner" / ".DS_Store").touch()
-    write(tmp_path / "run", "new", force=True)
-    assert names(tmp_path) == ["run", STAMPED, "run/summary.json"]
-    assert (tmp_path / "run" / "summary.json").read_text() == "new"
+@pytest.mark.parametrize("write", [write_folder, write_file])
+@pytest.mark.parametrize(
+    "call", ["os.fsync", "pathlib.Path.write_text", "pathlib.Path.rename"]
+)
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_a_disk_that_refuses_leaves_the_older_result(
+    write: Callable, call: str, number: int, tmp_path: Path, monkeypatch
+):
+    write(tmp_path / "run", "old")
+    before = content(tmp_path)
+    module, _, name = call.rpartition(".")
+    owner = os if module == "os" else Path
+    real, calls = getattr(owner, name), []
+
+    def refused(*given, **named):
+        calls.append(name)
+        if len(calls) == number + 1:
+            raise FULL
+        return real(*given, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(owner, name, refused)
+        try:
+            write(tmp_path / "run", "new")
+        except NotWritable as error:
+            assert os.strerror(errno.ENOSPC) in str(error)
+            assert content(tmp_path) == before
+        else:
+            assert len(calls) <= number, "the error was ignored"
+    assert os.listdir(tmp_path) == ["run"]
 
 
-def test_the_stamp_says_what_was_written(tmp_path: Path):
-    write(tmp_path / "run", "{}", inner="[]")
-    stamp = json.loads((tmp_path / STAMPED).read_text("utf-8"))
-    assert stamp.pop("version") and stamp.pop("schema") == "hdcal.result/1"
-    assert stamp == {
-        "files": [
-            {
-                "file": name,
-                "bytes": 2,
-                "sha256": sha256((tmp_path / "run" / name).read_bytes()).hexdigest(),
-            }
-            for name in ("inner/verdict.json", "summary.json")
-        ]
-    }
+@pytest.mark.parametrize("call", ["pathlib.Path.mkdir", "os.open"])
+def test_a_parent_that_is_read_only_is_refused_at_once(
+    call: str, tmp_path: Path, monkeypatch
+):
+    def refused(*_, **__):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(call, refused)
+        with pytest.raises(InputError, match="Read-only file system"):
+            Target(str(tmp_path / "run"))
+    assert not os.listdir(tmp_path)
 
 
-def test_the_same_result_has_the_same_stamp(tmp_path: Path):
-    write(tmp_path / "run", inner="[]")
-    write(tmp_path / "again", inner="[]")
-    assert (tmp_path / STAMPED).read_bytes() == (
-        tmp_path / "again" / STAMP
-    ).read_bytes()
-
-
-def test_a_link_is_followed(tmp_path: Path):
-    (tmp_path / "there").mkdir()
-    (tmp_path / "link").symlink_to(tmp_path / "there" / "run")
-    write(tmp_path / "link", "old")
-    write(tmp_path / "link", "new", force=True)
-    inside = [f"there/{STAMPED}", "there/run/summary.json"]
-    assert names(tmp_path) == ["link", "there", "there/run", *inside]
-    assert (tmp_path / "link" / "summary.json").read_text() == "new"
-
-
-def test_a_reserved_target_is_left_alone(tmp_path: Path):
-    with reserve_folder(tmp_path / "run"):
-        pass
-    assert names(tmp_path) == []
-    with pytest.raises(InputError, match="exists already"):
-        reserve_folder(tmp_path)
-    with pytest.raises(InputError, match="parent folder does not exist"):
-        reserve_folder(tmp_path / "none" / "run")
-    assert names(tmp_path) == []
-
-
-def test_a_file_is_written_whole(tmp_path: Path):
-    target = tmp_path / "bands.csv"
-    with reserve_file(target) as place:
-        assert not target.exists()
-        place.write(b"a\n1\n", 0o600)
-    assert os.stat(target).st_mode & 0o777 == 0o600
-    with pytest.raises(InputError, match="exists already"):
-        reserve_file(target)
-    with pytest.raises(InputError, match="exists already"):
-        write_whole(target, "a\n2\n")
-    assert target.read_text() == "a\n1\n"
-    with reserve_file(target, force=True, beginning="a\n") as place:
-        place.write(b"a\n2\n")
-    assert target.read_text() == "a\n2\n"
-    with pytest.raises(InputError, match="is a folder"):
-        reserve_file(tmp_path, force=True)
-    assert names(tmp_path) == ["bands.csv"]
-
-
-def test_force_replaces_no_table_of_others(tmp_path: Path):
-    target = tmp_path / "readings.csv"
-    target.write_text("deformation_mm,force_N\n")
+def test_impossible_targets_are_refused(tmp_path: Path):
+    (tmp_path / "file").touch()
+    for name in ("none/run", "file/run", "file", "", "/", "x" * 250):
+        with pytest.raises(InputError):
+            Target(f"{tmp_path}/{name}" if name.isalpha() else name, force=True)
     os.mkfifo(tmp_path / "pipe")
-    for path in (target, tmp_path / "pipe"):
-        with pytest.raises(InputError, match="is no table that hdcal wrote"):
-            reserve_file(path, force=True, beginning="deformation_mm,temperature_C,")
-    assert target.read_text() == "deformation_mm,force_N\n"
-    assert names(tmp_path) == ["pipe", "readings.csv"]
+    for name in ("pipe", "."):
+        with pytest.raises(InputError, match="is not a file that hdcal wrote"):
+            Target(f"{tmp_path}/{name}", force=True, beginning=b"x")
+    assert set(os.listdir(tmp_path)) == {"file", "pipe"}
 
 
-def test_what_is_seen_was_synced_before(tmp_path: Path, monkeypatch):
-    synced: set[int] = set()
-    seen: list[int] = []
-    fsync, rename = os.fsync, os.rename
+FOREIGN: dict[str, Callable[[Path], object]] = {
+    "thesis.txt": lambda run: (run / "thesis.txt").touch(),
+    "case/notes": lambda run: (run / "case" / "notes").touch(),
+    "mine": lambda run: (run / "mine").mkdir(),
+    "link": lambda run: (run / "link").symlink_to(run.parent),
+    "summary.json": lambda run: (run / "summary.json").write_text("mine"),
+    "case/verdict.json": lambda run: (run / "case" / "verdict.json").write_text("me"),
+    MARKER: lambda run: (run / MARKER).write_text('{"files": [1]}'),
+    "case": lambda run: (
+        (run / "case").rename(run.parent / "moved"),
+        (run / "case").symlink_to(run.parent / "moved"),
+    ),
+}
 
-    def watched_fsync(descriptor: int) -> None:
-        fsync(descriptor)
-        synced.add(os.fstat(descriptor).st_ino)
 
-    def watched_rename(source, *_) -> None:
-        paths = [Path(source), *Path(source).rglob("*")]
-        seen.extend(path.stat().st_ino for path in paths)
-        assert set(seen) <= synced
-        rename(source, *_)
+@pytest.mark.parametrize("name", FOREIGN)
+def test_what_hdcal_did_not_write_is_kept(name: str, tmp_path: Path):
+    write_folder(tmp_path / "run", "old")
+    FOREIGN[name](tmp_path / "run")
+    before = content(tmp_path)
+    with pytest.raises(InputError) as raised:
+        Target(str(tmp_path / "run"), force=True)
+    assert name in str(raised.value)
+    assert content(tmp_path) == before
+    assert (tmp_path / "run").is_dir() and not list(tmp_path.glob(".hdcal*"))
 
-    # Where there is no rename in one step: each has to go through Python.
-    monkeypatch.setattr("hdcal.report.saving.disk._rename", lambda *_: False)
-    monkeypatch.setattr(os, "fsync", watched_fsync)
-    monkeypatch.setattr(os, "rename", watched_rename)
-    write(tmp_path / "run", inner="[]")
-    assert len(seen) == 5
-    assert tmp_path.stat().st_ino in synced
-    with reserve_file(tmp_path / "bands.csv") as place:
-        place.write(b"a\n")
-    assert len(seen) == 6
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_what_is_changed_during_the_work_is_kept(name: str, tmp_path: Path):
+    write_folder(tmp_path / "run", "old")
+    (tmp_path / "run-2").touch()
+    with (
+        pytest.raises(InputError, match=r"the new result is in 'run-3'"),
+        Target(str(tmp_path / "run"), force=True) as target,
+        target.filled() as folder,
+    ):
+        (folder / "summary.json").write_text("new")
+        FOREIGN[name](tmp_path / "run")
+        before = content(tmp_path / "run")
+    assert content(tmp_path / "run") == before
+    assert content(tmp_path / "run-3")["summary.json"] == "new"
+    assert not list(tmp_path.glob(".hdcal*"))
+
+
+def test_a_file_that_appears_during_the_work_is_kept(tmp_path: Path):
+    with (
+        pytest.raises(InputError, match=r"the new result is in 'a-2\.csv'"),
+        Target(str(tmp_path / "a.csv"), beginning=b"") as target,
+        target.filled() as file,
+    ):
+        (tmp_path / "a.csv").write_text("mine")
+        file.write_text("new")
+    assert content(tmp_path) == {"a.csv": "mine", "a-2.csv": "new"}
+
+
+def test_a_file_with_another_beginning_is_kept(tmp_path: Path):
+    (tmp_path / "readings.csv").write_text("deformation,force\n")
+    with pytest.raises(InputError, match="is not a file that hdcal wrote"):
+        write_file(tmp_path / "readings.csv", "new")
+    assert content(tmp_path) == {"readings.csv": "deformation,force\n"}
+
+
+@pytest.mark.parametrize("name", ["link", "there/../link", "there/run"])
+def test_links_and_relative_paths_are_followed(name: str, tmp_path: Path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("there").mkdir()
+    Path("link").symlink_to(tmp_path / "there" / "run")
+    write_folder(Path(name), "old")
+    write_folder(Path(name), "new")
+    assert content(tmp_path / "there" / "run").keys() == FILES
+    assert set(os.listdir(tmp_path)) == {"there", "link"} and Path("link").is_symlink()
+    assert os.listdir("there") == ["run"]
+
+
+@pytest.mark.parametrize("kind", ["folder", "file"])
+@pytest.mark.parametrize("older", [False, True])
+def test_a_kill_at_any_step_leaves_a_whole_result(
+    kind: str, older: bool, tmp_path: Path
+):
+    script = [sys.executable, killed_writer.__file__, kind, str(int(older)), tmp_path]
+    done = subprocess.run(script, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    outcomes = json.loads(done.stdout)
+    assert len(outcomes) > {"folder": 15, "file": 10}[kind]
+    for at_once, after_next_start, left in outcomes:
+        assert after_next_start in ("new", "old" if older else None)
+        # Between the two renames nothing is there; the older one is put back.
+        assert at_once in (after_next_start, None) and left <= 1
+    assert {last for _, last, _ in outcomes} == {"new", "old" if older else None}
+
+
+def test_two_processes_never_write_one_target(tmp_path: Path):
+    script = [sys.executable, killed_writer.__file__, "hold", str(tmp_path / "run")]
+    (tmp_path / "link").symlink_to(tmp_path / "run")
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen(script, text=True, **pipes) as process:
+        assert process.stdout is not None and process.stdout.readline()
+        for name in ("run", "link", "./run"):
+            with pytest.raises(InputError, match="is being written by another"):
+                Target(f"{tmp_path}/{name}", force=True)
+        write_folder(tmp_path / "other", "new")
+        process.communicate("")
+    assert process.returncode == 0
+    assert content(tmp_path / "run").keys() == FILES
+    assert set(os.listdir(tmp_path)) == {"run", "link", "other"}

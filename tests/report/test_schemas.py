@@ -6,18 +6,19 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from hdcal.report.answer import Answer, json_schema
+from hdcal.report.answer import Answer
+from hdcal.report.result import Result
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs" / "_ext"))
 
-from schemas import answers, file_name
+from schemas import answers, file_name, schema_of
 
 ALL = answers()
 
 
 @pytest.mark.parametrize("name", ALL)
 def test_a_schema_is_valid_and_names_its_format(name: str):
-    schema = json_schema(ALL[name])
+    schema = schema_of(ALL[name])
     jsonschema.Draft202012Validator.check_schema(schema)
     format_, *kind = name.split()
     assert schema["properties"]["schema"]["const"] == format_
@@ -28,8 +29,9 @@ def test_a_schema_is_valid_and_names_its_format(name: str):
     assert not {"/", " "} & set(file_name(name))
 
 
-def test_nothing_else_passes_for_an_answer():
-    schema = json_schema(Answer)
+@pytest.mark.parametrize("base", [Answer, Result])
+def test_nothing_else_passes_for_an_answer(base: type):
+    schema = schema_of(base)
     good = {
         "schema": "hdcal.any/1",
         "status": "ok",

@@ -13,7 +13,6 @@ import h5py
 from commands import XB1
 from mutations import RAW, damaged_bytes, damaged_data, damaged_number, damaged_text
 from posteriors import single
-from sealing import sealed_set
 
 from hdcal.__main__ import hdcal
 from hdcal.errors import InputError
@@ -95,14 +94,13 @@ VALUES = [
 ]
 READING = {"deformation_mm": 0.2, "force_N": 37.8, "temperature_C": 20.0, "run": "a"}
 # What a few milliseconds can answer; other commands are named a case that is none.
-QUICK = ("check", "fit", "effects", "audit", "predict")
+QUICK = ("check", "fit", "effects", "predict")
 
 
 def make_targets(folder: Path) -> None:
     """Write whole inputs of every kind, each to be spoiled in a copy."""
     shutil.copytree(XB1, folder / "case")
     single(size=40).save(folder / "posterior.nc")
-    sealed_set(folder / "set", count=2)
 
 
 def _mostly(rng: random.Random) -> bool:
@@ -209,21 +207,6 @@ def without_a_force(answer: str) -> bool:
     return any(None in columns[name] for name in bands)
 
 
-def attack_set(rng: random.Random, targets: Path) -> list[str]:
-    """Spoil a sealed set, before it is answered or opened."""
-    shutil.copytree(targets / "set", "set")
-    shutil.copy(targets / "set.key", "set.key")
-    file = rng.choice([path for path in Path("set").rglob("*") if path.is_file()])
-    if file.suffix == ".json" and rng.random() < 0.7:
-        plain = json.loads(file.read_text())
-        spoiled = json.dumps(damaged_data(plain, rng))
-        file.write_text(spoiled if rng.random() < 0.7 else damaged_text(plain, rng))
-    else:
-        file.write_bytes(damaged_bytes(file.read_bytes(), rng))
-    ways = [["answer", "set", "--by", "none"], ["open", "set", "--key", "set.key"]]
-    return ["blind", *rng.choice(ways)]
-
-
 def attack_lines(rng: random.Random, targets: Path) -> list[str]:
     """Spoil a stream of readings."""
     lines = []
@@ -265,8 +248,7 @@ ATTACKS: dict[str, tuple[Callable[[random.Random, Path], list[str]], float]] = {
     "gear": (attack_gear, 0.3),
     "options": (attack_options, 0.2),
     "lines": (attack_lines, 0.1),
-    "posterior": (attack_posterior, 0.05),
-    "set": (attack_set, 0.05),
+    "posterior": (attack_posterior, 0.1),
 }
 
 

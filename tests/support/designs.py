@@ -7,7 +7,7 @@ from rigs import make_gear
 
 from hdcal.data.prior import Prior
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.physics.effects.progressive_stiffening import ProgressiveStiffening
+from hdcal.physics.effects.stiffness import ProgressiveStiffening
 
 
 def known(draws: int = 2000, theory="ring") -> DesignDraws:

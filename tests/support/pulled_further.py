@@ -1,18 +1,12 @@
 """Virtual rigs of which a part of the stroke was measured, and the truth beyond it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-
-from hdcal.blind.virtual_rig.history import FULL, History
-from hdcal.blind.virtual_rig.virtual_rig import (
-    MECHANISMS,
-    ActiveMechanism,
-    VirtualRig,
-    draw_rig,
-)
+from benchmarks.blind.rig.history import FULL, History
+from benchmarks.blind.rig.mechanisms import MECHANISMS
+from benchmarks.blind.rig.virtual_rig import draw_rig
 
 # A prediction is an immediate reading: what time alone brings is no part of it.
 OF_TIME = ("charge_leakage", "amplifier_drift")
@@ -72,35 +66,13 @@ def pulled_further(
     measured = np.linspace(0.02, FULL / times, rows)
     on = np.linspace(FULL / times, FULL, 20)[1:]
     rig = draw_rig(_ramp(np.concatenate([measured, on])), rng)
-    seen = replace(rig, history=_ramp(measured))
-    active = _sized(name, r, rig, seen, rng)
+    active = rig.draw_mechanism(MECHANISMS[name], r, rng, slice(rows))
     if active is None:
         return None
     full = rig.readings([active])
     noise = rig.sigma * rng.normal(size=rows)
     told = measured, full[:rows] + noise, FULL, float(full[-1]), rig.zero
     return PulledFurther(*told)
-
-
-def _sized(
-    name: str, r: float, rig: VirtualRig, seen: VirtualRig, rng: np.random.Generator
-) -> ActiveMechanism | None:
-    mechanism = MECHANISMS[name]
-    shape = mechanism.draw(rng)
-    sign = rng.choice([-1.0, 1.0]) if mechanism.signed else 1.0
-    rows = len(seen.history.deformation)
-
-    def of(log_size: float) -> ActiveMechanism:
-        return ActiveMechanism(name, sign * float(np.exp(log_size)), shape)
-
-    def excess(log_size: float) -> float:
-        gap = seen.gap_over_noise(rig.curve(of(log_size))[:rows])
-        return float(np.log(max(float(gap), 1e-9) / r))
-
-    low, high = np.log(1e-4 * mechanism.largest), np.log(mechanism.largest)
-    if excess(high) < 0.0 or excess(low) > 0.0:
-        return None
-    return of(float(brentq(excess, low, high, xtol=1e-4)))  # type: ignore[arg-type]
 
 
 def all_pulled_further(

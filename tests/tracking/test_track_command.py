@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from commands import MAIN, XB1, Hdcal
 
-from hdcal.tracking.live import LivePicture
 from hdcal.tracking.stream import read_line
 
 GEAR = XB1 / "gear.toml"
@@ -114,34 +113,6 @@ def test_csv_is_followed_as_its_json_would_be(here: Hdcal, monkeypatch, table):
     for of_table, of_rows in zip(*answers, strict=True):
         of_table.pop("error", None), of_rows.pop("error", None)
         assert of_table == of_rows
-
-
-def answered(row: int, mean: float, **more) -> dict:
-    level = {"mean": mean, "credible_95": [mean - 1.0, mean + 1.0]}
-    known = {"status": "ok", "row": row, "alarm": row > 8, **more}
-    return {**known, "stiffness_N_per_mm": level}
-
-
-@pytest.mark.parametrize("live", [True, False])
-def test_a_picture_follows_the_stream(live, monkeypatch):
-    """In a terminal each in the place of the last one; elsewhere one at the end."""
-    sink = io.StringIO()
-    picture = LivePicture(sink, live=live)
-    monkeypatch.setattr("hdcal.tracking.live._PAUSE", 0.0)
-    picture.draw()
-    picture.take({"status": "error", "row": 1})
-    unknown = answered(1, 200.0)
-    unknown["stiffness_N_per_mm"]["credible_95"] = None
-    picture.take(unknown)
-    for row in range(2, 11):
-        picture.take(answered(row, 200.0 + row))
-    pictures = sink.getvalue().count("stiffness [N/mm]")
-    assert pictures == 9 * live
-    assert sink.getvalue().count("\x1b[16A") == max(pictures - 1, 0)
-    picture.draw()
-    last = sink.getvalue().rpartition("stiffness [N/mm]")[2]
-    assert "readings with alarm: 2" in last and "\n211 ┤" in last
-    assert last.splitlines()[-1].split() == ["2", "reading", "10"]
 
 
 def test_a_comma_that_was_decimal_stays_so(here: Hdcal, monkeypatch):

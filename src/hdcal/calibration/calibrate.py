@@ -30,9 +30,9 @@ from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
+from hdcal.physics.effects.noise import HeteroscedasticNoise
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.registry import EFFECTS
-from hdcal.physics.scatter import Scatter
 
 # Where readings show that they scatter more at larger forces, it may be by any share.
 _SHARE = f"{HeteroscedasticNoise.name}.share"

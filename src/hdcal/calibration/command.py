@@ -11,9 +11,9 @@ from hdcal.cli.options import (
     folder_options,
     json_option,
     read_given,
+    sampling_options,
     take_reading,
 )
-from hdcal.cli.sampling_options import sampling_options
 from hdcal.errors import Finding
 
 

@@ -1,1 +1,1 @@
-"""What do curve fits say, and what does the article claim?"""
+"""What do least-squares polynomials say?"""

@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from functools import partial
-from typing import TYPE_CHECKING, Any, TextIO, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -20,10 +20,9 @@ from hdcal.report.plain import as_json, printable
 if TYPE_CHECKING:
     from hdcal.report.answer import Answer
     from hdcal.report.document import Document
-    from hdcal.report.saving.target import Target, TargetFolder
+    from hdcal.report.result import Result
+    from hdcal.report.saving import Target
     from hdcal.report.write import Report
-
-T = TypeVar("T", bound="Target")
 
 
 def _read_too(out: str) -> list[Finding]:
@@ -53,7 +52,7 @@ class Console:
         # What the options' texts held that could not be read.
         self.wrong = Findings()
         # Where the result goes; `reserve_folder` sets it.
-        self.folder: TargetFolder | None = None
+        self.folder: Target | None = None
         # Whether what reads the output went away.
         self.unread = False
 
@@ -101,22 +100,21 @@ class Console:
             replace: the parameter that says so.
         """
         if out is not None:
-            from hdcal.report.saving.reserve import reserve_folder
+            from hdcal.report.saving import Target
 
-            names = {"force": force, "replace": replace}
             self.wrong += _read_too(out)
-            self.folder = self.hold(partial(reserve_folder, out, **names))
+            self.folder = self.hold(partial(Target, out, force, replace))
 
-    def hold(self, reserve: Callable[[], T]) -> T | None:
-        """Return the place of a result, held until the command ends, or None.
+    def hold(self, reserve: "Callable[[], Target]") -> "Target | None":
+        """Return a target that is held until the command ends, or None.
 
         Args:
-            reserve: the place; what it refuses is noted.
+            reserve: makes the target; the findings of its refusal are collected.
         """
-        place = self.wrong.attempt(reserve)
-        if place is not None:
-            click.get_current_context().with_resource(place)
-        return place
+        target = self.wrong.attempt(reserve)
+        if target is not None:
+            click.get_current_context().with_resource(target)
+        return target
 
     def answer(
         self,
@@ -139,6 +137,26 @@ class Console:
         if self.json:
             self.data(answer)
         return 0 if answer.status == "ok" else 1
+
+    def show(self, result: "Result", **files: Any) -> int:
+        """Write the reserved folder if there is one, print a result, return its code.
+
+        Args:
+            result: what to write and print.
+            files: what `write_result` takes: names and content of the files.
+        """
+        from hdcal.report.terminal_text import terminal_parts
+
+        folder = None
+        if self.folder is not None:
+            from hdcal.report.result_folder import write_result
+
+            write_result(result, self.folder, command=self.command, **files)
+            folder = self.folder.name
+        self.table(*terminal_parts(result, folder))
+        if self.json:
+            self._print(result.to_json().rstrip(), to_error=False)
+        return 0 if result.status == "ok" else 1
 
     def report(self, report: "Report[Answer]") -> int:
         """Write the reserved folder if there is one, show the answer, return its code.

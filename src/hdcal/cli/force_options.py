@@ -1,13 +1,12 @@
 """Options that describe a force over time, and how their texts are read."""
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import click
 
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import FORCE, Parsed, read_columns
-from hdcal.cli.options import repeated_option
+from hdcal.cli.options import combined, repeated_option
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
@@ -30,41 +29,30 @@ def read_tones(text: str, option: str) -> list[float]:
         raise InputError([Finding(option, words, remedy)]) from None
 
 
-def force_options(command: Callable) -> Callable:
-    """Add --force, --column, --amplitude, --frequency and --duration."""
-    for add in (
-        click.option(
-            "--duration",
-            type=float,
-            metavar="S",
-            help="Of a shape [s] [default: 0.5].",
-        ),
-        click.option(
-            "--frequency",
-            type=Parsed("HZ", read_tones),
-            help="Of a sine [Hz]: 5; of a chirp its first and last: 5:200.",
-        ),
-        click.option(
-            "--amplitude",
-            type=FORCE,
-            help="Of a shape [N] [default: 80].",
-        ),
-        repeated_option(
-            "--column",
-            "columns",
-            metavar="QUANTITY=HEADER",
-            read=read_columns,
-            help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
-        ),
-        click.option(
-            "--force",
-            required=True,
-            metavar="F.csv|step|sine|chirp",
-            help="The force on the gear: a table with time_s and force_N, or a shape.",
-        ),
-    ):
-        command = add(command)
-    return command
+force_options = combined(
+    click.option(
+        "--force",
+        required=True,
+        metavar="F.csv|step|sine|chirp",
+        help="The force on the gear: a table with time_s and force_N, or a shape.",
+    ),
+    repeated_option(
+        "--column",
+        "columns",
+        metavar="QUANTITY=HEADER",
+        read=read_columns,
+        help="Read a quantity of F.csv from a header of your own: force=Load[kgf].",
+    ),
+    click.option("--amplitude", type=FORCE, help="Of a shape [N] [default: 80]."),
+    click.option(
+        "--frequency",
+        type=Parsed("HZ", read_tones),
+        help="Of a sine [Hz]: 5; of a chirp its first and last: 5:200.",
+    ),
+    click.option(
+        "--duration", type=float, metavar="S", help="Of a shape [s] [default: 0.5]."
+    ),
+)
 
 
 def read_drive(
@@ -72,7 +60,7 @@ def read_drive(
 ) -> "str | tuple[np.ndarray, np.ndarray]":
     """Return the shape, or the time and force of the table, that --force names.
 
-    What is wrong is kept by the console.
+    The console collects what is wrong.
 
     Args:
         console: of the command.

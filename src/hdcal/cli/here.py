@@ -1,11 +1,12 @@
 """What one could do next with what lies in a folder."""
 
+import os.path
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
 _TABLES = {".csv", ".txt", ".tsv", ".lvm", ".dat", ".xlsx", ".parquet", ".mat"}
-# So many of a kind are named.
+# Number of cases and of tables that are named.
 _MOST = 3
 _RESULTS = {
     "posterior.nc": "hdcal margin {name} --deformation MM --limit-force N",
@@ -19,7 +20,7 @@ def what_next(folder: Path) -> Iterator[str]:
         entries = sorted(folder.iterdir())
     except OSError:
         return
-    cases = [e for e in [folder, *entries] if _is_file(e / "data.csv")]
+    cases = [e for e in [folder, *entries] if os.path.isfile(e / "data.csv")]
     tables = [
         e for e in entries if e.suffix.lower() in _TABLES and e.name != "data.csv"
     ]
@@ -31,7 +32,7 @@ def what_next(folder: Path) -> Iterator[str]:
         yield f"hdcal check {_quoted(table.name)}"
     for entry in entries:
         for file, command in _RESULTS.items():
-            if _is_file(entry / file):
+            if os.path.isfile(entry / file):
                 yield command.format(name=_quoted(entry.name))
                 break
 
@@ -39,10 +40,3 @@ def what_next(folder: Path) -> Iterator[str]:
 def _quoted(name: str) -> str:
     """Return a name as a shell takes it, and no option."""
     return shlex.quote(f"./{name}" if name.startswith("-") else name)
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # in a folder that may not be read
-        return False

@@ -18,96 +18,87 @@ from hdcal.cli.option_types import (
     read_quantity,
 )
 from hdcal.data.theory_names import READINGS, Theory
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding
 
 if TYPE_CHECKING:
     from hdcal.data.case import Case
 
+# Adds one or several options to a command.
+Decorator = Callable[[Callable], Callable]
+
+
+def combined(*options: Decorator) -> Decorator:
+    """Return one decorator for several options, shown in this order in the help."""
+
+    def add(command: Callable) -> Callable:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
 
 def repeated_option(
     *names: str, metavar: str, read: Callable[[Sequence[str], str], Any], help: str
-) -> Callable[[Callable], Callable]:
-    """Add an option that may be repeated.
+) -> Decorator:
+    """Return an option that may be repeated.
 
     Args:
         names: of the option and of its parameter.
         metavar: form of its text.
         read: called with all texts and the option's name; raises `InputError`.
-        help: what it means.
+        help: its meaning.
     """
     return click.option(
         *names, metavar=metavar, multiple=True, callback=read_all(read), help=help
     )
 
 
-def sheet_option(command: Callable) -> Callable:
-    """Add the option that says which sheet of a workbook is meant."""
-    return repeated_option(
-        "--sheet",
+sheet_option = click.option(
+    "--sheet",
+    metavar="NAME",
+    help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
+    "several, each a specimen.",
+)
+column_option = repeated_option(
+    "--column",
+    "columns",
+    metavar="QUANTITY=HEADER",
+    read=read_columns,
+    help="Read a quantity from a header of your own: force=Load[kgf].",
+)
+# How cases are read.
+reading_options = combined(
+    click.option(
+        "--gear",
+        metavar="GEAR.toml",
+        help="The gear file [default: gear.toml beside the data].",
+    ),
+    click.option(
+        "--encoding",
         metavar="NAME",
-        read=_one,
-        help="Of a workbook (.xlsx) [default: the one with readings]; 'Probe*' for "
-        "several, each a specimen.",
-    )(command)
-
-
-def column_option(command: Callable) -> Callable:
-    """Add the option that says which column is which quantity."""
-    return repeated_option(
-        "--column",
-        "columns",
-        metavar="QUANTITY=HEADER",
-        read=read_columns,
-        help="Read a quantity from a header of your own: force=Load[kgf].",
-    )(command)
-
-
-def _one(texts: Sequence[str], option: str) -> str | None:
-    if len(texts) > 1:
-        words = f"is given {len(texts)} times"
-        remedy = "Name one; several that are called alike are 'Probe*'"
-        raise InputError([Finding(option, words, remedy)])
-    return texts[0] if texts else None
-
-
-def case_options(command: Callable) -> Callable:
-    """Add the argument and options that say which case to read."""
-    return reading_options(click.argument("data", metavar="DATA")(command))
-
-
-def reading_options(command: Callable) -> Callable:
-    """Add the options that say how cases are read."""
-    for add in (
-        click.option(
-            "--theory",
-            type=click.Choice(get_args(Theory)),
-            help="Stiffness formula that K multiplies; overrides the gear file.",
-        ),
-        column_option,
-        sheet_option,
-        click.option(
-            "--specimen",
-            metavar="LABEL",
-            help="Of several in the data, the one whose rows are read.",
-        ),
-        click.option(
-            "--reading",
-            type=click.Choice(READINGS),
-            help="Of the deformation, where the gear file is silent [default: radial].",
-        ),
-        click.option(
-            "--encoding",
-            metavar="NAME",
-            help="Of the data file's text [default: what it looks like].",
-        ),
-        click.option(
-            "--gear",
-            metavar="GEAR.toml",
-            help="The gear file [default: gear.toml beside the data].",
-        ),
-    ):
-        command = add(command)
-    return command
+        help="Of the data file's text [default: what it looks like].",
+    ),
+    click.option(
+        "--reading",
+        type=click.Choice(READINGS),
+        help="Of the deformation, where the gear file is silent [default: radial].",
+    ),
+    click.option(
+        "--specimen",
+        metavar="LABEL",
+        help="Of several in the data, the one whose rows are read.",
+    ),
+    sheet_option,
+    column_option,
+    click.option(
+        "--theory",
+        type=click.Choice(get_args(Theory)),
+        help="Stiffness formula that K multiplies; overrides the gear file.",
+    ),
+)
+# Which case is read, and how.
+case_options = combined(reading_options, click.argument("data", metavar="DATA"))
 
 
 def take_reading(settings: dict) -> dict:
@@ -117,13 +108,13 @@ def take_reading(settings: dict) -> dict:
 
 
 def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
-    """Read the case that `case_options` named; what is wrong is kept by the console.
+    """Read the case that `case_options` named; the console collects what is wrong.
 
     On a terminal it asks for what the gear file leaves open.
     """
     from hdcal.data.reading import read_case
 
-    if columns is None or is_refused(console, "--sheet"):  # which is said already
+    if columns is None:  # The console has that finding already.
         return None
     read = partial(read_case, columns=columns)
     case = console.wrong.attempt(read, data, gear, **how)
@@ -134,15 +125,11 @@ def read_given(console: Console, data, gear, columns, **how) -> "Case | None":
     return console.wrong.attempt(read, data, gear, **how)
 
 
-def is_refused(console: Console, option: str) -> bool:
-    """Tell whether what an option says could not be read."""
-    return any(finding.file == option for finding in console.wrong)
-
-
 def asked_reading(console: Console, case: "Case | None") -> str | None:
-    """Return how the deformation is read, where nothing says so but who sits there.
+    """Ask on a terminal whether the deformation is radial or diametral.
 
-    None where it is known, or nobody can be asked.
+    Returns:
+        The answer; None where the gear file says it, or nobody can be asked.
     """
     from hdcal.data.reading import leaves_reading_open
 
@@ -156,54 +143,44 @@ def asked_reading(console: Console, case: "Case | None") -> str | None:
     return click.prompt(words, default="radial", type=kinds, err=True)
 
 
-def library_option(command: Callable) -> Callable:
-    """Add --library."""
-    words = "Leave effects out of the library [default: all of them]."
-    return click.option("--library", metavar="minus:NAME[,NAME]", help=words)(command)
+library_option = click.option(
+    "--library",
+    metavar="minus:NAME[,NAME]",
+    help="Leave effects out of the library [default: all of them].",
+)
+skip_bad_option = click.option(
+    "--skip-bad",
+    is_flag=True,
+    help="Leave out gears of which something is wrong, whole, and say so.",
+)
+# The console knows it already; click has to accept it.
+json_option = click.option(
+    "--json",
+    "_json",
+    is_flag=True,
+    expose_value=False,
+    help="Print one JSON object; words go to standard error.",
+)
+force_option = click.option(
+    "--force", is_flag=True, help="Replace an older result of hdcal."
+)
 
 
-def skip_bad_option(command: Callable) -> Callable:
-    """Add --skip-bad."""
-    words = "Leave out gears of which something is wrong, whole, and say so."
-    return click.option("--skip-bad", is_flag=True, help=words)(command)
-
-
-def json_option(command: Callable) -> Callable:
-    """Add --json; the console knows it already, click has to accept it."""
-    words = "Print one JSON object; words go to standard error."
-    option = click.option(
-        "--json", "_json", is_flag=True, expose_value=False, help=words
-    )
-    return option(command)
-
-
-def folder_options(help: str) -> Callable[[Callable], Callable]:
-    """Add --out and --force.
+def folder_options(help: str) -> Decorator:
+    """Return --out and --force.
 
     Args:
         help: which folder --out names, and which one it is by default.
     """
-
-    def add(command: Callable) -> Callable:
-        return click.option("--out", metavar="DIR", help=help)(force_option(command))
-
-    return add
+    return combined(click.option("--out", metavar="DIR", help=help), force_option)
 
 
-# For a command that writes a folder where it is asked to.
+# For a command that writes a folder only if asked.
 out_option = folder_options("Also write a folder with a report.")
 
 
-def force_option(command: Callable) -> Callable:
-    """Add --force."""
-    words = "Replace an older result of hdcal."
-    return click.option("--force", is_flag=True, help=words)(command)
-
-
-def direction_option(
-    help: str, default: str | None = "up"
-) -> Callable[[Callable], Callable]:
-    """Add --direction.
+def direction_option(help: str, default: str | None = "up") -> Decorator:
+    """Return --direction.
 
     Args:
         help: what up and down are.
@@ -215,54 +192,68 @@ def direction_option(
     )
 
 
-def start_options(command: Callable) -> Callable:
-    """Add RUN and --gear, for a command that needs one of the two."""
-    words = "Without RUN: a gear of which priors are known."
-    option = click.option("--gear", metavar="GEAR.toml", help=words)
-    return click.argument("run", metavar="RUN", required=False)(option(command))
+# A command needs one of the two.
+start_options = combined(
+    click.argument("run", metavar="RUN", required=False),
+    click.option(
+        "--gear",
+        metavar="GEAR.toml",
+        help="Without RUN: a gear of which priors are known.",
+    ),
+)
 
 
-def decision_options(command: Callable) -> Callable:
-    """Add --limit-force and --rule."""
-    words = "Capacity of the actuator [N]: its size, in compression and in tension."
-    limit = click.option("--limit-force", type=FORCE, help=words)
-    rules = click.Choice(["guarded", "simple"])
-    words = "Decision about it, by the expanded uncertainty or not [default: guarded]."
-    return limit(click.option("--rule", type=rules, help=words)(command))
-
-
-def certificate_option(command: Callable) -> Callable:
-    """Add --certificate."""
-    words = "Also write a certificate to sign, one A4 page."
-    return click.option("--certificate", is_flag=True, help=words)(command)
-
-
-def material_option(help: str) -> Callable[[Callable], Callable]:
-    """Add --material."""
+def material_option(help: str) -> Decorator:
+    """Return --material."""
     return repeated_option(
         "--material", "materials", metavar="NAME", read=read_list, help=help
     )
 
 
-def tolerance_option(command: Callable) -> Callable:
-    """Add --tolerance."""
-    return repeated_option(
-        "--tolerance",
-        "tolerances",
-        metavar="SIZE_mm=±",
-        read=partial(read_named, read=partial(read_quantity, unit="mm")),
-        help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
-    )(command)
-
-
-def seed_option(command: Callable) -> Callable:
-    """Add --seed."""
-    return click.option(
-        "--seed",
-        default=0,
+tolerance_option = repeated_option(
+    "--tolerance",
+    "tolerances",
+    metavar="SIZE_mm=±",
+    read=partial(read_named, read=partial(read_quantity, unit="mm")),
+    help="Tolerance of a size: wall_thickness_mm=0.02; may be repeated.",
+)
+decision_options = combined(
+    click.option(
+        "--limit-force",
+        type=FORCE,
+        help="Capacity of the actuator [N]: its size, in compression and in tension.",
+    ),
+    click.option(
+        "--rule",
+        type=click.Choice(["guarded", "simple"]),
+        help="Decision about it, by the expanded uncertainty or not "
+        "[default: guarded].",
+    ),
+)
+certificate_option = click.option(
+    "--certificate",
+    is_flag=True,
+    help="Also write a certificate to sign, one A4 page.",
+)
+seed_option = click.option(
+    "--seed",
+    default=0,
+    show_default=True,
+    help="The same seed gives the same result.",
+)
+sampling_options = combined(
+    click.option("--chains", default=4, show_default=True, help="Independent chains."),
+    click.option(
+        "--warmup",
+        default=1000,
         show_default=True,
-        help="The same seed gives the same result.",
-    )(command)
+        help="Iterations of adaptation per chain.",
+    ),
+    click.option(
+        "--draws", default=1000, show_default=True, help="Draws kept per chain."
+    ),
+    seed_option,
+)
 
 
 def is_given(name: str) -> bool:

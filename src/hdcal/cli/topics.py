@@ -1,4 +1,4 @@
-"""`hdcal help` and `hdcal completion`: what can be read and done without the web."""
+"""`hdcal help`: the documentation in the terminal."""
 
 import click
 
@@ -6,10 +6,6 @@ from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 from hdcal.errors import Finding, InputError
-
-# Where a shell's completion asks.
-COMPLETE = "_HDCAL_COMPLETE"
-_SHELLS = ("bash", "zsh", "fish")
 
 
 @command("help", short_help="A page of the documentation, in the terminal.")
@@ -44,26 +40,4 @@ def show_topic(console: Console, topic):
         console.data({"status": "ok", "topic": topic, "text": text})
     else:
         console.table(Markdown(text, hyperlinks=False))
-    return 0
-
-
-@command("completion", short_help="Completion of commands for a shell.")
-@click.argument("shell", type=click.Choice(_SHELLS))
-@json_option
-@click.pass_context
-def show_completion(context: click.Context, shell):
-    """Print what makes SHELL complete commands and options of hdcal.
-
-    Put its output in ~/.bashrc (bash), in ~/.zshrc after compinit (zsh), or in
-    ~/.config/fish/completions/hdcal.fish (fish).
-    """
-    from click.shell_completion import get_completion_class
-
-    kind = get_completion_class(shell)
-    assert kind is not None
-    source = kind(context.find_root().command, {}, "hdcal", COMPLETE).source()
-    if context.obj.json:
-        context.obj.data({"status": "ok", "shell": shell, "source": source})
-    else:
-        context.obj.result(source)
     return 0

@@ -29,7 +29,6 @@ def compare(console: Console, runs, out, force, **asked):
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`.
     """
     from hdcal.comparison.compare import compare as side_by_side
-    from hdcal.comparison.summary import comparison_report
     from hdcal.prediction.engine.causes import read_models
 
     with console.wrong as wrong:
@@ -42,7 +41,7 @@ def compare(console: Console, runs, out, force, **asked):
         console.reserve_folder(out, force)
     read = {name: models for name, models in results.items() if models is not None}
     found = side_by_side(read, **asked)
-    return console.report(comparison_report(found, console.command))
+    return console.show(found, tables={"gears.csv": found.to_frame()})
 
 
 def _folder(run: str) -> Path:

@@ -1,16 +1,30 @@
 """How much the stiffness of several results differs, and how surely."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
+from pydantic import Field, computed_field
 
+from hdcal.comparison.charts import stiffness_chart
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
+from hdcal.data.versions import versions
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.notebook import Shown
 from hdcal.prediction.engine.causes import Cause, causes_of
 from hdcal.prediction.engine.models import Models
+from hdcal.report.chart_spec import Chart
+from hdcal.report.result import (
+    INTERVAL,
+    Count,
+    Draws,
+    Interval,
+    Item,
+    Probability,
+    Result,
+    Words,
+    quantity,
+)
 from hdcal.report.words import label
 
 # Draws of each result that are compared with those of the others.
@@ -19,30 +33,73 @@ _DRAWS = 4000
 MOST = 1000
 
 
-@dataclass(frozen=True, repr=False)
-class Comparison(Shown):
-    """Results side by side; the first one is what the others are compared with.
+class Compared(Item):
+    """One result with its difference from the first; 95 % credible intervals."""
 
-    Attributes:
-        names: of the results.
-        stiffness: draws of each, shape (n, t) [N/mm as read].
-        rows: readings that each rests on, shape (n,).
-        tolerance: difference that matters [N/mm]; None where none was stated.
-        notes: on what the comparison rests.
-        seed: of the pairs of draws.
-    """
-
-    names: tuple[str, ...]
-    stiffness: np.ndarray
-    rows: np.ndarray
-    tolerance: float | None
-    notes: tuple[str, ...]
-    seed: int
+    name: Words = quantity("result", column="gear")
+    rows: Count = quantity("readings")
+    stiffness_N_per_mm: Interval = quantity("stiffness as read", "N/mm")
+    difference_N_per_mm: Interval = quantity("difference from the first", "N/mm")
+    difference_percent: Interval = quantity("difference from the first", "%")
+    probability_stiffer: Probability = quantity("probability of being stiffer")
+    probability_differs: Probability | None = quantity(
+        "probability of a difference larger than the tolerance"
+    )
 
     @property
-    def difference(self) -> np.ndarray:
-        """Return draws of each one's stiffness less the first's, (n, t) [N/mm]."""
-        return self.stiffness - self.stiffness[0]
+    def differs(self) -> bool:
+        """Whether the interval of the difference excludes zero."""
+        return not self.difference_percent.lo <= 0.0 <= self.difference_percent.hi
+
+
+class Comparison(Result):
+    """Stiffness of several results, and its difference from that of the first.
+
+    Attributes:
+        results: in the given order; the first one is the reference.
+        tolerance_N_per_mm: difference that matters; None where none was given.
+        interval: probability that every interval holds.
+        seed: of the pairs of draws.
+        versions: of the packages that made it.
+        stiffness: draws of each result, shape (n, t) [N/mm as read].
+        data: SHA-256 of the data by the names of results.
+        effects: in the models, by the names of results.
+        temperatures: reference temperatures by the names of results [°C].
+        certified: whether certificates of gauges are in an interval.
+    """
+
+    template = "comparison/report.md.j2"
+    table = "results"
+
+    format: Literal["hdcal.compare/1"] = "hdcal.compare/1"
+    results: tuple[Compared, ...]
+    tolerance_N_per_mm: float | None = quantity("tolerance", "N/mm")
+    interval: float = Field(default=INTERVAL, gt=0.0, lt=1.0)
+    seed: Count
+    versions: dict[str, str]
+    stiffness: Draws
+    data: dict[str, str] = Field(exclude=True)
+    effects: dict[str, str] = Field(exclude=True)
+    temperatures: dict[str, float] = Field(exclude=True)
+    certified: bool = Field(exclude=True)
+
+    @computed_field
+    @property
+    def notes(self) -> tuple[Words, ...]:
+        """Limits of the comparison."""
+        return self.lines("notes")
+
+    @property
+    def ranked(self) -> list[Compared]:
+        """The other results: first those that differ, the largest difference first."""
+        return sorted(
+            self.results[1:],
+            key=lambda one: (not one.differs, -abs(one.difference_percent.median)),
+        )
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the stiffness of every result."""
+        return {"results": stiffness_chart(self.results)}
 
 
 def compare(
@@ -75,15 +132,42 @@ def compare(
             wrong.append(Finding("results", words, remedy))
     causes = {str(name): _causes(str(name), one) for name, one in results.items()}
     cases = {name: models[0].posterior.case for name, models in causes.items()}
-    _require_alike(cases)
+    _require_same_reading(cases)
     rng = np.random.default_rng(seed)
+    stiffness = np.stack([_draws(models, rng) for models in causes.values()])
     return Comparison(
-        names=tuple(causes),
-        stiffness=np.stack([_draws(models, rng) for models in causes.values()]),
-        rows=np.array([len(case.records.force) for case in cases.values()]),
-        tolerance=tolerance,
-        notes=tuple(_notes(causes, cases)),
+        results=tuple(
+            _compared(name, len(case.records.force), draws, stiffness[0], tolerance)
+            for (name, case), draws in zip(cases.items(), stiffness, strict=True)
+        ),
+        tolerance_N_per_mm=tolerance,
         seed=seed,
+        versions=versions(),
+        stiffness=stiffness,
+        data={name: case.data_sha256 for name, case in cases.items()},
+        effects={name: _effects(models) for name, models in causes.items()},
+        temperatures={n: case.gear.reference_temperature for n, case in cases.items()},
+        certified=any(case.gear.gauge_priors for case in cases.values()),
+    )
+
+
+def _compared(
+    name: str,
+    rows: int,
+    draws: np.ndarray,
+    first: np.ndarray,
+    tolerance: float | None,
+) -> Compared:
+    apart = draws - first
+    beyond = None if tolerance is None else float(np.mean(np.abs(apart) > tolerance))
+    return Compared(
+        name=name,
+        rows=rows,
+        stiffness_N_per_mm=Interval.of(draws),
+        difference_N_per_mm=Interval.of(apart),
+        difference_percent=Interval.of(100.0 * apart / first),
+        probability_stiffer=float(np.mean(apart > 0.0) + np.mean(apart == 0.0) / 2.0),
+        probability_differs=beyond,
     )
 
 
@@ -114,7 +198,7 @@ def _draws(models: Sequence[Cause], rng: np.random.Generator) -> np.ndarray:
     return rng.permutation(np.concatenate(parts))[:_DRAWS]
 
 
-def _require_alike(cases: Mapping[str, Case]) -> None:
+def _require_same_reading(cases: Mapping[str, Case]) -> None:
     """Refuse results of which one was read along the radius, one the diameter.
 
     Raises:
@@ -128,39 +212,7 @@ def _require_alike(cases: Mapping[str, Case]) -> None:
         raise InputError([Finding("results", words, remedy)])
 
 
-def _notes(
-    causes: Mapping[str, Sequence[Cause]], cases: Mapping[str, Case]
-) -> Iterator[str]:
-    """Yield what else may make a difference, or is in none."""
-    files: dict[str, str] = {}
-    for name, case in cases.items():
-        other = files.setdefault(case.data_sha256, name)
-        if other != name:
-            yield (
-                f"{other} and {name} are of the same data: what parts them is the "
-                "model, and their intervals are not independent."
-            )
-    effects = {
-        name: " and ".join(
-            sorted({label(e.name) for one in models for e in one.posterior.effects})
-        )
-        for name, models in causes.items()
-    }
-    if len(set(effects.values())) > 1:
-        told = "; ".join(f"{name}: {what or 'none'}" for name, what in effects.items())
-        yield f"Their models have other effects, which bear on the stiffness ({told})."
-    warm = {name: case.gear.reference_temperature for name, case in cases.items()}
-    if len(set(warm.values())) > 1:
-        told = ", ".join(f"{name} {at:g} °C" for name, at in warm.items())
-        yield f"Each stiffness is at its own reference temperature ({told})."
-    if any(case.gear.gauge_priors for case in cases.values()):
-        yield (
-            "What certificates state of gauges is in the interval of each result by "
-            "itself: where it is the same gauge, the difference is surer than it says."
-        )
-        return
-    yield (
-        "An error that all of them share, such as that of one load cell, is in no "
-        "difference; one that only some have, such as that of another rig, is in no "
-        "interval unless certificates state it."
-    )
+def _effects(causes: Sequence[Cause]) -> str:
+    """Return the effects in the models of a result."""
+    effects = {label(e.name) for one in causes for e in one.posterior.effects}
+    return " and ".join(sorted(effects)) or "none"

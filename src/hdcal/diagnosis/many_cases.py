@@ -15,12 +15,12 @@ from hdcal.data.case import Case
 from hdcal.data.reading import read_case
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.errors import Finding, Findings, HdcalError, InputError
-from hdcal.report.saving.contents import STAMP
+from hdcal.report.saving import MARKER
 
 Refused = Mapping[str, tuple[Finding, ...]]
 # What lies beside the folders of many cases.
 REFUSED = "refused.json"
-_OWN_FILES = {STAMP, REFUSED}
+_OWN_FILES = {MARKER, REFUSED}
 
 
 @dataclass(frozen=True)

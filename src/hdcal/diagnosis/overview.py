@@ -9,7 +9,6 @@ from hdcal.diagnosis.many_cases import REFUSED, AskedCases, Refused
 from hdcal.diagnosis.words import count_words, verdict_word
 from hdcal.report.document import Document, Section, Table, spoken_of
 from hdcal.report.plain import as_json
-from hdcal.report.saving.disk import write_file
 from hdcal.report.words import hypothesis, known, newton, percent
 
 _MEND = "Mend what is listed as refused."
@@ -43,7 +42,7 @@ def write_refused(refused: Refused, folder: Path) -> None:
         next_step=_MEND,
         cases=dict(refused),
     )
-    write_file(folder / REFUSED, as_json(answer).encode())
+    (folder / REFUSED).write_text(as_json(answer), "utf-8")
 
 
 def verdicts_answer(

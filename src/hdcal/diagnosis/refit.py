@@ -10,7 +10,6 @@ least.
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -74,10 +73,17 @@ def refit(
     if quick:
         return Refits({}, None, {})
 
-    together = progress and _Together(progress, len(_probable(posterior.probabilities)))
+    count, finished = len(_probable(posterior.probabilities)), 0
 
     def calibrated(name: str) -> Posterior:
-        own = parts_of(name)
+        nonlocal finished
+        own, before = parts_of(name), finished
+
+        def tell(done: int, total: int) -> None:
+            assert progress is not None
+            progress(before * total + done, total * max(count, before + 1))
+
+        finished += 1
         return calibrate(
             case,
             effects=tuple(sorted(own - {UNKNOWN})),
@@ -85,25 +91,10 @@ def refit(
             adapt_noise=False,
             seed=seed,
             registry=library,
-            progress=together and partial(together, name),
+            progress=progress and tell,
         )
 
     return weighed(posterior.probabilities, calibrated)
-
-
-class _Together:
-    """Tells of calibrations that run side by side as of one."""
-
-    def __init__(self, progress: Progress, many: int):
-        self._progress, self._many = progress, many
-        self._done: dict[str, int] = {}
-
-    def __call__(self, name: str, done: int, total: int) -> None:
-        """Tell how far one of them has come; the others take as long as it does."""
-        self._done[name] = done
-        self._progress(
-            sum(self._done.values()), total * max(self._many, len(self._done))
-        )
 
 
 def weighed(

@@ -135,7 +135,7 @@ def write_verdict(
 
     Args:
         verdict: from `diagnose`.
-        folder: an empty one, from `TargetFolder.filled`.
+        folder: an empty one, from `Target.filled`.
         command: how the result was made, for its provenance.
         report: whether figures and report are wanted; they take most of the time.
     """

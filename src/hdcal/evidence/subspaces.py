@@ -20,7 +20,7 @@ from hdcal.evidence.parameter_grid import (
 )
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.physics.effect import Effect
-from hdcal.physics.scatter import Scatter, scores
+from hdcal.physics.effects.scatter import Scatter, scores
 
 # Columns of a subspace; members beyond it are kept by their largest directions.
 WIDTH = 24

@@ -169,7 +169,7 @@ class FleetPosterior:
 
 def _share_findings(shares: Mapping[str, float], draws: int) -> Iterator[Finding]:
     # Late: it is not needed to fit a fleet.
-    from hdcal.prediction.tolerance_factors import check_rarity, check_shares
+    from hdcal.prediction.shares import check_rarity, check_shares
 
     yield from check_shares(**shares)
     yield from check_rarity(shares, draws)

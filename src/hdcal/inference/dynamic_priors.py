@@ -12,7 +12,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.problem import case_reading, influence_prior
 from hdcal.physics.dynamics import ring_mass
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.physics.effects.loops import CoulombFriction
 
 # In the order in which they are sampled and reported; K and E0 come first.
 SITES = (

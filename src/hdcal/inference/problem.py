@@ -29,7 +29,7 @@ from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
-from hdcal.physics.scatter import Scatter
+from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
 _base_columns = jax.jit(linear_columns)

@@ -24,7 +24,7 @@ from hdcal.motion.friction_search import (
     rubbing_contrast,
 )
 from hdcal.physics.effect import Effect
-from hdcal.physics.effects.coulomb_friction import CoulombFriction
+from hdcal.physics.effects.loops import CoulombFriction
 
 # Longer records keep the linear model: the response with friction is sequential.
 MOST_ROWS = 4000

@@ -132,8 +132,8 @@ def acting(
     effects: Sequence[type[Effect]],
 ) -> tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]:
     """Part effects into those that the dynamic model holds and those left out."""
-    kept = tuple(effect for effect in effects if effect.acts_at_once)
-    return kept, tuple(effect for effect in effects if not effect.acts_at_once)
+    kept = tuple(effect for effect in effects if effect.instantaneous)
+    return kept, tuple(effect for effect in effects if not effect.instantaneous)
 
 
 @jax.jit

@@ -1,12 +1,14 @@
 """The effect interface: one mechanism, one stage of the measurement chain.
 
-An effect is a frozen pytree. Class attributes declare what it is, fields are
-its parameters, one method computes on whole ordered records. Only amplitudes
-have a null value: there the effect changes nothing.
+An effect is a frozen pytree. Class keywords declare what it is, fields are its
+parameters, one method computes on whole ordered records. Only amplitudes have a null
+value: there the effect changes nothing.
 """
 
 import dataclasses
+import re
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import Any, ClassVar, Literal
 
 import equinox as eqx
@@ -15,6 +17,8 @@ from jaxtyping import Float
 from hdcal.data.records import Array, Records
 
 Stage = Literal["deformation", "force", "sensor", "noise"]
+Symmetry = Literal["odd", "even", "none"]
+PerRow = Float[Array, " n"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,20 +48,20 @@ def parameter(
 
 
 class Rows(eqx.Module):
-    """What an effect may look at: the records and what earlier stages made of them.
+    """The input of an effect: the records and the results of earlier stages.
 
     Attributes:
         records: the measured rows.
         temperature_rise: T − T_ref [K].
         stiffness: K·k(E(T)) per radial displacement [N/mm].
-        deformation: radial, as the gear sees it [mm]; the rig's own reading less
-            its offset while the deformation stage still runs.
+        deformation: radial deformation of the gear [mm]; on the deformation stage
+            the reading of the rig less its offset.
     """
 
     records: Records
-    temperature_rise: Float[Array, " n"]
-    stiffness: Float[Array, " n"]
-    deformation: Float[Array, " n"]
+    temperature_rise: PerRow
+    stiffness: PerRow
+    deformation: PerRow
 
 
 class Noise(eqx.Module):
@@ -75,44 +79,63 @@ class Noise(eqx.Module):
 class Effect(eqx.Module, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
-    Class attributes:
-        name: key of the registry and prefix of the posterior sites.
+    Its name, the key of the registry and prefix of the posterior sites, is that of the
+    class in snake case.
+
+    Class keywords, each also a class attribute:
         stage: where in the measurement chain it acts.
+        groups: of `physics.groups`; effects of a group look alike or share a remedy.
         needs: features of the records without which it cannot be tested.
-        groups: of `physics.groups`; those of one look alike or have one remedy.
-        symmetry: how the contribution answers to tension instead of compression,
-            `odd` (changes sign), `even` (does not) or `none` (neither, or by history).
-        mixture: whether a reading's noise becomes more than one normal.
-        period: of an effect with several amplitudes, its shape parameter that is a
-            period in radial deformation [mm]. Records of less than one period show a
-            bend like any other, and not this effect, unless its prior says so.
-        acts_at_once: whether it is a force or play of the gear itself that depends on
-            deformation, speed and temperature of the moment only; `hdcal respond`
-            takes such effects along and leaves others out.
-        twin: what obeys the same equation and is no effect of the library.
+        symmetry: how the contribution changes from compression to tension: `odd`
+            (changes sign), `even` (does not) or `none` (neither, or by history).
+        instantaneous: whether it is a force or play of the gear itself that depends
+            on deformation, speed and temperature of the moment only; `hdcal respond`
+            includes such effects and leaves others out.
+        mixture: whether the noise of a reading becomes more than one normal.
+        period: name of the shape parameter that is a period in radial deformation
+            [mm], for an effect with several amplitudes. Records shorter than one
+            period cannot show the effect, unless its prior says so.
+        twin: a mechanism outside the library that obeys the same equation.
+
+    A subclass without a stage inherits all of them, and the name, from its base.
     """
 
-    # What each effect says of itself.
-    told: ClassVar[tuple[str, ...]] = ("name", "stage", "groups")
     name: ClassVar[str]
     stage: ClassVar[Stage]
     groups: ClassVar[tuple[str, ...]]
-    needs: ClassVar[frozenset[str]] = frozenset()
-    symmetry: ClassVar[Literal["odd", "even", "none"]] = "odd"
-    mixture: ClassVar[bool] = False
-    period: ClassVar[str] = ""
-    acts_at_once: ClassVar[bool] = False
-    twin: ClassVar[str] = ""
+    needs: ClassVar[frozenset[str]]
+    symmetry: ClassVar[Symmetry]
+    instantaneous: ClassVar[bool]
+    mixture: ClassVar[bool]
+    period: ClassVar[str]
+    twin: ClassVar[str]
 
-    def __post_init__(self) -> None:
-        missing = [name for name in self.told if not hasattr(self, name)]
-        if missing:
-            words = f"{type(self).__name__} is no effect without {', '.join(missing)}"
-            raise TypeError(words)
+    def __init_subclass__(
+        cls,
+        *,
+        stage: Stage | None = None,
+        groups: Sequence[str] = (),
+        needs: Sequence[str] = (),
+        symmetry: Symmetry = "odd",
+        instantaneous: bool = False,
+        mixture: bool = False,
+        period: str = "",
+        twin: str = "",
+    ) -> None:
+        if stage is None:
+            return
+        if not groups or isinstance(groups, str) or isinstance(needs, str):
+            words = "groups and needs are tuples of names, and groups is not empty"
+            raise TypeError(f"{cls.__name__}: {words}")
+        cls.name = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+        cls.stage, cls.groups = stage, tuple(groups)
+        cls.needs, cls.symmetry = frozenset(needs), symmetry
+        cls.instantaneous, cls.mixture = instantaneous, mixture
+        cls.period, cls.twin = period, twin
 
     @abstractmethod
     def apply(self, signal: Any, rows: Rows) -> Any:
-        """Return the signal of this effect's stage as the effect leaves it.
+        """Return the signal of this effect's stage, changed by the effect.
 
         A row may depend on itself and on rows before it, never on the number of rows:
         copies of the last one may follow, and must change nothing before them.

@@ -1,4 +1,4 @@
-"""Results as plain data for JSON, and texts from files as harmless ones."""
+"""Results as plain data for JSON, and texts without control characters."""
 
 import json
 import math
@@ -36,12 +36,3 @@ def printable(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-
-
-def harmless(value: Any) -> Any:
-    """Return plain data whose texts hold no control characters."""
-    if isinstance(value, dict):
-        return {key: harmless(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [harmless(item) for item in value]
-    return printable(value) if isinstance(value, str) else value

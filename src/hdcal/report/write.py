@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from hdcal.report.chart import Chart
-from hdcal.report.csv_table import columns_csv
 from hdcal.report.document import Document, answer_spoken_of, spoken_of
-from hdcal.report.parquet_columns import columns_parquet
 from hdcal.report.plain import as_json
-from hdcal.report.saving.disk import write_file
-from hdcal.report.saving.target import TargetFolder
+from hdcal.report.saving import Target
+from hdcal.report.table_files import columns_csv, columns_parquet
 
 if TYPE_CHECKING:
     from hdcal.report.canvas import Figure
@@ -60,7 +58,7 @@ class Report(Generic[A]):
         object.__setattr__(self, "answer", answer)
 
 
-def write_report(report: Report, target: TargetFolder) -> None:
+def write_report(report: Report, target: Target) -> None:
     """Write a result folder, whole or not at all.
 
     Args:
@@ -68,7 +66,7 @@ def write_report(report: Report, target: TargetFolder) -> None:
         target: where.
 
     Raises:
-        KeptBeside: the target appeared or was edited meanwhile.
+        InputError: the target appeared or was edited; the result is beside it.
         NotWritable: the disk refused.
     """
     # Drawn before the folder is begun: what fails there touches no disk.
@@ -82,20 +80,20 @@ def write_report(report: Report, target: TargetFolder) -> None:
 
 def write_numbers(report: Report, folder: Path) -> None:
     """Write all of a report but page and figures into a folder that is there."""
-    write_file(folder / report.file, as_json(report.answer).encode())
+    (folder / report.file).write_text(as_json(report.answer), "utf-8")
     for name, columns in report.tables().items():
         parquet = name.endswith(".parquet")
         content = columns_parquet(columns) if parquet else columns_csv(columns).encode()
         if content is not None:
-            write_file(folder / name, content)
+            (folder / name).write_bytes(content)
     for name, content in report.others():
-        write_file(folder / name, content)
+        (folder / name).write_bytes(content)
 
 
 def write_files(files: Mapping[str, bytes], folder: Path) -> None:
     """Write files by their names into a folder that is there."""
     for name, content in files.items():
-        write_file(folder / name, content)
+        (folder / name).write_bytes(content)
 
 
 def report_files(

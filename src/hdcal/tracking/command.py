@@ -41,10 +41,9 @@ from hdcal.errors import Finding, InputError
     metavar="SHARE",
     help="After an alarm let the stiffness move by this share; 0.1 learns anew.",
 )
-@click.option("--plot", is_flag=True, help="Draw the stiffness on standard error.")
 @json_option
 @click.pass_obj
-def track(console: Console, known, gear, plot, **settings):
+def track(console: Console, known, gear, **settings):
     """Follow a gear reading by reading, from a calibration RUN or a gear file.
 
     Each line of standard input is a reading, such as {"deformation_mm": 0.2,
@@ -57,26 +56,20 @@ def track(console: Console, known, gear, plot, **settings):
         words = "needs either a calibration or a gear file, and not both"
         raise InputError([Finding("hdcal track", words, remedy)])
     from hdcal.cli.sources import load_gear, load_posterior
-    from hdcal.tracking.live import LivePicture
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
     start = load_gear(gear) if known is None else load_posterior(known)
     tracker, bad = Tracker(start, **settings), 0
     console.words(tracker.describe())
-    alone = sys.stderr.isatty() and not sys.stdout.isatty()
-    picture = LivePicture(sys.stderr, live=alone)
-    watch = [picture.take] if plot else []
     try:
-        bad = answer_lines(tracker, sys.stdin.buffer, sys.stdout, *watch)
+        bad = answer_lines(tracker, sys.stdin.buffer, sys.stdout)
     except KeyboardInterrupt:
         console.words(f"interrupted after {tracker.rows} rows")
         return 130
     except BrokenPipeError:
         console.unread = True
         discard_output()
-    if plot:
-        picture.draw()
     words = tracker.summary()
     console.words(words + (f"; lines that were no reading: {bad}" if bad else ""))
     return 2 if bad else 0

@@ -14,7 +14,7 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
-from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
+from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.prediction.engine.forces import grid_records
 from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import StreamPrior

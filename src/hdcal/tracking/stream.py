@@ -1,7 +1,7 @@
 """Readings as JSON or CSV in, what the tracker makes of them as JSON lines out."""
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import chain
 from typing import Any, BinaryIO, TextIO
 
@@ -16,12 +16,7 @@ _NUMBERS = {"deformation_mm": "deformation", "force_N": "force"}
 _OPTIONAL = {"temperature_C": "temperature", "time_s": "time"}
 
 
-def answer_lines(
-    tracker: Tracker,
-    source: BinaryIO,
-    sink: TextIO,
-    watch: Callable[[dict[str, Any]], None] = lambda _: None,
-) -> int:
+def answer_lines(tracker: Tracker, source: BinaryIO, sink: TextIO) -> int:
     """Answer every line that is not blank, good or bad, before the next is read.
 
     A bad line is answered by what is wrong with it; nothing is learned from it, and
@@ -32,7 +27,6 @@ def answer_lines(
         source: JSON objects with `deformation_mm` and `force_N`, and where known
             `temperature_C`, `time_s` and `run`; or a header row and lines of CSV.
         sink: takes a line for each.
-        watch: takes each answer, once it is written.
 
     Returns:
         How many lines were no reading.
@@ -53,7 +47,6 @@ def answer_lines(
             found["error"] = str(error)
         sink.write(_ENCODER.encode(found) + "\n")
         sink.flush()
-        watch(found)
     return bad
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.inference.posterior import Posterior
-from hdcal.physics.effects.heteroscedastic_noise import HeteroscedasticNoise
+from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.stream_prior import StreamPrior
 

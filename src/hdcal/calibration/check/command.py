@@ -1,6 +1,5 @@
 """`hdcal check`: read and validate, compute nothing."""
 
-import sys
 from functools import partial
 
 import click
@@ -26,7 +25,7 @@ _GEAR, _PNG, _SVG = b"[gear]\n", b"\x89PNG", b"<?xml"
 @click.option(
     "--plot",
     metavar="FILE.png",
-    help="Draw the readings there (.png or .svg) instead of in the terminal.",
+    help="Draw the readings there (.png or .svg).",
 )
 @force_option
 @json_option
@@ -37,7 +36,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     DATA may be a folder with a file, or a folder, for each gear too.
     """
     from hdcal.data.reading import UNSIZED
-    from hdcal.report.saving.reserve import reserve_file
+    from hdcal.report.saving import Target
 
     with console.wrong:
         case = read_whole(console, given)
@@ -52,32 +51,24 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         places = {}
         for name, text in asked.items():
             if name is not None:
-                reserve = partial(reserve_file, name, force=force, beginning=text)
+                reserve = partial(Target, name, force, beginning=text)
                 places[name] = console.hold(reserve)
     assert case is not None
     from hdcal.calibration.check.document import check_document
     from hdcal.calibration.check.summary import check_answer, gear_file
 
     found = check_answer(case)
-    drawn = None if plot or not _shows_braille() else case.records
-    code = console.answer(check_document(found, drawn, lacking=effects), found)
+    code = console.answer(check_document(found, lacking=effects), found)
     if write_gear:
-        places[write_gear].write(gear_file(case).encode())
+        with places[write_gear].filled() as path:
+            path.write_text(gear_file(case), "utf-8")
         console.words(f"the gear file: {write_gear}. Add what it does not know yet")
     if plot:
         from hdcal.calibration.check.figure import readings_figure
         from hdcal.report.canvas import render
 
         kind = "svg" if beginning == _SVG else "png"
-        places[plot].write(render(readings_figure(case), kind, case.name))
+        with places[plot].filled() as path:
+            path.write_bytes(render(readings_figure(case), kind, case.name))
         console.words(f"the picture: {plot}")
     return code
-
-
-def _shows_braille() -> bool:
-    """Tell whether standard output takes letters beyond those of its language."""
-    try:
-        "\u2801".encode(sys.stdout.encoding or "utf-8")
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -1,14 +1,12 @@
 """A check in words: the only place of its sentences."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from hdcal.calibration.check.answer import CheckAnswer, Ends
 from hdcal.data.measurements import ASSUMED
-from hdcal.data.records import Records
-from hdcal.report.braille import scatter_lines
-from hdcal.report.document import Document, Facts, Section, Sentences, Table, Text
+from hdcal.report.document import Document, Facts, Section, Table, Text
 from hdcal.report.words import known, number
 
 HEADLINE = "The input is in order."
@@ -42,21 +40,16 @@ OWN_SCATTER = (
 )
 
 
-def check_document(
-    found: CheckAnswer, drawn: Records | None = None, *, lacking: bool = False
-) -> Document:
+def check_document(found: CheckAnswer, *, lacking: bool = False) -> Document:
     """Return the report of a check.
 
     Args:
         found: what was understood.
-        drawn: the readings, to be drawn with letters; None without a picture.
         lacking: whether each effect that cannot be tested is listed.
     """
     sections = [Section("Data and gear", [Facts(list(_facts(found, lacking)))], True)]
     if found.specimens:
         sections.append(_specimens(found))
-    if drawn is not None:
-        sections.append(Section("The readings", [Sentences(_picture(drawn))], True))
     return Document(
         name=found.case,
         kind="check",
@@ -123,12 +116,6 @@ def _lacking(found: CheckAnswer, each: bool) -> Iterator[tuple[str, str]]:
             "not testable",
             f"{len(lacking)} effects, for want of {', '.join(needs)}",
         )
-
-
-def _picture(records: Records) -> Sequence[str]:
-    labels = "deformation [mm]", "force [N]"
-    x, y = np.asarray(records.deformation), np.asarray(records.force)
-    return scatter_lines(x, y, labels)
 
 
 def _span(ends: Ends) -> str:

@@ -12,12 +12,7 @@ import click
 
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
-from hdcal.cli.options import (
-    column_option,
-    is_refused,
-    json_option,
-    sheet_option,
-)
+from hdcal.cli.options import column_option, json_option, sheet_option
 from hdcal.data.theory_names import READINGS
 from hdcal.errors import Finding, InputError, quoted
 
@@ -105,7 +100,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
             console.wrong.attempt(read_gear, tables)
         elif Path(data).is_dir():
             raise InputError([Finding("data", "is a folder", "Name a file")])
-        elif not (columns is None or is_refused(console, "--sheet")):
+        elif columns is not None:
             how = {"columns": columns, "sheet": sheet}
             case = console.wrong.attempt(read_case, data, tables, **how)
     measured = {
@@ -156,7 +151,7 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
     Raises:
         InputError: one of them is there already, or cannot be written.
     """
-    from hdcal.report.saving.reserve import reserve_file
+    from hdcal.report.saving import Target
 
     made = not folder.exists()
     if made and not folder.parent.is_dir():
@@ -171,11 +166,13 @@ def _write(folder: Path, files: dict[str, bytes]) -> None:
         folder.mkdir()
     try:
         with ExitStack() as held:
-            places = {
-                name: held.enter_context(reserve_file(folder / name)) for name in files
+            targets = {
+                name: held.enter_context(Target(str(folder / name), beginning=b""))
+                for name in files
             }
             for name, content in files.items():
-                places[name].write(content)
+                with targets[name].filled() as path:
+                    path.write_bytes(content)
     except BaseException:
         if made and not any(folder.iterdir()):
             folder.rmdir()

@@ -1,12 +1,11 @@
-"""The JSON answers of a study and of the article's tables."""
+"""The JSON answer of a study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from hdcal.design.answer import DesignAnswer
-from hdcal.design.study.article_tables import ArticleRow
-from hdcal.report.answer import Answer, Promise
+from hdcal.report.answer import Promise
 
 _COLUMNS = ["material", "force_median_N", "force_lo_N", "force_hi_N", "stress_MPa"]
 
@@ -25,12 +24,3 @@ class StudyAnswer(DesignAnswer):
     columns: Annotated[
         Mapping[str, tuple[float | str, ...]], Promise(required=_COLUMNS)
     ]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ArticleAnswer(Answer):
-    """What `hdcal study --article` answers."""
-
-    schema: Literal["hdcal.article/1"] = "hdcal.article/1"
-    status: Literal["ok"] = "ok"
-    rows: tuple[ArticleRow, ...]

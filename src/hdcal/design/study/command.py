@@ -31,22 +31,15 @@ def _axes() -> tuple[str, ...]:
 @click.option(
     "--temperature", type=float, metavar="C", help="[default: the reference one]"
 )
-@click.option(
-    "--article",
-    is_flag=True,
-    help="Print the article's Tables 3 and 4 beside consistent values instead.",
-)
 @options.seed_option
 @options.folder_options("Result folder [default: NAME-study].")
 @options.json_option
 @click.pass_obj
-def study(console: Console, run, gear, article, out, force, **asked):
+def study(console: Console, run, gear, out, force, **asked):
     """Compute the force for every combination of sizes, from RUN.
 
     RUN is a folder of `hdcal calibrate`.
     """
-    if article:
-        return _article(console, run)
     from hdcal.design.sources import open_source
     from hdcal.design.study.study import study as run_study
     from hdcal.design.study.summary import study_report
@@ -61,17 +54,3 @@ def study(console: Console, run, gear, article, out, force, **asked):
     assert source is not None and target is not None
     told = study_report(run_study(source, **asked), console.command)
     return console.report(told)
-
-
-def _article(console: Console, run) -> int:
-    from hdcal.cli.sources import load_posterior
-    from hdcal.design.study.article_tables import article_rows
-    from hdcal.design.study.document import article_document
-    from hdcal.design.study.summary import article_answer
-
-    others = ("gear", "out", "vary", "materials", "deformation", "temperature")
-    with console.wrong as wrong:
-        wrong += options.without_meaning(others, "--article")
-    posterior = None if run is None else load_posterior(run)
-    found = article_answer(article_rows(posterior))
-    return console.answer(article_document(found), found)

@@ -1,13 +1,11 @@
-"""The reports of a study and of the article's tables."""
+"""The report of a study."""
 
 from collections.abc import Sequence
 
-from hdcal.classical.audit.article import TITLE
 from hdcal.design.document import HEADINGS, band, design_document, picture
 from hdcal.design.sentences import as_known
 from hdcal.design.sizes import named
-from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
-from hdcal.design.study.article_tables import ArticleRow
+from hdcal.design.study.answer import StudyAnswer
 from hdcal.report.document import Document, Section, Table, Text
 from hdcal.report.parameters import Interval
 from hdcal.report.words import estimate, number, percent
@@ -17,12 +15,6 @@ _FIRST_ROWS, _MOST_ROWS = 40, 200
 _STUDY = (
     "Median force with its band, or as a map over the first two sizes. Where more were "
     "varied, the others are at their middle value."
-)
-ARTICLE_HEADLINE = "Tables 3 and 4 of the article beside values that hold together."
-_ARTICLE = (
-    "original, revised: as printed. article: its slope 1625.19 N/mm scaled by δ³/R³, "
-    "and times 0.13. ring: the series divides, the length counts, K = 1. Rows 0.7 and "
-    "0.9 mm lie beyond what the article measured, 0.54 mm."
 )
 
 
@@ -106,44 +98,3 @@ def _row(found: StudyAnswer, shown: Sequence[str], row: int) -> list[str]:
     texts = [_cell(columns[name][row]) for name in shown]
     most = max(map(float, columns["stress_MPa"]))
     return [*texts, *estimate(Interval(*ends)), number(stress, 0.1 * most)]
-
-
-def article_document(found: ArticleAnswer) -> Document:
-    """Return the article's Tables 3 and 4 beside what holds together."""
-    sections = [
-        Section(
-            f"Table {which} of the article, forces in N",
-            [_article_table([row for row in found.rows if row.table == which])],
-            brief=True,
-        )
-        for which in (3, 4)
-    ]
-    return Document(
-        name=TITLE,
-        kind="article tables",
-        subtitle="its forces beside consistent ones",
-        headline=found.headline,
-        sections=[*sections, Section("Columns", [Text(_ARTICLE)], brief=True)],
-    )
-
-
-def _article_table(rows: Sequence[ArticleRow]) -> Table:
-    # In Table 3 the deformation changes, in Table 4 the sizes.
-    sizes = {"deformation_mm": "ω [mm]"}
-    if rows[0].table == 4:
-        sizes = {"wall_thickness_mm": "δ [mm]", "radius_mm": "R [mm]"}
-    forces = ("original_N", "revised_N", "measured_N")
-    forces += ("article_N", "article_revised_N", "ring_N")
-    columns = [*sizes.values()]
-    columns += [name.removesuffix("_N").replace("_", " ") for name in forces]
-    if rows[0].calibrated_N is not None:
-        columns += ["calibrated", "95 % credible"]
-    cells = []
-    for row in rows:
-        values = vars(row)
-        texts = [f"{values[name]:g}" for name in sizes]
-        texts += ["–" if values[n] is None else f"{values[n]:.2f}" for n in forces]
-        if row.calibrated_N is not None:
-            texts += estimate(row.calibrated_N)
-        cells.append(texts)
-    return Table(columns, cells, frozenset(columns))

@@ -1,11 +1,7 @@
-"""Studies and the article's tables as answers."""
+"""A study as an answer and as a report."""
 
-from collections.abc import Sequence
-
-from hdcal.design.study.answer import ArticleAnswer, StudyAnswer
-from hdcal.design.study.article_tables import ArticleRow
+from hdcal.design.study.answer import StudyAnswer
 from hdcal.design.study.document import (
-    ARTICLE_HEADLINE,
     study_document,
     study_headline,
     study_words,
@@ -50,11 +46,4 @@ def study_report(found: Study, command: str = "") -> Report[StudyAnswer]:
         figures,
         tables=lambda: {"study.csv": found.columns},
         charts=charts,
-    )
-
-
-def article_answer(rows: Sequence[ArticleRow]) -> ArticleAnswer:
-    """Return the article's tables as an answer, ready for JSON."""
-    return ArticleAnswer(
-        reasons=(), headline=ARTICLE_HEADLINE, next_step=None, rows=tuple(rows)
     )

@@ -10,7 +10,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from hdcal.errors import Finding, InputError
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
@@ -63,10 +62,7 @@ def unseen(posterior: Posterior, values: dict, mass, seed: int):
     else:
         radial = case_reading(posterior.case).radial_per_read
         moved = sample_prior(mass_prior(gear, radial), "mass", rng, count)
-    ratio = gear.dynamic_priors.get("damping_ratio")
-    if ratio is None:
-        words = "this older result holds no prior of the damping"
-        raise InputError([Finding(posterior.case.name, words, "Calibrate again")])
+    ratio = gear.dynamic_priors["damping_ratio"]
     return moved, sample_prior(ratio, "damping_ratio", rng, count)
 
 

@@ -1,1 +1,1 @@
-"""One file per effect."""
+"""Effects by kind."""

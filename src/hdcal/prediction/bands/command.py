@@ -10,7 +10,7 @@ from hdcal.cli.option_types import DEFORMATIONS, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
 
 # By these columns --force knows an older table.
-_BEGINNING = "deformation_mm,temperature_C,direction,physics_lo_N,"
+_BEGINNING = b"deformation_mm,temperature_C,direction,physics_lo_N,"
 
 
 @command(short_help="Bands on the force from a result folder.")
@@ -44,19 +44,18 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     could not tell apart are averaged over by their probability.
     """
     from hdcal.prediction.engine.causes import averaging_words, causes_of, read_models
-    from hdcal.report.saving.reserve import reserve_file
+    from hdcal.report.saving import Target
 
     file = None
     with console.wrong:
         if out is not None:
-            asked = {"force": force, "beginning": _BEGINNING}
-            file = console.hold(partial(reserve_file, out, **asked))
+            file = console.hold(partial(Target, out, force, beginning=_BEGINNING))
     models = read_models(run)
     causes = causes_of(models)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows
     from hdcal.prediction.bands.summary import prediction_answer
-    from hdcal.report.csv_table import columns_csv
+    from hdcal.report.table_files import columns_csv
 
     bands = bands_of(models, deformation, temperature, direction)
     untested = untested_rows(bands, causes[0].posterior.case.records)
@@ -64,7 +63,8 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
         console.words(words)
     table = columns_csv(bands.columns())
     if file is not None:
-        file.write(table.encode())
+        with file.filled() as path:
+            path.write_text(table, "utf-8")
         console.words(f"the table: {out}")
     elif not console.json:
         console.result(table.rstrip("\n"))

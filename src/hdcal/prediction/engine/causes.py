@@ -29,8 +29,7 @@ from hdcal.prediction.engine.models import Models, model_pairs
 from hdcal.report.words import hypothesis, percent
 
 VERDICT = "verdict.json"
-# The older one lacks levels and remainders; its posteriors are read alike.
-SCHEMAS = ("hdcal.verdict/2", "hdcal.verdict/1")
+SCHEMA = "hdcal.verdict/2"
 _LARGEST_VERDICT = 64 << 20
 # Of probability that is left out, less than this is the rounding of a sum.
 _ROUNDING = 1e-6
@@ -151,17 +150,8 @@ def weight_left_out(causes: Sequence[Cause]) -> float:
 
 def left_out(posterior: Posterior) -> LeftOut | None:
     """Return what a diagnosis calibrated no model of; None where that is nothing."""
-    told, origin = posterior.settings.get(LEFT_OUT), posterior.settings.get(ORIGIN)
-    if told is not None:
-        return typed(LeftOut, told)
-    if origin is None:
-        return None
-    # An older diagnosis left out what failed its checks, and the sum fell short.
-    chances = typed(HeldOrigin, origin).probabilities
-    missing = 1.0 - sum(chances.values())
-    if missing <= _ROUNDING:
-        return None
-    return LeftOut(missing, max(chances, key=lambda name: chances[name]))
+    stated = posterior.settings.get(LEFT_OUT)
+    return None if stated is None else typed(LeftOut, stated)
 
 
 def averaging_words(causes: Sequence[Cause]) -> list[str]:
@@ -240,12 +230,12 @@ def _read_verdict(path: Path) -> dict:
     try:
         found = json.loads(path.read_text("utf-8"))
         schema = str(found["schema"])
-        if schema in SCHEMAS and _is_whole(found):
+        if schema == SCHEMA and _is_whole(found):
             return found
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        schema = SCHEMAS[0]
-    if schema not in SCHEMAS:
-        words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMAS[0]}"
+        schema = SCHEMA
+    if schema != SCHEMA:
+        words = f"has the format {schema[:60]}, and this hdcal reads {SCHEMA}"
         remedy = "Use the hdcal that wrote it, or diagnose again"
     raise InputError([Finding(str(path), words, remedy)])
 

@@ -20,8 +20,7 @@ from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.distributions import moments
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
-from hdcal.physics.effects.thermal_expansion import ThermalExpansion
-from hdcal.physics.effects.thermal_zero_drift import ThermalZeroDrift
+from hdcal.physics.effects.temperature import ThermalExpansion, ThermalZeroDrift
 from hdcal.prediction.engine.causes import Cause
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.growth import BendLaw, Growth, fit_growths

@@ -22,7 +22,7 @@ from hdcal.prediction.margin.request import Criteria, MarginRequest
 from hdcal.prediction.margin.result import Level
 from hdcal.prediction.margin.stated import RULES
 from hdcal.prediction.margin.temperatures import MOST_TEMPERATURES
-from hdcal.prediction.tolerance_factors import check_rarity, check_shares
+from hdcal.prediction.shares import check_rarity, check_shares
 
 
 def check_margin(

@@ -61,7 +61,7 @@ from hdcal.prediction.margin.stated import Rule
 from hdcal.prediction.margin.temperatures import levels_between, nodes_of
 from hdcal.prediction.margin.uncertainty import stated_uncertainty
 from hdcal.prediction.margin.variance_shares import variance_shares
-from hdcal.prediction.tolerance_factors import BASES
+from hdcal.prediction.shares import BASES
 
 
 def margin(

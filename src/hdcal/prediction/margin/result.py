@@ -13,7 +13,7 @@ from hdcal.prediction.margin.deformation_reached import DeformationReached
 from hdcal.prediction.margin.gradients import Gradient
 from hdcal.prediction.margin.stated import Chance, Decision, Size, StatedUncertainty
 from hdcal.prediction.margin.variance_shares import VarianceShare
-from hdcal.prediction.tolerance_factors import BASES
+from hdcal.prediction.shares import BASES
 from hdcal.report.answer import Promise, Real, Sentences, Words
 from hdcal.report.parameters import Interval
 

@@ -6,6 +6,7 @@ function touch(figure) {
   const room = document.createElement("div");
   room.className = charts.length > 2 ? "touch many" : "touch";
   const cells = charts.map(() => room.appendChild(document.createElement("div")));
+  charts.forEach((chart, k) => cells[k].classList.toggle("row", chart.wide ?? !k));
   const ink = name => getComputedStyle(document.documentElement).getPropertyValue(name);
   // Charts over the same axis move together.
   const syncs = Object.fromEntries(
@@ -79,10 +80,70 @@ function touch(figure) {
 
   // What y spans, with some room but not beyond where it can be.
   function spanned(chart, low, high) {
+    if (isLog(chart, 1)) return uPlot.rangeLog(low, high, 10, true);
     const [least, most] = uPlot.rangeNum(low ?? 0, high ?? 1, 0.1, true);
     const [floor, roof] = chart.limits;
     return [floor == null ? least : Math.max(least, floor),
       roof == null ? most : Math.min(most, roof)];
+  }
+
+  const isLog = (chart, axis) => Boolean((chart.log || [])[axis]);
+
+  // Lines and strips across a chart, below its curves.
+  function drawRules(plot, chart) {
+    const {ctx, bbox} = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const rule of chart.rules || []) {
+      const [from, to] = [rule.low, rule.high].map(v => plot.valToPos(v, rule.axis, true));
+      const colour = rule.colour || ink("--ink").trim();
+      ctx.fillStyle = colour + hex(rule.opacity ?? 1);
+      ctx.strokeStyle = colour;
+      ctx.setLineDash(rule.dashed ? [8, 6] : []);
+      ctx.beginPath();
+      if (rule.opacity !== undefined) {
+        if (rule.axis === "x") ctx.fillRect(from, bbox.top, to - from, bbox.height);
+        else ctx.fillRect(bbox.left, from, bbox.width, to - from);
+      } else {
+        ctx.moveTo(...(rule.axis === "x" ? [from, bbox.top] : [bbox.left, from]));
+        ctx.lineTo(...(rule.axis === "x"
+          ? [from, bbox.top + bbox.height] : [bbox.left + bbox.width, from]));
+        ctx.stroke();
+      }
+    }
+    ctx.restore();
+  }
+
+  function drawErrors(plot, chart) {
+    const {ctx, bbox} = plot;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.lineWidth = 2 * devicePixelRatio;
+    for (const [at, low, high] of chart.errors || []) {
+      ctx.strokeStyle = chart.series[at].colour || ink("--ink").trim();
+      ctx.beginPath();
+      plot.data[0].forEach((x, row) => {
+        const ends = [low, high].map(k => plot.data[k + 1][row]);
+        if (ends.some(end => end == null)) return;
+        const place = plot.valToPos(x, "x", true);
+        ctx.moveTo(place, plot.valToPos(ends[0], "y", true));
+        ctx.lineTo(place, plot.valToPos(ends[1], "y", true));
+      });
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  // Both ends of the error bar, behind the value of its point.
+  function range(chart, plot, k, row) {
+    const bar = (chart.errors || []).find(([at]) => at === k);
+    if (!bar) return "";
+    const [low, high] = bar.slice(1).map(end => shown(plot.data[end + 1][row]));
+    return ` (${low} … ${high})`;
   }
 
   const isEdge = each => !each.points && each.width === 0;
@@ -127,15 +188,19 @@ function touch(figure) {
       const every = charts.filter(each => each.x === chart.x)
         .flatMap(each => [each.data[0][0], each.data[0].at(-1)]);
       const ends = {min: Math.min(...every), max: Math.max(...every)};
-      const margin = 0.02 * (ends.max - ends.min);
+      const margin = 0.02 * (ends.max - ends.min), isLogX = isLog(chart, 0);
+      const all = isLogX ? [ends.min / 1.1, ends.max * 1.1]
+        : chart.names.length ? [0.4, chart.names.length + 0.6]
+        : [ends.min - margin, ends.max + margin];
       const band = bandsOf(chart);
       return new uPlot({
       ...sized(chart, which),
       cursor: {sync: {key: syncs[chart.x].key, scales: ["x", null]}, drag: {x: true, y: false}},
-      scales: {x: {time: false, range: (_, low, high) =>
-        low === chart.data[0][0] && high === chart.data[0].at(-1)
-          ? [ends.min - margin, ends.max + margin] : [low, high]},
-        y: {range: (_, low, high) => spanned(chart, low, high)}},
+      title: chart.title || undefined,
+      scales: {x: {time: false, distr: isLogX ? 3 : 1, range: (_, low, high) =>
+        low === chart.data[0][0] && high === chart.data[0].at(-1) ? all : [low, high]},
+        y: {distr: isLog(chart, 1) ? 3 : 1,
+          range: (_, low, high) => spanned(chart, low, high)}},
       legend: {markers: {
         width: (_, k) => !k ? 0 : chart.series[k - 1].dashed ? 2 : isEdge(chart.series[k - 1]) ? 1 : 0,
         dash: (_, k) => k && chart.series[k - 1].dashed ? "dashed" : "solid",
@@ -146,6 +211,8 @@ function touch(figure) {
         label: label, stroke: text, grid: {stroke: line, width: 1},
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
         ...(label === chart.x && chart.names.length ? named(chart) : {}),
+        ...(isLog(chart, label === chart.y ? 1 : 0)
+          ? {values: (_, places) => places.map(shown)} : {}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({
@@ -155,13 +222,15 @@ function touch(figure) {
           paths: each.points ? () => null : undefined,
           points: {show: each.points, size: 6, fill: hue(each), width: 0},
           value: (plot, value, _, row) => k in band && value != null
-            ? shown(plot.data[band[k] + 1][row]) + " … " + shown(value) : shown(value),
+            ? shown(plot.data[band[k] + 1][row]) + " … " + shown(value)
+            : value == null ? "" : shown(value) + range(chart, plot, k, row),
         }))),
       bands: chart.bands.map(([high, low, strength]) => ({
         series: [high + 1, low + 1],
         fill: chart.series[high].colour + hex(strength),
       })),
-      hooks: {ready: [moving]},
+      hooks: {ready: [moving], drawAxes: [plot => drawRules(plot, chart)],
+        draw: [plot => drawErrors(plot, chart)]},
     }, chart.data, cells[which]); });
     drawn.forEach((plot, which) => {
       syncs[charts[which].x].sub(plot);
@@ -169,7 +238,7 @@ function touch(figure) {
       const {series, bands} = charts[which], band = bandsOf(charts[which]);
       const rows = plot.root.querySelectorAll(".u-legend .u-series");
       series.forEach((each, k) => {
-        if (isEdge(each) && (bands.length > 3 || !(k in band)))
+        if (!each.label || isEdge(each) && (bands.length > 3 || !(k in band)))
           rows[k + 1].style.display = "none";
       });
     });

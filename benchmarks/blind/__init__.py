@@ -1,0 +1,1 @@
+"""The blind check: cases under seal, answers without their causes, and scores."""

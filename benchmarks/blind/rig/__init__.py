@@ -1,0 +1,1 @@
+"""A virtual test rig whose physics is not that of the library."""

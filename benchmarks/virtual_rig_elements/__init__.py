@@ -1,1 +1,0 @@
-"""The virtual rig's ring and cup as finite elements; they make its tables."""

@@ -1,1 +1,0 @@
-"""`hdcal blind` and its commands."""

@@ -1,1 +1,0 @@
-"""The virtual rig of the blind check: other physics than the library's."""

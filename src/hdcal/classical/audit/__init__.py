@@ -1,1 +1,0 @@
-"""Does the article agree with its own numbers?"""

@@ -1,0 +1,27 @@
+"""Chart of a comparison."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hdcal.report.chart_spec import ORANGE, Chart, Panel, Points
+
+if TYPE_CHECKING:
+    from hdcal.comparison.compare import Compared
+
+
+def stiffness_chart(results: "Sequence[Compared]") -> Chart:
+    """Return the stiffness of each result with its interval."""
+    spans = [one.stiffness_N_per_mm for one in results]
+    points = Points(
+        label="median and 95 % credible interval",
+        x=np.arange(1.0, len(spans) + 1.0),
+        y=np.array([span.median for span in spans]),
+        low=np.array([span.lo for span in spans]),
+        high=np.array([span.hi for span in spans]),
+        colour=ORANGE,
+    )
+    axis = results[0].label("stiffness_N_per_mm")
+    names = [one.name for one in results]
+    return Chart(panels=[Panel(x="result", y=axis, marks=[points], names=names)])

@@ -1,0 +1,108 @@
+"""Runs and specimens that differ, described by their spread."""
+
+from abc import abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, final
+
+import jax.numpy as jnp
+from jax.scipy.special import ndtri
+from jaxtyping import Int
+
+from hdcal.data.records import Array
+from hdcal.physics.effect import Effect, PerRow, Rows, parameter
+from hdcal.physics.theory import Scalar
+
+Kind = Literal["run", "specimen"]
+# The fractional parts of its multiples fill the unit interval evenly.
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+
+
+def scores(label: Int[Array, " n"]) -> PerRow:
+    """Return a fixed standard normal score for each label."""
+    return ndtri(jnp.mod((jnp.asarray(label) + 1.0) * _GOLDEN, 1.0))
+
+
+class Scatter(Effect):
+    """An effect by which members, runs or specimens, deviate by sd · N(0, 1) each.
+
+    Its amplitude is the spread. `apply` uses fixed scores and serves tests and
+    illustrations. A calibration does not call it: its model has a zero for each run
+    and a stiffness for each specimen, integrates them out where it can, and infers
+    the spread under `run_offset_sd` and `specimen_sd`.
+
+    Class attributes:
+        members: run or specimen.
+    """
+
+    members: ClassVar[Kind]
+
+    if TYPE_CHECKING:
+        sd: Scalar
+
+    def __init_subclass__(cls, *, members: Kind, **declared: Any) -> None:
+        cls.members = members
+        super().__init_subclass__(**declared)
+
+    @abstractmethod
+    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
+        """Return the change of each row by one unit of its member's deviation.
+
+        Args:
+            signal: of the effect's stage.
+            rows: the covariates and earlier stages.
+        """
+
+    @final
+    def apply(self, signal: PerRow, rows: Rows) -> PerRow:
+        """Return the signal with the deviation of every member."""
+        label = getattr(rows.records, self.members)
+        return signal + self.sd * scores(label) * self.unit(signal, rows)
+
+
+class RunOffset(
+    Scatter,
+    stage="sensor",
+    groups=("mounting or gear",),
+    needs=("runs",),
+    symmetry="even",
+    members="run",
+):
+    """F → F + b_i in run i, with b_i ~ N(0, sd²).
+
+    The zero differs from mounting to mounting.
+
+    Source: Gelman et al., Bayesian Data Analysis (varying-intercept model).
+    """
+
+    sd: Scalar = parameter(
+        "N", "spread of the zeros of the runs", typical=2.0, null=0.0
+    )
+
+    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
+        """Return one newton at every row."""
+        return jnp.ones_like(signal)
+
+
+class SpecimenVariation(
+    Scatter,
+    stage="force",
+    groups=("mounting or gear",),
+    needs=("specimens",),
+    members="specimen",
+):
+    """F → F (1 + d_i) of specimen i, with d_i ~ N(0, sd²).
+
+    The stiffness differs from gear to gear of a batch.
+
+    Source: Gelman et al., Bayesian Data Analysis (varying-slope model).
+    """
+
+    sd: Scalar = parameter(
+        "1",
+        "relative spread of the stiffnesses of the specimens",
+        typical=0.05,
+        null=0.0,
+    )
+
+    def unit(self, signal: PerRow, rows: Rows) -> PerRow:
+        """Return the force itself: a deviation of one doubles it."""
+        return signal

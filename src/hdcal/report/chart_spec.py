@@ -1,0 +1,159 @@
+"""Charts as declarations: what is shown, not how it is drawn.
+
+`chart_drawing` draws them with Matplotlib, `chart_browser` makes them interactive.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+# Okabe and Ito's colours, distinct in every kind of colour vision; INK is that of the
+# text around a chart.
+BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+YELLOW, SKY, GREY, RED, INK = "#E69F00", "#56B4E9", "#8a8a8a", "#b00020", ""
+CYCLE = (BLUE, ORANGE, GREEN, PURPLE, YELLOW, SKY)
+# More points than this make large files and show no more.
+MOST_DRAWN = 4000
+Dash = Literal["solid", "dashed", "dotted", "dashdot"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """A curve; NaN interrupts it. `x` ascends; with `steps` it holds the edges."""
+
+    label: str = ""
+    x: np.ndarray
+    y: np.ndarray
+    colour: str = BLUE
+    dash: Dash = "solid"
+    width: float = 1.6
+    steps: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Points:
+    """Points, with error bars from `low` to `high` where these are given."""
+
+    label: str = ""
+    x: np.ndarray
+    y: np.ndarray
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+    colour: str = INK
+    marker: str = "o"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Band:
+    """The area between two curves; NaN interrupts it. `hatched`: extrapolated."""
+
+    label: str = ""
+    x: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    colour: str = BLUE
+    opacity: float = 0.25
+    hatched: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bars:
+    """Bars from `low` to `high` at places, often 1, 2, … of named categories."""
+
+    label: str = ""
+    at: np.ndarray
+    high: np.ndarray
+    low: np.ndarray | None = None
+    colour: str = BLUE
+    width: float = 0.7
+    hatched: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """A straight line across the panel, at a value of one axis."""
+
+    at: float
+    axis: Literal["x", "y"] = "y"
+    label: str = ""
+    colour: str = INK
+    dash: Dash = "solid"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Span:
+    """A shaded strip across the panel, between two values of one axis."""
+
+    low: float
+    high: float
+    axis: Literal["x", "y"] = "y"
+    label: str = ""
+    colour: str = GREY
+    opacity: float = 0.15
+
+
+Mark = Line | Points | Band | Bars | Rule | Span
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """Marks on two axes, drawn in their order.
+
+    Attributes:
+        x: label of the axis with its unit.
+        y: likewise.
+        marks: what is drawn; marks with the same label share an entry of the legend.
+        title: above the panel.
+        names: categories at 1, 2, … of the x axis.
+        horizontal: drawn with both axes exchanged, so that long names have room.
+        x_limits: ends of the axis; None where the marks decide.
+        y_limits: likewise.
+        x_log: whether the axis is logarithmic.
+        y_log: likewise.
+        y_ticks: whether the y axis has a scale; a density needs none.
+        wide: takes a whole row of the chart.
+        height: in inches; by default one that suits the marks.
+    """
+
+    x: str
+    y: str
+    marks: Sequence[Mark]
+    title: str = ""
+    names: Sequence[str] = ()
+    horizontal: bool = False
+    x_limits: tuple[float | None, float | None] = (None, None)
+    y_limits: tuple[float | None, float | None] = (None, None)
+    x_log: bool = False
+    y_log: bool = False
+    y_ticks: bool = True
+    wide: bool = False
+    height: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chart:
+    """Panels in rows.
+
+    Attributes:
+        panels: from left to right and from top to bottom.
+        columns: panels in a row.
+        share_x: panels that are not wide have the same x axis.
+        share_y: likewise.
+        failed: marked as a result that must not be used.
+    """
+
+    panels: Sequence[Panel]
+    columns: int = 1
+    share_x: bool = False
+    share_y: bool = False
+    failed: bool = False
+
+
+def drawn_rows(y: np.ndarray) -> np.ndarray:
+    """Return the rows to draw: all of them, or a random choice and the largest ones."""
+    if len(y) <= MOST_DRAWN:
+        return np.arange(len(y))
+    chosen = np.random.default_rng(0).choice(len(y), MOST_DRAWN, replace=False)
+    return np.union1d(chosen, np.argsort(-np.abs(y - np.nanmedian(y)))[:50])

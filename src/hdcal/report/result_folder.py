@@ -1,0 +1,53 @@
+"""The folder of a result: page, JSON, charts, tables and other files."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from hdcal.report.chart_drawing import images
+from hdcal.report.page import html_page
+from hdcal.report.result import Result
+from hdcal.report.table_files import columns_csv
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from hdcal.report.saving import Target
+
+PAGE = "report.html"
+
+
+def write_result(
+    result: Result,
+    target: "Target",
+    *,
+    command: str = "",
+    answer: str = "summary.json",
+    tables: "Mapping[str, pd.DataFrame] | None" = None,
+    others: Mapping[str, Callable[[], bytes]] | None = None,
+) -> None:
+    """Write a result folder, whole or not at all.
+
+    Args:
+        result: what to write.
+        target: where.
+        command: the command line that made the result.
+        answer: name of the JSON file.
+        tables: by the names of their CSV files.
+        others: content of other files by their names.
+    """
+    drawn = {name: images(chart, name) for name, chart in result.charts().items()}
+    page = html_page(result, command, {n: each["svg"] for n, each in drawn.items()})
+    contents = {
+        answer: result.to_json().encode(),
+        PAGE: page.encode("utf-8", "xmlcharrefreplace"),
+    }
+    for name, each in drawn.items():
+        contents |= {f"{name}.{kind}": image for kind, image in each.items()}
+    contents |= {
+        name: columns_csv(dict(table)).encode()
+        for name, table in (tables or {}).items()
+    }
+    contents |= {name: make() for name, make in (others or {}).items()}
+    with target.filled() as folder:
+        for name, content in contents.items():
+            (folder / name).write_bytes(content)

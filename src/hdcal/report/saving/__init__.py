@@ -1,1 +1,0 @@
-"""Results on disk: each appears whole or not at all, and replaces nothing of others."""

@@ -1,0 +1,33 @@
+"""Columns as the content of CSV and Parquet files."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.formula_cells import without_formula
+
+
+def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
+    """Text of a CSV file, of which a spreadsheet runs no cell as a formula."""
+    frame = pd.DataFrame(dict(columns)).rename(columns=without_formula).infer_objects()
+    for name in frame.select_dtypes(exclude="number"):
+        frame[name] = frame[name].map(_cell, na_action="ignore").astype(object)
+    # A cell with one of the characters that end a line is quoted: both are needed.
+    text = frame.to_csv(index=False, float_format="%.9g", lineterminator="\r\n")
+    return text.replace("\r\n", "\n")
+
+
+def columns_parquet(columns: Mapping[str, np.ndarray]) -> bytes | None:
+    """Content of a Parquet file; None where pyarrow is not installed."""
+    try:
+        return pd.DataFrame(dict(columns)).to_parquet(index=False)
+    except ImportError:  # pip install "hdcal[files]"
+        return None
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    return without_formula(value) if isinstance(value, str) else value

@@ -1,0 +1,94 @@
+"""A result as a terminal prints it, by rich's Markdown."""
+
+import io
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, ClassVar
+
+from rich import box
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
+from rich.markdown import Heading, Markdown, TableElement
+from rich.table import Table
+from rich.text import Text
+
+from hdcal.report.markdown import cut, parsed, without_figures
+from hdcal.report.plain import printable
+
+if TYPE_CHECKING:
+    from hdcal.report.result import Result
+
+
+_LONGEST_WORD = 28
+
+
+class _Heading(Heading):
+    """A heading in bold at the left edge, directly above what follows."""
+
+    new_line = False
+
+    def __rich_console__(
+        self, console: Console, options: ConsoleOptions
+    ) -> RenderResult:
+        yield Text(self.text.plain, "bold")
+
+
+class _Table(TableElement):
+    """A table in which numbers and words stay whole."""
+
+    def __rich_console__(
+        self, console: Console, options: ConsoleOptions
+    ) -> RenderResult:
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+        rows = [row.cells for row in self.body.rows] if self.body else []
+        header = self.header.row.cells if self.header and self.header.row else []
+        for i, cell in enumerate(header):
+            texts = [row[i].content.plain for row in rows]
+            right = cell.justify == "right"
+            words = texts if right else [w for text in texts for w in text.split()]
+            least = min(max(map(len, words), default=1), _LONGEST_WORD)
+            justify = "right" if right else "left"
+            table.add_column(cell.content, justify=justify, min_width=least)
+        for cells in rows:
+            table.add_row(*(cell.content for cell in cells))
+        yield table
+
+
+class _Markdown(Markdown):
+    """Markdown without figures, and with tables that stay readable in plain text."""
+
+    elements: ClassVar = Markdown.elements | {
+        "heading_open": _Heading,
+        "table_open": _Table,
+    }
+
+    def __init__(self, text: str):
+        super().__init__("", hyperlinks=False)
+        self.parsed = cut(without_figures(parsed(text)))
+
+
+def terminal_parts(
+    result: "Result", folder: str | None = None
+) -> Iterator[RenderableType]:
+    """Yield what a terminal prints of a result.
+
+    Args:
+        result: what to print.
+        folder: where the whole result was written, or None.
+    """
+    yield Text(f"{result.line('title')}: {result.line('subtitle')}", "bold")
+    if result.reasons:
+        yield Text("FAILED: this result must not be used.", "bold red")
+        yield from (Text(f"  {printable(why)}", "red") for why in result.reasons)
+    shown = ["" if result.reasons else result.block("headline"), result.block("body")]
+    if result.next_step:
+        shown.append(f"**Next step:** {result.block('next_step')}")
+    yield _Markdown("\n\n".join(shown))
+    if folder is not None:
+        yield Text(f"\nThe result: {printable(folder)}  (open report.html)")
+
+
+def plain_text(result: "Result", width: int) -> str:
+    """Return what a terminal of this width prints, without colours."""
+    target = io.StringIO()
+    console = Console(file=target, width=width, highlight=False, emoji=False)
+    console.print(*terminal_parts(result), sep="\n")
+    return "\n".join(line.rstrip() for line in target.getvalue().splitlines())

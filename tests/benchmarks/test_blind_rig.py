@@ -1,0 +1,141 @@
+"""The virtual rig is independent of the library, and its gaps have the stated size."""
+
+import subprocess
+import sys
+from collections import Counter
+
+import numpy as np
+import pytest
+from benchmarks.blind.cases import draw_cases, gear_file
+from benchmarks.blind.mixes import SHARES, SIZES, effects_on
+from benchmarks.blind.rig.contact import _curve
+from benchmarks.blind.rig.loadings import LOADINGS, rich
+from benchmarks.blind.rig.mechanisms import MECHANISMS
+from benchmarks.blind.rig.noise import NOISES
+from benchmarks.blind.rig.outside import LISTED, OUTSIDE
+from benchmarks.blind.rig.virtual_rig import (
+    ActiveMechanism,
+    RigState,
+    VirtualRig,
+    draw_noise,
+    draw_rig,
+)
+
+import hdcal
+from hdcal.errors import InputError
+
+
+def test_the_rig_imports_nothing_of_the_library():
+    modules = ("loadings", "mechanisms", "noise", "outside")
+    script = "import sys, " + ", ".join(f"benchmarks.blind.rig.{m}" for m in modules)
+    script += "; print({'hdcal', 'jax', 'numpyro'} & {*sys.modules})"
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout.strip() == "set()", done.stderr
+
+
+def test_every_effect_of_the_library_has_a_mechanism():
+    # Without a run on the bare rig no reading shows its compliance.
+    assert {*MECHANISMS, *NOISES} == {*hdcal.EFFECTS} - {"rig_compliance"}
+    assert len(OUTSIDE) == 65 and {*LISTED} < {*OUTSIDE}
+    assert not {*OUTSIDE} & {*hdcal.EFFECTS}
+
+
+@pytest.mark.parametrize("loading", LOADINGS)
+def test_a_mechanism_is_drawn_at_the_stated_size(loading: str):
+    for name in effects_on(loading):
+        if name in NOISES:
+            continue
+        for r in (0.5, 2.0):
+            rng = np.random.default_rng([7, int(10 * r)])
+            rig = draw_rig(LOADINGS[loading]().history, rng)
+            drawn = rig.draw_mechanism(MECHANISMS[name], r, rng)
+            if drawn is not None:
+                gap = rig.gap_over_noise(rig.curve(drawn))
+                assert gap == pytest.approx(r, rel=1e-3), name
+
+
+@pytest.mark.parametrize("mix", ["effects", "outside", "rigs"])
+def test_a_label_states_the_size_of_its_gap(mix: str):
+    for _, label in draw_cases(mix, 80, seed=11):
+        if label.kind in ("effect", "outside") and label.truth[0] not in NOISES:
+            rms = np.sqrt(np.mean(np.square(label.curve)))
+            assert rms / label.sigma == pytest.approx(label.r, rel=2e-3), label.truth
+
+
+def test_noise_mechanisms_have_the_stated_size():
+    force = np.linspace(5.0, 110.0, 4000)
+    for name, mechanism in NOISES.items():
+        added = mechanism(force, 0.4, np.random.default_rng(2))
+        rms = np.sqrt(np.mean(added**2))
+        assert rms == pytest.approx(0.4, rel=0.05), name
+
+
+def test_a_calibration_absorbs_slope_zero_and_loss_of_modulus():
+    rig = VirtualRig(rich().history)
+    x, _, warm = rig.absorbed.T
+    assert rig.gap_over_noise(3.0 * x - 2.0) < 1e-6
+    # Ridge regression: the prior holds back a part of the loss of modulus.
+    left = warm - np.polyval(np.polyfit(x, warm, 1), x)
+    np.testing.assert_allclose(rig.gap(warm), left / (1.0 + left @ left), atol=1e-9)
+
+
+def test_the_same_seed_draws_the_same_cases():
+    first, again, other = (list(draw_cases("all", 6, seed)) for seed in (3, 3, 4))
+    assert first == again
+    assert all(one != two for one, two in zip(first, other, strict=True))
+    with pytest.raises(InputError):
+        next(draw_cases("some", 6, 3))
+
+
+def test_the_mix_all_has_the_published_proportions():
+    labels = [label for _, label in draw_cases("all", 200, seed=5)]
+    counts = Counter(label.mix for label in labels)
+    assert counts == {name: round(200 * share) for name, share in SHARES.items()}
+    assert {label.r for label in labels} == {0.0, *SIZES}
+    withheld = [label for label in labels if label.withheld]
+    assert all(len(x.withheld) == 2 and x.truth[0] in x.withheld for x in withheld)
+
+
+def test_hdcal_reads_what_the_rig_writes(tmp_path):
+    (tmp_path / "gear.toml").write_text(gear_file("prior"))
+    for text, label in draw_cases("prior", 3, seed=8):
+        (tmp_path / "data.csv").write_text(text)
+        records = hdcal.read_case(tmp_path).records
+        history = LOADINGS[label.program]().history
+        np.testing.assert_allclose(records.deformation, history.deformation, atol=1e-5)
+        left = np.asarray(records.force) - label.clean
+        assert np.std(left) < 1.5 * label.sigma * (1.0 + label.r)
+        np.testing.assert_array_equal(records.run, history.run)
+
+
+def test_correlated_noise_has_its_variance_and_correlation():
+    rig = VirtualRig(rich(2000).history, sigma=0.5)
+    noise = draw_noise(rig, np.random.default_rng(1), correlation=0.6)
+    assert np.std(noise) == pytest.approx(0.5, rel=0.03)
+    assert np.corrcoef(noise[1:], noise[:-1])[0, 1] == pytest.approx(0.6, abs=0.02)
+
+
+def test_closed_forms():
+    history = LOADINGS["ramp"]().history
+    rig = VirtualRig(history, alpha=0.0)
+    # One arm: a force that arrives at once decays with the stated rate.
+    leak = MECHANISMS["charge_leakage"]
+    state, held = RigState(history, np.array([200.0]), history.deformation), np.ones(60)
+    lost = leak.adds(50.0 * held, state, 0.01, {"slow": 0.0})
+    expected = 50.0 * np.exp(-0.01 * (history.time - history.time[0])) - 50.0
+    np.testing.assert_allclose(lost, expected, atol=1e-9)
+    # Dahl's friction approaches its largest with the stated reach.
+    slip = ActiveMechanism(MECHANISMS["coulomb_friction"], 2.0, {"reach": 0.05})
+    expected = 2.0 * (1.0 - np.exp(-history.deformation / 0.05))
+    np.testing.assert_allclose(rig.curve(slip), expected, atol=1e-9)
+
+
+def test_the_tables_of_the_finite_elements():
+    # Series of the elastica of a thin ring, secant over tangent stiffness.
+    x = np.linspace(-0.04, 0.04, 9)
+    elastica = 1.0 - 1.543 * x + 3.352 * x**2 - 6.93 * x**3
+    np.testing.assert_allclose(_curve("ring.csv")(x), elastica, atol=5e-4)
+    heights = np.linspace(44.0, 68.0, 25)
+    assert _curve("cup.csv")(62.0) == 1.0
+    assert np.all(np.diff(_curve("cup.csv")(heights)) < 0.0)
