@@ -7,13 +7,13 @@ import pytest
 from scipy import optimize
 from scipy.stats import multivariate_normal
 
-from hdcal.inference.density import log_likelihood
-from hdcal.inference.gear_sums import MountingSums, gear_sums
-from hdcal.inference.population_problem import (
+from hdcal.fleets.gear_sums import MountingSums, gear_sums
+from hdcal.fleets.population_problem import (
     PopulationProblem,
     draw_gears,
     gear_law,
 )
+from hdcal.inference.density import log_likelihood
 
 # Nats by which four nodes may differ from a fine grid.
 _CLOSE = 0.02

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.off_in import noise_chance, zero_chance
-from hdcal.inference.gear_sums import MountingSums
-from hdcal.inference.population_problem import (
+from hdcal.fleets.population_problem import (
     PopulationProblem,
     draw_gears,
     gear_centres,

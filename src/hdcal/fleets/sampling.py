@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from hdcal.data.prior import Prior
+from hdcal.fleets.population_problem import PopulationProblem
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, mixing_checks, sampling_checks
 from hdcal.inference.independence import MAX_SHAPE, sample_independently
 from hdcal.inference.mixing import mixing
-from hdcal.inference.population_problem import PopulationProblem
 from hdcal.inference.sample import Progress, sample
 
 

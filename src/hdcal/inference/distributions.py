@@ -1,6 +1,6 @@
 """Prior families as NumPyro distributions and as frozen SciPy distributions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
@@ -95,3 +95,25 @@ def sample_prior(
     if prior.family == "fixed":
         return np.full(count, float(prior.numbers[0]))
     return np.asarray(frozen(prior, name).ppf(rng.random(count)))
+
+
+def effective_priors(
+    priors: Mapping[str, Prior], values: Mapping, mountings: int
+) -> dict[str, Prior]:
+    """Return the priors, that of the force zero given how mountings differ.
+
+    A certificate states the zero of the gauge itself. To it the mean of n tested
+    mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
+
+    Args:
+        priors: by site name.
+        values: parameters of one draw, or medians of them.
+        mountings: n; 0 where no certificate states the zero, or none differ.
+    """
+    if not mountings:
+        return dict(priors)
+    zero = priors["force_offset"]
+    middle, gauge = zero.numbers
+    of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(mountings)
+    both = Prior("normal", (middle, jnp.hypot(gauge, of_mean)), zero.unit, zero.source)
+    return {**priors, "force_offset": both}

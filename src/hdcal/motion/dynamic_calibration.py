@@ -16,7 +16,6 @@ from hdcal.inference.density import densities
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.frequency_scan import scan
 from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
 from hdcal.inference.sample import (
@@ -25,6 +24,7 @@ from hdcal.inference.sample import (
     check_settings,
     sample,
 )
+from hdcal.motion.frequency_scan import scan
 from hdcal.motion.friction_search import motion_slopes
 from hdcal.motion.loss import (
     WHITE,

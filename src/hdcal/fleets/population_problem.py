@@ -19,9 +19,9 @@ from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
+from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
+from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.gear_sums import GearSums, line_noise, stretched
-from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
