@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize.elementwise import find_root
 from scipy.special import ndtr, ndtri
 
-# Of bounds on many gears; halvings that find a quantile to a millionth of an sd.
+# Of bounds on many gears.
 CONFIDENCE = 0.95
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 from scipy.special import softmax
 
 from hdcal.inference.t_mixture import TMixture
@@ -93,4 +93,4 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
 
     if excess(0.0) >= 0.0:
         return powered(0.0)
-    return powered(brentq(excess, _LEAST_POWER, 0.0))
+    return powered(root_scalar(excess, bracket=(_LEAST_POWER, 0.0)).root)
