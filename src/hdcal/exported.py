@@ -43,7 +43,7 @@ class _Exported:
     def __init__(self, function: Callable, static: tuple[str, ...]):
         update_wrapper(self, function)
         self._function, self._static = function, static
-        self._jitted = jax.jit(function, static_argnames=static)
+        self._jitted: Any = jax.jit(function, static_argnames=static)
         self._loaded: dict[Any, Callable | None] = {}
 
     def __call__(self, *args, **named):
@@ -79,7 +79,7 @@ class _Exported:
         text = repr((parts, shapes, settings))
         file = folder / f"export-{_code()}" / hashlib.sha256(text.encode()).hexdigest()
         with suppress(Exception):
-            return jax.jit(jax.export.deserialize(bytearray(file.read_bytes())).call)
+            return jax.jit(_read(file).call)
         try:
             exported = jax.export.export(jax.jit(flat))(*leaves)
             _write(file, exported.serialize())
@@ -104,6 +104,11 @@ def _is_special(leaves: list) -> bool:
     modes = "jax_disable_jit", "jax_debug_nans", "jax_debug_infs"
     tracing = any(isinstance(leaf, Tracer) for leaf in leaves)
     return tracing or any(map(_setting, modes))
+
+
+def _read(file: Path) -> Any:
+    content: Any = bytearray(file.read_bytes())
+    return jax.export.deserialize(content)
 
 
 def _write(file: Path, content: bytes) -> None:
