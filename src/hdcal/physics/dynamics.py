@@ -23,9 +23,7 @@ from hdcal.exported import jit
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
-from hdcal.physics.theory import RING_SERIES
-
-Scalar = Float[Array, ""] | float
+from hdcal.physics.theory import RING_SERIES, Scalar
 
 # Stiffness of the gear over that of the contact that holds it by friction [-]: a stuck
 # gear has 20 times its natural frequency, critically damped. The deformation differs
