@@ -6,19 +6,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from arviz_base import from_dict
+import xarray as xr
 from jax.flatten_util import ravel_pytree
 from moving import TRUTH, frictional_case, motion, moving_case, moving_gear
-from trees import arrays_of
 
 from hdcal import InputError, Prior, calibrate_dynamic, respond
-from hdcal.inference import laplace, posterior_file
+from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution, frozen
-from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
+from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import FRICTION, dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic
+from hdcal.inference.model_average import load_any
+from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.values import POSITIVE
 from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps
@@ -249,15 +250,15 @@ def posterior() -> DynamicPosterior:
     rng, scalars = np.random.default_rng(0), {}
     for name, value in values.items():
         scalars[name] = value * (1.0 + 0.01 * rng.standard_normal((2, 50)))
-    kept = {"posterior": scalars, "observed_data": {"force": case.records.force}}
-    kept |= {"sample_stats": {"diverging": np.zeros((2, 50), bool)}}
-    tree = from_dict(kept | {"constant_data": posterior_file.covariates(case.records)})
-    settings = {"kind": "dynamic", "with_gap": False, "seed": 0, "seconds": 0.0}
+    stats = dataset({"diverging": np.zeros((2, 50), bool)})
+    groups = {"posterior": dataset(scalars), "sample_stats": stats}
+    tree = xr.DataTree.from_dict(groups | data_groups(case.records))
+    settings = {"with_gap": False, "seed": 0, "seconds": 0.0}
     settings |= {"chains": 2, "warmup": 1, "draws": 50, "versions": {}}
     settings |= {"target_acceptance": 0.8}
     checks = (Check("by hand", "passed", "told to"),)
     priors = dynamic_site_priors(case, "ring", (CoulombFriction,))
-    about = (CoulombFriction,), priors, arrays_of(tree), {}, checks, settings
+    about = (CoulombFriction,), priors, tree, {}, checks, settings
     return DynamicPosterior(case, "ring", *about)
 
 

@@ -23,7 +23,6 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.design.materials import read_material
 from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import frozen
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.residuals import misfits
@@ -32,12 +31,13 @@ from hdcal.physics.chain import Reading
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.causes import (
     averaging_words,
-    causes_of,
     jointly_worth,
     likeliest,
     sample_prior,
 )
 from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
+from hdcal.prediction.engine.models import Models
+from hdcal.prediction.engine.pooled import Pooled, pool
 from hdcal.prediction.engine.untested import Untested
 
 
@@ -172,7 +172,7 @@ class DesignDraws:
 
 
 def design_draws(
-    source: Posterior | Gear, *, draws: int = 4000, seed: int = 0
+    source: Models | Gear, *, draws: int = 4000, seed: int = 0
 ) -> DesignDraws:
     """Return what designs are computed from.
 
@@ -185,15 +185,17 @@ def design_draws(
         NotUsable: the calibration failed its checks.
         InputError: the seed is none, or there are no sizes to design with.
     """
-    theory = source.theory
+    pooled = None if isinstance(source, Gear) else pool(source)
+    theory = (pooled or source).theory
     with Findings() as wrong:
         wrong += implausible("seed", seed)
         if theory == SPRING:
             words = "has no sizes, and a design changes sizes"
             remedy = "Calibrate with the sizes of the gear and another theory"
             wrong.append(Finding(f"theory '{theory}'", words, remedy))
-    if isinstance(source, Posterior):
-        return _calibrated(source, seed)
+    if pooled is not None:
+        return _calibrated(pooled, seed)
+    assert isinstance(source, Gear)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
     keys = separate_keys(seed, count=len(priors))
@@ -213,19 +215,19 @@ def design_draws(
     )
 
 
-def _calibrated(posterior: Posterior, seed: int) -> DesignDraws:
-    causes, gear = causes_of(posterior), posterior.case.gear
-    values, untested = gear_values(posterior, seed)
+def _calibrated(pooled: Pooled, seed: int) -> DesignDraws:
+    causes, gear = pooled.causes, pooled.case.gear
+    values, untested = gear_values(pooled, seed)
     main = likeliest(causes).posterior
     return DesignDraws(
         gear=gear,
-        theory=posterior.theory,
-        problem=posterior.problem,
+        theory=pooled.theory,
+        problem=pooled.problem,
         values=values,
         facts=_own_facts(gear),
         material=gear.material,
         kind="posterior",
-        records=posterior.case.records,
+        records=pooled.case.records,
         misfits=(*averaging_words(causes), *misfits(main)),
         untested=untested,
         worth=jointly_worth(causes),

@@ -97,7 +97,7 @@ def _density(values: np.ndarray, edges: tuple[float, float]):
 
 def sampler_figure(posterior: Posterior) -> Figure:
     """Draw rank plots: chains that agree are level everywhere."""
-    names, drawn = list(posterior.diagnoses), posterior.arrays.groups["posterior"]
+    names, drawn = list(posterior.diagnoses), posterior.tree["posterior"]
     with style():
         figure, panels = _grid(len(names), 1.75)
         for axes, name in zip(panels, names, strict=True):

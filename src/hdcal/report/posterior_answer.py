@@ -135,7 +135,7 @@ def _warnings(posterior: Posterior) -> tuple[str, ...]:
 
 
 def _sampling(posterior: Posterior) -> Sampling:
-    diverging = posterior.arrays.groups["sample_stats"]["diverging"].values
+    diverging = posterior.tree["sample_stats"]["diverging"]
     names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
     settings: dict[str, Any] = {name: posterior.settings[name] for name in names}
     return Sampling(**settings, divergences=int(diverging.sum()))

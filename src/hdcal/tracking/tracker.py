@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.untested_reading import UNKNOWNS
 from hdcal.tracking.beginning import begin_core, begin_prior, usual_design
 from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
@@ -60,7 +60,7 @@ class Tracker:
 
     def __init__(
         self,
-        known: Posterior | Gear,
+        known: Models | Gear,
         *,
         alarm_rows: float = ALARM_ROWS,
         forget: float = 1.0,
@@ -72,10 +72,10 @@ class Tracker:
             wrong += implausible("forget", forget) + implausible("reopen", reopen)
             wrong += implausible("seed", seed)
         self._causes, self._unequal = [], None
-        if isinstance(known, Posterior):
+        if not isinstance(known, Gear):
             known, self._causes = followed_causes(known, forget)
         prior = begin_prior(known, seed)
-        if isinstance(known, Posterior):
+        if not isinstance(known, Gear):
             self._unequal = UnequalRows(known, prior)
         self._unknowns, self._full_scale = False, AssumedFullScale(known)
         self._core, self._columns = begin_core(known, prior, forget, self._unequal)

@@ -19,8 +19,8 @@ from hdcal.data.records import Geometry
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.study.study import force_quantiles
 from hdcal.errors import Finding, InputError
-from hdcal.inference.posterior import Posterior
 from hdcal.physics.theory import article, ring
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import stiffness_ratio
 
 SCHEMA = "hdcal.article/1"
@@ -57,17 +57,17 @@ class ArticleRow:
     calibrated_N: dict[str, float] | None
 
 
-def article_rows(posterior: Posterior | None = None) -> tuple[ArticleRow, ...]:
+def article_rows(models: Models | None = None) -> tuple[ArticleRow, ...]:
     """Return Tables 3 and 4 of the article beside consistent values.
 
     Args:
-        posterior: a calibration of the article's gear, for the calibrated forces.
+        models: a calibration of the article's gear, for the calibrated forces.
 
     Raises:
         NotUsable: the calibration failed its checks.
         InputError: it is of another gear.
     """
-    draws = None if posterior is None else design_draws(posterior)
+    draws = None if models is None else design_draws(models)
     if draws is not None:
         _check_gear(draws)
     gear = article_gear()

@@ -64,7 +64,7 @@ def study(console: Console, run, gear, article, out, force, **asked):
 
 
 def _article(console: Console, run) -> int:
-    from hdcal.cli.sources import load_posterior
+    from hdcal.cli.sources import load_usable
     from hdcal.design.study.article_tables import article_rows
     from hdcal.design.study.document import article_document
     from hdcal.design.study.summary import article_answer
@@ -72,6 +72,6 @@ def _article(console: Console, run) -> int:
     others = ("gear", "out", "vary", "materials", "deformation", "temperature")
     with console.wrong as wrong:
         wrong += options.without_meaning(others, "--article")
-    posterior = None if run is None else load_posterior(run)
+    posterior = None if run is None else load_usable(run)
     found = article_answer(article_rows(posterior))
     return console.answer(article_document(found), found)

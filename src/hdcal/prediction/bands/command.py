@@ -43,7 +43,8 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
     could not tell apart are averaged over by their probability.
     """
-    from hdcal.prediction.engine.causes import averaging_words, causes_of, read_models
+    from hdcal.inference.model_average import load_models
+    from hdcal.prediction.engine.causes import averaging_words, causes_of
     from hdcal.report.saving.reserve import reserve_file
 
     file = None
@@ -51,7 +52,7 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
         if out is not None:
             asked = {"force": force, "beginning": _BEGINNING}
             file = console.hold(partial(reserve_file, out, **asked))
-    models = read_models(run)
+    models = load_models(run)
     causes = causes_of(models)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows

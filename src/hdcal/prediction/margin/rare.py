@@ -24,7 +24,7 @@ from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
-from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.mixing import pareto_shape
 from hdcal.inference.trust_region import Secant, minimise
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
