@@ -19,6 +19,7 @@ PUBLIC = [
     "Geometry",
     "HdcalError",
     "InputError",
+    "ModelAverage",
     "Noise",
     "NotUsable",
     "Posterior",

@@ -185,31 +185,29 @@ def design_draws(
         NotUsable: the calibration failed its checks.
         InputError: the seed is none, or there are no sizes to design with.
     """
-    pooled = None if isinstance(source, Gear) else pool(source)
-    theory = (pooled or source).theory
+    known = source if isinstance(source, Gear) else pool(source)
     with Findings() as wrong:
         wrong += implausible("seed", seed)
-        if theory == SPRING:
+        if known.theory == SPRING:
             words = "has no sizes, and a design changes sizes"
             remedy = "Calibrate with the sizes of the gear and another theory"
-            wrong.append(Finding(f"theory '{theory}'", words, remedy))
-    if pooled is not None:
-        return _calibrated(pooled, seed)
-    assert isinstance(source, Gear)
-    ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
-    priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
+            wrong.append(Finding(f"theory '{SPRING}'", words, remedy))
+    if isinstance(known, Pooled):
+        return _calibrated(known, seed)
+    ratio = _formula(known, known.K_theory) / _formula(known, known.theory)
+    priors = {**known.priors, "K": scaled(known.priors["K"], ratio)}
     keys = separate_keys(seed, count=len(priors))
     values = {
         name: sample_prior(prior, name, key, draws)
         for key, (name, prior) in zip(keys, priors.items(), strict=True)
     }
     return DesignDraws(
-        gear=source,
-        theory=source.theory,
-        problem=_bare_problem(source),
+        gear=known,
+        theory=known.theory,
+        problem=_bare_problem(known),
         values=values,
-        facts=_own_facts(source),
-        material=source.material,
+        facts=_own_facts(known),
+        material=known.material,
         kind="prior",
         records=None,
     )

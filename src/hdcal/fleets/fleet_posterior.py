@@ -31,7 +31,7 @@ from hdcal.inference.posterior_file import (
     not_a_posterior,
     read_tree,
 )
-from hdcal.inference.posterior_tree import dataset, joined
+from hdcal.inference.posterior_tree import dataset, group_of, joined_draws
 
 if TYPE_CHECKING:
     from hdcal.fleets.fleet import Fleet
@@ -65,7 +65,7 @@ class FleetPosterior:
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws of the population by site, chains joined, as `Fleet` has them."""
-        return joined(self.tree["posterior"])
+        return joined_draws(self.tree)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -154,8 +154,8 @@ class FleetPosterior:
         """
         if self.draws.keys() != self.facts.units.keys():
             raise ValueError("has other sites than a population")
-        drawn = self.tree["posterior"]["stiffness"]
-        if self.tree["predictions"][_NEXT].shape != drawn.shape:
+        drawn = group_of(self.tree, "posterior")["stiffness"]
+        if group_of(self.tree, "predictions")[_NEXT].shape != drawn.shape:
             raise ValueError("has another number of gears to come")
 
     @classmethod

@@ -13,7 +13,7 @@ from hdcal.data.case import Case, Gear
 from hdcal.data.full_scale import FullScale
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
-from hdcal.inference.posterior_tree import COVARIATES
+from hdcal.inference.posterior_tree import COVARIATES, group_of
 
 _TABLES = (
     "priors",
@@ -77,8 +77,9 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     sizes = gear["geometry"].items()
     gear["geometry"] = Geometry(**{n: nan if v is None else v for n, v in sizes})
     gear["full_scale"] = FullScale(**gear["full_scale"])
-    rows = {name: tree["constant_data"][name].values for name in COVARIATES}
-    rows["force"] = tree["observed_data"]["force"].values
+    columns = group_of(tree, "constant_data")
+    rows = {name: columns[name].values for name in COVARIATES}
+    rows["force"] = group_of(tree, "observed_data")["force"].values
     for name, column in rows.items():
         if column.shape != (len(rows["force"]),) or not np.isfinite(column).all():
             raise ValueError(f"{name} is no column of numbers")

@@ -113,10 +113,10 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
 
 def _explored(energy: np.ndarray) -> np.ndarray:
     """Return the BFMI of each chain; NaN where the energy stands still."""
-    from arviz_stats.base import array_stats
+    from arviz_stats.base.array import array_stats
 
     with np.errstate(all="ignore"):
-        return array_stats.bfmi(energy)
+        return np.asarray(array_stats.bfmi(energy))
 
 
 def _bad(value: float) -> float:

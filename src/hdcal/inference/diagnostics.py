@@ -97,13 +97,17 @@ def power_sensitivity(
         draws: of each parameter, (chain, draw).
         log_part: log density of prior or likelihood of each draw.
     """
-    from arviz_stats.base import array_stats
+    from arviz_stats.base.array import array_stats
 
-    powers = 1.0 - _POWER, 1.0 + _POWER
-    weights = [softmax((power - 1.0) * log_part) for power in powers]
+    about = {
+        "lower_w": softmax(-_POWER * log_part),
+        "upper_w": softmax(_POWER * log_part),
+        "lower_alpha": 1.0 - _POWER,
+        "upper_alpha": 1.0 + _POWER,
+    }
     # The distance is 0/0 where all draws are equal.
     with np.errstate(all="ignore"):
         return {
-            name: float(array_stats.power_scale_sense(values, *weights, *powers))
+            name: np.asarray(array_stats.power_scale_sense(values, **about)).item()
             for name, values in draws.items()
         }

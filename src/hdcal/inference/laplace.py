@@ -183,7 +183,7 @@ def to_group(found: Whitening) -> xr.Dataset:
     return xr.Dataset({"mode": (axes[:1], mode), "factor": (axes, factor)})
 
 
-def from_group(problem: Sampled, group: xr.DataTree) -> Whitening:
+def from_group(problem: Sampled, group: xr.Dataset) -> Whitening:
     """Return the fit of a group that `to_group` made.
 
     Args:

@@ -33,15 +33,15 @@ def mixing(draws: Mapping[str, np.ndarray]) -> dict[str, Mixing]:
 
 def _mixing(values: np.ndarray) -> Mixing:
     # Importing arviz-stats takes a second.
-    from arviz_stats.base import array_stats
+    from arviz_stats.base.array import array_stats
 
-    axes = {"chain_axis": 0, "draw_axis": 1}
     with np.errstate(all="ignore"):
-        return Mixing(
-            rhat=float(array_stats.rhat(values, **axes)),
-            ess_bulk=float(array_stats.ess(values, **axes)),
-            ess_tail=float(array_stats.ess(values, method="tail", prob=_TAIL, **axes)),
+        found = (
+            array_stats.rhat(values),
+            array_stats.ess(values),
+            array_stats.ess(values, method="tail", prob=_TAIL),
         )
+    return Mixing(*(np.asarray(one).item() for one in found))
 
 
 def have_mixed(draws: Mapping[str, np.ndarray]) -> bool:
@@ -63,9 +63,10 @@ def pareto_shape(weight: np.ndarray) -> float:
     Raises:
         ValueError: the largest weights are equal.
     """
-    from arviz_stats.base import array_stats
+    from arviz_stats.base.array import array_stats
 
     # The tail that is fitted would hold weights of zero.
     if np.count_nonzero(weight) <= 3.0 * np.sqrt(len(weight)):
         return np.inf
-    return float(array_stats.pareto_khat(weight[None], r_eff=1.0, tail="right"))
+    shape = array_stats.pareto_khat(weight[None], r_eff=1.0, tail="right")
+    return np.asarray(shape).item()

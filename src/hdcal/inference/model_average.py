@@ -121,7 +121,7 @@ class ModelAverage:
             raise not_a_posterior(file) from error
         posteriors = {}
         for name, share in sorted(shares.items(), key=lambda item: -item[1]):
-            one = Posterior.from_tree(tree[name], file, effects)
+            one = Posterior.from_tree(tree.children[name], file, effects)
             one = replace(one, settings={**one.settings, HYPOTHESIS: name})
             posteriors[name] = float(share), one
         return cls(posteriors, left_out)

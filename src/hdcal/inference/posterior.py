@@ -29,7 +29,7 @@ from hdcal.inference.posterior_file import (
     not_a_posterior,
     read_tree,
 )
-from hdcal.inference.posterior_tree import OVER_DRAWS, joined
+from hdcal.inference.posterior_tree import OVER_DRAWS, group_of, joined_draws
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
@@ -96,12 +96,12 @@ class Posterior(Shown):
     @cached_property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws in code units by site, chains joined: [draw, …]."""
-        return joined(self.tree["posterior"])
+        return joined_draws(self.tree)
 
     @property
     def size(self) -> tuple[int, int]:
         """Number of chains, and of draws of each."""
-        sizes = self.tree["posterior"].sizes
+        sizes = group_of(self.tree, "posterior").sizes
         return sizes["chain"], sizes["draw"]
 
     @cached_property
@@ -224,8 +224,9 @@ class Posterior(Shown):
         Raises:
             KeyError, ValueError: they are not.
         """
+        drawn = group_of(self.tree, "posterior")
         for name, shape in self.sites.items():
-            one = self.tree["posterior"][name]
+            one = drawn[name]
             if one.dims[:2] != OVER_DRAWS or one.shape[2:] != shape:
                 raise ValueError(f"{name} has another shape")
             if not np.isfinite(one).all():

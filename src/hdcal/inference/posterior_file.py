@@ -145,10 +145,12 @@ def digest(tree: xr.DataTree) -> str:
     """
     whole = hashlib.sha256()
     for node in sorted(tree.subtree, key=lambda node: node.path):
-        attributes = {n: node.attrs[n] for n in sorted(node.attrs) if n != DIGEST}
-        whole.update(json.dumps([node.path, attributes]).encode())
-        for name, one in sorted(node.to_dataset(inherit=False).variables.items()):
-            values = one.values
+        attributes = {n: v for n, v in node.attrs.items() if n != DIGEST}
+        head = json.dumps([node.path, attributes], sort_keys=True)
+        whole.update(head.encode())
+        variables = node.to_dataset(inherit=False).variables
+        for name in sorted(map(str, variables)):
+            one, values = variables[name], variables[name].values
             whole.update(json.dumps([name, one.dims, one.shape]).encode())
             whole.update(
                 values.tobytes()

@@ -70,7 +70,7 @@ def build_tree(
             rows under `TOTAL`, (chain, draw).
         observed: columns of the records that the model explains.
     """
-    units = _DERIVED | units
+    units = {**_DERIVED, **units}
     labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
     groups = {
         "posterior": dataset(draws.values, units=units, labels=labels),
@@ -126,11 +126,20 @@ def data_groups(
     }
 
 
-def joined(group: xr.DataTree) -> dict[str, np.ndarray]:
-    """Return all draws of a group by site, chains joined: [draw, …]."""
+def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:
+    """Return a group of a tree.
+
+    Raises:
+        KeyError: there is none.
+    """
+    return tree.children[name].to_dataset(inherit=False)
+
+
+def joined_draws(tree: xr.DataTree) -> dict[str, np.ndarray]:
+    """Return all draws of the posterior by site, chains joined: [draw, …]."""
     return {
         str(name): one.values.reshape(-1, *one.shape[2:])
-        for name, one in group.data_vars.items()
+        for name, one in group_of(tree, "posterior").data_vars.items()
     }
 
 

@@ -14,6 +14,7 @@ from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.model_average import NONE, UNKNOWN, LeftOut
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
 from hdcal.inference.problem import Problem, without_texts
 from hdcal.inference.values import POSITIVE, Values
 from hdcal.prediction.engine.models import Models, model_pairs
@@ -51,7 +52,8 @@ class Cause:
         """Mode of its density and curvature there."""
         if laplace.GROUP not in self.posterior.tree:
             return laplace.fit(self.problem)
-        return laplace.from_group(self.problem, self.posterior.tree[laplace.GROUP])
+        kept = group_of(self.posterior.tree, laplace.GROUP)
+        return laplace.from_group(self.problem, kept)
 
     @property
     def size(self) -> int:

@@ -16,6 +16,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.theory_names import Theory
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import PILOT_NOISE
+from hdcal.inference.posterior_tree import group_of
 from hdcal.inference.problem import Problem, build_problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.inference.values import Values
@@ -126,15 +127,16 @@ def _rows(causes: Sequence[Cause]) -> list[np.ndarray]:
 
 def _values(name: str, causes: Sequence[Cause], rows, effects) -> np.ndarray:
     """Return the draws of a site, [draw, …], of a cause without it at its null."""
-    trees = [cause.posterior.tree for cause in causes]
-    having = next(tree for tree in trees if name in tree["posterior"])
+    groups = [group_of(cause.posterior.tree, "posterior") for cause in causes]
+    first = next(k for k, group in enumerate(groups) if name in group)
     # The shape of an absent effect is as in its prior, unless it is fixed.
-    spare = having["prior" if name in having["prior"] else "posterior"][name].values
-    shape, nulls, parts = having["posterior"][name].shape[2:], _nulls(effects), []
-    for cause, tree, kept in zip(causes, trees, rows, strict=True):
+    prior = group_of(causes[first].posterior.tree, "prior")
+    spare = (prior if name in prior else groups[first])[name].values
+    shape, nulls, parts = groups[first][name].shape[2:], _nulls(effects), []
+    for cause, group, kept in zip(causes, groups, rows, strict=True):
         size = *cause.posterior.size, *shape
-        if name in tree["posterior"]:
-            every = tree["posterior"][name].values
+        if name in group:
+            every = group[name].values
         elif name in nulls:
             every = np.full(size, nulls[name])
         else:
