@@ -328,12 +328,6 @@ def test_a_name_needs_nine_tenths_and_residuals_of_noise(name, posterior):
     assert "friction" not in headline(middle, spoiled)
 
 
-def test_a_file_with_probabilities_of_other_models_is_refused(posterior, tmp_path):
-    weighed(posterior, {"plastic": 1.0}).save(tmp_path / "posterior.nc")
-    with pytest.raises(InputError, match="not a posterior"):
-        load_any(tmp_path)
-
-
 def test_a_friction_left_out_is_told_by_the_damping():
     case = frictional_case(0, 0.01, 1.0)
     found = chosen(case, [])

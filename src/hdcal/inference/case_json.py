@@ -15,6 +15,7 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.inference.posterior_tree import COVARIATES, group_of
 
+_ABOUT = ("name", "run_labels", "specimen_labels", "data_sha256", "notes")
 _TABLES = (
     "priors",
     "scale_priors",
@@ -24,13 +25,15 @@ _TABLES = (
 )
 
 
-def describe_prior(prior: Prior) -> dict[str, Any]:
-    """Return a prior as plain data."""
-    return asdict(prior) | {"numbers": [float(number) for number in prior.numbers]}
+def to_json(plain: Any) -> str:
+    """Return plain data as JSON; numbers may be arrays, dates become text."""
+    return json.dumps(
+        plain, default=lambda x: float(x) if hasattr(x, "__float__") else str(x)
+    )
 
 
 def restore_priors(held: Mapping[str, Mapping]) -> dict[str, Prior]:
-    """Return priors that `describe_prior` described."""
+    """Return priors that were described by `asdict`."""
     return {
         name: Prior(**{**one, "numbers": tuple(one["numbers"])})
         for name, one in held.items()
@@ -39,25 +42,11 @@ def restore_priors(held: Mapping[str, Mapping]) -> dict[str, Prior]:
 
 def describe_case(case: Case) -> str:
     """Return a case without its rows as JSON."""
+    about = {name: getattr(case, name) for name in _ABOUT}
     gear = asdict(case.gear)
-    sizes = {name: float(size) for name, size in gear["geometry"].items()}
-    gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes.items()}
-    for table in _TABLES:
-        priors = getattr(case.gear, table)
-        gear[table] = {name: describe_prior(p) for name, p in priors.items()}
-    return json.dumps(
-        {
-            "name": case.name,
-            "gear": gear,
-            "known": sorted(case.records.known),
-            "run_labels": case.run_labels,
-            "specimen_labels": case.specimen_labels,
-            "data_sha256": case.data_sha256,
-            "notes": case.notes,
-        },
-        # Dates of the gear file.
-        default=str,
-    )
+    sizes = gear["geometry"].items()
+    gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes}
+    return to_json({**about, "gear": gear, "known": sorted(case.records.known)})
 
 
 def restore_case(text: str, tree: xr.DataTree) -> Case:
@@ -86,12 +75,10 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
     for name in ("run", "specimen"):
         if rows[name].max() >= len(held[f"{name}_labels"]):
             raise ValueError(f"a {name} has no label")
-    return Case(
-        name=held["name"],
-        gear=Gear(**gear),
-        records=Records(**rows, known=frozenset(held["known"])),
-        run_labels=tuple(held["run_labels"]),
-        specimen_labels=tuple(held["specimen_labels"]),
-        data_sha256=held["data_sha256"],
-        notes=tuple(held["notes"]),
-    )
+    about = {name: _tuples(held[name]) for name in _ABOUT}
+    records = Records(**rows, known=frozenset(held["known"]))
+    return Case(gear=Gear(**gear), records=records, **about)
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

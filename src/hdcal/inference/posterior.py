@@ -16,9 +16,9 @@ from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference.case_json import (
     describe_case,
-    describe_prior,
     restore_case,
     restore_priors,
+    to_json,
 )
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
@@ -148,7 +148,7 @@ class Posterior(Shown):
             "kind": self.kind,
             "theory": self.theory,
             "effects": [effect.name for effect in self.effects],
-            "priors": {n: describe_prior(prior) for n, prior in self.priors.items()},
+            "priors": {n: asdict(prior) for n, prior in self.priors.items()},
             "settings": dict(self.settings),
             "diagnoses": {n: asdict(one) for n, one in self.diagnoses.items()},
             "checks": [asdict(check) for check in self.checks],
@@ -156,7 +156,7 @@ class Posterior(Shown):
         return {
             "status": "ok" if self.usable else "failed",
             "case": describe_case(self.case),
-            "model": json.dumps(model),
+            "model": to_json(model),
         }
 
     @classmethod

@@ -3,8 +3,8 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import xarray as xr
 
@@ -14,57 +14,35 @@ from hdcal.errors import Finding, InputError, NotUsable
 FILE_NAME = "posterior.nc"
 # Attributes that hold the format, and the digest of everything else.
 FORMAT, DIGEST = "hdcal_format", "sha256"
-_LARGEST_FILE = 1 << 32
+_VERSION, _LARGEST_FILE = 2, 1 << 32
 
 
-@dataclass(frozen=True)
-class Kind:
+class Kind(NamedTuple):
     """A kind of posterior file.
 
     Attributes:
-        format: name and version of its format.
+        name: of its format, without the version.
+        words: its content.
         again: how it is made anew.
-        elsewhere: problem and remedy where another kind is needed.
     """
 
-    format: str
+    name: str
+    words: str
     again: str
-    elsewhere: tuple[str, str]
 
     @property
-    def name(self) -> str:
-        """Name of the format, without its version."""
-        return self.format.rpartition("/")[0]
+    def format(self) -> str:
+        """Name and version of the format."""
+        return f"{self.name}/{_VERSION}"
 
 
-CALIBRATION = Kind(
-    "hdcal.posterior/2",
-    "calibrate again",
-    ("is of a calibration, not of a fleet", "Name the folder of a fleet"),
-)
-FLEET = Kind(
-    "hdcal.fleet-posterior/2",
-    "run hdcal fleet again",
-    (
-        "is of a fleet, which models no gear by itself",
-        "Ask margin or fleet with --deformation for the force of the next gear, "
-        "compare lots within one fleet, calibrate a gear with --specimen",
-    ),
-)
-# Answers without a posterior file, and what to name instead.
+CALIBRATION = Kind("hdcal.posterior", "of a calibration", "calibrate again")
+FLEET = Kind("hdcal.fleet-posterior", "of a fleet", "run hdcal fleet again")
+# Answers without a posterior file.
 _WITHOUT = {
-    "hdcal.compare/1": (
-        "a comparison has no posterior",
-        "Name the folders of the results that were compared",
-    ),
-    "hdcal.causes/1": (
-        "causes across gears have no posterior",
-        "Name the folder of a fleet, or of the calibration of one gear",
-    ),
-    "hdcal.verdict/2": (
-        "this diagnosis holds no calibrated model",
-        "Diagnose again without --quick, or calibrate",
-    ),
+    "hdcal.compare/1": "a comparison has no posterior",
+    "hdcal.causes/1": "causes across gears have no posterior",
+    "hdcal.verdict/2": "this diagnosis holds no calibrated model",
 }
 
 
@@ -126,7 +104,8 @@ def read_tree(path: Path, kind: Kind = CALIBRATION) -> xr.DataTree:
     if (found := _kind(written)) is None:
         raise not_a_posterior(path, kind)
     if found is not kind:
-        problem, remedy = found.elsewhere
+        problem = f"is {found.words}, and one {kind.words} is needed"
+        remedy = f"Name the result folder {kind.words}"
     elif written != kind.format:
         problem = f"has the format {written}, and this hdcal reads {kind.format}"
         remedy = f"Use the hdcal that wrote it, or {kind.again}"
@@ -178,15 +157,15 @@ def _missing(path: Path) -> Finding:
     Raises:
         NotUsable: the answer is of a diagnosis that failed.
     """
-    problem, remedy = "there is no such file", "Name the folder of a calibration"
+    problem = "there is no such file"
     for name in ("summary.json", "verdict.json"):
         try:
             answer = json.loads((path.parent / name).read_bytes())
-            problem, remedy = _WITHOUT.get(answer["schema"], (problem, remedy))
+            problem = _WITHOUT.get(answer["schema"], problem)
             failed = answer["status"] == "failed"
         except (OSError, ValueError, KeyError, TypeError):
             continue
         if failed and name == "verdict.json":
             reasons = "; ".join(map(str, answer.get("reasons", ())))
             raise NotUsable(f"this diagnosis failed and must not be used: {reasons}")
-    return Finding(str(path), problem, remedy)
+    return Finding(str(path), problem, "Name the folder of a calibration")
