@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conjugate import SIGMA, conjugate_case, known_posterior, unit_stiffness
-from hdcal.inference.pareto import pareto_shape
 from mirrored import mirrored
 from posteriors import with_leftover
 from rigs import make_case, make_records
@@ -15,6 +14,7 @@ from slices import slice_of
 import hdcal
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior
+from hdcal.inference.mixing import pareto_shape
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES
