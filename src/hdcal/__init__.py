@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hdcal.fleets.fleet import fleet
     from hdcal.fleets.fleet_posterior import FleetPosterior
     from hdcal.inference.dynamic_posterior import DynamicPosterior
+    from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
@@ -46,6 +47,7 @@ _HOMES = {
     "Geometry": "data.records",
     "HdcalError": "errors",
     "InputError": "errors",
+    "ModelAverage": "inference.model_average",
     "Noise": "physics.effect",
     "NotUsable": "errors",
     "Posterior": "inference.posterior",

@@ -27,7 +27,9 @@ class _Foreign(Exception):
     """A class of which the digest holds no code, such as an effect of the user."""
 
 
-def jit(function: Callable | None = None, *, static_argnames: tuple[str, ...] = ()):
+def jit(
+    function: Callable | None = None, *, static_argnames: tuple[str, ...] = ()
+) -> Any:
     """Return a compiled function; serves as a decorator like `jax.jit`.
 
     Args:
@@ -111,7 +113,7 @@ def _read(file: Path) -> Any:
     return jax.export.deserialize(content)
 
 
-def _write(file: Path, content: bytes) -> None:
+def _write(file: Path, content: bytes | bytearray) -> None:
     """Write a file, whole or not at all."""
     file.parent.mkdir(0o700, exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:

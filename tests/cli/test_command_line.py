@@ -31,7 +31,7 @@ from hdcal.calibration.effects.effects import Effects
 def test_help_is_given_without_heavy_imports(arguments):
     script = (
         "import atexit, sys; from hdcal.__main__ import main;"
-        "heavy = {'jax', 'numpy', 'pandas', 'matplotlib', 'rich', 'jinja2'};"
+        "heavy = {'jax', 'numpy', 'pandas', 'xarray', 'rich', 'jinja2', 'matplotlib'};"
         "atexit.register(lambda: print('loaded', *sorted(heavy & sys.modules.keys())));"
         "main()"
     )

@@ -85,18 +85,13 @@ class Discrepancy(eqx.Module):
         return jnp.concatenate([own, jnp.full(2, sd), own[:_LOOP_SIZE]])
 
 
-def leftover_size(records: Records, *, loop: bool) -> int:
+def leftover_size(records: Records) -> int:
     """Return the number of weights of the discrepancy of a case.
 
     Args:
         records: of the case.
-        loop: whether it may know loading from unloading; older calibrations may not.
     """
-    return BASIS_SIZE + (2 + _LOOP_SIZE) * _is_directed(records, loop)
-
-
-def _is_directed(records: Records, loop: bool) -> bool:
-    return loop and "unloading" in records.known
+    return BASIS_SIZE + (2 + _LOOP_SIZE) * ("unloading" in records.known)
 
 
 @jit(static_argnames=("directed",))
@@ -122,7 +117,7 @@ def _line(scaled):
 
 
 def build_discrepancy(
-    records: Records, effects: Sequence[type[Effect]] = (), *, loop: bool = True
+    records: Records, effects: Sequence[type[Effect]] = ()
 ) -> Discrepancy:
     """Project the functions off an offset and a slope at the tested rows.
 
@@ -130,7 +125,6 @@ def build_discrepancy(
         records: tested rows.
         effects: of the model; beside one whose force goes with the direction of the
             movement half a loop would be a second name for the same thing.
-        loop: as `leftover_size`.
     """
     deformation, rows = np.asarray(records.deformation), len(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))
@@ -139,7 +133,7 @@ def build_discrepancy(
         repeat_last_row(np.asarray(column), bucket_size(rows))
         for column in ((deformation - centre) / half_range, records.sense)
     )
-    directed = _is_directed(records, loop)
+    directed = "unloading" in records.known
     line, found = (
         np.asarray(table)[:rows]
         for table in (_line(place), _functions(place, movement, directed=directed))

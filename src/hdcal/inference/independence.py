@@ -22,8 +22,7 @@ from jaxtyping import Float
 from hdcal.data.records import Array
 from hdcal.exported import jit
 from hdcal.inference.laplace import Whitening, potential, values_at
-from hdcal.inference.mixing import have_mixed
-from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.mixing import have_mixed, pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 

@@ -8,13 +8,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
 from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
 from hdcal.exported import jit
-from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
 
@@ -217,30 +217,22 @@ def _stop_at_kink():
     return stop
 
 
-def to_group(found: Whitening) -> Group:
-    """Return a fit as the group of a posterior file."""
+def to_group(found: Whitening) -> xr.Dataset:
+    """Return a fit as a group of a posterior's tree."""
+    axes = "coordinate", "standard"
     mode, factor = _flatten(found.centre), np.asarray(found.factor)
-    axes = {"mode": ("coordinate",), "factor": ("coordinate", "standard")}
-    return group_of({"mode": mode, "factor": factor}, (), axes)
+    return xr.Dataset({"mode": (axes[:1], mode), "factor": (axes, factor)})
 
 
-def from_group(problem: Sampled, group: Group | None) -> Whitening:
-    """Return the fit that a posterior file holds, or fit where it holds none.
+def from_group(problem: Sampled, group: xr.Dataset) -> Whitening:
+    """Return the fit of a group that `to_group` made.
 
     Args:
         problem: the inference problem.
-        group: from `to_group`; of another problem it counts as none.
+        group: of a posterior of this problem.
     """
-    if group is not None and {"mode", "factor"} <= group.keys():
-        mode, factor = group["mode"].values, group["factor"].values
-        like = _prior_middle(problem)
-        size = len(_flatten(like))
-        fits = mode.shape == (size,) and factor.shape == (size, size)
-        fits = fits and mode.dtype.kind in "iuf" and factor.dtype.kind in "iuf"
-        fits = fits and np.isfinite(mode).all() and np.isfinite(factor).all()
-        if fits and np.linalg.matrix_rank(factor) == size:
-            return Whitening(_unflatten(like, mode), factor)
-    return fit(problem)
+    centre = _unflatten(_prior_middle(problem), group["mode"].values)
+    return Whitening(centre, group["factor"].values)
 
 
 def sites_at(problem: Sampled, position: Position) -> dict[str, float]:

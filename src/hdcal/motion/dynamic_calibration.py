@@ -14,10 +14,9 @@ from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import Check
 from hdcal.inference.density import densities
-from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.dynamic_posterior import LOSS, DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
 from hdcal.inference.sample import (
     Draws,
@@ -88,7 +87,7 @@ def calibrate_dynamic(
     problem, priors = chosen.problem, chosen.priors
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, chosen.whitening, seed, progress=progress, **size)
-    settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
+    settings: dict[str, object] = {"seed": seed, **size, "with_gap": False}
     own = _specifics(problem, found, (rival, *chosen.checks))
     parts = assemble(case, priors, problem, found, own, seed)
     settings |= run_settings(found, began)

@@ -44,7 +44,7 @@ def fit(console: Console, degrees, through_origin, at, run, out, force, **given)
     """
     from hdcal.classical.fit.fit import fit as fit_case
     from hdcal.classical.fit.summary import fit_report
-    from hdcal.cli.sources import load_posterior
+    from hdcal.cli.sources import load_usable
 
     with console.wrong as wrong:
         case = read_given(console, **given)
@@ -53,6 +53,6 @@ def fit(console: Console, degrees, through_origin, at, run, out, force, **given)
             fits = wrong.attempt(fit_case, case, degrees, through_origin=through_origin)
         console.reserve_folder(out, force)
     assert case is not None and fits is not None
-    posterior = None if run is None else load_posterior(run)
+    posterior = None if run is None else load_usable(run)
     told = fit_report(case, fits, console.command, at=at, posterior=posterior)
     return console.report(told)

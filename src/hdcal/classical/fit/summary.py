@@ -19,9 +19,10 @@ from hdcal.classical.fit.notation import model_name
 from hdcal.data.case import Case
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings
-from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import predict
-from hdcal.prediction.engine.causes import averaging_words, causes_of
+from hdcal.prediction.engine.causes import averaging_words
+from hdcal.prediction.engine.models import Models
+from hdcal.prediction.engine.pooled import Pooled, pool
 from hdcal.report.parameters import credible_interval
 from hdcal.report.write import Report
 
@@ -33,7 +34,7 @@ def fit_answer(
     fits: Sequence[PolynomialFit],
     *,
     at: float | None = None,
-    posterior: Posterior | None = None,
+    posterior: Models | None = None,
 ) -> FitAnswer:
     """Return classical fits as an answer, ready for JSON.
 
@@ -49,7 +50,8 @@ def fit_answer(
         NotUsable: the calibration failed its checks.
     """
     at = case.gear.nominal_deformation if at is None else at
-    _check(case, at, posterior)
+    models = None if posterior is None else pool(posterior)
+    _check(case, at, models)
     known = [f.aicc for f in fits if f.aicc is not None]
     curves = tuple(_curve(one, at, min(known, default=None)) for one in fits)
     rows = len(case.records.force)
@@ -63,8 +65,8 @@ def fit_answer(
         interval_kind=KIND,
         fits=curves,
         at_mm=at,
-        bayesian=None if posterior is None else _beside(posterior, at),
-        notes=(*case.notes, *notes(case), *_averaging(posterior)),
+        bayesian=None if models is None else _beside(models, at),
+        notes=(*case.notes, *notes(case), *_averaging(models)),
     )
 
 
@@ -74,7 +76,7 @@ def fit_report(
     command: str = "",
     *,
     at: float | None = None,
-    posterior: Posterior | None = None,
+    posterior: Models | None = None,
 ) -> Report[FitAnswer]:
     """Return all that `hdcal fit` leaves behind.
 
@@ -96,14 +98,14 @@ def fit_report(
     return Report(document, found, "fit.json", figures, charts=charts)
 
 
-def _check(case: Case, at: float | None, posterior: Posterior | None) -> None:
+def _check(case: Case, at: float | None, models: Pooled | None) -> None:
     with Findings() as wrong:
         wrong += (outside := implausible("at", at))
         if at is not None and not outside and not abs(at) < case.gear.reach:
             words = f"{at:g} mm is no deformation of this gear"
             wrong.append(Finding("at", words, "Give it in mm, as read"))
-        if posterior is not None and posterior.case.data_sha256 != case.data_sha256:
-            words = f"is a calibration of other data ({posterior.case.name})"
+        if models is not None and models.case.data_sha256 != case.data_sha256:
+            words = f"is a calibration of other data ({models.case.name})"
             remedy = "Name the result folder that was made from these data"
             wrong.append(Finding("run", words, remedy))
 
@@ -149,25 +151,25 @@ def _highest_first(one: PolynomialFit) -> tuple[float, ...]:
     return tuple(full[::-1].tolist())
 
 
-def _beside(posterior: Posterior, at: float | None) -> BayesianAnswer:
-    posterior.require_usable()
+def _beside(models: Pooled, at: float | None) -> BayesianAnswer:
     return BayesianAnswer(
         interval_kind="equal-tailed credible interval",
-        theory=posterior.theory,
-        effects=tuple(effect.name for effect in posterior.effects),
-        with_gap=bool(posterior.settings["with_gap"]),
-        stiffness_N_per_mm=credible_interval(posterior.draws["stiffness"]),
-        sigma_N=credible_interval(posterior.draws["sigma"]),
-        at=None if at is None else _predicted(posterior, at),
+        theory=models.theory,
+        effects=tuple(effect.name for effect in models.effects),
+        with_gap=models.with_gap,
+        stiffness_N_per_mm=credible_interval(models.values["stiffness"]),
+        sigma_N=credible_interval(models.values["sigma"]),
+        at=None if at is None else _predicted(models, at),
     )
 
 
-def _averaging(posterior: Posterior | None) -> list[str]:
-    return [] if posterior is None else averaging_words(causes_of(posterior))
+def _averaging(models: Pooled | None) -> list[str]:
+    return [] if models is None else averaging_words(models.causes)
 
 
-def _predicted(posterior: Posterior, at: float) -> BayesianForceAt:
-    bands = {n: v[0].item() for n, v in predict(posterior, [at]).columns().items()}
+def _predicted(models: Pooled, at: float) -> BayesianForceAt:
+    weighed = [(one.probability, one.posterior) for one in models.causes]
+    bands = {n: v[0].item() for n, v in predict(weighed, [at]).columns().items()}
     return BayesianForceAt(
         force_N=bands["physics_median_N"],
         lo_N=bands["physics_lo_N"],

@@ -9,12 +9,12 @@ import numpy as np
 
 from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
 from hdcal.prediction.engine.growth import Growth, bend_covariance
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.prediction.engine.untested import BENDS, Untested, fitted_columns
 
 # Draws that tell: their sd is then known to some 5 %.
@@ -47,20 +47,20 @@ class UntestedReading:
     """The bend and the drift of the rig at conditions that were not tested.
 
     Args:
-        posterior: of one model, or a mixture.
+        pooled: draws of all causes.
     """
 
-    def __init__(self, posterior: Posterior):
-        values, self._untested = gear_values(posterior)
+    def __init__(self, pooled: Pooled):
+        values, self._untested = gear_values(pooled)
         kept = np.linspace(0, len(values["K"]) - 1, _DRAWS).astype(int)
         self._values = {name: column[kept] for name, column in values.items()}
-        self._problem = posterior.problem
+        self._problem = pooled.problem
         sides = self._untested.below, self._untested.above
         self._bends = [
             _Bend(growth, self._values[BENDS][:, side], self._values[CAUSE])
             for side, growth in enumerate(sides)
         ]
-        warm = posterior.case.records.temperature
+        warm = pooled.case.records.temperature
         self._tested = float(np.min(warm)), float(np.max(warm))
 
     def at(self, deformation: float, temperature: float) -> Addition:

@@ -26,7 +26,7 @@ from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
-from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.mixing import pareto_shape
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
