@@ -12,6 +12,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpyro.infer.hmc import hmc
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
@@ -64,8 +65,6 @@ class Draws:
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     """Return NUTS' own init and step functions on standard coordinates."""
-    from numpyro.infer.hmc import hmc
-
     init, step = hmc(
         lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
     )
