@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import pytest
 import xarray as xr
-from hdcal.inference.posterior import PILOT_NOISE
 from posteriors import plain_draws, ramp_case, written_posterior
 from rigs import make_gear
 from trees import arrays_of
 
 from hdcal.errors import InputError
 from hdcal.inference import noise_form
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import PILOT_NOISE, Posterior
 from hdcal.inference.serial_correlation import CORRELATION
 
 

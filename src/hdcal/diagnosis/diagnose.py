@@ -117,7 +117,7 @@ def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     """Refuse priors of unknown effects, and forces that fall with the deformation.
 
     Raises:
-        InputError: an effect has no prior or does not bear padded rows, the gear file
+        InputError: an effect has no prior, the gear file
             names an unknown one, or the force does not grow with the deformation; or
             the seed is none.
     """

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import numpyro
 from jaxtyping import Float
 
 from hdcal.data.prior import Prior
@@ -23,6 +24,7 @@ from hdcal.exported import jit
 from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
 from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.density import log_likelihood
+from hdcal.inference.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
@@ -87,10 +89,6 @@ class PopulationProblem(Sampled):
 
     def declare(self) -> None:
         """Declare the joint density of the population and all readings to NumPyro."""
-        import numpyro
-
-        from hdcal.inference.model import sample_site
-
         values = {name: sample_site(name, p) for name, p in self.priors.items()}
         for kind, groups in self.groups.items():
             spread = values[f"{kind}_ratio"] * values[_MEMBERS[kind]]

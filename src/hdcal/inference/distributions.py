@@ -11,7 +11,7 @@ from scipy import stats
 from hdcal.data.prior import Prior
 
 if TYPE_CHECKING:
-    from scipy.stats.distributions import rv_frozen
+    from scipy.stats.distributions import rv_continuous_frozen
 
 # Parameters that cannot be negative: a normal prior of one is truncated at zero.
 POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
@@ -21,7 +21,7 @@ class _Family(NamedTuple):
     """Both forms of a family, as functions of the prior's numbers."""
 
     numpyro: Callable[..., dist.Distribution]
-    scipy: Callable[..., "rv_frozen"]
+    scipy: Callable[..., "rv_continuous_frozen"]
 
 
 _FAMILIES = {
@@ -58,7 +58,7 @@ def distribution(prior: Prior, name: str = "") -> dist.Distribution:
     return _family(prior, name).numpyro(*prior.numbers)
 
 
-def frozen(prior: Prior, name: str = "") -> "rv_frozen":
+def frozen(prior: Prior, name: str = "") -> "rv_continuous_frozen":
     """Return the SciPy distribution of a prior that is not fixed.
 
     Args:

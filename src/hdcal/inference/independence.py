@@ -73,8 +73,7 @@ def sample_independently(
     Returns:
         The draws; None where proposals cover the posterior badly.
     """
-    # Apart from what callers draw by the same seed.
-    rng = np.random.default_rng([seed, 1])
+    rng = np.random.default_rng(np.asarray(_entropy(seed)))
     law, efficiency = _adapted(problem, whitening, rng)
     if efficiency < 1.0 / _MOST:
         return None
@@ -100,6 +99,12 @@ def sample_independently(
         # They cover it, and are too few.
         each *= 2
     return None
+
+
+@jax.jit
+def _entropy(seed: int):
+    """Return the key from which `sample` draws too, as numbers."""
+    return jax.random.key_data(jax.random.split(jax.random.key(seed))[0])
 
 
 def _adapted(

@@ -11,6 +11,9 @@ import numpy as np
 import xarray as xr
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
+from numpyro.distributions import biject_to
+from numpyro.handlers import substitute, trace
+from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
@@ -50,15 +53,11 @@ class Whitening(eqx.Module):
 @jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
-    from numpyro.infer.util import potential_energy
-
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
 def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return every site at an unconstrained position, and what follows from them."""
-    from numpyro.infer.util import constrain_fn
-
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
@@ -136,9 +135,6 @@ def _middle(site: dict[str, Any]):
 @jit
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
-    from numpyro.distributions import biject_to
-    from numpyro.handlers import substitute, trace
-
     sites = trace(substitute(model, substitute_fn=_middle)).get_trace(problem)
     return {
         name: biject_to(site["fn"].support).inv(site["value"])
@@ -150,8 +146,6 @@ def _prior_middle(problem: Sampled) -> Position:
 @jit
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
-    from numpyro.infer.util import constrain_fn, unconstrain_fn
-
     known = constrain_fn(model, (problem,), {}, position) | values
     return unconstrain_fn(model, (problem,), {}, known)
 
@@ -242,8 +236,6 @@ def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
 
 @jit
 def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
-    from numpyro.infer.util import constrain_fn
-
     return constrain_fn(model, (problem,), {}, position)
 
 
