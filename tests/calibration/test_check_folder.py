@@ -7,7 +7,7 @@ import numpy as np
 from commands import Hdcal
 from schema_checks import obeys
 
-from hdcal.calibration.check.answer import CheckAnswer
+from hdcal.calibration.check.check import Check
 
 STIFFNESS = {"A": 100.0, "B": 120.0, "C": 90.0}
 HEADERS = {"A": "deformation_mm,force_N", "B": "deformation_um;Load [kN]"}
@@ -33,14 +33,14 @@ def test_each_gear_has_a_row_and_fleet_is_pointed_to(here: Hdcal, tmp_path: Path
     done = here("check", "line", "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    obeys(answer, CheckAnswer)
+    obeys(answer, Check)
     slopes = {s["name"]: s["stiffness_N_per_mm"] for s in answer["specimens"]}
     assert {name: round(slope, 6) for name, slope in slopes.items()} == STIFFNESS
     assert {s["rows"] for s in answer["specimens"]} == {6}
     assert "`fleet`" in answer["next_step"] and answer["case"] == "line"
     assert any("each file is a gear" in note for note in answer["notes"])
     # For people too.
-    assert "The specimens" in done.stderr
+    assert "Specimens" in done.stderr
 
 
 def test_folders_of_gears_have_gear_files_of_their_own(here: Hdcal, tmp_path: Path):

@@ -2,14 +2,21 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
-from hdcal.notebook import Shown
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -74,7 +81,7 @@ class Gear:
 
 
 @dataclass(frozen=True, repr=False)
-class Case(Shown):
+class Case:
     """Records of one data file on one gear, with where they came from.
 
     Attributes:
@@ -112,6 +119,48 @@ class Case(Shown):
     def __repr__(self) -> str:
         rows = len(self.records.force)
         return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"
+
+    def _repr_html_(self) -> str:
+        return self._check()._repr_html_()
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the readings under the headers of hdcal's own files.
+
+        Columns that were not measured are left out.
+        """
+        import pandas as pd
+
+        records = self.records
+        columns: dict[str, Any] = {
+            "deformation_mm": records.deformation,
+            "force_N": records.force,
+        }
+        for header in ("temperature_C", "time_s", "angle_rad", "force_sd_N"):
+            name = header.rpartition("_")[0]
+            if name in records.known:
+                columns[header] = getattr(records, name)
+        labels = {"run": self.run_labels, "specimen": self.specimen_labels}
+        for name in sorted(labels.keys() & records.known):
+            columns[name] = np.array(labels[name])[np.asarray(getattr(records, name))]
+        return pd.DataFrame(columns)
+
+    def to_datatree(self) -> "xr.DataTree":
+        """Return the readings as xarray's DataTree, over the dimension `row`."""
+        import xarray as xr
+
+        return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the readings.
+
+        Args:
+            ax: where; by default new axes of pyplot.
+        """
+        return self._check().plot(ax)
+
+    def _check(self) -> Any:
+        # Imported by its name: data are below the questions that are asked of them.
+        return import_module("hdcal.calibration.check.check").check(self)
 
 
 def require_case(given: object) -> None:
