@@ -176,7 +176,7 @@ def fit(
         at_mm=at,
         bayesian=None if posterior is None else _calibrated(posterior, at),
         case=case,
-        averaging=() if posterior is None else averaging_words(causes_of(posterior)),
+        averaging=() if posterior is None else _averaging(posterior),
         part="part" if case.gear.theory == SPRING else "gear",
     )
 
@@ -225,11 +225,15 @@ def _calibrated(posterior: Posterior, at: float | None) -> Calibrated:
     return Calibrated(
         theory=posterior.theory,
         effects=tuple(effect.name for effect in posterior.effects),
-        with_gap=posterior.settings["with_gap"],
+        with_gap=bool(posterior.settings["with_gap"]),
         stiffness_N_per_mm=Interval.of(posterior.draws["stiffness"]),
         sigma_N=Interval.of(posterior.draws["sigma"]),
         at=None if at is None else _predicted(posterior, at),
     )
+
+
+def _averaging(posterior: Posterior) -> tuple[str, ...]:
+    return tuple(averaging_words(causes_of(posterior)))
 
 
 def _predicted(posterior: Posterior, at: float) -> PredictedForceAt:

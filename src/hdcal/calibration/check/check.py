@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
-import pandas as pd
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
@@ -12,6 +11,7 @@ from hdcal.data.case import Case
 from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_schema import certificates_in
 from hdcal.data.loading import loading
+from hdcal.data.records import Array
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
@@ -222,25 +222,27 @@ def _data(case: Case) -> CheckedData:
     )
 
 
-def _ends(values: np.ndarray) -> Ends:
+def _ends(values: Array) -> Ends:
     return float(np.min(values)), float(np.max(values))
 
 
 def _specimens(case: Case) -> tuple[Specimen, ...]:
     records = case.records
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
-    table = pd.DataFrame({"x": records.deformation, "y": records.force})
-    # From the first reading of each run, so that one that is held becomes exactly zero.
-    table -= table.groupby(run).transform("first")
-    table -= table.groupby(run).transform("mean")
-    products = pd.DataFrame({"xx": table.x**2, "xy": table.x * table.y})
-    sums = products.groupby(specimen).sum()
-    counts = pd.Series(run).groupby(specimen).agg(["size", "nunique"])
+    x, y = np.asarray(records.deformation), np.asarray(records.force)
+    first = np.unique(run, return_index=True)[1]
+    # Counted from its first reading, a deformation that is held is exactly zero.
+    x, y = _centred(x - x[first][run], run), _centred(y, run)
+    xx, xy = np.bincount(specimen, x * x), np.bincount(specimen, x * y)
+    slopes = np.divide(xy, xx, out=np.full(len(xx), np.nan), where=xx > 0.0)
+    rows, runs = np.bincount(specimen), np.bincount(specimen[first])
+    columns = case.specimen_labels, rows.tolist(), runs.tolist(), slopes.tolist()
     return tuple(
         Specimen(name=name, rows=rows, runs=runs, stiffness_N_per_mm=slope)
-        for name, rows, runs, slope in zip(
-            *(case.specimen_labels, counts["size"], counts["nunique"]),
-            sums.xy / sums.xx,
-            strict=True,
-        )
+        for name, rows, runs, slope in zip(*columns, strict=True)
     )
+
+
+def _centred(values: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Return values less the mean of their run."""
+    return values - (np.bincount(run, values) / np.bincount(run))[run]

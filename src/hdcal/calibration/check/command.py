@@ -42,7 +42,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     from hdcal.data.reading import UNSIZED
     from hdcal.report.saving import Target
 
-    kind = str(plot).lower()[-3:]
+    kind = "svg" if str(plot).lower().endswith(".svg") else "png"
     places = {}
     with console.wrong:
         case = read_whole(console, given)
@@ -52,7 +52,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         if plot is not None and not plot.lower().endswith((".png", ".svg")):
             words = f"'{plot}' ends in neither .png nor .svg"
             raise InputError([Finding("plot", words, "Name such a file")])
-        for name, beginning in ((write_gear, _GEAR), (plot, _PICTURES.get(kind))):
+        for name, beginning in ((write_gear, _GEAR), (plot, _PICTURES[kind])):
             if name is not None:
                 reserve = partial(Target, name, force, beginning=beginning)
                 places[name] = console.hold(reserve)
