@@ -49,7 +49,7 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
 
 def _draw_prior(axes: Axes, posterior: Posterior, name: str) -> None:
     found = posterior.diagnoses[name]
-    believed = frozen(posterior.effective_priors[name])
+    believed = frozen(posterior.effective_priors[name], name)
     shown, factor = unit_of(posterior, name)
     after = posterior.draws[name]
     # The prior's long tails would squeeze everything else into one bin.
