@@ -207,7 +207,7 @@ def _implausible_K(case: Case) -> tuple[float, float, float] | None:
 def _data(case: Case) -> CheckedData:
     records = case.records
     movement = loading(np.asarray(records.deformation), np.asarray(records.direction))
-    loaded, held, unloaded = (np.count_nonzero(movement == sign) for sign in (1, 0, -1))
+    loaded, held, unloaded = (int(np.sum(movement == sign)) for sign in (1, 0, -1))
     return CheckedData(
         rows=len(records.force),
         runs=case.run_labels,

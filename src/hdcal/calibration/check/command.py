@@ -18,13 +18,13 @@ if TYPE_CHECKING:
 _GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 
 
-@command(short_help="Read DATA only, and say what was understood.")
+@command(short_help="Read DATA and report what was read; compute nothing.")
 @case_options
-@click.option("--effects", is_flag=True, help="List what each effect lacks, too.")
+@click.option("--effects", is_flag=True, help="Also list what the data lack for each effect.")
 @click.option(
     "--write-gear",
     metavar="GEAR.toml",
-    help="Without a gear file: write one there, with what was understood of DATA.",
+    help="Without a gear file: write one there, with what is known from DATA.",
 )
 @click.option(
     "--plot",
@@ -35,9 +35,9 @@ _GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 @json_option
 @click.pass_obj
 def check(console: Console, effects, write_gear, plot, force, **given):
-    """Read DATA and its gear file, and say what was understood.
+    """Read DATA and its gear file, and report what was read.
 
-    DATA may be a folder with a file, or a folder, for each gear too.
+    DATA may also be a folder with a file, or a folder, for each gear.
     """
     from hdcal.data.reading import UNSIZED
     from hdcal.report.saving import Target
@@ -65,7 +65,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
     if write_gear:
         with places[write_gear].filled() as path:
             path.write_text(_gear_file(case), "utf-8")
-        console.words(f"the gear file: {write_gear}. Add what it does not know yet")
+        console.words(f"the gear file: {write_gear}. Complete it")
     if plot:
         (picture,) = images(found.charts()["readings"], case.name, [kind]).values()
         with places[plot].filled() as path:
