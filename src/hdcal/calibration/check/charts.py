@@ -20,12 +20,12 @@ def readings_chart(case: Case) -> Chart:
     )
     marks = [
         Points(
-            label=f"{kind}{name}" if len(names) > 1 else "",
+            label=f"{kind}{names[place]}" if len(names) > 1 else "",
             x=x[group == place],
             y=y[group == place],
             colour=CYCLE[place % len(CYCLE)],
         )
-        for place, name in enumerate(names)
+        for place in np.unique(group)
     ]
     panel = Panel(
         x=f"deformation as read ({case.gear.reading}) [mm]",

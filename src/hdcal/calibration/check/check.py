@@ -16,7 +16,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
 from hdcal.report.chart_spec import Chart
-from hdcal.report.result import Count, Item, Result, Words, quantity
+from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
 from hdcal.report.sentences import rendered
 from hdcal.report.units import UNITS
 
@@ -24,7 +24,6 @@ from hdcal.report.units import UNITS
 _FAR = 3.0
 
 Ends = tuple[float, float]
-EffectName = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
 
 
 class CheckedGear(Item):
@@ -68,7 +67,7 @@ class CheckedData(Item):
     temperature_measured: bool
     direction: RowsByMovement
     known: tuple[str, ...]
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    sha256: Digest
 
 
 class TestableEffects(Item):

@@ -20,7 +20,9 @@ _GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 
 @command(short_help="Read DATA and report what was read; compute nothing.")
 @case_options
-@click.option("--effects", is_flag=True, help="Also list what the data lack for each effect.")
+@click.option(
+    "--effects", is_flag=True, help="Also list what the data lack for each effect."
+)
 @click.option(
     "--write-gear",
     metavar="GEAR.toml",
