@@ -39,7 +39,7 @@ def test_each_specimen_has_its_rows_runs_and_slope():
     assert "`fleet`" in (found.next_step or "")
 
 
-def test_one_that_was_not_moved_has_no_slope_and_takes_no_digits_from_the_others():
+def test_a_specimen_that_is_held_has_no_slope_and_the_others_keep_their_digits():
     found = check(case_of("A", "B", held="B"))
     one, other = (s.stiffness_N_per_mm for s in found.specimens)
     assert one == pytest.approx(100.0) and np.isnan(other)

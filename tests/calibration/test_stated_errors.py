@@ -19,7 +19,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_each_certificate_is_said_with_what_comes_of_it(folder, here):
+def test_each_certificate_is_shown_as_a_standard_uncertainty(folder, here):
     (folder / "gear.toml").write_text(SIZES + STATED_BY)
     answer = json.loads(here("check", folder, "--json").stdout)
     found = {one["parameter"]: one for one in answer["certificates"]}
@@ -39,7 +39,7 @@ def test_each_certificate_is_said_with_what_comes_of_it(folder, here):
     assert any(note.startswith("force_sd is") for note in answer["notes"])
 
 
-def test_a_zero_that_the_file_knows_better_is_no_certificates(folder, here):
+def test_a_prior_of_the_gear_file_replaces_a_certificate(folder, here):
     prior = '[priors]\nforce_offset = { family = "fixed", value = 0.0 }\n'
     (folder / "gear.toml").write_text(SIZES + STATED_BY + prior)
     answer = json.loads(here("check", folder, "--json").stdout)
@@ -47,7 +47,7 @@ def test_a_zero_that_the_file_knows_better_is_no_certificates(folder, here):
     assert "deformation_offset" in names and "force_offset" not in names
 
 
-def test_without_any_nothing_is_said(folder, here):
+def test_without_certificates_none_are_shown(folder, here):
     rows = "".join(f"{i / 10},{20 * i}\n" for i in range(6))
     (folder / "data.csv").write_text("deformation_mm,force_N\n" + rows)
     (folder / "gear.toml").write_text(SIZES)

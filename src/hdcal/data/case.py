@@ -1,4 +1,4 @@
-"""What one calibration is about: a gear, how it was read, and the records."""
+"""A case: a gear, how it was read, and the records."""
 
 import math
 from dataclasses import dataclass, field
@@ -45,7 +45,7 @@ class Gear:
             the names are not checked here, the effects live on a higher floor.
         dynamic_priors: of the moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.
-        density: of the material [N·s²/mm⁴], None where its file says nothing of it.
+        density: of the material [N·s²/mm⁴], None where its file states none.
         gauge_priors: of the gauges' gains and the thermometer's offset, those that a
             certificate states: keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
@@ -93,13 +93,13 @@ class Case:
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
-        lots: lot of each specimen index; empty where none is told.
-        operators: who mounted each run index; empty where none is told.
-        rigs: which rig read each run index; empty where none is told.
-        dates: when each run index was measured first, in ISO 8601; an empty one of a
-            run that does not say, and empty where none is told.
-        left_out: specimens of which no row is here, as one of theirs is wrong, each
-            with what that is; empty unless `skip_bad` was asked for.
+        lots: lot of each specimen index; empty where none is stated.
+        operators: who mounted each run index; empty where none is stated.
+        rigs: which rig read each run index; empty where none is stated.
+        dates: first date of each run index in ISO 8601, empty for a run without one;
+            empty where none is stated.
+        left_out: specimens left out because of a faulty row, each with the finding;
+            empty unless `skip_bad` was given.
     """
 
     name: str
@@ -164,7 +164,7 @@ class Case:
 
 
 def require_case(given: object) -> None:
-    """Raise InputError where something else was given for a case."""
+    """Raise InputError unless a case was given."""
     if not isinstance(given, Case):
         words = f"a {type(given).__name__} is none"
         remedy = "Read it first, as in read_case(data, gear={'radius_mm': 40.0, …})"
