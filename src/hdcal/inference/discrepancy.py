@@ -8,15 +8,14 @@ It knows no temperature.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
 
@@ -100,7 +99,7 @@ def _is_directed(records: Records, loop: bool) -> bool:
     return loop and "unloading" in records.known
 
 
-@partial(jax.jit, static_argnames=("directed",))
+@jit(static_argnames=("directed",))
 def _functions(scaled, movement, *, directed: bool):
     """Return the functions before anything is projected off, shape (n, m)."""
     smooth = _basis(scaled)
@@ -117,7 +116,7 @@ def _basis(scaled):
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
-@jax.jit
+@jit
 def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
@@ -164,7 +163,7 @@ def discrepancy_columns(
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))
 
 
-@jax.jit
+@jit
 def _columns(discrepancy: Discrepancy, deformation, movement):
     return discrepancy.columns(deformation, movement)
 

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
@@ -46,7 +47,7 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-@jax.jit
+@jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     from numpyro.infer.util import potential_energy
@@ -61,7 +62,7 @@ def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
-@jax.jit
+@jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrained(problem, position)
@@ -99,7 +100,7 @@ def _unflatten(like: Position, flat: np.ndarray) -> Position:
     return jax.tree.unflatten(structure, shaped)
 
 
-@jax.jit
+@jit
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian.
 
@@ -132,7 +133,7 @@ def _middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@jax.jit
+@jit
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
     from numpyro.distributions import biject_to
@@ -146,7 +147,7 @@ def _prior_middle(problem: Sampled) -> Position:
     }
 
 
-@jax.jit
+@jit
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
     from numpyro.infer.util import constrain_fn, unconstrain_fn
@@ -247,7 +248,7 @@ def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     return {name: float(value) for name, value in _sites(problem, position).items()}
 
 
-@jax.jit
+@jit
 def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
     from numpyro.infer.util import constrain_fn
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
+from hdcal.exported import jit
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
@@ -79,7 +80,7 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@partial(jax.jit, static_argnames=("warmup", "chains"))
+@jit(static_argnames=("warmup", "chains"))
 def _start(problem, whitening, seed, target, *, warmup, chains):
     """Return the states of chains at their start, as the leaves of NUTS' own."""
     own, _ = jax.random.split(jax.random.key(seed))
@@ -97,7 +98,7 @@ def _states(problem, whitening, keys, target, warmup):
     return jax.vmap(one)(keys)
 
 
-@partial(jax.jit, static_argnames=("warmup", "length"))
+@jit(static_argnames=("warmup", "length"))
 def _advance(problem, whitening, leaves, target, *, warmup, length):
     """Return the states after so many steps, as leaves, and what is kept of each."""
     start, step = _kernel(problem, whitening, warmup, target)
@@ -124,7 +125,7 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
     return jax.tree.leaves(states), kept
 
 
-@jax.jit
+@jit
 def _constrain(problem, whitening, standard, seed):
     _, own = jax.random.split(jax.random.key(seed))
     keys = jax.random.split(own, standard.shape[:2])
