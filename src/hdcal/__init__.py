@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
-    from hdcal.classical.fit.fit import fit
+    from hdcal.classical.fit import fit
     from hdcal.comparison.compare import compare
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
@@ -61,7 +61,7 @@ _HOMES = {
     "causes": "shared_causes.causes",
     "compare": "comparison.compare",
     "diagnose": "diagnosis.diagnose",
-    "fit": "classical.fit.fit",
+    "fit": "classical.fit",
     "fleet": "fleets.fleet",
     "force": "physics.chain",
     "inverse_design": "design.inverse_design",
