@@ -20,6 +20,7 @@ from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
 from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.density import log_likelihood
@@ -226,7 +227,7 @@ class DrawnGears(NamedTuple):
     chance: Float[Array, "t g"]
 
 
-@jax.jit
+@jit
 def draw_gears(problem: PopulationProblem, values: Mapping, seed: int) -> DrawnGears:
     """Draw every gear from what is known of it given each draw of the population.
 

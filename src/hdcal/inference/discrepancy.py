@@ -8,10 +8,8 @@ It knows no temperature.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -21,6 +19,7 @@ from numpyro.contrib.hsgp.spectral_densities import (
 )
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
 
@@ -104,7 +103,7 @@ def _is_directed(records: Records, loop: bool) -> bool:
     return loop and "unloading" in records.known
 
 
-@partial(jax.jit, static_argnames=("directed",))
+@jit(static_argnames=("directed",))
 def _functions(scaled, movement, *, directed: bool):
     """Return the functions before anything is projected off, shape (n, m)."""
     smooth = _basis(scaled)
@@ -119,7 +118,7 @@ def _basis(scaled):
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
-@jax.jit
+@jit
 def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
@@ -166,7 +165,7 @@ def discrepancy_columns(
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))
 
 
-@jax.jit
+@jit
 def _columns(discrepancy: Discrepancy, deformation, movement):
     return discrepancy.columns(deformation, movement)
 

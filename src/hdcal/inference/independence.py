@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import have_mixed
 from hdcal.inference.pareto import pareto_shape
@@ -101,7 +102,7 @@ def sample_independently(
     return None
 
 
-@jax.jit
+@jit
 def _entropy(seed: int):
     """Return the key from which `sample` draws too, as numbers."""
     return jax.random.key_data(jax.random.split(jax.random.key(seed))[0])
@@ -163,7 +164,7 @@ def _log_densities(
     return np.concatenate(found)
 
 
-@jax.jit
+@jit
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
@@ -174,7 +175,7 @@ def _potentials(
     return jax.lax.map(one, standard)
 
 
-@jax.jit
+@jit
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
     def one(place):
         return values_at(problem, whitening.position(place))

@@ -16,6 +16,7 @@ from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
@@ -49,7 +50,7 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-@jax.jit
+@jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
@@ -60,7 +61,7 @@ def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
-@jax.jit
+@jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrained(problem, position)
@@ -98,7 +99,7 @@ def _unflatten(like: Position, flat: np.ndarray) -> Position:
     return jax.tree.unflatten(structure, shaped)
 
 
-@jax.jit
+@jit
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian.
 
@@ -131,7 +132,7 @@ def _middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@jax.jit
+@jit
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
     sites = trace(substitute(model, substitute_fn=_middle)).get_trace(problem)
@@ -142,7 +143,7 @@ def _prior_middle(problem: Sampled) -> Position:
     }
 
 
-@jax.jit
+@jit
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
     known = constrain_fn(model, (problem,), {}, position) | values
@@ -241,7 +242,7 @@ def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     return {name: float(value) for name, value in _sites(problem, position).items()}
 
 
-@jax.jit
+@jit
 def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
     return constrain_fn(model, (problem,), {}, position)
 

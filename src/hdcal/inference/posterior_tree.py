@@ -6,6 +6,7 @@ import jax
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.exported import jit
 from hdcal.inference import posterior_file
 from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.density import densities, pointwise_log_likelihood
@@ -88,7 +89,7 @@ def force_log_likelihood(
     return {"force": np.asarray(each)[..., :rows]}
 
 
-@jax.jit
+@jit
 def _pointwise(problem, values, records, columns, before):
     def one(value):
         return pointwise_log_likelihood(problem, value, records, columns, before)

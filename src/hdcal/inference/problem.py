@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -14,6 +13,7 @@ from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
@@ -31,7 +31,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
-_base_columns = jax.jit(linear_columns)
+_base_columns = jit(linear_columns)
 
 
 class Problem(Sampled):

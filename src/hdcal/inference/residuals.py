@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
@@ -111,7 +112,7 @@ def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: values[::every] for name, values in draws.items()}
 
 
-@jax.jit
+@jit
 def _fit(problem, values, records, columns):
     """Return the posterior mean of each row's mean reading [N], draw after draw."""
 

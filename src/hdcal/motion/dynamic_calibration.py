@@ -9,6 +9,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import Check
@@ -183,7 +184,7 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     return best, Check(name, "passed", "the search from several ends in one place")
 
 
-@jax.jit
+@jit
 def _pointwise(problem: DynamicProblem, values):
     # Chains side by side, draws one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)

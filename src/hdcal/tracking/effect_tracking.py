@@ -10,6 +10,7 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
@@ -138,7 +139,7 @@ def _draws(posterior: Posterior, chosen: np.ndarray) -> Draws:
     return values["alpha"], values["deformation_offset"], effects
 
 
-@jax.jit
+@jit
 def _readings(draws: Draws, reading: Reading, stiffness, rows):
     """Return the mean reading [N], shape (stiffness, draw, row).
 
@@ -163,7 +164,7 @@ def _readings(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(over_draws, in_axes=(0, None))(stiffness, draws)
 
 
-@jax.jit
+@jit
 def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     """Return the same of rows that know nothing of each other."""
 
@@ -173,7 +174,7 @@ def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(one, out_axes=2)(rows)
 
 
-@jax.jit
+@jit
 def _columns(draws: Draws, reading: Reading, ends, row):
     """Return the first columns of `Particles` at one row, shape (3, particle)."""
     low, high = _readings(draws, reading, ends, row[None, :])[:, :, 0]

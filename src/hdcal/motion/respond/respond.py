@@ -12,6 +12,7 @@ import numpy as np
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError, NotUsable
+from hdcal.exported import jit
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
@@ -168,7 +169,7 @@ def _move(
     )
 
 
-@jax.jit
+@jit
 def _forces(force: Forcing, times):
     return jax.vmap(force)(times)
 

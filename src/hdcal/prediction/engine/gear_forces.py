@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.gauges import acting, shown
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -64,7 +65,7 @@ def evenly(total: int, count: int) -> np.ndarray:
     return np.linspace(0, total - 1, min(count, total)).astype(int)
 
 
-@jax.jit
+@jit
 def gear_forces(
     problem: Problem,
     values: Values,

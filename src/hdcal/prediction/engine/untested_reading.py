@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
@@ -161,19 +162,19 @@ def _powers(place: np.ndarray) -> np.ndarray:
     return place[:, None] ** np.arange(3)
 
 
-@jax.jit
+@jit
 def _reach(growth: Growth, deformation):
     """Return how far beyond the end a deformation is, and the share of the bend."""
     return growth.beyond(deformation), growth.share(deformation)
 
 
-@jax.jit
+@jit
 def _leftover(discrepancy: Discrepancy, growths: tuple[Growth, Growth], deformation):
     """Return the columns of the fitted leftover; growths below and above."""
     return _columns(discrepancy, growths, deformation, jnp.zeros_like(deformation))
 
 
-@jax.jit
+@jit
 def _half_loop(discrepancy: Discrepancy, growths, deformation, weights):
     """Return the mean square over draws of what loading adds to the middle."""
     up, middle = (
@@ -191,7 +192,7 @@ def _columns(discrepancy: Discrepancy, growths, deformation, movement):
     return fitted_columns(discrepancy, ends, (deformation, movement), share)
 
 
-@jax.jit
+@jit
 def _given(growth: Growth, sizes, cause):
     """Return what `Growth.given` says of every draw."""
 
@@ -201,7 +202,7 @@ def _given(growth: Growth, sizes, cause):
     return jax.vmap(one)(sizes, cause)
 
 
-@jax.jit
+@jit
 def _drifts(problem: Problem, values: Values, untested: Untested, at, warm):
     """Return what the rig's drift adds to a reading in every draw [N]."""
     loading = jnp.where(at < 0.0, -1.0, 1.0)
