@@ -101,7 +101,7 @@ def sample_independently(
     return None
 
 
-@jax.jit
+@jit
 def _entropy(seed: int):
     """Return the key from which `sample` draws too, as numbers."""
     return jax.random.key_data(jax.random.split(jax.random.key(seed))[0])
