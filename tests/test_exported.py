@@ -1,5 +1,6 @@
 """Traces that are kept between processes give the numbers of `jax.jit`."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -55,7 +56,8 @@ def run_again(folder: Path) -> list[float]:
     done = subprocess.run(
         [sys.executable, "-c", AGAIN],
         cwd=Path(__file__).parent,
-        env={"JAX_COMPILATION_CACHE_DIR": str(folder), "JAX_ENABLE_X64": "1"},
+        env=os.environ
+        | {"JAX_COMPILATION_CACHE_DIR": str(folder), "JAX_ENABLE_X64": "1"},
         capture_output=True,
         text=True,
     )
