@@ -12,7 +12,7 @@ from schema_checks import obeys
 from slices import slice_of
 
 from hdcal.calibration.check.answer import CheckAnswer
-from hdcal.calibration.effects.answer import EffectsAnswer
+from hdcal.calibration.effects.effects import Effects
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_effects_lists_the_whole_library(here: Hdcal):
 
     done = here("effects", "--json")
     found = json.loads(done.stdout)
-    obeys(found, EffectsAnswer)
+    obeys(found, Effects)
     assert found["headline"] == f"{len(EFFECTS)} effects can be added to the model."
     listed = found["effects"]
     assert [effect["name"] for effect in listed] == list(EFFECTS)

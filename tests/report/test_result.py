@@ -6,6 +6,7 @@ from typing import Literal
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from pydantic import ValidationError
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from hdcal.report import sentences
 from hdcal.report.chart_spec import Chart, Line, Panel
 from hdcal.report.result import Draws, Interval, Item, Result, quantity
+from hdcal.report.result_folder import csv_file
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"
 BODY = """\
@@ -115,6 +117,27 @@ def test_the_table_has_the_ends_of_intervals_and_no_empty_column():
     assert forces(2).to_datatree()["force_N"].dims == ("row",)
 
 
+def test_a_table_of_items_by_name_has_their_names():
+    class Named(Forces):
+        table = "named"
+
+        @property
+        def named(self):
+            return {"K": Interval(median=2.0, lo=1.0, hi=3.0)}
+
+    frame = Named(rows=(), draws=np.zeros(3)).to_frame()
+    assert frame.to_dict("records") == [{"name": "K", "median": 2, "lo": 1, "hi": 3}]
+
+
+def test_csv_has_no_formula_and_no_broken_row():
+    columns = {"=a": ["=1+1", "x\ry,z", None], "n": [1.0, np.nan, 1 / 3]}
+    columns["ok"] = [True, False, True]
+    text = csv_file(pd.DataFrame(columns)).decode()
+    assert text.split("\n") == [
+        *["'=a,n,ok", "'=1+1,1,true", '"x\ry,z",,false', ",0.333333333,true", ""]
+    ]
+
+
 def test_texts_from_files_are_shown_as_they_are():
     found = forces(name=HOSTILE)
     assert found.headline == f"{HOSTILE} is a gear."
@@ -157,16 +180,17 @@ def test_a_failed_result_is_marked_everywhere():
 
 
 def test_long_tables_are_cut_except_in_a_browser():
-    found = forces(30)
-    assert found.text().count("\nA  ") == 25 and "5 more rows" in found.text()
-    assert found._repr_html_().count("<td>A</td>") == 25
+    found = forces(103)
+    assert found.text().count("\nA  ") == 100 and "3 more rows" in found.text()
+    assert found._repr_html_().count("<td>A</td>") == 100
     page = found.page()
-    assert page.count("<td>A</td>") == 30 and '<table data-page="25">' in page
+    assert page.count("<td>A</td>") == 103 and '<table data-page="25">' in page
     assert page.index("<tbody hidden") < page.rindex("<td>A</td>")
 
 
-def test_numbers_stay_whole_in_a_narrow_terminal():
-    found = forces(name="a long name " * 9)
+@pytest.mark.parametrize("long", ["a long name " * 9, "n" * 200])
+def test_numbers_stay_whole_in_a_narrow_terminal(long: str):
+    found = forces(name=long)
     wide = Interval(median=-12345.6, lo=-12345.7, hi=-12345.5)
     row = found.rows[0].model_copy(update={"force_N": wide})
     assert "-12345.60" in found.model_copy(update={"rows": (row,)}).text(width=40)

@@ -1,1 +1,1 @@
-"""Finished results side by side: how they differ, and how surely."""
+"""How much does the stiffness of several results differ?"""

@@ -1,4 +1,4 @@
-"""`hdcal compare`: finished results side by side."""
+"""`hdcal compare`: the stiffness of finished results."""
 
 import os
 from pathlib import Path

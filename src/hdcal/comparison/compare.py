@@ -1,4 +1,4 @@
-"""How much the stiffness of several results differs, and how surely."""
+"""Comparison of the stiffness of several results."""
 
 from collections.abc import Mapping, Sequence
 from typing import Literal
@@ -29,7 +29,7 @@ from hdcal.report.words import label
 
 # Draws of each result that are compared with those of the others.
 _DRAWS = 4000
-# More results make a list that nobody reads.
+# More results make a table that nobody reads.
 MOST = 1000
 
 
@@ -110,16 +110,16 @@ def compare(
 ) -> Comparison:
     """Compare the stiffness of finished results with that of the first.
 
-    Each is of its own data, so that their posteriors are independent: a draw of one is
-    paired with any draw of another.
+    Posteriors of different data are independent: a draw of one is paired with any draw
+    of another.
 
     Args:
-        results: what `calibrate` or `diagnose` returned, by a name.
+        results: what `calibrate` or `diagnose` returned, by name.
         tolerance: difference of stiffness that matters [N/mm as read].
         seed: of the pairs.
 
     Raises:
-        InputError: there are fewer than two, or they are not read alike.
+        InputError: there are fewer than two, or their readings differ in kind.
         NotUsable: a result failed its checks.
     """
     with Findings() as wrong:
@@ -175,14 +175,14 @@ def _causes(name: str, result: Models) -> tuple[Cause, ...]:
     """Return the models of a result.
 
     Raises:
-        InputError: it is none.
+        InputError: it is not a calibrated model.
         NotUsable: it failed its checks.
     """
     try:
         return causes_of(result)
     except (TypeError, ValueError, AttributeError) as error:
-        words = f"{name} is no calibrated model"
-        remedy = "Give what calibrate or diagnose returned, itself"
+        words = f"{name} is not a calibrated model"
+        remedy = "Give what calibrate or diagnose returned"
         raise InputError([Finding("results", words, remedy)]) from error
 
 
@@ -199,15 +199,15 @@ def _draws(models: Sequence[Cause], rng: np.random.Generator) -> np.ndarray:
 
 
 def _require_same_reading(cases: Mapping[str, Case]) -> None:
-    """Refuse results of which one was read along the radius, one the diameter.
+    """Check that all results were read along the radius, or all along the diameter.
 
     Raises:
-        InputError: they were.
+        InputError: they were not.
     """
     readings = {name: case.gear.reading for name, case in cases.items()}
     if len(set(readings.values())) > 1:
-        told = ", ".join(f"{name} is {how}" for name, how in readings.items())
-        words = f"are not read alike: {told}"
+        kinds = ", ".join(f"{name} is {how}" for name, how in readings.items())
+        words = f"differ in how the deformation was read: {kinds}"
         remedy = "Read both along the radius, or both along the diameter"
         raise InputError([Finding("results", words, remedy)])
 

@@ -116,8 +116,10 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
         (y, panel.y, panel.y_limits, panel.y_log),
     ):
         axes.set(**{f"{axis}label": plain(label)})
-        axes.set(**{f"{axis}scale": "log" if log else "linear"})
-        _limit(axes, axis, limits)
+        if log:
+            axes.set(**{f"{axis}scale": "log"})
+        if limits != (None, None):
+            axes.set(**{f"{axis}lim": limits})
     if panel.names:
         _name(axes, panel)
     if not panel.y_ticks:
@@ -146,11 +148,6 @@ def axes_or_new(axes: Axes | None) -> Axes:
     return axes
 
 
-def _limit(axes: Axes, axis: str, limits: tuple[float | None, float | None]) -> None:
-    if limits != (None, None):
-        getattr(axes, f"set_{axis}lim")(*limits)
-
-
 def _name(axes: Axes, panel: Panel) -> None:
     """Write categories in place of numbers; of very many only some have room."""
     step = -(-len(panel.names) // _MOST_NAMES)
@@ -177,8 +174,7 @@ def _line(axes: Axes, mark: Line, turned: bool, order: float) -> Any:
     }
     if mark.steps:
         way = "horizontal" if turned else "vertical"
-        stairs = axes.stairs(mark.y, mark.x, baseline=None, orientation=way, **look)
-        return stairs
+        return axes.stairs(mark.y, mark.x, baseline=None, orientation=way, **look)
     pair = (mark.y, mark.x) if turned else (mark.x, mark.y)
     return axes.plot(*pair, **look)[0]
 
@@ -187,14 +183,15 @@ def _points(axes: Axes, mark: Points, turned: bool, order: float) -> Any:
     rows = drawn_rows(mark.y)
     many = len(rows) > _MANY
     x, y = mark.x[rows], mark.y[rows]
+    pair = (y, x) if turned else (x, y)
     colour = mark.colour or _DARK
     if mark.low is not None and mark.high is not None:
         reach = np.abs(np.stack([y - mark.low[rows], mark.high[rows] - y]))
         bars: dict[str, Any] = {"xerr" if turned else "yerr": reach}
         bars |= {"ecolor": colour, "elinewidth": 1.6, "capsize": 3, "zorder": order}
-        axes.errorbar(*((y, x) if turned else (x, y)), fmt="none", **bars)
+        axes.errorbar(*pair, fmt="none", **bars)
     return axes.plot(
-        *((y, x) if turned else (x, y)),
+        *pair,
         mark.marker,
         color=colour,
         markersize=2.5 if many else 5.0,

@@ -12,8 +12,8 @@ from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
 
-# A table of more rows is shown in part; a browser can turn its pages.
-MOST_ROWS = 25
+# Rows of a table in a terminal or a notebook, and on a page until it is turned.
+MOST_ROWS, PAGE_ROWS = 100, 25
 # HTML of a figure, from the name of its chart, its text and its caption.
 Figure = Callable[[str, str, str], str]
 _PARSER = MarkdownIt("commonmark", {"html": False}).enable("table")
@@ -103,8 +103,8 @@ def paged(tokens: Sequence[Token]) -> list[Token]:
         if token.type == "table_open":
             table = token
         row = 0 if token.type == "tbody_open" else row + (token.type == "tr_open")
-        if token.type == "tr_open" and row == MOST_ROWS + 1:
-            table.attrSet("data-page", str(MOST_ROWS))
+        if token.type == "tr_open" and row == PAGE_ROWS + 1:
+            table.attrSet("data-page", str(PAGE_ROWS))
             rest = Token("tbody_open", "tbody", 1, {"hidden": "hidden"})
             found += [Token("tbody_close", "tbody", -1), rest]
         found.append(token)

@@ -154,7 +154,7 @@ class Result(Item):
 
     Attributes:
         template: address of the Markdown template inside the package.
-        table: name of the attribute that holds the rows of the main table.
+        table: name of the attribute that holds the main table: items, or items by name.
         reasons: why the result must not be used; empty if it may be.
         part: the word for what was measured.
     """
@@ -223,7 +223,12 @@ class Result(Item):
         """Return the main table; columns without any value are left out."""
         import pandas as pd
 
-        rows = [row.columns() for row in getattr(self, self.table)]
+        table = getattr(self, self.table)
+        rows = (
+            [{"name": name} | row.columns() for name, row in table.items()]
+            if isinstance(table, Mapping)
+            else [row.columns() for row in table]
+        )
         names = dict.fromkeys(name for row in rows for name in row)
         kept = [n for n in names if any(row.get(n) is not None for row in rows)]
         return pd.DataFrame(rows, columns=kept)

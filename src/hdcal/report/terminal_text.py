@@ -2,6 +2,7 @@
 
 import io
 from collections.abc import Iterator
+from textwrap import fill
 from typing import TYPE_CHECKING, ClassVar
 
 from rich import box
@@ -16,8 +17,8 @@ from hdcal.report.plain import printable
 if TYPE_CHECKING:
     from hdcal.report.result import Result
 
-
-_LONGEST_WORD = 28
+# Longer words wrap, or numbers would have no room.
+_LONGEST = 30
 
 
 class _Heading(Heading):
@@ -41,12 +42,16 @@ class _Table(TableElement):
         rows = [row.cells for row in self.body.rows] if self.body else []
         header = self.header.row.cells if self.header and self.header.row else []
         for i, cell in enumerate(header):
-            texts = [row[i].content.plain for row in rows]
-            right = cell.justify == "right"
-            words = texts if right else [w for text in texts for w in text.split()]
-            least = min(max(map(len, words), default=1), _LONGEST_WORD)
+            texts = [row[i].content.plain for row in rows if i < len(row)]
+            right, title = cell.justify == "right", cell.content.plain
+            words = not any(" " in text or len(text) > _LONGEST for text in texts)
+            whole = right or words
+            if whole and title:
+                # A column that does not wrap would not wrap its title either.
+                width = max(map(len, [*texts, *title.split()]))
+                title = fill(title, width, break_long_words=False)
             justify = "right" if right else "left"
-            table.add_column(cell.content, justify=justify, min_width=least)
+            table.add_column(Text(title), justify=justify, no_wrap=whole)
         for cells in rows:
             table.add_row(*(cell.content for cell in cells))
         yield table

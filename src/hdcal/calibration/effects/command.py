@@ -7,13 +7,11 @@ from hdcal.cli.console import Console
 from hdcal.cli.options import json_option
 
 
-@command(short_help="List the library of effects.")
+@command("effects", short_help="List the library of effects.")
 @json_option
 @click.pass_obj
 def effects(console: Console):
     """List the effects that `hdcal calibrate --effect NAME` can include."""
-    from hdcal.calibration.effects.document import effects_document
-    from hdcal.calibration.effects.summary import effects_answer
+    from hdcal.calibration.effects.effects import effects as library
 
-    found = effects_answer()
-    return console.answer(effects_document(found), found)
+    return console.show(library())
