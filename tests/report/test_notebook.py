@@ -19,7 +19,7 @@ from hdcal.design.study.chart import study_chart
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.errors import InputError
 from hdcal.inference.residual_shapes import Structure
-from hdcal.notebook import TELLERS, Shown
+from hdcal.notebook import RESULTS, TELLERS, Shown
 from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
@@ -34,7 +34,7 @@ def test_every_public_result_is_shown():
     called.append(hdcal.FleetPosterior.next_force)
     returned = [inspect.signature(one).return_annotation for one in called]
     results = {c for c in returned if inspect.isclass(c) and is_dataclass(c)}
-    assert {c.__name__ for c in results} - NO_RESULTS == set(TELLERS)
+    assert {c.__name__ for c in results} - NO_RESULTS == {*TELLERS, *RESULTS}
     assert all(issubclass(c, Shown) for c in results if c.__name__ not in NO_RESULTS)
 
 
@@ -67,7 +67,7 @@ def results():
     }
 
 
-@pytest.mark.parametrize("name", sorted(set(TELLERS) - {"DynamicPosterior"}))
+@pytest.mark.parametrize("name", sorted({*TELLERS, *RESULTS} - {"DynamicPosterior"}))
 def test_a_result_is_shown(name: str, results):
     found, words = results[name]
     assert type(found).__name__ == name
@@ -83,7 +83,7 @@ def test_a_quick_verdict_says_that_nothing_was_sampled(results):
     assert (verdict_answer(quick).seed, verdict_answer(quick).quick) == (3, True)
 
 
-@pytest.mark.parametrize("name", sorted(set(TELLERS) - {"DynamicPosterior"}))
+@pytest.mark.parametrize("name", sorted({*TELLERS, *RESULTS} - {"DynamicPosterior"}))
 def test_a_result_is_a_line_a_table_and_a_drawing(name: str, results):
     found, _ = results[name]
     assert repr(found).startswith(f"<{name}") and len(repr(found)) < 400
@@ -146,7 +146,7 @@ def test_a_case_says_what_was_guessed_of_it(results):
 def test_residuals_say_their_shapes(results):
     left = results["Residuals"][0]
     assert (left.structure, left.noise) == ((), ())
-    assert "No shape was found" in repr(left)
+    assert "have no shape" in repr(left)
     bend = Structure("curvature", 0.001, 2.0, "They bend.")
     noise = Structure("scatter", 0.001, 2.0, "They grow.")
     shaped = replace(left, structure=(bend,), noise=(noise,))

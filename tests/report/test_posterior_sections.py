@@ -8,10 +8,8 @@ from posteriors import plain_draws, ramp_case, single, written_posterior
 from rich.console import Console
 from rigs import make_gear
 
-from hdcal.calibration.figure.residuals import residual_figure
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import Check
-from hdcal.inference.residuals import residuals
 from hdcal.report.document import Document, Tag
 from hdcal.report.html import html_page
 from hdcal.report.parameters import Interval, parameter_estimates
@@ -44,13 +42,6 @@ def test_a_sentence_calls_parameters_what_they_are_called_on_paper():
         "Influence coefficient K and Young's modulus E₀ are alike, in 1/K",
         "Hysteresis: width: Kraft of alphas",
     ]
-
-
-def test_no_words_lie_on_the_readings():
-    posterior = single()
-    figure = residual_figure(posterior, residuals(posterior))
-    for axes in figure.axes:
-        assert not axes.texts and "±2 sd" in axes.get_title(loc="right")
 
 
 def test_a_terminal_has_room_for_fewer_columns():

@@ -175,7 +175,10 @@ class Result(Item):
     @computed_field
     @property
     def headline(self) -> Words:
-        """The answer in one sentence."""
+        """The answer in one sentence, or why there is none."""
+        if self.reasons:
+            why = "; ".join(self.reasons)
+            return f"This result failed its checks and must not be used: {why}."
         return self.line("headline")
 
     @computed_field

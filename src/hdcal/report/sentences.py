@@ -17,7 +17,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.report.plain import printable
-from hdcal.report.words import number, percent
+from hdcal.report.words import capital, label, number, percent, unit
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -59,11 +59,14 @@ def _environment(plain: bool) -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {
+        "capital": capital,
         "code": code,
+        "label": label,
         "median": median,
         "number": number,
         "percent": percent,
         "span": span,
+        "unit": unit,
     }
     return environment
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.theory_names import SPRING
 from hdcal.report.parameters import Interval
 from hdcal.report.units import UNITS
 
@@ -110,8 +111,10 @@ def prior_words(name: str, prior: Prior) -> str:
     return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
 
 
-def label(name: str) -> str:
-    """Return what a parameter is called on paper."""
+def label(name: str, theory: str = "") -> str:
+    """Return what a parameter is called on paper, under some theory."""
+    if name == "K" and theory == SPRING:
+        return "stiffness K"
     effect, dot, parameter = name.partition(".")
     if dot:
         return f"{effect}: {parameter}".replace("_", " ")
