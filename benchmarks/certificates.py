@@ -147,9 +147,9 @@ def made(seed: int) -> Rig:
 def sampled(case: Case, seed: int) -> Posterior:
     """Return short chains of a case: what `calibrate` draws, its checks left out."""
     shipped, theory = effect_priors(), case.gear.theory
-    problem, key = build_problem(case, shipped), jax.random.key(seed)
+    problem = build_problem(case, shipped)
     size = {"chains": 2, "warmup": 300, "draws": 500}
-    draws = sample(problem, laplace.fit(problem), key, **size)
+    draws = sample(problem, laplace.fit(problem), seed, **size)
     priors = problem_priors(case, (), shipped, theory)
     arrays = ArrayTree({"posterior": group_of(draws.values)})
     return Posterior(case, theory, (), priors, arrays, {}, (), {"with_gap": False})

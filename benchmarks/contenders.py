@@ -33,14 +33,13 @@ WALKERS, BURN_IN, STEPS = 32, 500, 4000
 
 
 def hdcal(numbers):
-    import jax
 
     from hdcal.inference import laplace
     from hdcal.inference.sample import sample
 
     problem = make_problem()
     whitening = laplace.fit(problem)
-    return lambda seed: sample(problem, whitening, jax.random.key(seed)).values
+    return lambda seed: sample(problem, whitening, seed).values
 
 
 def blackjax(numbers):

@@ -10,6 +10,7 @@ from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
 
+import platformdirs
 from pydantic import TypeAdapter
 from pydantic.dataclasses import dataclass
 
@@ -32,6 +33,17 @@ Library = Mapping[str, type[Effect]]
 Diagnoser = Callable[[hdcal.Case, Library], Answer]
 _PACKAGES = ("jax", "jaxlib", "numpy", "numpyro", "scipy")
 OPENED = "opened.json"
+# Read by libraries when a process imports them; a value set by the user stands.
+_ENVIRONMENT = {
+    "JAX_PLATFORMS": "cpu",
+    "JAX_COMPILATION_CACHE_DIR": platformdirs.user_cache_dir("hdcal", False),
+    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+    "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+    # JAX caches no program that may call back to raise an error: NaN is looked for.
+    "EQX_ON_ERROR": "nan",
+    # Thousands of small systems are solved, for which threads only wait.
+    "OPENBLAS_NUM_THREADS": "1",
+}
 
 
 @dataclass(frozen=True)
@@ -227,9 +239,8 @@ def _completed(found: BlindSet, tasks, diagnose: Diagnoser, jobs: int):
     Raises:
         RuntimeError: some cases failed; the others were answered before.
     """
-    # Thousands of small systems are solved, over which threads only wait.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    for name, value in _ENVIRONMENT.items():
+        os.environ.setdefault(name, value)
     context = get_context("spawn")
     with ProcessPoolExecutor(jobs, context, initializer=_start) as pool:
         futures = [
@@ -250,9 +261,8 @@ def _completed(found: BlindSet, tasks, diagnose: Diagnoser, jobs: int):
 
 
 def _start() -> None:
-    """Leave interruptions to the parent, and share compiled programs."""
+    """Leave interruptions to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    hdcal.keep_compilations()
 
 
 def _answer(table: Path, gear: Path, withheld, diagnose: Diagnoser) -> Answer:

@@ -108,9 +108,9 @@ def _drawn_curve(
         curve = _outside_curve(plan.truth[0], plan.r, rig, rng)
         return None if curve is None else (curve, {})
     outside = np.zeros(len(rig.history.order))
-    if plan.beside:
+    if plan.outside:
         r = plan.r * np.sqrt(1.0 - plan.share)
-        outside = _outside_curve(plan.beside, r, rig, rng)
+        outside = _outside_curve(plan.outside, r, rig, rng)
         if outside is None:
             return None
     active, amplitude = [], {}
@@ -172,7 +172,7 @@ def _read(
         curve=_rounded(rig.gap(curve), writing),
         # Amplitudes of a rig of another scale would each need a factor.
         amplitude={} if plan.mix == RIGS else amplitude,
-        beside=plan.beside,
+        outside=plan.outside,
         share=plan.share,
     )
     return loading.csv(reading, writing), label

@@ -34,7 +34,7 @@ class Label:
         curve: what the mechanisms leave after calibration [N].
         amplitude: true value of the library parameter `effect.parameter`, where the
             mechanism has the same, in the library's unit.
-        beside: mechanism outside the library in a composite.
+        outside: mechanism outside the library in a composite.
         share: share of the effect in the mean square of a composite's gap.
     """
 
@@ -52,7 +52,7 @@ class Label:
     clean: tuple[float, ...] = ()
     curve: tuple[float, ...] = ()
     amplitude: dict[str, float] = field(default_factory=dict)
-    beside: str = ""
+    outside: str = ""
     share: float = 1.0
 
 

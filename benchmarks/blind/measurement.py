@@ -40,7 +40,7 @@ def sealed_measurement(
     if material.is_file():
         if material.parent != gear.parent or material.suffix != ".toml":
             words = f"names the material file {case.gear.material}"
-            raise refusal(gear, words, "Put a .toml file beside the gear file")
+            raise refusal(gear, words, "Put a .toml file next to the gear file")
         files[material.name] = material.read_bytes()
     # The size of the gap and the noise of a measurement are not known.
     label = Label(

@@ -58,7 +58,7 @@ class Plan:
     loading: str
     noise: Noise = "iid"
     withheld: tuple[str, ...] = ()
-    beside: str = ""
+    outside: str = ""
     share: float = 1.0
     points: int = POINTS
 
@@ -128,9 +128,9 @@ def _rigs() -> Iterator[Plan]:
         both = tuple(sorted((name, decoy)))
         yield Plan(RIGS, "effect", (name,), 1.0, "rich", withheld=both)
     for number, name in enumerate(n for n in shown if n not in NOISES):
-        beside = tuple(OUTSIDE)[(3 * number) % len(OUTSIDE)]
+        outside = tuple(OUTSIDE)[(3 * number) % len(OUTSIDE)]
         for share in EFFECT_SHARES:
-            more = {"beside": beside, "share": share}
+            more = {"outside": outside, "share": share}
             yield Plan(RIGS, "composite", (name,), 1.0, "rich", **more)
     for loading in (*others, "fleet"):
         for name in effects_on(loading)[::3]:
@@ -191,5 +191,5 @@ def other_truth(plan: Plan, rng: np.random.Generator, *, noises: bool = False) -
     drawn = rng.choice(names, len(plan.truth), replace=False)
     truth = tuple(sorted(map(str, drawn)))
     withheld = tuple(sorted({*decoys, *truth})) if plan.withheld else ()
-    beside = str(rng.choice(tuple(OUTSIDE))) if plan.beside else ""
-    return replace(plan, truth=truth, withheld=withheld, beside=beside)
+    outside = str(rng.choice(tuple(OUTSIDE))) if plan.outside else ""
+    return replace(plan, truth=truth, withheld=withheld, outside=outside)

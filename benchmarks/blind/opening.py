@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import hdcal
 from benchmarks.blind.answers import OPENED, Frozen, read_frozen
 from benchmarks.blind.calibration import reliability
 from benchmarks.blind.estimates import Estimate
-from benchmarks.blind.rivals import closable_share, with_force
+from benchmarks.blind.rivals import closable_share
 from benchmarks.blind.scored_case import Cases, ScoredCase
 from benchmarks.blind.scores import (
     COLUMNS,
@@ -127,15 +127,16 @@ def closable_shares(found: BlindSet, cases: Cases) -> dict[str, float]:
     close all of a gap.
     """
     shares = {}
-    for case, entry in zip(cases, found.manifest.cases, strict=True):
-        label, effect = case.label, case.answer.effect
-        right = case.one_effect and effect == label.truth[0] and effect in hdcal.EFFECTS
-        if not right or label.r < _LEAST_CLOSED_R or not case.answer.closed:
+    for scored, entry in zip(cases, found.manifest.cases, strict=True):
+        label, effect = scored.label, scored.answer.effect
+        if not scored.one_effect or label.r < _LEAST_CLOSED_R:
             continue
-        clean = with_force(
-            hdcal.read_case(found.table(entry), found.gear), np.asarray(label.clean)
-        )
-        share = closable_share(clean, effect, hdcal.EFFECTS, label.sigma)
+        if effect not in hdcal.EFFECTS or effect != label.truth[0]:
+            continue
+        case = hdcal.read_case(found.table(entry), found.gear)
+        clean = replace(case.records, force=np.asarray(label.clean))
+        case = replace(case, records=clean)
+        share = closable_share(case, effect, hdcal.EFFECTS, label.sigma)
         if share is not None:
             shares[label.case] = share
     return shares

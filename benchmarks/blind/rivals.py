@@ -1,7 +1,7 @@
 """Least squares, effect by effect: the simpler ways of choosing a cause."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import jax
@@ -89,7 +89,7 @@ def closable_share(
     """Return the share of a gap without noise that an effect of the library can close.
 
     Args:
-        case: whose readings have no noise.
+        case: with readings without noise.
         name: of the effect.
         library: that contains it.
         noise_sd: of the readings whose gap it was [N].
@@ -101,11 +101,6 @@ def closable_share(
     if name not in found or found[NONE].square <= 0.0:
         return None
     return 1.0 - float(np.sqrt(found[name].square / found[NONE].square))
-
-
-def with_force(case: Case, force: np.ndarray) -> Case:
-    """Return the case with other readings [N]."""
-    return replace(case, records=replace(case.records, force=force))
 
 
 def _straight(case: Case, noise_sd: float | None) -> _Straight:

@@ -61,7 +61,7 @@ class ScoredCase:
 
     @cached_property
     def probabilities(self) -> dict[str, float]:
-        """Of all hypotheses, the remainder beside an effect counted for the effect."""
+        """Of all hypotheses, an effect with a remainder counted for the effect."""
         found: dict[str, float] = {}
         for name, value in self.answer.probabilities.items():
             parts = [part for part in name.split("+") if part != UNKNOWN]

@@ -142,8 +142,8 @@ def _outside(cases: Cases) -> Iterator[Row]:
     withheld = [c for c in cases if c.withheld and c.at(1.0)]
     wrong = share(c.named for c in withheld)
     yield Row("true effect withheld, r = 1: another named", wrong, at_most(0.1))
-    told = [c for c in withheld if c.stated or c.answer.verdict == UNKNOWN]
-    right = share(not c.stated or c.stated_right for c in told)
+    stated = [c for c in withheld if c.stated or c.answer.verdict == UNKNOWN]
+    right = share(not c.stated or c.stated_right for c in stated)
     words = "true effect withheld, r = 1: its group stated, or unknown"
     yield Row(words, right, at_least(0.85))
     both = [c for c in cases if c.label.kind == "composite"]
@@ -261,10 +261,15 @@ def columns(cases: Cases) -> dict[str, Estimate]:
     return {name: score(cases) for name, score in COLUMNS.items()}
 
 
+def _in_words(case: ScoredCase) -> str:
+    name = "+".join(case.label.truth) or NONE
+    return f"withheld {name}" if case.withheld else name
+
+
 def mix_ups(cases: Cases, most: int = 12) -> Sequence[tuple[str, str, int]]:
     """Return the most frequent wrong answers: truth, most probable, and cases."""
     wrong = Counter(
-        ("+".join(case.label.truth) or NONE, case.top)
+        (_in_words(case), case.top)
         for case in cases
         if case.truth is not None and case.top != case.truth
     )

@@ -111,7 +111,7 @@ def canonical(data: Any) -> bytes:
 
 
 def write_hashed(path: Path, adapter: TypeAdapter, content: Any) -> str:
-    """Write content beside its hash, whole or not at all, and return the hash."""
+    """Write content with its hash, whole or not at all, and return the hash."""
     plain = adapter.dump_python(content, mode="json")
     sha256 = digest(canonical(plain))
     unfinished = path.with_name(f".{path.name}.unfinished")

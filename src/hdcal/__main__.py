@@ -49,8 +49,9 @@ def _show_version(context: click.Context, _, wanted: bool) -> None:
 
 # Former commands, and what to use instead.
 REMOVED = {
-    "audit": "the page 'The article against its own numbers' of the documentation",
+    "audit": "'hdcal help audit', the page of the documentation",
     "blind": "'make blind' in a clone of the project",
+    "completion": "click's own: _HDCAL_COMPLETE=bash_source hdcal",
 }
 
 

@@ -3,11 +3,12 @@
 import subprocess
 import sys
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
 from benchmarks.blind.cases import draw_cases, gear_file
-from benchmarks.blind.mixes import SHARES, SIZES, effects_on
+from benchmarks.blind.mixes import SHARES, SIZES
 from benchmarks.blind.rig.contact import _curve
 from benchmarks.blind.rig.loadings import LOADINGS, rich
 from benchmarks.blind.rig.mechanisms import MECHANISMS
@@ -18,7 +19,6 @@ from benchmarks.blind.rig.virtual_rig import (
     RigState,
     VirtualRig,
     draw_noise,
-    draw_rig,
 )
 
 import hdcal
@@ -30,7 +30,8 @@ def test_the_rig_imports_nothing_of_the_library():
     script = "import sys, " + ", ".join(f"benchmarks.blind.rig.{m}" for m in modules)
     script += "; print({'hdcal', 'jax', 'numpyro'} & {*sys.modules})"
     command = [sys.executable, "-c", script]
-    done = subprocess.run(command, capture_output=True, text=True)
+    root = Path(__file__).parents[2]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=root)
     assert done.stdout.strip() == "set()", done.stderr
 
 
@@ -41,23 +42,9 @@ def test_every_effect_of_the_library_has_a_mechanism():
     assert not {*OUTSIDE} & {*hdcal.EFFECTS}
 
 
-@pytest.mark.parametrize("loading", LOADINGS)
-def test_a_mechanism_is_drawn_at_the_stated_size(loading: str):
-    for name in effects_on(loading):
-        if name in NOISES:
-            continue
-        for r in (0.5, 2.0):
-            rng = np.random.default_rng([7, int(10 * r)])
-            rig = draw_rig(LOADINGS[loading]().history, rng)
-            drawn = rig.draw_mechanism(MECHANISMS[name], r, rng)
-            if drawn is not None:
-                gap = rig.gap_over_noise(rig.curve(drawn))
-                assert gap == pytest.approx(r, rel=1e-3), name
-
-
-@pytest.mark.parametrize("mix", ["effects", "outside", "rigs"])
+@pytest.mark.parametrize("mix", ["effects", "outside", "programs", "rigs"])
 def test_a_label_states_the_size_of_its_gap(mix: str):
-    for _, label in draw_cases(mix, 80, seed=11):
+    for _, label in draw_cases(mix, 120, seed=11):
         if label.kind in ("effect", "outside") and label.truth[0] not in NOISES:
             rms = np.sqrt(np.mean(np.square(label.curve)))
             assert rms / label.sigma == pytest.approx(label.r, rel=2e-3), label.truth

@@ -45,13 +45,16 @@ def test_a_run_of_four_cases_with_an_interruption(tmp_path, monkeypatch, capsys)
     with pytest.raises(InputError, match="these answers are frozen"):
         answer_set(folder, "stub", noted)
     assert program.main(opening) == 0
-    told = capsys.readouterr().out
-    assert f"commitment {commitment}" in told and f"answers {sha256} by 'stub'" in told
+    printed = capsys.readouterr().out
+    assert (
+        f"commitment {commitment}" in printed
+        and f"answers {sha256} by 'stub'" in printed
+    )
     scores = json.loads((folder / "result" / "scores.json").read_text())
     named = {row["what"]: row["found"] for row in scores["rows"]}
     wrong = named["true effect withheld, r = 1: another named"]
     assert (wrong["value"], wrong["n"]) == (1.0, 4)
-    assert told.strip() == (folder / "result" / "scores.md").read_text().strip()
+    assert printed.strip() == (folder / "result" / "scores.md").read_text().strip()
     assert (folder / "result" / "reliability.png").stat().st_size > 1000
 
 
@@ -74,8 +77,8 @@ def test_a_measurement_is_sealed_under_a_name_that_tells_nothing(tmp_path, capsy
     assert [path.name for path in (folder / "cases").iterdir()] == ["case.csv"]
     assert program.main(["answer", str(folder), "--by", "none"]) == 0
     assert program.main(["open", str(folder), "--key", f"{folder}.key"]) == 0
-    told = capsys.readouterr().out
-    assert "stated contact_onset or plastic_yield; none: none" in told
+    printed = capsys.readouterr().out
+    assert "stated contact_onset or plastic_yield; none: none" in printed
 
 
 SHOWN = {

@@ -155,8 +155,10 @@ def test_answers_frozen_after_the_first_opening_are_not_blind(tmp_path):
     assert "NOT BLIND" not in open_set(found.folder, key)
     # Even if they say that they are.
     answered(found, "later")
-    told = [x for x in open_set(found.folder, key).splitlines() if x.startswith("answ")]
-    assert [line.endswith("NOT BLIND") for line in told[:2]] == [False, True]
+    printed = [
+        x for x in open_set(found.folder, key).splitlines() if x.startswith("answ")
+    ]
+    assert [line.endswith("NOT BLIND") for line in printed[:2]] == [False, True]
     scores = json.loads((found.folder / "result" / "scores.json").read_text())
     assert scores["answers"]["before"]["blind"]
     assert not scores["answers"]["later"]["blind"]

@@ -54,7 +54,7 @@ def test_a_table_of_others_is_kept(here: Hdcal, calibrated, tmp_path: Path):
 
 def test_a_result_is_replaced_with_force(here: Hdcal, tmp_path: Path):
     for more, code in (([], 0), ([], 2), (["--force"], 0)):
-        assert here("audit", "--out", "run", *more).returncode == code
+        assert here("fit", XB1, "--out", "run", *more).returncode == code
         assert os.listdir(tmp_path) == ["run"]
 
 

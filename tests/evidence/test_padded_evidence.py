@@ -4,14 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from centred import Centred
 from compiling import compilations
 from diagnosis_cases import judged, simulated
 from rigs import cycles
 
-from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
-from hdcal.errors import InputError
 from hdcal.evidence import closed_form, noise_evidence
 from hdcal.evidence.compute_evidence import compute_evidence
 from hdcal.inference import padding
@@ -92,9 +89,3 @@ def test_sizes_of_one_bucket_share_every_executable():
         assert found == []
         judged(larger, library=LIBRARY)
         assert found
-
-
-def test_an_effect_that_looks_ahead_is_refused():
-    priors = effect_priors() | {"centred.size": Prior("normal", (0.0, 5.0))}
-    with pytest.raises(InputError, match="further ones follow"):
-        compute_evidence(rows_of(42), {"centred": Centred}, priors)

@@ -16,8 +16,8 @@ from scipy import stats
 import hdcal
 from hdcal.data.case import Case
 from hdcal.fleets.fleet_problem import fleet_problem
+from hdcal.fleets.population_problem import PopulationProblem
 from hdcal.fleets.readings import fleet_readings
-from hdcal.inference.population_problem import PopulationProblem
 
 X, RUNS = np.linspace(0.05, 0.5, 6), 2
 BINS = 10

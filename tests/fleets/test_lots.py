@@ -8,8 +8,8 @@ import pytest
 from fleets import handmade
 
 import hdcal
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.summary import fleet_answer, fleet_report, gear_columns
-from hdcal.inference.groupings import group_offsets
 from hdcal.report.document import Table
 from hdcal.report.write import write_numbers
 

@@ -7,10 +7,10 @@ import pytest
 from scipy.stats import binomtest
 
 import hdcal
+from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.off_in import FALSE_CALLS, called_off, chance_of, zero_chance
 from hdcal.fleets.own_shapes import own_shapes
 from hdcal.fleets.summary import fleet_answer, gear_columns
-from hdcal.inference.gear_sums import MountingSums
 
 UP = np.linspace(0.05, 0.5, 8)
 X, GEARS, RUNS = np.concatenate([UP, UP[-2::-1]]), 14, 2

@@ -9,14 +9,14 @@ from fleets import handmade
 
 import hdcal
 from hdcal.fleets.fleet_posterior import FleetPosterior
+from hdcal.fleets.gear_sums import gear_sums
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import linked_rigs, rig_grouping
 from hdcal.fleets.next_gear import new_group_sd
 from hdcal.fleets.notes import RIGS_APART
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.fleets.read_fleet import read_fleet
 from hdcal.fleets.summary import fleet_answer, gear_columns
-from hdcal.inference.gear_sums import gear_sums
-from hdcal.inference.groupings import group_offsets
 
 X, NOISE, MOUNTED = np.linspace(0.05, 0.5, 8), 0.3, 0.4
 

@@ -53,11 +53,11 @@ def run_sbc(model: str, count: int):
     ranks, hits = [], []
     for index in range(count):
         key = jax.random.key(1000 + index)
-        of_truth, of_data, of_fit = jax.random.split(key, 3)
+        of_truth, of_data = jax.random.split(key)
         truth = draw_truth(template, of_truth)
         data = simulate(template, case, truth, of_data)
         problem, draws = posterior_draws(
-            data, effects, of_fit, chains=2, warmup=300, draws=400
+            data, effects, index, chains=2, warmup=300, draws=400
         )
         every = len(draws["K"]) // RANKED
         thin = {n: v[::every][:RANKED] for n, v in draws.items()}

@@ -18,7 +18,7 @@ from hdcal.inference import laplace
 from hdcal.inference.assembly import assemble
 from hdcal.inference.checks import conflict_check
 from hdcal.inference.density import log_prior
-from hdcal.inference.effective_priors import effective_priors
+from hdcal.inference.distributions import effective_priors
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import build_problem, problem_priors
@@ -80,7 +80,7 @@ def posterior() -> Posterior:
     found = near_the_mode(problem)
     priors = problem_priors(case, (), shipped, theory)
     own = _specifics(case, problem, found)
-    parts = assemble(case, priors, problem, found, own, jax.random.key(2))
+    parts = assemble(case, priors, problem, found, own, 2)
     return Posterior(case, theory, (), priors, *parts, {"with_gap": False})
 
 

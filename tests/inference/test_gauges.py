@@ -90,7 +90,7 @@ def test_the_prior_of_the_coefficient_stays_exact():
     total = float(log_density(model, (problem,), {}, given)[0])
     wanted = float(log_likelihood(problem, values)) - np.log(seen * added)
     for name in (*sites, "K", "sigma"):
-        law = distribution(problem.priors[name], positive=name == "E0")
+        law = distribution(problem.priors[name], name)
         wanted += float(law.log_prob(values[name]))
     # Both signs of the place are the same correlation.
     law = distribution(problem.priors[CORRELATION])

@@ -74,14 +74,13 @@ def _double():
 
 
 def drawn(problem, seed=0, chains=4, draws=800):
-    key = jax.random.key(seed)
     whitening = laplace.fit(problem)
-    return sample_independently(problem, whitening, key, chains=chains, draws=draws)
+    return sample_independently(problem, whitening, seed, chains=chains, draws=draws)
 
 
 def first_drawn(problem, **size):
-    """Return draws by the first key by which there are any."""
-    found = (drawn(problem, key, **size) for key in range(8))
+    """Return draws by the first seed by which there are any."""
+    found = (drawn(problem, seed, **size) for seed in range(8))
     return next(draws for draws in found if draws is not None)
 
 
@@ -103,7 +102,7 @@ def test_a_wrong_acceptance_would_be_seen(monkeypatch):
     assert stats.kstest(size, stats.gamma(5.0).cdf).pvalue < 1e-6
 
 
-def test_the_same_key_draws_the_same():
+def test_the_same_seed_draws_the_same():
     first, second = first_drawn(Skew({})), first_drawn(Skew({}))
     assert np.array_equal(first.values["size"], second.values["size"])
 
@@ -114,7 +113,7 @@ def test_what_proposals_do_not_cover_is_not_drawn(problem):
 
 
 def test_tails_heavier_than_any_proposal_are_drawn_right_or_not_at_all():
-    drawn_at_all = [found for key in range(6) if (found := drawn(Tails({}), key))]
+    drawn_at_all = [found for seed in range(6) if (found := drawn(Tails({}), seed))]
     assert drawn_at_all
     for found in drawn_at_all:
         place = found.values["place"][:, ::8].ravel()
@@ -146,21 +145,20 @@ def quarter_off():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("which", ["fleet-demo", "many off"])
-def test_a_fleet_is_what_nuts_has_it_whatever_the_key(which):
+def test_a_fleet_is_what_nuts_has_it_whatever_the_seed(which):
     demo = which == "fleet-demo"
     case = hdcal.read_case(datasets_folder() / which) if demo else quarter_off()
     problem, _ = fleet_problem(fleet_readings(case))
     whitening = laplace.fit(problem, {"stiffness": 200.0})
-    keys = [jax.random.key(key) for key in range(6)]
     each = [
-        sample_independently(problem, whitening, key, chains=4, draws=2000)
-        for key in keys
+        sample_independently(problem, whitening, seed, chains=4, draws=2000)
+        for seed in range(6)
     ]
     drawn = [found.values for found in each if found is not None]
     assert len(drawn) >= 2
     # All of them together: what single ones leave out would be missing here too.
     fast = {n: np.concatenate([one[n] for one in drawn]) for n in drawn[0]}
-    slow = sample(problem, whitening, keys[0], chains=4, warmup=800, draws=4000).values
+    slow = sample(problem, whitening, 0, chains=4, warmup=800, draws=4000).values
     well = [mixing(draws) for draws in (fast, slow)]
     for name, values in slow.items():
         share = np.array([0.025, 0.25, 0.5, 0.75, 0.975])

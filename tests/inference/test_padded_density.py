@@ -3,16 +3,13 @@
 import dataclasses
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
-from centred import Centred
 from moving import moving_case
 from rigs import draw_truth, make_case, make_gear, program
 from slices import slice_of
 
-from hdcal.data.priors import Prior, effect_priors
-from hdcal.errors import InputError
+from hdcal.data.priors import effect_priors
 from hdcal.inference import compress, density
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic, predict_motion
@@ -138,23 +135,6 @@ def test_a_row_of_padding_that_counts_is_seen():
     values = values_of(problem)
     found, slow = (float(EXPAND(p, values)[0]) for p in (more, bare(problem, case)))
     assert abs(found - slow) > 1e-6 * abs(slow)
-
-
-class Cumulative(Centred, stage="force", groups=("zero over temperature",)):
-    """The same about the mean of the rows so far."""
-
-    def apply(self, signal, rows):
-        """Return the force and its share."""
-        mean = jnp.cumsum(rows.deformation) / jnp.arange(1, len(signal) + 1)
-        return signal + self.size * (rows.deformation - mean)
-
-
-def test_an_effect_from_outside_that_does_not_bear_padding_is_refused():
-    prior = Prior("half_normal", (1.0,), "N/mm", "a test")
-    priors = {"centred.size": prior, "cumulative.size": prior}
-    with pytest.raises(InputError, match=r"centred.*further ones follow"):
-        build_problem(case_of(), priors, (Centred,))
-    assert build_problem(case_of(), priors, (Cumulative,)).count == 198
 
 
 def test_groups_of_no_rows_change_nothing():

@@ -19,7 +19,6 @@ from hdcal.inference.distributions import distribution, frozen
 from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
 from hdcal.inference.dynamic_priors import FRICTION, dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic
-from hdcal.inference.values import POSITIVE
 from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps
 from hdcal.motion.dynamic_calibration import highest_peak
@@ -179,8 +178,7 @@ def test_the_density_with_friction_is_that_of_the_stated_priors(asked):
         values = laplace.values_at(problem, position)
         stated = log_likelihood(problem, values)
         for name in names:
-            positive = name in POSITIVE
-            law = distribution(problem.priors[name], positive=positive)
+            law = distribution(problem.priors[name], name)
             stated = stated + law.log_prob(values[name])
         moved = jax.jacfwd(
             lambda at: jnp.stack(

@@ -90,12 +90,12 @@ def run(population: str, size: int, count: int, fixed: bool = False):
     """Return whether bounds hold [case, kind, content]: one fair, two wrong kinds."""
     hits = []
     for index in range(count):
-        of_truth, of_data, of_fit = jax.random.split(jax.random.key(7000 + index), 3)
+        of_truth, of_data = jax.random.split(jax.random.key(7000 + index))
         blank = build_problem(template(population, size), effect_priors())
         truth = TYPICAL if fixed else draw_truth(blank, of_truth)
         case = made(population, size, truth, of_data)
         problem, draws = posterior_draws(
-            case, (), of_fit, chains=2, warmup=200, draws=500
+            case, (), index, chains=2, warmup=200, draws=500
         )
         true = [true_quantile(population, truth, problem, p) for p in CONTENTS]
         narrow = {

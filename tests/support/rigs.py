@@ -19,7 +19,7 @@ from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import POSITIVE, build_effects, member_base, with_rounding
+from hdcal.inference.values import build_effects, member_base, with_rounding
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
 
@@ -126,7 +126,7 @@ def draw_truth(problem, key) -> dict:
         if prior.family == "fixed":
             values[name] = np.float64(prior.numbers[0])
         else:
-            law = distribution(prior, positive=name in POSITIVE)
+            law = distribution(prior, name)
             values[name] = np.asarray(law.sample(own))
     return values
 
@@ -163,8 +163,8 @@ def simulate(problem, case: Case, truth: dict, key) -> Case:
     return replace(case, records=replace(case.records, force=force))
 
 
-def posterior_draws(case: Case, effects, key, **settings) -> tuple:
+def posterior_draws(case: Case, effects, seed: int, **settings) -> tuple:
     """Fit a case; return its problem and draws, chains joined."""
     problem = build_problem(case, effect_priors(), effects)
-    draws = sample(problem, laplace.fit(problem), key, **settings)
+    draws = sample(problem, laplace.fit(problem), seed, **settings)
     return problem, {n: v.reshape(-1, *v.shape[2:]) for n, v in draws.values.items()}

@@ -149,5 +149,5 @@ def parallax(history: History, rng: np.random.Generator) -> Floats:
     """The dial is read from one side, and from the other after a change of operator."""
     needle = 2 * np.pi * history.force / rng.uniform(40.0, 100.0)
     handover = history.order >= rng.uniform(0.35, 0.65) * len(history.order)
-    seen = np.where(handover, rng.uniform(-1.0, 0.0), 1.0)
-    return seen * np.sin(needle - rng.uniform(0, 2 * np.pi))
+    side = np.where(handover, rng.uniform(-1.0, 0.0), 1.0)
+    return side * np.sin(needle - rng.uniform(0, 2 * np.pi))

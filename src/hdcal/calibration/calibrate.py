@@ -27,7 +27,6 @@ from hdcal.inference.noise_form import (
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
-from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
@@ -185,11 +184,10 @@ def calibrate(
     problem = build_problem(case, shipped, chosen, **model)
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    of_draws, of_prior = separate_keys(seed, count=2)
     fitted = laplace.fit(problem)
-    found = sample(problem, fitted, of_draws, progress=progress, **size)
+    found = sample(problem, fitted, seed, progress=progress, **size)
     own = _specifics(case, problem, found, shown=shown)
-    arrays, diagnoses, checks = assemble(case, priors, problem, found, own, of_prior)
+    arrays, diagnoses, checks = assemble(case, priors, problem, found, own, seed)
     kept = ArrayTree({**arrays.groups, laplace.GROUP: laplace.to_group(fitted)})
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
     settings |= {LOOP: True} | run_settings(found, began)

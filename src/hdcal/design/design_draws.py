@@ -22,10 +22,9 @@ from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.design.materials import read_material
 from hdcal.errors import Finding, Findings
-from hdcal.inference.distributions import frozen
+from hdcal.inference.distributions import frozen, sample_prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
-from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.residuals import misfits
 from hdcal.inference.values import Values
 from hdcal.physics.chain import Reading
@@ -35,7 +34,6 @@ from hdcal.prediction.engine.causes import (
     causes_of,
     jointly_worth,
     likeliest,
-    sample_prior,
 )
 from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
 from hdcal.prediction.engine.untested import Untested
@@ -161,10 +159,11 @@ class DesignDraws:
         if name == self.material:
             return self
         facts = read_material(name)
-        keys = separate_keys(seed, count=2)
+        # Apart from the draws of the gear as it is.
+        rng = np.random.default_rng([seed, 1])
         new = {
-            site: sample_prior(facts[site], site, key, self.size)
-            for site, key in zip(("E0", "alpha"), keys, strict=True)
+            site: sample_prior(facts[site], site, rng, self.size)
+            for site in ("E0", "alpha")
         }
         stiffer = new["E0"] / np.asarray(self.values["E0"])
         values = {**self.values, **new, MODULUS: stiffer}
@@ -196,10 +195,9 @@ def design_draws(
         return _calibrated(source, seed)
     ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
     priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
-    keys = separate_keys(seed, count=len(priors))
+    rng = np.random.default_rng(seed)
     values = {
-        name: sample_prior(prior, name, key, draws)
-        for key, (name, prior) in zip(keys, priors.items(), strict=True)
+        name: sample_prior(prior, name, rng, draws) for name, prior in priors.items()
     }
     return DesignDraws(
         gear=source,

@@ -112,7 +112,7 @@ def _measured(evidence: CaseEvidence, names: Sequence[str]) -> tuple[float, floa
 def _causes(case: Case) -> list[tuple[str, float, float, str]]:
     """Return name, mean and sd of the log factor, and what would split it off."""
     geometry = case.gear.geometry
-    _, modulus_sd = log_moments(case.gear.priors["E0"])
+    _, modulus_sd = log_moments(case.gear.priors["E0"], "E0")
     wall, radius = float(geometry.wall_thickness), float(geometry.radius)
     lower = replace(geometry, load_height=float(geometry.load_height) - HEIGHT_SD_MM)
     at_rim = float(THEORIES["cup"](geometry, 1.0))

@@ -83,7 +83,7 @@ def integrate_noise(value, centre, rows, prior: Prior):
 
     def at(point, weight):
         log_sd = centre + np.sqrt(2.0) * width * point
-        log_prior = distribution(prior).log_prob(jnp.exp(log_sd)) + log_sd
+        log_prior = distribution(prior, "sigma").log_prob(jnp.exp(log_sd)) + log_sd
         return value(log_sd) + log_prior + np.log(weight) + point**2
 
     # One after the other in the program's text: a loop would take twice as long.

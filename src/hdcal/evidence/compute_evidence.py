@@ -29,7 +29,6 @@ from hdcal.evidence.subspaces import (
     subspace_effect,
 )
 from hdcal.evidence.unknown_structure import unknown_evidence, unknown_kernels
-from hdcal.inference.padding_check import check_padding
 from hdcal.inference.problem import problem_priors
 from hdcal.physics.effect import Effect
 
@@ -54,7 +53,7 @@ def compute_evidence(
         stiffness: about which effects act [N/mm]; by default from least squares.
 
     Raises:
-        InputError: an effect has no prior, or does not bear padded rows.
+        InputError: an effect has no prior.
     """
     # Raises where a prior is missing.
     problem_priors(case, tuple(library.values()), shipped, case.gear.theory)
@@ -62,7 +61,6 @@ def compute_evidence(
     missing = {n: effect.needs - case.records.known for n, effect in library.items()}
     accounted = (QUANTISATION,) if case.gear.force_resolution > 0.0 else ()
     testable = [n for n in library if not missing[n] and n not in accounted]
-    check_padding([library[n] for n in testable], prepared.records, prepared.reading)
     noisy = {n: library[n] for n in testable if library[n].stage == "noise"}
     piecewise, subspaces = [], {}
     for name in [name for name in testable if name not in noisy]:

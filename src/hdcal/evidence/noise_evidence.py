@@ -110,7 +110,7 @@ def _minus_log_density(point, effect, problem: NoiseProblem, sigma: Prior):
     mean = problem.columns @ coefficients
     each = log_probability(problem.reading, mean, noise, 0.0, rounded=False)
     inside = measured(len(problem.reading), problem.count)
-    law = distribution(sigma).log_prob(jnp.exp(log_sd)) + log_sd
+    law = distribution(sigma, "sigma").log_prob(jnp.exp(log_sd)) + log_sd
     prior = -0.5 * jnp.sum(problem.precision * coefficients**2)
     return -(jnp.sum(jnp.where(inside, each, 0.0)) + law + prior)
 

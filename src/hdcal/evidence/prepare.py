@@ -128,24 +128,24 @@ def _correlations(records: Records) -> np.ndarray:
     return np.array([*CORRELATIONS, middle, longest])
 
 
-def log_moments(prior: Prior) -> tuple[float, float]:
+def log_moments(prior: Prior, name: str = "") -> tuple[float, float]:
     """Return mean and sd of the logarithm of a positive parameter."""
     if prior.family == "lognormal":
         return float(np.log(prior.numbers[0])), float(prior.numbers[1])
-    mean, sd = moments(prior)
+    mean, sd = moments(prior, name)
     return float(np.log(mean)), sd / mean
 
 
-def moments(prior: Prior) -> tuple[float, float]:
+def moments(prior: Prior, name: str = "") -> tuple[float, float]:
     """Return mean and sd of a parameter; one that is fixed has a very small sd."""
-    mean, sd = distributions.moments(prior)
+    mean, sd = distributions.moments(prior, name)
     return mean, 1e-9 if prior.family == "fixed" else sd
 
 
 def stiffness_prior(case: Case, priors) -> tuple[float, float, float, float]:
     """Return mean and sd of the log stiffness, and both formulas with K = 1 [N/mm]."""
     k_mean, k_sd = log_moments(priors["K"])
-    e_mean, e_sd = log_moments(priors["E0"])
+    e_mean, e_sd = log_moments(priors["E0"], "E0")
     modulus = np.exp(e_mean)
     nominal, ring = (
         float(THEORIES[theory](case.gear.geometry, modulus))

@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from jaxtyping import Key
 
-from hdcal.data.records import Array
+from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.off_in import noise_chance, zero_chance
-from hdcal.inference.gear_sums import MountingSums
-from hdcal.inference.population_problem import (
+from hdcal.fleets.population_problem import (
     PopulationProblem,
     draw_gears,
     gear_centres,
@@ -26,7 +24,7 @@ def each_gear(
     problem: PopulationProblem,
     sums: MountingSums,
     draws: Mapping[str, np.ndarray],
-    key: Key[Array, ""],
+    seed: int,
     ratio: np.ndarray,
 ) -> dict[str, Any]:
     """Return what is known of each gear, as `Fleet` has it.
@@ -35,14 +33,14 @@ def each_gear(
         problem: the gears.
         sums: of each mounting, as if one rig had read them all.
         draws: of the population by site, shape (d,).
-        key: source of randomness.
+        seed: of the draws.
         ratio: of the noise of each gear beside its own shapes to that beside lines.
     """
     gears = len(problem.sums.lot)
     many = min(max(_GEAR_DRAWS, _IN_ALL // gears), _MOST_DRAWN // gears)
     every = -(-len(draws["stiffness"]) // many)
     chosen = {name: v[::every] for name, v in draws.items()}
-    drawn = draw_gears(problem, chosen, key)
+    drawn = draw_gears(problem, chosen, seed)
     stiffness, off = np.asarray(drawn.stiffness), np.asarray(drawn.off)
     centre = np.asarray(gear_centres(chosen, problem.sums.lot)).T
     apart = stiffness / centre - 1.0

@@ -26,7 +26,6 @@ from hdcal.fleets.readings import FleetReadings
 from hdcal.fleets.sampling import sample_population
 from hdcal.fleets.usable import usable
 from hdcal.inference.checks import Check
-from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import Progress, check_settings
 from hdcal.notebook import Shown
 from hdcal.report.plain import as_plain
@@ -218,14 +217,13 @@ def fleet(
     readings, ratio = usable(readings, gears, skip_bad=skip_bad)
     readings = readings.at_one_size(ratio)
     problem, unit = fleet_problem(readings)
-    of_draws, of_gears = separate_keys(seed, count=2)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     start = rough_values(problem, readings.sums)
-    found = sample_population(problem, start, of_draws, progress=progress, **size)
+    found = sample_population(problem, start, seed, progress=progress, **size)
     on_one_rig = readings.on_one_rig(found.values)
     shapes = own_shapes(on_one_rig.case)
     about = problem, on_one_rig.sums, found.values
-    each = each_gear(*about, of_gears, shapes.noise_ratio)
+    each = each_gear(*about, seed, shapes.noise_ratio)
     each["chances"]["shape"] = shapes.chance
     return Fleet(
         readings=readings,

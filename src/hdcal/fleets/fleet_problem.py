@@ -9,6 +9,8 @@ from hdcal.data.prior import Prior
 from hdcal.data.scatter import reading_step
 from hdcal.evidence.prepare import moments, stiffness_prior
 from hdcal.fleets.change_points import middle_sd
+from hdcal.fleets.gear_sums import GearSums, MountingSums, gear_sums, stretched
+from hdcal.fleets.groupings import Grouping
 from hdcal.fleets.groups import (
     groups,
     lot_grouping,
@@ -17,14 +19,12 @@ from hdcal.fleets.groups import (
     slopes,
     zeros,
 )
-from hdcal.fleets.readings import FleetReadings
-from hdcal.inference.gear_sums import GearSums, MountingSums, gear_sums, stretched
-from hdcal.inference.groupings import Grouping
-from hdcal.inference.population_problem import (
+from hdcal.fleets.population_problem import (
     GROUP_RATIO,
     POPULATION_PRIORS,
     PopulationProblem,
 )
+from hdcal.fleets.readings import FleetReadings
 from hdcal.inference.problem import problem_priors
 
 

@@ -7,8 +7,8 @@ import scipy
 
 from hdcal.data.case import Case
 from hdcal.fleets.change_points import middle_sd
-from hdcal.inference.gear_sums import MountingSums
-from hdcal.inference.groupings import Grouping, grouping
+from hdcal.fleets.gear_sums import MountingSums
+from hdcal.fleets.groupings import Grouping, grouping
 
 # Lots, operators or rigs, each of which has a number of its own.
 MOST_GROUPS = 40

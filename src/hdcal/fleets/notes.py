@@ -10,9 +10,9 @@ from hdcal.data.certificates import GAINS
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.fleet_problem import population_priors
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import linked_rigs
 from hdcal.fleets.misfit import misfit_words
-from hdcal.inference.groupings import group_offsets
 from hdcal.report.parameters import credible_interval
 from hdcal.report.words import estimate
 

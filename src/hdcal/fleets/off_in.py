@@ -6,9 +6,9 @@ import numpy as np
 import scipy
 from scipy.special import digamma, polygamma, stdtr
 
-from hdcal.inference.gear_sums import MountingSums
-from hdcal.inference.groupings import group_offsets
-from hdcal.inference.population_problem import PopulationProblem
+from hdcal.fleets.gear_sums import MountingSums
+from hdcal.fleets.groupings import group_offsets
+from hdcal.fleets.population_problem import PopulationProblem
 
 # Share of the gears that are called off which are ordinary ones at most, in the mean.
 FALSE_CALLS = 0.05

@@ -8,8 +8,8 @@ import numpy as np
 
 from hdcal.fleets.change_points import Changes, changes, middle_sd
 from hdcal.fleets.fleet import Fleet
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import groups
-from hdcal.inference.groupings import group_offsets
 from hdcal.report.answer import Count, Probability, Promise, Real, Words
 from hdcal.report.parameters import Interval
 

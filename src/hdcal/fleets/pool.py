@@ -15,6 +15,7 @@ from hdcal.data.mountings import TELLING, run_labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.data.reading_notes import mountings_note
 from hdcal.errors import Finding
+from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.groups import read_by
 from hdcal.fleets.readings import (
     FleetReadings,
@@ -22,7 +23,6 @@ from hdcal.fleets.readings import (
     modulus_left,
     row_sums,
 )
-from hdcal.inference.gear_sums import MountingSums
 
 # Stands in no label.
 _BETWEEN = "\n"

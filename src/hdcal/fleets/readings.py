@@ -10,9 +10,9 @@ from hdcal.data.case import Case, Gear
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows
+from hdcal.fleets.gear_sums import MountingSums, stretched
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import group_of, read_by
-from hdcal.inference.gear_sums import MountingSums, stretched
-from hdcal.inference.groupings import group_offsets
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,13 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Key
 
 from hdcal.data.prior import Prior
-from hdcal.data.records import Array
+from hdcal.fleets.population_problem import PopulationProblem
 from hdcal.inference import laplace
 from hdcal.inference.checks import Check, mixing_checks, sampling_checks
 from hdcal.inference.independence import MAX_SHAPE, sample_independently
 from hdcal.inference.mixing import mixing
-from hdcal.inference.population_problem import PopulationProblem
 from hdcal.inference.sample import Progress, sample
 
 
@@ -33,7 +31,7 @@ class SampledPopulation(NamedTuple):
 def sample_population(
     problem: PopulationProblem,
     start: Mapping[str, float],
-    key: Key[Array, ""],
+    seed: int,
     *,
     chains: int,
     warmup: int,
@@ -45,7 +43,7 @@ def sample_population(
     Args:
         problem: the gears.
         start: sites whose value is roughly known, where to look first.
-        key: source of randomness.
+        seed: the same one gives the same draws.
         chains: chains of draws.
         warmup: iterations of adaptation per chain, where NUTS draws.
         draws: of each chain.
@@ -53,12 +51,12 @@ def sample_population(
     """
     whitening = laplace.fit(problem, start)
     size = {"chains": chains, "draws": draws, "progress": progress}
-    cheap = sample_independently(problem, whitening, key, **size)
+    cheap = sample_independently(problem, whitening, seed, **size)
     if cheap is not None:
         mixed = mixing(_free(cheap.values, problem.priors))
         checks = (*mixing_checks(mixed, chains), _covering(cheap.shape))
         return SampledPopulation(_flat(cheap.values), checks, "independent proposals")
-    found = sample(problem, whitening, key, warmup=warmup, **size)
+    found = sample(problem, whitening, seed, warmup=warmup, **size)
     mixed = mixing(_free(found.values, problem.priors))
     checks = sampling_checks(vars(found), mixed)
     return SampledPopulation(_flat(found.values), checks, "NUTS")

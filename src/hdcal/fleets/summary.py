@@ -21,6 +21,7 @@ from hdcal.fleets.answer import (
 from hdcal.fleets.document import fleet_document
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.gauge import gauge
+from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.headline import far_apart, headline
 from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.fleets.next_force import CONTENTS, NextForce
@@ -28,7 +29,6 @@ from hdcal.fleets.next_gear import CONFIDENCE, stiffness_bounds
 from hdcal.fleets.notes import notes_of
 from hdcal.fleets.off_in import FALSE_CALLS
 from hdcal.fleets.over_time import time_answer, time_series
-from hdcal.inference.groupings import group_offsets
 from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
@@ -86,7 +86,7 @@ def _kinds(off_in: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def _influence(found: Fleet) -> np.ndarray:
     """Return draws of K of every gear: data tell its product with the modulus only."""
-    mean, sd = moments(found.case.gear.priors["E0"])
+    mean, sd = moments(found.case.gear.priors["E0"], "E0")
     rng = np.random.default_rng(int(str(found.settings["seed"])))
     modulus = 1.0 + sd / mean * rng.standard_normal((len(found.stiffness), 1))
     return found.stiffness / (found.unit * modulus)

@@ -5,11 +5,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Key
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
-from hdcal.data.records import Array
 from hdcal.data.versions import versions
 from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.checks import (
@@ -21,12 +19,14 @@ from hdcal.inference.checks import (
 )
 from hdcal.inference.density import densities
 from hdcal.inference.diagnostics import Diagnosis, diagnose_parameters
+from hdcal.inference.distributions import sample_prior
 from hdcal.inference.flat_directions import dead_parameters, flat_directions
 from hdcal.inference.mixing import mixing
 from hdcal.inference.posterior_tree import build_tree
-from hdcal.inference.prior_draws import draw_priors
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
+
+_PRIOR_DRAWS = 2000
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def assemble(
     problem: Sampled,
     found: Draws,
     own: Specifics,
-    key: Key[Array, ""],
+    seed: int,
 ) -> tuple[ArrayTree, dict[str, Diagnosis], tuple[Check, ...]]:
     """Return the groups, diagnoses and checks of a posterior.
 
@@ -64,7 +64,7 @@ def assemble(
         problem: what was sampled.
         found: its draws.
         own: of this kind of calibration.
-        key: of the prior draws.
+        seed: of the prior draws.
     """
     weights = densities(problem, found.values)
     centre = {name: np.median(v, axis=(0, 1)) for name, v in found.values.items()}
@@ -77,7 +77,11 @@ def assemble(
     }
     scalars = {name: found.values[name] for name in sampled}
     diagnoses = diagnose_parameters(scalars, sampled, *weights)
-    prior_draws = draw_priors(sampled, key)
+    rng = np.random.default_rng(seed)
+    prior_draws = {
+        name: sample_prior(prior, name, rng, _PRIOR_DRAWS)
+        for name, prior in sampled.items()
+    }
     arrays = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
     dead = dead_parameters(own.slopes, problem)
     alive = {name: slope for name, slope in own.slopes.items() if name not in dead}

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from hdcal.data.priors import Prior
-from hdcal.inference.distributions import bounds, frozen
+from hdcal.inference.distributions import frozen
 from hdcal.inference.mixing import ESS_PER_CHAIN, MAX_RHAT, Mixing
 from hdcal.inference.sample import MAX_TREE_DEPTH
 from hdcal.inference.serial_correlation import CORRELATION, worth
@@ -205,7 +205,7 @@ def conflict_check(
     """Say which posteriors lie where their prior thought nothing would be."""
     far = {}
     for parameter, values in draws.items():
-        prior, median = frozen(priors[parameter]), float(np.median(values))
+        prior, median = frozen(priors[parameter], parameter), float(np.median(values))
         # A density that is highest at zero, as of an effect, expects a zero.
         below = np.inf if _peaks_at_zero(priors[parameter]) else prior.cdf(median)
         if 2.0 * min(below, prior.sf(median)) < CONFLICT_TAIL:
@@ -216,7 +216,7 @@ def conflict_check(
     each = [f"{name} = {about}" for name, about in far.items()]
     words = f"far outside what was expected before the data: {listed(each)}"
     noise = {*far} <= {"sigma", CORRELATION}
-    if noise and all(_above(draws[name], priors[name]) for name in far):
+    if noise and all(_above(name, draws, priors) for name in far):
         # A wrong unit shows in the stiffness too.
         remedy = "A loop, a bend or a drift that the model lacks counts as noise here"
         return Check(NOISY, "warning", f"{words}. {remedy}")
@@ -228,8 +228,8 @@ def conflict_check(
     return Check(PLAUSIBLE, "warning", f"{words}. {remedy}")
 
 
-def _above(values: np.ndarray, prior: Prior) -> bool:
-    return float(np.median(values)) > frozen(prior).median()
+def _above(name: str, draws: Mapping, priors: Mapping[str, Prior]) -> bool:
+    return float(np.median(draws[name])) > frozen(priors[name], name).median()
 
 
 def _peaks_at_zero(prior: Prior) -> bool:
@@ -245,7 +245,7 @@ def bound_check(draws: Mapping[str, np.ndarray], priors: Mapping[str, Prior]) ->
     for parameter, values in draws.items():
         if parameter in ORDINARY_AT_ZERO:
             continue
-        low, high = bounds(priors[parameter])
+        low, high = frozen(priors[parameter], parameter).support()
         flat = values.reshape(-1)
         ends = ((low, flat - low), (high, high - flat))
         for end, distance in ends:

@@ -17,7 +17,6 @@ from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import given_before
 from hdcal.inference.values import (
-    POSITIVE,
     Values,
     block_coefficients,
     correlation_of,
@@ -82,7 +81,7 @@ def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
     total = jnp.zeros(())
     for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":
-            law = distribution(prior, positive=name in POSITIVE)
+            law = distribution(prior, name)
             total = total + law.log_prob(values[name])
     return total
 

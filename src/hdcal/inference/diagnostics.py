@@ -62,7 +62,7 @@ def diagnose_parameters(
         to_data = dict(zip(draws, _sensitivity(draws, log_likelihood), strict=True))
     found = {}
     for name, values in draws.items():
-        contraction = _contraction(values, priors[name])
+        contraction = _contraction(values, priors[name], name)
         weak = bool(to_data[name] < SENSITIVE < to_prior[name])
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
         found[name] = Diagnosis(
@@ -75,7 +75,7 @@ def diagnose_parameters(
     return found
 
 
-def _contraction(draws: np.ndarray, prior: Prior) -> float:
+def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
     """Return which share of the prior's variance the data removed.
 
     What a lognormal prior lets be large may scatter widely too; in logarithms its width
@@ -84,7 +84,7 @@ def _contraction(draws: np.ndarray, prior: Prior) -> float:
     if prior.family == "lognormal":
         logarithm, sd = np.log(np.maximum(draws, _TINY)), float(prior.numbers[1])
         return float(1.0 - logarithm.var() / sd**2)
-    return float(1.0 - draws.var() / moments(prior)[1] ** 2)
+    return float(1.0 - draws.var() / moments(prior, name)[1] ** 2)
 
 
 def _sensitivity(draws: Mapping[str, np.ndarray], log_part: np.ndarray) -> np.ndarray:

@@ -1,180 +1,119 @@
-"""From a prior table to NumPyro's distributions, and to laws that NumPy evaluates."""
+"""Prior families as NumPyro distributions and as frozen SciPy distributions."""
 
-import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy import special
+import numpyro.distributions as dist
+from scipy import stats
 
-from hdcal.data.priors import Prior
+from hdcal.data.prior import Prior
 
 if TYPE_CHECKING:
-    import numpyro.distributions as dist
+    from scipy.stats.distributions import rv_frozen
+
+# Parameters that cannot be negative: a normal prior of one is truncated at zero.
+POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
 
 
-# Ends of the support by family; a uniform law has its own.
-_SUPPORTS = {
-    "normal": (-math.inf, math.inf),
-    "lognormal": (0.0, math.inf),
-    "half_normal": (0.0, math.inf),
-    "beta": (0.0, 1.0),
+class _Family(NamedTuple):
+    """Both forms of a family, as functions of the prior's numbers."""
+
+    numpyro: Callable[..., dist.Distribution]
+    scipy: Callable[..., "rv_frozen"]
+
+
+_FAMILIES = {
+    "normal": _Family(dist.Normal, stats.norm),
+    "lognormal": _Family(
+        lambda median, log_sd: dist.LogNormal(jnp.log(median), log_sd),
+        lambda median, log_sd: stats.lognorm(log_sd, scale=median),
+    ),
+    "half_normal": _Family(dist.HalfNormal, lambda sd: stats.halfnorm(scale=sd)),
+    "uniform": _Family(dist.Uniform, lambda low, high: stats.uniform(low, high - low)),
+    "beta": _Family(dist.Beta, stats.beta),
 }
+_POSITIVE_NORMAL = _Family(
+    lambda mean, sd: dist.TruncatedNormal(mean, sd, low=0.0),
+    lambda mean, sd: stats.truncnorm(-mean / sd, float("inf"), mean, sd),
+)
 
 
-def distribution(prior: Prior, *, positive: bool = False) -> "dist.Distribution":
-    """Return the distribution of a prior that is not fixed.
+def _family(prior: Prior, name: str) -> _Family:
+    if prior.family == "normal" and name in POSITIVE:
+        return _POSITIVE_NORMAL
+    if prior.family not in _FAMILIES:
+        raise ValueError(f"no distribution for the prior family {prior.family!r}")
+    return _FAMILIES[prior.family]
+
+
+def distribution(prior: Prior, name: str = "") -> dist.Distribution:
+    """Return the NumPyro distribution of a prior that is not fixed.
 
     Args:
         prior: family and numbers.
-        positive: cut a normal prior at zero (a modulus cannot be negative).
+        name: of the parameter.
     """
-    # Late: what was traced before needs none.
-    import numpyro.distributions as dist
-
-    numbers = prior.numbers
-    match prior.family:
-        case "normal" if positive:
-            return dist.TruncatedNormal(numbers[0], numbers[1], low=0.0)
-        case "normal":
-            return dist.Normal(numbers[0], numbers[1])
-        case "lognormal":
-            return dist.LogNormal(jnp.log(numbers[0]), numbers[1])
-        case "half_normal":
-            return dist.HalfNormal(numbers[0])
-        case "uniform":
-            return dist.Uniform(numbers[0], numbers[1])
-        case "beta":
-            return dist.Beta(numbers[0], numbers[1])
-    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+    return _family(prior, name).numpyro(*prior.numbers)
 
 
-class PriorLaw(NamedTuple):
-    """A prior as a law that NumPy evaluates: `scipy.stats` takes 0.3 s to import.
+def frozen(prior: Prior, name: str = "") -> "rv_frozen":
+    """Return the SciPy distribution of a prior that is not fixed.
 
-    All but a beta law are functions of a standard normal or uniform variable.
+    Args:
+        prior: family and numbers.
+        name: of the parameter.
     """
-
-    family: str
-    numbers: tuple[float, ...]
-
-    def cdf(self, x: ArrayLike) -> np.ndarray:
-        """Return the probability below, of the shape of `x`."""
-        return self._tail(np.asarray(x, float), below=True)
-
-    def sf(self, x: ArrayLike) -> np.ndarray:
-        """Return the probability above, exact where it is next to nothing."""
-        return self._tail(np.asarray(x, float), below=False)
-
-    def ppf(self, share: ArrayLike) -> np.ndarray:
-        """Return the values below which shares lie, of the shape of `share`."""
-        q, (first, *others) = np.asarray(share, float), self.numbers
-        match self.family:
-            case "normal":
-                return first + others[0] * special.ndtri(q)
-            case "lognormal":
-                return first * np.exp(others[0] * special.ndtri(q))
-            case "half_normal":
-                return first * special.ndtri(0.5 * (1.0 + q))
-            case "uniform":
-                return first + (others[0] - first) * q
-        return special.betaincinv(first, others[0], q)
-
-    def pdf(self, x: ArrayLike) -> np.ndarray:
-        """Return the density, of the shape of `x`."""
-        return np.exp(self.logpdf(x))
-
-    def logpdf(self, x: ArrayLike) -> np.ndarray:
-        """Return the log of the density, of the shape of `x`; −∞ beyond the ends."""
-        x, (first, *others) = np.asarray(x, float), self.numbers
-        low, high = _SUPPORTS.get(self.family, self.numbers)
-        inside = np.where((x < low) | (x > high), np.nan, x)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            match self.family:
-                case "uniform":
-                    density = 0.0 * inside - np.log(high - low)
-                case "beta":
-                    density = special.xlogy(first - 1.0, inside)
-                    density += special.xlog1py(others[0] - 1.0, -inside)
-                    density -= special.betaln(first, others[0])
-                case family:
-                    sd = others[0] if others else first
-                    density = -0.5 * self._score(inside) ** 2 - np.log(sd)
-                    density -= 0.5 * np.log(2.0 * np.pi)
-                    if family == "half_normal":
-                        density += np.log(2.0)
-                    if family == "lognormal":
-                        density = np.where(x > 0.0, density - np.log(inside), np.nan)
-        return np.where(np.isnan(density), -np.inf, density)
-
-    def median(self) -> float:
-        """Return the value that as much lies below as above."""
-        return float(self.ppf(0.5))
-
-    def interval(self, share: float) -> tuple[float, float]:
-        """Return the ends between which a share lies, as much beyond either."""
-        low, high = self.ppf(0.5 + 0.5 * share * np.array([-1.0, 1.0]))
-        return float(low), float(high)
-
-    def _score(self, x: np.ndarray) -> np.ndarray:
-        """Return the standard normal variable."""
-        first, *others = self.numbers
-        if self.family == "lognormal":
-            with np.errstate(divide="ignore"):
-                return np.log(np.maximum(x, 0.0) / first) / others[0]
-        return (x - first) / others[0] if others else np.maximum(x, 0.0) / first
-
-    def _tail(self, x: np.ndarray, *, below: bool) -> np.ndarray:
-        side = 1.0 if below else -1.0
-        match self.family:
-            case "uniform":
-                low, high = self.numbers
-                share = np.clip((x - low) / (high - low), 0.0, 1.0)
-                return share if below else 1.0 - share
-            case "beta":
-                share = special.betainc if below else special.betaincc
-                return share(*self.numbers, np.clip(x, 0.0, 1.0))
-            case "half_normal":
-                score = self._score(x)
-                inside = special.erf(score / np.sqrt(2.0))
-                return inside if below else 2.0 * special.ndtr(-score)
-        return special.ndtr(side * self._score(x))
+    return _family(prior, name).scipy(*map(float, prior.numbers))
 
 
-def frozen(prior: Prior) -> PriorLaw:
-    """Return the law of a prior that is not fixed."""
-    if prior.family not in (*_SUPPORTS, "uniform"):
-        raise ValueError(f"no distribution for the prior family {prior.family!r}")
-    return PriorLaw(prior.family, tuple(float(number) for number in prior.numbers))
+def moments(prior: Prior, name: str = "") -> tuple[float, float]:
+    """Return mean and sd of a prior, in its own unit.
+
+    Args:
+        prior: family and numbers; the sd of a fixed one is 0.
+        name: of the parameter.
+    """
+    if prior.family == "fixed":
+        return float(prior.numbers[0]), 0.0
+    law: Any = frozen(prior, name)
+    return float(law.mean()), float(law.std())
 
 
-def bounds(prior: Prior) -> tuple[float, float]:
-    """Return the ends of the prior's support."""
-    if prior.family == "uniform":
-        return float(prior.numbers[0]), float(prior.numbers[1])
-    if prior.family in _SUPPORTS:
-        return _SUPPORTS[prior.family]
-    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+def sample_prior(
+    prior: Prior, name: str, rng: np.random.Generator, count: int
+) -> np.ndarray:
+    """Return draws of a parameter from its prior, shape (count,).
+
+    Args:
+        prior: family and numbers, possibly fixed.
+        name: of the parameter.
+        rng: source of randomness.
+        count: number of draws.
+    """
+    if prior.family == "fixed":
+        return np.full(count, float(prior.numbers[0]))
+    return np.asarray(frozen(prior, name).ppf(rng.random(count)))
 
 
-def moments(prior: Prior) -> tuple[float, float]:
-    """Return mean and sd of a prior, in its own unit."""
-    first, *others = (float(number) for number in prior.numbers)
-    second = others[0] if others else 0.0
-    match prior.family:
-        case "fixed" | "normal":
-            return first, second
-        case "lognormal":
-            mean = first * math.exp(0.5 * second**2)
-            return mean, mean * math.sqrt(math.expm1(second**2))
-        case "half_normal":
-            return first * math.sqrt(2.0 / math.pi), first * math.sqrt(
-                1.0 - 2.0 / math.pi
-            )
-        case "uniform":
-            return 0.5 * (first + second), (second - first) / math.sqrt(12.0)
-        case "beta":
-            both = first + second
-            return first / both, math.sqrt(first * second / (both + 1.0)) / both
-    raise ValueError(f"no distribution for the prior family {prior.family!r}")
+def effective_priors(
+    priors: Mapping[str, Prior], values: Mapping, mountings: int
+) -> dict[str, Prior]:
+    """Return the priors, that of the force zero given how mountings differ.
+
+    A certificate states the zero of the gauge itself. To it the mean of n tested
+    mountings adds N(0, τ²/n), τ their sd: the parameter is the zero of that mean.
+
+    Args:
+        priors: by site name.
+        values: parameters of one draw, or medians of them.
+        mountings: n; 0 where no certificate states the zero, or none differ.
+    """
+    if not mountings:
+        return dict(priors)
+    zero = priors["force_offset"]
+    middle, gauge = zero.numbers
+    of_mean = jnp.asarray(values["run_offset_sd"]) / jnp.sqrt(mountings)
+    both = Prior("normal", (middle, jnp.hypot(gauge, of_mean)), zero.unit, zero.source)
+    return {**priors, "force_offset": both}

@@ -38,7 +38,7 @@ def dead_parameters(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[
     """
     dead = []
     for name, slope in slopes.items():
-        reach = np.sqrt(np.sum(slope**2)) * moments(problem.priors[name])[1]
+        reach = np.sqrt(np.sum(slope**2)) * moments(problem.priors[name], name)[1]
         if reach < _DEAD:
             dead.append(name)
     return dead
@@ -60,7 +60,8 @@ def flat_directions(slopes: Mapping[str, np.ndarray], problem: Sampled) -> list[
     """
     # In units of its prior sd every parameter has prior precision one.
     scaled = {
-        name: slope * moments(problem.priors[name])[1] for name, slope in slopes.items()
+        name: slope * moments(problem.priors[name], name)[1]
+        for name, slope in slopes.items()
     }
     unseen = [name for name, column in scaled.items() if column @ column < 1.0]
     sentences = [

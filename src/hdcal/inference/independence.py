@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Float, Key
+from jaxtyping import Float
 
 from hdcal.data.records import Array
 from hdcal.inference.laplace import Whitening, potential, values_at
@@ -54,7 +54,7 @@ class IndependentDraws(NamedTuple):
 def sample_independently(
     problem: Sampled,
     whitening: Whitening,
-    key: Key[Array, ""],
+    seed: int,
     *,
     chains: int,
     draws: int,
@@ -65,7 +65,7 @@ def sample_independently(
     Args:
         problem: the inference problem, with every parameter among its coordinates.
         whitening: its mode and curvature, from `laplace.fit`.
-        key: source of randomness; the same key gives the same draws.
+        seed: the same one gives the same draws.
         chains: chains of draws.
         draws: kept of each chain.
         progress: called with (densities computed, densities in all).
@@ -73,7 +73,8 @@ def sample_independently(
     Returns:
         The draws; None where proposals cover the posterior badly.
     """
-    rng = np.random.default_rng(np.asarray(jax.random.key_data(key)))
+    # Apart from what callers draw by the same seed.
+    rng = np.random.default_rng([seed, 1])
     law, efficiency = _adapted(problem, whitening, rng)
     if efficiency < 1.0 / _MOST:
         return None

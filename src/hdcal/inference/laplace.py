@@ -1,6 +1,7 @@
 """The Laplace fit: where the posterior is and how it is shaped, for whitening."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import equinox as eqx
@@ -9,20 +10,21 @@ import jax.numpy as jnp
 import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
+from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
 from hdcal.inference.array_tree import Group, group_of
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
-from hdcal.inference.trust_region import expansion, minimise
 
 Position = dict[str, Any]
 
-# Largest share of the gradient that may be left, in posterior sds, at the mode.
-_TOLERANCE = 1e-6
+# Length of the gradient at which a search ends [nat per posterior sd], the largest
+# radius of its trust region in such units, and the most steps.
+_TOLERANCE, _LARGEST_RADIUS, _MOST_STEPS = 1e-6, 1e4, 300
 # The group of a posterior file that holds it.
 GROUP = "laplace"
-# A search among bends ends when so many steps gained less than this [nat].
+# A search among kinks of the density ends when so many steps gained less [nat].
 _STEPS, _LEAST_GAIN = 12, 1e-3
 
 
@@ -107,7 +109,17 @@ def _expand(problem: Sampled, like: Position, flat):
         flat: where to expand, flattened.
     """
     _, unravel = ravel_pytree(like)
-    return expansion(lambda x: _typical(problem, unravel(x)), flat)
+
+    expand = jax.value_and_grad(lambda x: _typical(problem, unravel(x)))
+
+    def along(direction):
+        (value, slope), (_, row) = jax.jvp(expand, (flat,), (direction,))
+        return value, slope, row
+
+    # One row of the Hessian after the other: half the tracing of `jax.hessian`.
+    value, slope, curve = jax.lax.map(along, jnp.eye(len(flat)))
+    # Rounding can leave the halves of the Hessian apart, far from the mode.
+    return value[0], slope[0], 0.5 * (curve + curve.T)
 
 
 def _middle(site: dict[str, Any]):
@@ -164,16 +176,44 @@ def fit(
     # Parameters differ by many orders in scale: a trust region wants them alike.
     scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-12))
 
-    def expand(u):
-        value, slope, curve = _expand(problem, place, flat + scale * u)
-        slope, curve = np.asarray(slope) * scale, np.asarray(curve) * scale
-        return value, slope, curve * scale[:, None]
+    @lru_cache(maxsize=1)
+    def expand(*u: float):
+        parts = _expand(problem, place, flat + scale * np.array(u))
+        value, slope, curve = map(np.asarray, parts)
+        if not all(np.isfinite(part).all() for part in (value, slope, curve)):
+            return np.inf, np.zeros(len(u)), np.eye(len(u))
+        return float(value), slope * scale, curve * scale * scale[:, None]
 
-    # At a bend no gradient vanishes: the end is where nothing more is gained.
-    patience = (_STEPS, _LEAST_GAIN) if problem.bent else None
-    found = minimise(expand, np.zeros(len(flat)), _TOLERANCE, patience=patience)
-    factor = scale[:, None] * _inverse_root(found.curve)
-    return Whitening(_unflatten(place, flat + scale * found.place), factor)
+    found = minimize(
+        lambda u: expand(*u)[:2],
+        np.zeros(len(flat)),
+        jac=True,
+        hess=lambda u: expand(*u)[2],
+        method="trust-exact",
+        callback=_stop_at_kink() if problem.bent else None,
+        options={
+            "gtol": _TOLERANCE,
+            "max_trust_radius": _LARGEST_RADIUS,
+            "maxiter": _MOST_STEPS,
+        },
+    )
+    factor = scale[:, None] * _inverse_root(found.hess)
+    return Whitening(_unflatten(place, flat + scale * found.x), factor)
+
+
+def _stop_at_kink():
+    """Return a callback that ends a search which gains nothing more.
+
+    At a kink the gradient does not vanish.
+    """
+    levels: list[float] = []
+
+    def stop(intermediate_result: OptimizeResult) -> None:
+        levels.append(float(intermediate_result.fun))
+        if len(levels) > _STEPS and levels[-1 - _STEPS] - levels[-1] < _LEAST_GAIN:
+            raise StopIteration
+
+    return stop
 
 
 def to_group(found: Whitening) -> Group:

@@ -20,7 +20,7 @@ from hdcal.inference.gauges import with_gains
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.values import POSITIVE, stiffness
+from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
 
@@ -33,7 +33,7 @@ def sample_site(name: str, prior: Prior):
     """Sample a parameter from its prior; a fixed one is what it is."""
     if prior.family == "fixed":
         return numpyro.deterministic(name, jnp.asarray(prior.numbers[0]))
-    return numpyro.sample(name, distribution(prior, positive=name in POSITIVE))
+    return numpyro.sample(name, distribution(prior, name))
 
 
 def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
@@ -55,7 +55,7 @@ def sample_amplitude(name: str, prior: Prior, unit: Scalar | None):
     u = numpyro.sample(f"_{name}", logistic)
     size = unit * softplus(u)
     log_jacobian = jnp.log(unit) + log_sigmoid(u)
-    log_prior = distribution(prior).log_prob(size) + log_jacobian
+    log_prior = distribution(prior, name).log_prob(size) + log_jacobian
     numpyro.factor(f"_{name}_prior", log_prior - logistic.log_prob(u))
     return numpyro.deterministic(name, size)
 
@@ -135,7 +135,7 @@ def _sample_noise(problem: Problem, values: dict) -> None:
         values[CORRELATION] = _sample_correlation(problem.priors[CORRELATION])
         unshared = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
     if problem.correlated and prior.family != "fixed":
-        law = _scaled_and_moved(distribution(prior, positive=True), unshared, 0.0)
+        law = _scaled_and_moved(distribution(prior, name), unshared, 0.0)
         added = jnp.asarray(numpyro.sample("_added_sd", law))
         values[name] = numpyro.deterministic(name, added / unshared)
     else:
@@ -192,7 +192,7 @@ def _widen_zero(problem: Problem, values: dict) -> None:
     """Put the effective prior of the zero in the place of that of the gauge itself."""
     name = "force_offset"
     gauge, both = (
-        jnp.asarray(distribution(priors[name]).log_prob(values[name]))
+        jnp.asarray(distribution(priors[name], name).log_prob(values[name]))
         for priors in (problem.priors, problem.priors_given(values))
     )
     numpyro.factor("_zero", both - gauge)

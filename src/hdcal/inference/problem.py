@@ -17,7 +17,7 @@ from hdcal.errors import Finding, InputError
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
-from hdcal.inference.effective_priors import effective_priors
+from hdcal.inference.distributions import effective_priors
 from hdcal.inference.member_counts import (
     check_member_counts,
     integrated_kinds,
@@ -25,7 +25,6 @@ from hdcal.inference.member_counts import (
 )
 from hdcal.inference.noise_form import noise_form, pilot_noise
 from hdcal.inference.padding import pad_records
-from hdcal.inference.padding_check import check_padding
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
@@ -202,7 +201,6 @@ def _checked(case: Case, effects: Sequence[type[Effect]]) -> tuple[type[Effect],
     if findings:
         raise InputError(findings)
     effects = without_scatter(effects)
-    check_padding(effects, case.records, case_reading(case))
     return effects
 
 
@@ -228,7 +226,7 @@ def build_problem(
         loop: whether the leftover discrepancy may know loading from unloading.
 
     Raises:
-        InputError: an effect lacks its covariates or a prior, or bears no padding.
+        InputError: an effect lacks its covariates or a prior.
     """
     effects, theory = _checked(case, effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)

@@ -134,7 +134,7 @@ def _whiten(posterior: Posterior, centre, near: Linearisation, residual) -> Whit
     priors = posterior.problem.priors_given(centre)
     table, pull = [near.members], [-near.place]
     for name, slope in near.slopes.items():
-        mean, prior_sd = moments(priors[name])
+        mean, prior_sd = moments(priors[name], name)
         table.append(slope[:, None] * prior_sd)
         pull.append(np.array([(mean - centre[name]) / prior_sd]))
     below = np.concatenate(pull)

@@ -12,10 +12,8 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Key
 
 from hdcal.data.plausible import implausible
-from hdcal.data.records import Array
 from hdcal.errors import Findings
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
@@ -82,9 +80,10 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
 
 
 @partial(jax.jit, static_argnames=("warmup", "chains"))
-def _start(problem, whitening, key, target, *, warmup, chains):
+def _start(problem, whitening, seed, target, *, warmup, chains):
     """Return the states of chains at their start, as the leaves of NUTS' own."""
-    keys = jax.random.split(key, chains)
+    own, _ = jax.random.split(jax.random.key(seed))
+    keys = jax.random.split(own, chains)
     return jax.tree.leaves(_states(problem, whitening, keys, target, warmup))
 
 
@@ -126,8 +125,9 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
 
 
 @jax.jit
-def _constrain(problem, whitening, standard, key):
-    keys = jax.random.split(jax.random.fold_in(key, 1), standard.shape[:2])
+def _constrain(problem, whitening, standard, seed):
+    _, own = jax.random.split(jax.random.key(seed))
+    keys = jax.random.split(own, standard.shape[:2])
 
     def one(drawn):
         e, key = drawn
@@ -141,7 +141,7 @@ def _constrain(problem, whitening, standard, key):
 def sample(
     problem: Sampled,
     whitening: Whitening,
-    key: Key[Array, ""],
+    seed: int,
     *,
     chains: int = 4,
     warmup: int = 1000,
@@ -157,13 +157,13 @@ def sample(
     Args:
         problem: the inference problem.
         whitening: coordinates from `laplace.fit`.
-        key: source of randomness; the same key gives the same draws.
+        seed: the same one gives the same draws.
         chains: independent chains, one after the other in each stretch.
         warmup: iterations of adaptation per chain, discarded.
         draws: iterations kept per chain, or a multiple of them.
         progress: called after every stretch.
     """
-    begin = partial(_Run, problem, whitening, key, chains, warmup, progress)
+    begin = partial(_Run, problem, whitening, seed, chains, warmup, progress)
     # Over bends long steps diverge: they are not even tried.
     *longer, shortest = TARGET_ACCEPTANCE[problem.bent :]
     for target in longer:
@@ -210,11 +210,11 @@ def _sound(kept) -> bool:
 class _Run:
     """All chains of one step size, which may go on."""
 
-    def __init__(self, problem, whitening, key, chains, warmup, progress, target):
-        self._problem, self._whitening, self._key = problem, whitening, key
+    def __init__(self, problem, whitening, seed, chains, warmup, progress, target):
+        self._problem, self._whitening, self._seed = problem, whitening, seed
         self._warmup, self._progress, self._target = warmup, progress, target
         size = {"warmup": warmup, "chains": chains}
-        self._states = _start(problem, whitening, key, target, **size)
+        self._states = _start(problem, whitening, seed, target, **size)
         self._done, self._kept = 0, []
 
     def advance(self, draws: int, *, in_vain_if_diverging: bool = False) -> None:
@@ -250,7 +250,7 @@ class _Run:
     def found(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
         standard, *about = self.kept()
-        values = _constrain(self._problem, self._whitening, standard, self._key)
+        values = _constrain(self._problem, self._whitening, standard, self._seed)
         named = {name: np.asarray(value) for name, value in values.items()}
         return Draws(named, *about, target_acceptance=self._target)
 

@@ -20,8 +20,6 @@ from hdcal.physics.effect import Effect, Noise, parameters
 # Float scalars and arrays by site name; what each one is depends on the name.
 Values = Mapping[str, Any]
 
-# A normal prior of these is cut at zero.
-POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
 MEMBERS = {
     "run": "run_offset",
     "specimen": "specimen_deviation",

@@ -16,16 +16,15 @@ from hdcal.inference.density import densities
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.frequency_scan import scan
 from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
-from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.sample import (
     Draws,
     Progress,
     check_settings,
     sample,
 )
+from hdcal.motion.frequency_scan import scan
 from hdcal.motion.friction_search import motion_slopes
 from hdcal.motion.loss import (
     WHITE,
@@ -86,12 +85,11 @@ def calibrate_dynamic(
     theory = theory or case.gear.theory
     chosen, rival = _chosen(case, theory, effects)
     problem, priors = chosen.problem, chosen.priors
-    of_draws, of_prior = separate_keys(seed, count=2)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
-    found = sample(problem, chosen.whitening, of_draws, progress=progress, **size)
+    found = sample(problem, chosen.whitening, seed, progress=progress, **size)
     settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
     own = _specifics(problem, found, (rival, *chosen.checks))
-    parts = assemble(case, priors, problem, found, own, of_prior)
+    parts = assemble(case, priors, problem, found, own, seed)
     settings |= run_settings(found, began)
     settings |= {LOSS: chosen.probabilities} if chosen.probabilities else {}
     return DynamicPosterior(case, theory, problem.effects, priors, *parts, settings)

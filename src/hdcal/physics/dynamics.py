@@ -2,8 +2,12 @@
 
 The coordinate y is the deformation per millimetre *as read*, measured from the
 unloaded gear, and F is the load that acts on the gear. The restoring force g is that
-of the calibrated chain with the effects that act at once; what remembers the record,
-or belongs to gauges and sensors, is left out.
+of the calibrated chain with its instantaneous effects; effects with memory, and those
+of gauges and sensors, are left out.
+
+Dry friction is a contact that sticks elastically and slips at its full force, as in the
+effect `hysteresis`: its state is a displacement u, ideal friction the limit of a stiff
+contact. No speed enters, so slow motions stick and slip as fast ones do.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,12 +27,14 @@ from hdcal.physics.theory import RING_SERIES
 
 Scalar = Float[Array, ""] | float
 
-# Dry friction turns its sign over this speed [mm/s]: an ideal jump has no solution
-# that can be integrated. Far below the speeds of vibration, so that it costs little.
-FRICTION_SPEED = 1.0
-# Error allowed per step, relative and in shares of the static deformation. What
-# accumulates over hundreds of periods stays below 1e-7 of the response.
-_RELATIVE, _ABSOLUTE = 1e-9, 1e-11
+# Stiffness of the gear over that of the contact that holds it by friction [-]: a stuck
+# gear has 20 times its natural frequency, critically damped. The deformation differs
+# from that of ideal friction f by at most some 3 % of f/k.
+STUCK = 1.0 / 400.0
+# Error allowed per step, relative and in shares of the static deformation: without
+# friction some 1e-7 of the response after hundreds of periods, with it far below the
+# effect of `STUCK`.
+_SMOOTH, _STICKING = (1e-9, 1e-11), (1e-6, 1e-8)
 MOST_STEPS = 2_000_000
 
 
@@ -71,10 +77,10 @@ class Oscillator(eqx.Module):
         mass: m [N·s²/mm]; 1 kg = 1e-3 N·s²/mm.
         damping: c [N·s/mm], beside that of any effect.
         base: the static force model; its offsets are not used.
-        effects: those that act at once, see `acting`.
+        effects: instantaneous ones.
         reading: how the rig reads.
         temperature: of the gear [°C].
-        leftover: what the model leaves of the force [N] at a deformation [mm], or None.
+        leftover: unexplained force [N] at a deformation [mm], or None.
     """
 
     mass: Scalar
@@ -92,46 +98,46 @@ class Oscillator(eqx.Module):
         warm = self.base.stiffness * (1.0 - self.base.alpha * rise)
         return jnp.asarray(warm * self.reading.radial_per_read)
 
-    def restoring(self, deformation: Scalar, speed: Scalar) -> Float[Array, ""]:
+    @property
+    def frictional(self) -> bool:
+        """Return whether the force depends on the sense of the movement."""
+        return any("unloading" in effect.needs for effect in self.effects)
+
+    def restoring(
+        self, deformation: Scalar, speed: Scalar, sense: Scalar
+    ) -> Float[Array, ""]:
         """Return g, the force of the gear against its deformation [N].
 
         Args:
             deformation: y [mm].
             speed: ẏ [mm/s].
+            sense: share of the dry friction that acts, from −1 to 1.
         """
-        modelled = self._modelled(deformation, speed)
-        if self.leftover is None:
-            return modelled
-        return modelled + self.leftover(deformation)
-
-    def _modelled(self, deformation: Scalar, speed: Scalar) -> Float[Array, ""]:
-        """Return what stiffness and effects make of g [N]."""
-        if not self.effects:
-            return self.stiffness * deformation
-        row, none = jnp.reshape(deformation, (1,)), jnp.zeros(1)
-        sense = jnp.tanh(jnp.reshape(speed, (1,)) / FRICTION_SPEED)
+        row, zero = jnp.reshape(deformation, (1,)), jnp.zeros(1)
+        label = jnp.zeros(1, int)
         records = Records(
             deformation=row,
-            temperature=none + self.temperature,
-            time=none,
-            angle=none,
-            direction=sense,
-            sense=sense,
+            temperature=zero + self.temperature,
+            time=zero,
+            angle=zero,
+            direction=zero + sense,
+            sense=zero + sense,
             rate=jnp.reshape(speed, (1,)),
-            run=none.astype(int),
-            specimen=none.astype(int),
-            force=none,
-            force_sd=none,
+            run=label,
+            specimen=label,
+            force=zero,
+            force_sd=zero,
             known=frozenset(),
         )
         base = replace(self.base, deformation_offset=0.0, force_offset=0.0, sigma=1.0)
-        return predict_reading(base, self.effects, records, self.reading)[0][0]
+        force = predict_reading(base, self.effects, records, self.reading)[0][0]
+        return force if self.leftover is None else force + self.leftover(deformation)
 
 
 def acting(
     effects: Sequence[type[Effect]],
 ) -> tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]:
-    """Part effects into those that the dynamic model holds and those left out."""
+    """Return the effects that the dynamic model includes, and the others."""
     kept = tuple(effect for effect in effects if effect.instantaneous)
     return kept, tuple(effect for effect in effects if not effect.instantaneous)
 
@@ -162,8 +168,8 @@ def integrate(
         oscillator: one set of parameters.
         force: over time.
         times: increasing [s]; motion begins at the first.
-        reach: deformation at which the integration ends: what gives way there runs
-            on for ever [mm].
+        reach: deformation at which the integration ends [mm]: a gear that gives way
+            there accelerates without end.
 
     Returns:
         Deformation [mm] and speed [mm/s] at the times, whether the integration came
@@ -173,17 +179,21 @@ def integrate(
     pace = jnp.sqrt(oscillator.stiffness / oscillator.mass)
     size = force.largest() / oscillator.stiffness
     size = jnp.where(size > 0.0, size, 1.0)
+    slip, lag = _slip(oscillator, size) / size, 2.0 * jnp.sqrt(STUCK)
 
     def motion(tau, state, _):
-        y, speed = state[0] * size, state[1] * size * pace
-        drag = oscillator.damping * speed + oscillator.restoring(y, speed)
+        y, v, u = state
+        held = jnp.clip(u + lag * v, -slip, slip) if oscillator.frictional else u
+        drag = oscillator.damping * v * size * pace
+        drag += oscillator.restoring(y * size, v * size * pace, held / slip)
         push = force(times[0] + tau / pace) - drag
-        return jnp.stack([state[1], push / (oscillator.stiffness * size)])
+        return jnp.stack([v, push / (oscillator.stiffness * size), (held - u) / lag])
 
-    controller = diffrax.PIDController(rtol=_RELATIVE, atol=_ABSOLUTE)
+    relative, absolute = _STICKING if oscillator.frictional else _SMOOTH
+    controller = diffrax.PIDController(rtol=relative, atol=absolute)
     corners = force.corners()
     if corners is not None:
-        # Where the force bends a step ends: no step may smooth a corner over.
+        # A step ends at each corner of the force, so that none is smoothed.
         inner = (jnp.asarray(corners) - times[0]) * pace
         controller = diffrax.ClipStepSizeController(controller, step_ts=inner)
     shown = (jnp.asarray(times) - times[0]) * pace
@@ -193,14 +203,26 @@ def integrate(
         t0=shown[0],
         t1=shown[-1],
         dt0=None,
-        y0=jnp.zeros(2),
+        y0=jnp.zeros(3),
         saveat=diffrax.SaveAt(ts=shown),
         stepsize_controller=controller,
         max_steps=MOST_STEPS,
         event=diffrax.Event(lambda t, y, args, **_: jnp.abs(y[0]) * size > reach),
         throw=False,
     )
-    states = jnp.asarray(found.ys) * jnp.stack([size, size * pace])
+    states = jnp.asarray(found.ys)[:, :2] * jnp.stack([size, size * pace])
     done = found.result == diffrax.RESULTS.successful
     gone = found.result == diffrax.RESULTS.event_occurred
     return states, done & jnp.all(jnp.isfinite(states)), gone
+
+
+def _slip(oscillator: Oscillator, size: Scalar) -> Float[Array, ""]:
+    """Return the movement at which a contact at rest slips [mm].
+
+    Args:
+        oscillator: one set of parameters.
+        size: static deformation under the largest force [mm].
+    """
+    stuck, free = (oscillator.restoring(size, 0.0, sense) for sense in (1.0, 0.0))
+    slip = STUCK * (stuck - free) / oscillator.stiffness
+    return jnp.maximum(slip, _STICKING[1] * size)

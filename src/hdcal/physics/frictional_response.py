@@ -15,18 +15,23 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array
-from hdcal.physics.linear_response import LinearGear, Scalar, decay_entries
+from hdcal.physics.linear_response import (
+    LinearGear,
+    Scalar,
+    State,
+    applied,
+    decay_entries,
+    following,
+    whole_steps,
+)
 
 # Steps towards the time of a turn before the last one: enough also where the force
 # jumps from row to row. One is enough for a gear that swings freely.
 _SEARCH = 4
-# Deformation and speed. Two numbers and no array: what runs row after row is then
-# fused into few operations.
-State = tuple[Scalar, Scalar]
 
 
 class _Gear(NamedTuple):
-    """m [N·s²/mm], c [N·s/mm] and f [N]: what is the same in every step."""
+    """Constants of all steps: m [N·s²/mm], c [N·s/mm] and f [N]."""
 
     mass: Scalar
     damping: Scalar
@@ -34,7 +39,7 @@ class _Gear(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """One time step; what does not hang on the state.
+    """One time step; independent of the state.
 
     Attributes:
         length: h [s].
@@ -42,8 +47,8 @@ class _Step(NamedTuple):
         slope: of the force [N/s].
         stiffness: k [N/mm].
         matrix: of free decay over the whole step, row after row.
-        gain: what the force adds over the whole step.
-        drag: what friction takes over the whole step from a motion of sense +1.
+        gain: change of the state by the force over the whole step.
+        drag: change by friction over the whole step, for a motion of sense +1.
     """
 
     length: Scalar
@@ -69,7 +74,7 @@ def frictional_response(
     """
     same = _Gear(gear.mass, gear.damping, friction)
 
-    # A gradient computes each step anew: quicker than to keep some forty numbers of it.
+    # A gradient recomputes each step, which is faster than to store its numbers.
     @jax.checkpoint
     def advance(state, step):
         state = _advance(same, step, state)
@@ -83,27 +88,13 @@ def frictional_response(
 def _steps(gear: _Gear, stiffness, time, force) -> _Step:
     """Return all steps, each number an array of one entry per step."""
     length = jnp.diff(time)
-    slope = jnp.diff(force) / length
     stiffness = jnp.broadcast_to(stiffness, length.shape)
-    matrix = decay_entries(LinearGear(gear.mass, gear.damping, stiffness), length)
-    level, rate = _following(gear, stiffness, slope, force[:-1])
-    kept = _applied(matrix, (level, rate))
-    gain = level + rate * length - kept[0], rate - kept[1]
+    linear = LinearGear(gear.mass, gear.damping, stiffness)
+    matrix, gain = whole_steps(linear, time, force)
     held = gear.friction / stiffness
     drag = held * (matrix[0] - 1.0), held * matrix[2]
+    slope = jnp.diff(force) / length
     return _Step(length, force[:-1], slope, stiffness, matrix, gain, drag)
-
-
-def _following(gear: _Gear, stiffness, slope, force) -> State:
-    """Return the state that follows a force F₀ + s t without swinging."""
-    rate = slope / stiffness
-    return (force - gear.damping * rate) / stiffness, rate
-
-
-def _applied(matrix, state: State) -> State:
-    """Return the product of a matrix, row after row, and a state."""
-    a, b, c, d = matrix
-    return a * state[0] + b * state[1], c * state[0] + d * state[1]
 
 
 def _moved(gear: _Gear, step: _Step, state: State, sense, force, after) -> State:
@@ -117,17 +108,17 @@ def _moved(gear: _Gear, step: _Step, state: State, sense, force, after) -> State
         force: F where it begins [N].
         after: how long [s].
     """
-    acting = force - sense * gear.friction
-    level, rate = _following(gear, step.stiffness, step.slope, acting)
-    matrix = decay_entries(LinearGear(gear.mass, gear.damping, step.stiffness), after)
-    swing = _applied(matrix, (state[0] - level, state[1] - rate))
+    linear = LinearGear(gear.mass, gear.damping, step.stiffness)
+    level, rate = following(linear, step.slope, force - sense * gear.friction)
+    matrix = decay_entries(linear, after)
+    swing = applied(matrix, (state[0] - level, state[1] - rate))
     return level + rate * after + swing[0], rate + swing[1]
 
 
 def _advance(gear: _Gear, step: _Step, state: State) -> State:
     """Return the state at the end of a step."""
     sense = jnp.sign(state[1])
-    free = _applied(step.matrix, state)
+    free = applied(step.matrix, state)
     whole = tuple(
         f + gain + sense * drag
         for f, gain, drag in zip(free, step.gain, step.drag, strict=True)
@@ -139,18 +130,17 @@ def _advance(gear: _Gear, step: _Step, state: State) -> State:
 
 
 def _turn(gear: _Gear, step: _Step, state: State, end):
-    """Return when the gear comes to rest [s] and where [mm]; now, if it is at rest.
+    """Return when the gear comes to rest [s] and where [mm].
 
-    By steps of third order from where a straight line turns. Only the last of them is
-    differentiated, at a time that counts as given: with a speed of zero there, its
-    error has neither a first nor a second derivative. Gradients and Hessians are those
-    of the turn itself, at the cost of one step.
+    Iterations of third order from a linear estimate. Only the last of them is
+    differentiated, at a time held constant: at a speed of zero its error has neither a
+    first nor a second derivative, so gradients and Hessians are those of the turn.
 
     Args:
         gear: mass, damping and friction.
         step: in which it turns.
         state: where it begins.
-        end: speed at the end of the step, had it gone on [mm/s].
+        end: speed at the end of the step without a turn [mm/s].
     """
     sense = jnp.sign(state[1])
     still, turns = sense == 0.0, end * sense < 0.0
@@ -161,7 +151,7 @@ def _turn(gear: _Gear, step: _Step, state: State, end):
         push = step.force + step.slope * at - step.stiffness * y
         a = (push - gear.damping * v - gear.friction * sense) / gear.mass
         jerk = (step.slope - step.stiffness * v - gear.damping * a) / gear.mass
-        # Nothing is asked of a gear that does not turn: no division by zero there.
+        # No division by zero for a gear that does not turn.
         a = jnp.where(turns & (a != 0.0), a, 1.0)
         late = v / a * (1.0 + 0.5 * v * jerk / a**2)
         return jnp.clip(at - late, 0.0, step.length), y - 0.5 * v**2 / a

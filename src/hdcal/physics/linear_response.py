@@ -2,10 +2,9 @@
 
 m ÿ + c ẏ + k y = F(t). Between two rows the particular solution for F = F₀ + s τ is
 y_p = (F₀ + s τ)/k − c s/k², and what is left over decays freely, in closed form: no
-step size enters, and neither damping nor time steps need be of any kind.
+step size enters, and damping and time steps may be of any size.
 """
 
-import math
 from typing import NamedTuple
 
 import jax
@@ -15,9 +14,12 @@ from jaxtyping import Float
 from hdcal.data.records import Array
 
 Scalar = Float[Array, ""] | float
+# Deformation [mm] and speed [mm/s]. Two numbers instead of an array, so that XLA fuses
+# the operations of a row.
+State = tuple[Scalar, Scalar]
 # Below this |x| the functions of √x are summed as series, smooth through zero.
 _SMALL = 1e-4
-# Longer records are taken in stretches of so many steps, to bound the memory.
+# Longer records are computed in stretches of so many steps, to bound the memory.
 _STRETCH = 16_384
 
 
@@ -38,7 +40,7 @@ def _sine(x):
 
 
 class LinearGear(NamedTuple):
-    """What answers a force: m ÿ + c ẏ + k y.
+    """The linear oscillator m ÿ + c ẏ + k y = F.
 
     Attributes:
         mass: m [N·s²/mm].
@@ -54,10 +56,10 @@ class LinearGear(NamedTuple):
 def decay_entries(
     gear: LinearGear, step: Float[Array, "*n"]
 ) -> tuple[Float[Array, "*n"], ...]:
-    """Return the matrix that takes (y, ẏ) a time step [s] further without a force.
+    """Return the matrix of the free motion of (y, ẏ) over a time step [s].
 
-    Its four entries, row after row: exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)),
-    γ = c/2m, x = (k/m − γ²) h², C = cos √x, S = sin √x / √x: one formula through
+    Its four entries, row after row, are exp(A h) = e^(−γh) (C 1 + S h (A + γ 1)),
+    γ = c/2m, x = (k/m − γ²) h², C = cos √x, S = sin √x / √x, valid through
     critical damping.
     """
     half, square = 0.5 * gear.damping / gear.mass, gear.stiffness / gear.mass
@@ -65,6 +67,27 @@ def decay_entries(
     decay = jnp.exp(-half * step)
     level, slope = decay * _cosine(x), decay * _sine(x) * step
     return level + half * slope, slope, -square * slope, level - half * slope
+
+
+def applied(matrix: tuple[Scalar, ...], state: State) -> State:
+    """Return the product of a matrix, given row after row, and a state."""
+    a, b, c, d = matrix
+    return a * state[0] + b * state[1], c * state[0] + d * state[1]
+
+
+def following(gear: LinearGear, slope: Scalar, force: Scalar) -> State:
+    """Return the state that follows the force F₀ + s t without vibration."""
+    rate = slope / gear.stiffness
+    return (force - gear.damping * rate) / gear.stiffness, rate
+
+
+def whole_steps(gear: LinearGear, time, force) -> tuple[tuple[Scalar, ...], State]:
+    """Return matrix and gain of all steps: state ← matrix · state + gain."""
+    step = jnp.diff(time)
+    matrix = decay_entries(gear, step)
+    level, rate = following(gear, jnp.diff(force) / step, force[:-1])
+    kept = applied(matrix, (level, rate))
+    return matrix, (level + rate * step - kept[0], rate - kept[1])
 
 
 def linear_response(
@@ -76,7 +99,7 @@ def linear_response(
     """Return deformation [mm] and speed [mm/s] at the rows.
 
     Args:
-        gear: that answers.
+        gear: mass, damping and stiffness.
         time: increasing, in steps of any size [s].
         force: at the rows [N], linear between them.
         start: deformation and speed at the first row.
@@ -88,22 +111,22 @@ def linear_response(
 
 def _advance(gear: LinearGear, time, force, start) -> Float[Array, "n-1 2"]:
     """Return the states at all rows but the first."""
-    step, stiffness = jnp.diff(time), gear.stiffness
-    slope = jnp.diff(force) / step
-    lag = gear.damping * slope / stiffness**2
-    before = jnp.stack([force[:-1] / stiffness - lag, slope / stiffness], axis=-1)
-    after = jnp.stack([force[1:] / stiffness - lag, slope / stiffness], axis=-1)
-    entries = decay_entries(gear, step)
-    matrix = jnp.stack(entries, axis=-1).reshape(-1, 2, 2)
-    gain = after - jnp.einsum("nij,nj->ni", matrix, before)
-    return _follow(matrix, gain, start)
+
+    def advance(state, step):
+        matrix, gain = step
+        free = applied(matrix, state)
+        state = free[0] + gain[0], free[1] + gain[1]
+        return state, jnp.stack(state)
+
+    steps = whole_steps(gear, time, force)
+    return jax.lax.scan(advance, (start[0], start[1]), steps)[1]
 
 
 def _in_stretches(gear: LinearGear, time, force, start) -> Float[Array, "n 2"]:
-    """Return all states, stretch after stretch; a gradient computes each anew.
+    """Return all states, stretch after stretch.
 
-    Of the record only the states are kept for a gradient, where otherwise some thirty
-    numbers per row would be.
+    A gradient recomputes each stretch: it keeps the states only, instead of some
+    thirty numbers per row.
     """
     steps = len(time) - 1
     count = -(-steps // _STRETCH)
@@ -125,45 +148,3 @@ def _in_stretches(gear: LinearGear, time, force, start) -> Float[Array, "n 2"]:
     parts = stiffness.reshape(count, _STRETCH), time[rows], force[rows]
     _, states = jax.lax.scan(stretch, start, parts)
     return jnp.concatenate([start[None], states.reshape(-1, 2)[:steps]])
-
-
-def _follow(
-    matrix: Float[Array, "n 2 2"], gain: Float[Array, "n 2"], start: Float[Array, "2"]
-) -> Float[Array, "n 2"]:
-    """Return x_i = M_i x_(i−1) + g_i for all rows.
-
-    In about √n stretches side by side, then from stretch to stretch: 2√n steps in
-    sequence, where row by row it would be n.
-    """
-    rows = len(gain)
-    length = max(math.isqrt(rows), 1)
-    count = -(-rows // length)
-    # Rows that change nothing fill up the last stretch.
-    spare = count * length - rows
-    matrix = jnp.concatenate([matrix, jnp.broadcast_to(jnp.eye(2), (spare, 2, 2))])
-    gain = jnp.concatenate([gain, jnp.zeros((spare, 2))])
-    by_place = (
-        matrix.reshape(count, length, 2, 2).swapaxes(0, 1),
-        gain.reshape(count, length, 2).swapaxes(0, 1),
-    )
-
-    def apply(m, x):
-        return jnp.sum(m * x[..., None, :], axis=-1)
-
-    def within(so_far, row):
-        product, driven = so_far
-        m, g = row
-        turned = jnp.sum(m[..., :, :, None] * product[..., None, :, :], axis=-2)
-        so_far = turned, apply(m, driven) + g
-        return so_far, so_far
-
-    still = jnp.broadcast_to(jnp.eye(2), (count, 2, 2)), jnp.zeros((count, 2))
-    _, (product, driven) = jax.lax.scan(within, still, by_place)
-
-    def between(state, stretch):
-        m, g = stretch
-        return apply(m, state) + g, state
-
-    _, first = jax.lax.scan(between, start, (product[-1], driven[-1]))
-    states = apply(product, first[None]) + driven
-    return states.swapaxes(0, 1).reshape(count * length, 2)[:rows]

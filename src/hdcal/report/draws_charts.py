@@ -6,7 +6,7 @@ import numpy as np
 from arviz_stats.base import array_stats
 from scipy.stats import rankdata
 
-from hdcal.inference.distributions import bounds, frozen
+from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
 from hdcal.report.chart_spec import (
     BLUE,
@@ -35,14 +35,15 @@ def prior_chart(posterior: Posterior) -> Chart:
 
 def _density_panel(posterior: Posterior, name: str) -> Panel:
     shown, factor = unit_of(posterior, name)
-    draws, prior = posterior.draws[name], frozen(posterior.effective_priors[name])
+    draws = posterior.draws[name]
+    prior = frozen(posterior.effective_priors[name], name)
     from_data = posterior.diagnoses[name].driven_by == "data"
     marks: list[Mark] = []
     # Without the prior's long tails the posterior has room.
     low, high = prior.ppf([0.005, 0.98])
     reach = 0.2 * float(np.ptp(draws))
     if reach > 0.0:
-        least, most = bounds(posterior.effective_priors[name])
+        least, most = prior.support()
         ends = max(least, draws.min() - reach), min(most, draws.max() + reach)
         x, density, _ = array_stats.kde(draws, bound_correction=True, custom_lims=ends)
         low, high = min(low, x[0]), max(high, x[-1])

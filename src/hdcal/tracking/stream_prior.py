@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.data.prior import Prior, scaled
-from hdcal.inference.distributions import bounds, frozen
+from hdcal.data.prior import scaled
+from hdcal.inference.distributions import sample_prior
 from hdcal.inference.gauges import as_read
 from hdcal.inference.mixed_posterior import causes_of_draws
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.values import POSITIVE
 from hdcal.physics.chain import Base, Reading, linear_coefficients
 from hdcal.physics.theory import THEORIES
 
@@ -66,7 +65,7 @@ def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
     if problem.specimens:
         sd = draws["specimen_sd"] * np.sqrt(1.0 + 1.0 / problem.specimens)
         stiffness = stiffness * (1.0 + sd * rng.standard_normal(size))
-    run_sd = _draw(posterior.priors["run_offset_sd"], rng, size)
+    run_sd = sample_prior(posterior.priors["run_offset_sd"], "run_offset_sd", rng, size)
     if problem.runs:
         run_sd = draws["run_offset_sd"] * np.sqrt(1.0 + 1.0 / problem.runs)
     draws["force_offset"] = draws["force_offset"] + run_sd * rng.standard_normal(size)
@@ -94,8 +93,12 @@ def prior_from_gear(gear: Gear, seed: int = 0) -> StreamPrior:
         for name in (gear.theory, gear.K_theory)
     )
     priors = {**gear.priors, "K": scaled(gear.priors["K"], meant / own)}
-    draws = {n: _draw(priors[n], rng, _PRIOR_DRAWS, n in POSITIVE) for n in _SITES}
-    run_sd = _draw(gear.scale_priors["run_offset_sd"], rng, _PRIOR_DRAWS)
+    draws = {
+        name: sample_prior(priors[name], name, rng, _PRIOR_DRAWS) for name in _SITES
+    }
+    run_sd = sample_prior(
+        gear.scale_priors["run_offset_sd"], "run_offset_sd", rng, _PRIOR_DRAWS
+    )
     draws["force_offset"] += run_sd * rng.standard_normal(_PRIOR_DRAWS)
     half = 0.5 if gear.reading == "diametral" else 1.0
     reading = Reading(half, gear.reference_temperature)
@@ -114,11 +117,3 @@ def _stream_prior(
     variance = draws["sigma"] ** 2 + stated + step**2 / 12.0
     remounting = 2.0 * float(np.mean(run_sd**2))
     return StreamPrior(base, weights, variance, cause, reading, remounting, step)
-
-
-def _draw(prior: Prior, rng, size: int, positive: bool = False) -> np.ndarray:
-    if prior.family == "fixed":
-        return np.full(size, float(prior.numbers[0]))
-    law = frozen(prior)
-    low = float(law.cdf(0.0)) if positive and bounds(prior)[0] < 0.0 else 0.0
-    return np.asarray(law.ppf(low + (1.0 - low) * rng.random(size)))

@@ -26,7 +26,6 @@ from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 
-SCHEMA = "hdcal.study/1"
 AXES = (*SIZES, "deformation_mm", "temperature_C")
 MOST_DESIGNS, MOST_AXES, MOST_MATERIALS = 100_000, 4, 20
 # Forces held at a time [numbers]: 16 MB.

@@ -9,7 +9,6 @@ from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.motion.quantities import quantity_table
 from hdcal.motion.respond.answer import QuantityEstimate, ResponseAnswer
-from hdcal.physics.dynamics import FRICTION_SPEED
 from hdcal.prediction.engine.causes import averaging_words, causes_of
 from hdcal.report.document import Document, Picture, Section, Text, notices
 from hdcal.report.parameters import Interval
@@ -88,11 +87,6 @@ def remarks(
         yield (
             "Left out, because they remember what came before or belong to gauges and "
             f"sensors: {listed}."
-        )
-    if any(effect.name == "coulomb_friction" for effect in kept):
-        yield (
-            f"Dry friction turns its sign over a speed of {FRICTION_SPEED:g} mm/s: a "
-            "gear that sticks creeps instead."
         )
     at_rest = not isinstance(posterior, DynamicPosterior)
     gap = posterior.problem.discrepancy if at_rest else None

@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.inference.distributions import sample_prior
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem, case_reading
-from hdcal.inference.random_keys import separate_keys
 from hdcal.inference.values import Values
 from hdcal.motion.respond.request import Request
 from hdcal.physics.chain import Base, Reading
@@ -26,7 +26,6 @@ from hdcal.physics.dynamics import (
     natural_frequency,
 )
 from hdcal.physics.effect import Effect, parameters
-from hdcal.prediction.engine.causes import sample_prior
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_leftover
 from hdcal.prediction.engine.untested import Bends, Untested
 
@@ -57,14 +56,14 @@ def unseen(posterior: Posterior, values: dict, mass, seed: int):
     if isinstance(posterior, DynamicPosterior):
         return values["mass"], values["damping_ratio"]
     count, gear = len(values["K"]), posterior.case.gear
-    of_mass, of_ratio = separate_keys(seed, count=2)
+    rng = np.random.default_rng(seed)
     if mass is not None:
         moved = np.full(count, float(mass))
     else:
         radial = case_reading(posterior.case).radial_per_read
-        moved = sample_prior(mass_prior(gear, radial), "mass", of_mass, count)
+        moved = sample_prior(mass_prior(gear, radial), "mass", rng, count)
     ratio = gear.dynamic_priors["damping_ratio"]
-    return moved, sample_prior(ratio, "damping_ratio", of_ratio, count)
+    return moved, sample_prior(ratio, "damping_ratio", rng, count)
 
 
 def _with_values(effect: type[Effect], values) -> Effect:

@@ -26,7 +26,6 @@ class SeatingSlack(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the deformation beyond the play."""
         eighth = signal**8 + self.clearance**8 + _NEGLIGIBLE**8
         return signal - self.clearance * signal / eighth**0.125
 
@@ -54,7 +53,6 @@ class ContactBedding(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the share of the deformation that the gear takes."""
         depth = jnp.sqrt(signal**2 + _CORNER**2)
         # In ω_g a parabola, k ω_g² − (k (|ω| − c) − P) ω_g − |ω| P = 0; its positive
         # root in the form that needs no division by k.
@@ -86,7 +84,6 @@ class ContactOnset(Effect, stage="force", groups=("curve up",), instantaneous=Tr
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with that of the second contact added."""
         width = jnp.sqrt((_ROUNDED * self.onset) ** 2 + _LEAST**2)
 
         def beyond(depth):

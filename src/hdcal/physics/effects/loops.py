@@ -33,7 +33,6 @@ class PlasticYield(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force less the share that the plastic part does not carry."""
         # Specimen after specimen, each from its first row, whatever the run.
         order = jnp.argsort(rows.records.specimen, stable=True)
         specimen = jnp.asarray(rows.records.specimen)[order]
@@ -64,7 +63,6 @@ class CoulombFriction(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with friction added."""
         return signal + self.force * rows.records.sense
 
 
@@ -89,7 +87,6 @@ class LoadFriction(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with friction added."""
         load = jnp.abs(rows.stiffness * rows.deformation)
         return signal + self.share * load * rows.records.sense
 
@@ -121,6 +118,5 @@ class Hysteresis(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the cells' share added."""
         cells = stop_cells(rows.deformation, rows.records.run, self.reach * _SPREAD)
         return signal + self.force * jnp.mean(cells, axis=0)

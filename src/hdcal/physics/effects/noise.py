@@ -17,7 +17,6 @@ class Quantisation(Effect, stage="noise", groups=("noise",), symmetry="even"):
     step: Scalar = parameter("N", "step of the readings", typical=0.98, null=0.0)
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
-        """Return the mixture with the variance of the rounding added."""
         sd = jnp.sqrt(signal.sd**2 + self.step**2 / 12.0)
         return Noise(signal.log_weight, sd)
 
@@ -35,7 +34,6 @@ class HeteroscedasticNoise(Effect, stage="noise", groups=("noise",), symmetry="e
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
-        """Return the mixture with the variance of the load's noise added."""
         load = rows.stiffness * rows.deformation
         sd = jnp.sqrt(signal.sd**2 + (self.share * load) ** 2)
         return Noise(signal.log_weight, sd)
@@ -60,7 +58,6 @@ class Outliers(Effect, stage="noise", groups=("noise",), symmetry="even", mixtur
     )
 
     def apply(self, signal: Noise, rows: Rows) -> Noise:
-        """Return the mixture with a wide copy of every component."""
         wild = jnp.log(self.fraction + _NONE)
         tame = jnp.log1p(-self.fraction)
         return Noise(

@@ -44,16 +44,10 @@ class Scatter(Effect):
 
     @abstractmethod
     def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the change of each row by one unit of its member's deviation.
-
-        Args:
-            signal: of the effect's stage.
-            rows: the covariates and earlier stages.
-        """
+        """Return the change of each row by one unit of its member's deviation."""
 
     @final
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the signal with the deviation of every member."""
         label = getattr(rows.records, self.members)
         return signal + self.sd * scores(label) * self.unit(signal, rows)
 
@@ -78,7 +72,6 @@ class RunOffset(
     )
 
     def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return one newton at every row."""
         return jnp.ones_like(signal)
 
 
@@ -104,5 +97,4 @@ class SpecimenVariation(
     )
 
     def unit(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force itself: a deviation of one doubles it."""
         return signal

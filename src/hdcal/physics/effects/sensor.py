@@ -26,7 +26,6 @@ class RigCompliance(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the deformation of the gear."""
         return signal / (1.0 + self.compliance * rows.stiffness)
 
 
@@ -46,7 +45,6 @@ class DisplacementNonlinearity(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the deformation that a linear gauge would read."""
         return signal * (1.0 + self.curvature * signal)
 
 
@@ -71,7 +69,6 @@ class ScrewError(
     pitch: Scalar = parameter("mm", "radial travel per turn of the screw", typical=0.5)
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the deformation with the error of the screw added."""
         turn = 2.0 * jnp.pi * signal / self.pitch
         return signal + self.sine * jnp.sin(turn) + self.cosine * jnp.cos(turn)
 
@@ -97,7 +94,6 @@ class ForceSaturation(Effect, stage="sensor", groups=("curve down",)):
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force as read by the saturating sensor."""
         x = 3.0 * self.curvature * signal**2
         small = x < _SMALL
         root = jnp.sqrt(jnp.where(small, 1.0, x))

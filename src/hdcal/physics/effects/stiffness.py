@@ -25,7 +25,6 @@ class ProgressiveStiffening(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the gain added."""
         depth = jnp.sqrt(rows.deformation**2 + _CORNER**2) - _CORNER
         return signal + rows.stiffness * rows.deformation * self.slope * depth
 
@@ -53,7 +52,6 @@ class LargeDeflection(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the loss of stiffness added."""
         bent = self.curvature * rows.deformation
         loss = bent * (_FIRST + _SECOND * bent)
         return signal + rows.stiffness * rows.deformation * loss
@@ -78,7 +76,6 @@ class Ovality(Effect, stage="force", groups=("angle",), needs=("angle",)):
     sin_2: Scalar = _share("stiffness, twice per turn, sine", 0.015)
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the stiffness of the loaded diameter."""
         angle = rows.records.angle
         gain = self.cos_1 * jnp.cos(angle) + self.sin_1 * jnp.sin(angle)
         gain += self.cos_2 * jnp.cos(2.0 * angle) + self.sin_2 * jnp.sin(2.0 * angle)
@@ -103,7 +100,6 @@ class StiffnessFatigue(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force less the loss."""
         records = rows.records
         cycle = load_cycle(records.sense, records.run, records.specimen)
         return signal - rows.stiffness * rows.deformation * self.loss * jnp.log10(cycle)

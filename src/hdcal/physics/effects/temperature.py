@@ -23,7 +23,6 @@ class ThermalExpansion(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the deformation with the expansion added."""
         return signal + self.slope * rows.temperature_rise
 
 
@@ -47,7 +46,6 @@ class ThermalStiffness(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the gain added."""
         gain = self.slope * rows.temperature_rise
         return signal + rows.stiffness * rows.deformation * gain
 
@@ -71,5 +69,4 @@ class ThermalZeroDrift(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the zero shifted."""
         return signal + self.slope * rows.temperature_rise

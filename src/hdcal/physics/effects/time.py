@@ -25,7 +25,6 @@ class ViscousDamping(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the drag added."""
         return signal + self.coefficient * rows.records.rate
 
 
@@ -49,7 +48,6 @@ class Relaxation(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force less its relaxed part."""
         load, records = rows.stiffness * rows.deformation, rows.records
         left = fading(load, records.time, records.run, 1.0 / self.time_constant)
         return signal - self.share * (load - left)
@@ -71,7 +69,6 @@ class ChargeLeakage(Effect, stage="sensor", groups=("rate or time",), needs=("ti
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force as read from the leaking amplifier."""
         records = rows.records
         return fading(signal, records.time, records.run, self.rate)
 
@@ -91,5 +88,4 @@ class AmplifierDrift(
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
-        """Return the force with the zero shifted."""
         return signal + self.rate * rows.records.time

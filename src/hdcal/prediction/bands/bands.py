@@ -13,7 +13,6 @@ import numpy as np
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Records
 from hdcal.errors import Finding, InputError
-from hdcal.inference.random_keys import key_array
 from hdcal.notebook import Shown
 from hdcal.prediction.engine.causes import Cause, causes_of, likeliest
 from hdcal.prediction.engine.conditions import (
@@ -205,8 +204,7 @@ def _quantiles(causes: Sequence[Cause], models, path: Records, count: int, tails
     """
     parts = []
     for model in models:
-        keys = key_array(seed, count=len(model[1]["K"]))
-        parts.append(readings(*model, path, keys))
+        parts.append(readings(*model, path, seed))
     tables = [np.concatenate(kind)[:, -count:] for kind in zip(*parts, strict=True)]
     if len(causes) == 1:
         found = [np.quantile(table, tails, axis=0) for table in tables]

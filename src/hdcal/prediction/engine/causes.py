@@ -3,19 +3,16 @@
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-import jax
 import numpy as np
 
-from hdcal.data.prior import Prior
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.typed_json import typed
 from hdcal.errors import Finding, InputError, NotUsable
 from hdcal.inference import laplace
-from hdcal.inference.distributions import distribution
 from hdcal.inference.hypotheses import (
     LEFT_OUT,
     NONE,
@@ -26,8 +23,8 @@ from hdcal.inference.hypotheses import (
 )
 from hdcal.inference.mixed_posterior import models_of
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.problem import Problem, without_texts
-from hdcal.inference.values import POSITIVE, Values
+from hdcal.inference.problem import Problem
+from hdcal.inference.values import Values
 from hdcal.prediction.engine.models import Models, model_pairs
 from hdcal.report.words import hypothesis, percent
 
@@ -190,26 +187,6 @@ def left_out_words(causes: Sequence[Cause]) -> list[str]:
         f"{percent(missing.probability)} of the probability lies on hypotheses that "
         f"were not calibrated; it counts as {hypothesis(missing.counted_as)}."
     ]
-
-
-def sample_prior(prior: Prior, name: str, key, count: int) -> np.ndarray:
-    """Return draws of a parameter from its prior, shape (count,).
-
-    Args:
-        prior: in code units.
-        name: of the parameter; some cannot be negative.
-        key: JAX random key.
-        count: number of draws.
-    """
-    if prior.family == "fixed":
-        return np.full(count, float(prior.numbers[0]))
-    (known,) = without_texts({name: prior}).values()
-    return np.asarray(_drawn(known, key, positive=name in POSITIVE, count=count))
-
-
-@partial(jax.jit, static_argnames=("positive", "count"))
-def _drawn(prior: Prior, key, *, positive: bool, count: int):
-    return distribution(prior, positive=positive).sample(key, (count,))
 
 
 def read_models(run: Path | str) -> list[tuple[float, Posterior]]:

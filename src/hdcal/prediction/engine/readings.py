@@ -2,7 +2,7 @@
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, Key
+from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.inference.problem import Problem
@@ -19,7 +19,7 @@ def readings(
     values: Values,
     untested: Untested,
     records: Records,
-    keys: Key[Array, " draw"],
+    seed: int,
 ) -> tuple[Float[Array, "draw n"], Float[Array, "draw n"], Float[Array, "draw n"]]:
     """Return mean reading, the same with the fitted leftover, and a new reading [N].
 
@@ -30,7 +30,7 @@ def readings(
         values: draws by site, with what they leave open: [draw, …].
         untested: what is not known beyond the tested conditions.
         records: from `grid_records`.
-        keys: of the new reading, on a new run and a new specimen where these were
+        seed: of the new reading, on a new run and a new specimen where these were
             fitted, with the rounding of the rig.
     """
     at = records.deformation
@@ -57,6 +57,7 @@ def readings(
         left = bend + fitted
         return mean + bend, mean + left, new + left + error
 
+    keys = jax.random.split(jax.random.key(seed), len(values["K"]))
     return jax.vmap(one)(values, keys)
 
 

@@ -19,13 +19,13 @@ import numpy as np
 from jax.scipy.special import log_ndtr, logsumexp
 from jaxtyping import Float
 from scipy import special
+from scipy.optimize import minimize
 
 from hdcal.data.records import Array
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
 from hdcal.inference.pareto import pareto_shape
-from hdcal.inference.trust_region import Secant, minimise
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
@@ -47,8 +47,8 @@ _POINTS, _TRIALS, _COUNTED = 4096, 2, 2
 _ABREAST = 4
 # Standard normal scores of a point, beside its parameters.
 _OPEN = 5
-# Slope at which a search ends, and the least curvature that it believes.
-_SLOPE, _FLAT = 1e-3, 1e-4
+# Slope at which a search ends.
+_SLOPE = 1e-3
 # Of the levels of a bend's size, the power of their distance from the largest.
 _TOWARDS_LARGE = 4.0
 # Nodes of a standard normal, and their shares.
@@ -138,7 +138,7 @@ class _Target(eqx.Module):
         value, found, free = self.force(point, sizes)
         prior, of_sigma = self.problem.priors["sigma"], 0.0
         if prior.family != "fixed":
-            law = distribution(prior, positive=True)
+            law = distribution(prior, "sigma")
             of_sigma = law.log_prob(value["sigma"]) + jnp.log(value["sigma"])
         whole = Mixture(found.weight, found.mean, jnp.sqrt(found.sd**2 + free))
         # Plain arrays: what is traced of them can be kept.
@@ -256,14 +256,14 @@ def _laws(target: _Target, sizes) -> SamplingLaws:
     start = np.zeros(size)
 
     def towards(point):
-        return _towards(target, point, sizes)
+        value, slope = _towards(target, point, sizes)
+        return float(value), np.asarray(slope)
 
-    slope = np.asarray(towards(start)[1])
-    place, curve = minimise(Secant(towards, size), start, _SLOPE)
-    strength, axes = np.linalg.eigh(curve)
-    shape = (axes / np.maximum(np.abs(strength), _FLAT)) @ axes.T
+    slope = towards(start)[1]
+    options = {"gtol": _SLOPE}
+    found = minimize(towards, start, jac=True, method="BFGS", options=options)
     counts = np.append(np.ones(size - _OPEN, bool), slope[-_OPEN:] != 0.0)
-    place, shape = place[counts], shape[np.ix_(counts, counts)]
+    place, shape = found.x[counts], found.hess_inv[np.ix_(counts, counts)]
     return SamplingLaws(counts, ((0.0 * place, np.eye(len(place))), (place, shape)))
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import root_scalar
 from scipy.special import softmax
 
 from hdcal.inference.t_mixture import TMixture
@@ -12,8 +13,8 @@ from hdcal.inference.t_mixture import TMixture
 _FREE, _SPREAD = 5.0, 1.3
 # Points per dimension that a shape rests on, at least.
 _RESTS_ON = 20.0
-# The power of weights is searched for between 1 and ten to this one, by halves.
-_LEAST_POWER, _HALVINGS = -12.0, 40
+# The power of weights is searched for between 1 and ten to this one.
+_LEAST_POWER = -12.0
 
 
 @dataclass(frozen=True)
@@ -87,13 +88,9 @@ def _tempered(log_weight: np.ndarray, least: float) -> np.ndarray | None:
     def powered(exponent: float) -> np.ndarray:
         return softmax(10.0**exponent * log_weight)
 
-    def is_worth_it(exponent: float) -> bool:
-        return 1.0 / np.sum(powered(exponent) ** 2) >= least
+    def excess(exponent: float) -> float:
+        return 1.0 / np.sum(powered(exponent) ** 2) - least
 
-    if is_worth_it(0.0):
+    if excess(0.0) >= 0.0:
         return powered(0.0)
-    low, high = _LEAST_POWER, 0.0
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if is_worth_it(middle) else (low, middle)
-    return powered(low)
+    return powered(root_scalar(excess, bracket=(_LEAST_POWER, 0.0)).root)

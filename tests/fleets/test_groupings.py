@@ -8,7 +8,7 @@ from numpyro.handlers import seed
 from numpyro.infer.util import log_density
 from scipy.stats import multivariate_normal
 
-from hdcal.inference.groupings import group_offsets, grouping, sample_offsets
+from hdcal.fleets.groupings import group_offsets, grouping, sample_offsets
 
 
 @pytest.fixture(autouse=True)

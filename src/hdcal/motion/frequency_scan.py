@@ -140,7 +140,7 @@ def _best_near(problem: DynamicProblem, place: np.ndarray, step: float):
 
 def _frequencies(problem: DynamicProblem) -> np.ndarray:
     """Return what the priors allow and the sampling can show [Hz]."""
-    ends = {name: _ends(problem.priors[name]) for name in ("K", "E0", "mass")}
+    ends = {name: _ends(problem.priors[name], name) for name in ("K", "E0", "mass")}
     soft, stiff = ends["K"] * ends["E0"] * problem.unit_stiffness
     light, heavy = ends["mass"]
     low, high = np.sqrt(soft / heavy), np.sqrt(stiff / light)
@@ -153,17 +153,17 @@ def _frequencies(problem: DynamicProblem) -> np.ndarray:
     return np.linspace(low, high, count) / (2.0 * np.pi)
 
 
-def _ends(prior: Prior) -> np.ndarray:
+def _ends(prior: Prior, name: str) -> np.ndarray:
     """Return between which positive numbers the prior puts next to everything."""
     if prior.family == "fixed":
         return np.full(2, float(prior.numbers[0]))
-    return np.maximum(frozen(prior).ppf([_TAIL, 1.0 - _TAIL]), 1e-9)
+    return np.maximum(frozen(prior, name).ppf([_TAIL, 1.0 - _TAIL]), 1e-9)
 
 
 def _values(problem: DynamicProblem, place, found, left) -> dict[str, float]:
     frequency, ratio = place
     stiffness = 1.0 / found[0]
-    modulus = float(np.mean(_ends(problem.priors["E0"])))
+    modulus = float(np.mean(_ends(problem.priors["E0"], "E0")))
     influence = stiffness / (modulus * problem.unit_stiffness)
     values = {
         "E0": modulus,

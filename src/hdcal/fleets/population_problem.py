@@ -19,9 +19,9 @@ from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
+from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
+from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.gear_sums import GearSums, line_noise, stretched
-from hdcal.inference.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.sampled_problem import Sampled
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
@@ -229,13 +229,13 @@ class DrawnGears(NamedTuple):
 
 
 @jax.jit
-def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
+def draw_gears(problem: PopulationProblem, values: Mapping, seed: int) -> DrawnGears:
     """Draw every gear from what is known of it given each draw of the population.
 
     Args:
         problem: the gears.
         values: draws of the population by site, shape (t,).
-        key: source of randomness.
+        seed: of the draws.
     """
 
     def one(drawn):
@@ -255,6 +255,7 @@ def draw_gears(problem: PopulationProblem, values: Mapping, key) -> DrawnGears:
         chance = jnp.sum(weight * 2.0 * jax.scipy.stats.norm.sf(abs(law.far)), axis=1)
         return DrawnGears(stiffness, noise, off, chance)
 
-    keys = jax.random.split(key, len(values["stiffness"]))
+    own = jax.random.fold_in(jax.random.key(seed), 1)
+    keys = jax.random.split(own, len(values["stiffness"]))
     # One after the other: a hundred thousand gears side by side fill the memory.
     return jax.lax.map(one, (values, keys))
