@@ -22,7 +22,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.terminal import terminal_lines
-from hdcal.report.words import estimate, with_labels
+from hdcal.report.words import estimate
 
 
 def shown(*sections) -> tuple[str, str]:
@@ -33,15 +33,6 @@ def shown(*sections) -> tuple[str, str]:
     with terminal.capture() as caught:
         terminal.print(*terminal_lines(document), sep="\n")
     return html_page(document, images), caught.get()
-
-
-def test_a_sentence_calls_parameters_what_they_are_called_on_paper():
-    names = ["K", "E0", "alpha", "hysteresis.width"]
-    said = ["K and E0 are alike, in 1/K", "hysteresis.width: Kraft of alphas"]
-    assert with_labels(said, names) == [
-        "Influence coefficient K and Young's modulus E₀ are alike, in 1/K",
-        "Hysteresis: width: Kraft of alphas",
-    ]
 
 
 def test_a_terminal_has_room_for_fewer_columns():

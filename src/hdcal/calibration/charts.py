@@ -15,8 +15,9 @@ from hdcal.prediction.bands.charts import (
     branches,
 )
 from hdcal.report.chart_spec import (
-    BLUE,
     CYCLE,
+    GREY,
+    INK,
     Chart,
     Panel,
     Points,
@@ -26,7 +27,8 @@ from hdcal.report.chart_spec import (
 )
 
 _MOST_COLUMNS, _MOST_GROUPS = 3, 6
-_MARKERS = {1: "^", -1: "v"}
+# Marker of each direction, and its colour where colours show nothing else.
+_MARKERS = {1: ("^", INK), -1: ("v", GREY)}
 
 
 def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Chart:
@@ -47,7 +49,8 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
     top, panels = [*band_marks(bands)], []
     for index, (level, colour) in enumerate(zip(levels, colours, strict=True)):
         here = nearest == index
-        top += _readings(left, left.measured, here, colour, "measured")
+        points = "" if len(levels) == 1 else colour
+        top += _readings(left, left.measured, here, points, "measured")
         marks = [
             mark
             for one in branches(bands)
@@ -64,7 +67,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
                 title="distance from the fit"
                 if len(levels) == 1
                 else f"at {level:g} °C",
-                marks=[*marks, Rule(at=0.0), *_readings(left, distance, here, colour)],
+                marks=[*marks, Rule(at=0.0), *_readings(left, distance, here, points)],
                 y_limits=(-reach, reach),
                 height=2.3,
             )
@@ -107,14 +110,24 @@ def _readings(
     label: str = "",
     x: np.ndarray | None = None,
 ) -> Iterator[Points]:
-    """Yield some rows as points, each direction with its marker."""
+    """Yield some rows as points, each direction with its marker.
+
+    Args:
+        left: residuals.
+        y: values of all rows.
+        here: which rows.
+        colour: of the points; empty where it shows the direction.
+        label: what is shown; empty without any.
+        x: places of all rows, by default the deformation.
+    """
     x = left.deformation if x is None else x
     words = movement_words(left.deformation)
-    for sense, marker in _MARKERS.items():
+    for sense, (marker, own) in _MARKERS.items():
         rows = here & (left.direction == sense)
         if rows.any():
             text = f"{label}, {words[sense]}" if label else ""
-            yield Points(label=text, x=x[rows], y=y[rows], colour=colour, marker=marker)
+            look = {"colour": colour or own, "marker": marker}
+            yield Points(label=text, x=x[rows], y=y[rows], **look)
 
 
 def residual_chart(left: Residuals, runs: Sequence[str] = ()) -> Chart:
@@ -165,4 +178,4 @@ def _groups(
             name = runs[run] if len(runs) else run
             yield f"run {name}", left.run == run, colour
     else:
-        yield "measured", np.ones(len(warmth), bool), BLUE
+        yield "measured", np.ones(len(warmth), bool), ""

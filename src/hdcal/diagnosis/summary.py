@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
@@ -119,7 +120,9 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
         from hdcal.diagnosis.chart import where_charts
 
         # Of a failed fit there is the marked figure alone.
-        made = {"where": where_charts(verdict)} if verdict.status == "ok" else {}
+        made: dict[str, Any] = {}
+        if verdict.status == "ok":
+            made["where"] = where_charts(verdict)
         if refit is not None and refit[1].usable:
             made["bands"] = bands_chart()
         return made

@@ -1,9 +1,10 @@
 """Charts of draws: posterior against prior, and the mixing of the chains."""
 
 import math
+from typing import Any
 
 import numpy as np
-from arviz_stats.base import array_stats
+from arviz_stats.base.array import array_stats
 from scipy.stats import rankdata
 
 from hdcal.inference.distributions import frozen
@@ -36,7 +37,7 @@ def prior_chart(posterior: Posterior) -> Chart:
 def _density_panel(posterior: Posterior, name: str) -> Panel:
     shown, factor = unit_of(posterior, name)
     draws = posterior.draws[name]
-    prior = frozen(posterior.effective_priors[name], name)
+    prior: Any = frozen(posterior.effective_priors[name], name)
     from_data = posterior.diagnoses[name].driven_by == "data"
     marks: list[Mark] = []
     # Without the prior's long tails the posterior has room.
@@ -82,7 +83,7 @@ def _density_panel(posterior: Posterior, name: str) -> Panel:
 
 def rank_chart(posterior: Posterior) -> Chart:
     """Return the ranks of each chain's draws; chains that agree are level."""
-    draws = posterior.tree["posterior"]
+    draws = posterior.tree["posterior"].to_dataset()
     panels = [
         _rank_panel(
             draws[name].values,

@@ -11,7 +11,7 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION, Driver
 from hdcal.inference.posterior import Posterior
-from hdcal.report.parameters import measured, parameter_estimates
+from hdcal.report.parameters import parameter_estimates
 from hdcal.report.provenance import data_rows, provenance_rows
 from hdcal.report.result import INTERVAL, Count, Interval, Item, Result, Words, quantity
 from hdcal.report.words import capital, label, prior_words
@@ -123,7 +123,8 @@ class PosteriorResult(Result):
     @property
     def measured(self) -> Mapping[str, ParameterEstimate]:
         """The parameters without those that the theory defines."""
-        return measured(self.parameters, self.gear.theory)
+        defined = {"E0"} if self.gear.theory == SPRING else set()
+        return {n: one for n, one in self.parameters.items() if n not in defined}
 
     @property
     def contraction_limits(self) -> tuple[float, float]:
@@ -157,10 +158,9 @@ class PosteriorResult(Result):
 def posterior_fields(posterior: Posterior) -> dict[str, Any]:
     """Return the fields of a `PosteriorResult`."""
     case, settings, checks = posterior.case, posterior.settings, posterior.checks
-    sampling = {
-        name: settings[name] for name in Sampling.model_fields if name in settings
-    }
-    diverging = posterior.tree["sample_stats"]["diverging"]
+    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
+    sampling: dict[str, Any] = {name: settings[name] for name in names}
+    diverging = posterior.tree["sample_stats"].to_dataset()["diverging"]
     return {
         "reasons": posterior.reasons,
         "part": "part" if posterior.theory == SPRING else "gear",

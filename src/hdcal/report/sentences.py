@@ -3,8 +3,8 @@
 A template defines the blocks `title`, `subtitle`, `headline`, `next_step`, `body` and
 `page`. A terminal, a notebook and the page show all but the last one, which is shown on
 the page only: there each `##` heading begins a folded section, and each `#` heading a
-group of them. Its variables are `result`, `part` (the word for what was measured) and
-`command` (the command line).
+group of them. Its variables are `result`, `part` (the word for what was measured),
+`command` (the command line) and `on_page` (whether the body is for the page).
 """
 
 import re

@@ -134,11 +134,12 @@ def branch_marks(
                 )
     dash: Dash = "solid" if branch.loading else "dashed"
     name = "" if around_median else branch.label
-    for values, shown, text, how, width in (
+    curves: list[tuple[np.ndarray, np.ndarray, str, Dash, float]] = [
         (middle, tested, name, dash, 1.6),
         (middle, untested, label(_UNTESTED), "dotted", 1.6),
         (bands.with_gap_median_N[rows], tested | untested, "", "dashdot", 1.0),
-    ):
+    ]
+    for values, shown, text, how, width in curves:
         if np.isfinite(part(values, shown)).any():
             y = part(values, shown)
             yield Line(label=text, x=x, y=y, colour=colour, dash=how, width=width)
