@@ -13,7 +13,7 @@ from posteriors import (
     with_leftover,
     written_posterior,
 )
-from rigs import make_gear
+from rigs import cycles, make_case, make_gear
 
 from hdcal.calibration.calibration import Calibration, calibration_of
 from hdcal.data.prior import Prior
@@ -125,6 +125,25 @@ def test_charts_show_readings_bands_densities_and_ranks():
     assert at == pytest.approx(207.0, abs=1.5) and density.high.max() == 1.0
     levels = np.array([m.y for m in charts["sampler"].panels[0].marks[2:]])
     np.testing.assert_allclose(levels.mean(axis=0), 1.0)
+
+
+def test_in_tension_the_falling_branch_is_that_of_loading():
+    records = replace(cycles(24), temperature=np.full(24, 20.0))
+    records = replace(
+        records,
+        deformation=-records.deformation,
+        force=-200.0 * records.deformation,
+        sense=-records.sense,
+        direction=-records.sense,
+    )
+    case = make_case(records)
+    found = calibration_of(written_posterior(case, plain_draws(case, 400)))
+    lines = {
+        mark.label: mark.dash
+        for mark in found.charts()["calibration"].panels[0].marks
+        if isinstance(mark, Line) and mark.label
+    }
+    assert lines["median"] == "solid" and lines["median, unloading"] == "dashed"
 
 
 def test_each_temperature_has_a_panel_and_untested_parts_are_hatched():

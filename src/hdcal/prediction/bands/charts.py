@@ -66,7 +66,10 @@ def branches(bands: Bands) -> list[Branch]:
     """Return temperatures in ascending order, each with its directions."""
     levels = np.unique(bands.temperature_C)
     colours = ascending_colours(len(levels))
-    side = loading_side(bands.deformation_mm)
+    # The tested side; the curves may go beyond zero to a nominal deformation.
+    tested = np.asarray(bands.tested, bool)
+    places = bands.deformation_mm[tested if tested.any() else slice(None)]
+    side, words = loading_side(places), movement_words(places)
     found: list[Branch] = []
     for level, colour in zip(levels.tolist(), colours, strict=True):
         here = bands.temperature_C == level
@@ -74,10 +77,10 @@ def branches(bands: Bands) -> list[Branch]:
         for way in ways:
             rows = np.flatnonzero(here & (bands.direction == way))
             loads = len(ways) == 1 or way == ("down" if side < 0 else "up")
-            words = movement_words(bands.deformation_mm)[1 if way == "up" else -1]
             label = f"median at {level:g} °C" if len(levels) > 1 else "median"
             if not loads:
-                label = "" if len(found) > 1 else f"median, {words}"
+                label = f"median, {words[1 if way == 'up' else -1]}"
+                label = "" if len(found) > 1 else label
             order = np.argsort(bands.deformation_mm[rows], kind="stable")
             found.append(
                 Branch(
