@@ -38,7 +38,7 @@ class Calibration(PosteriorResult):
     Attributes:
         parameters: by name, those that were fixed last.
         K_by_theory: from the one posterior by every theory; None of a spring.
-        residuals: shapes found in them.
+        residuals: their shapes that noise would rarely have.
         effects: in the model.
         with_gap: whether the model has a leftover discrepancy.
         specimens: of several, by label, the stiffness of each as read [N/mm].

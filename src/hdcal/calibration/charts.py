@@ -53,12 +53,12 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
         top += _readings(left, left.measured, here, points, "measured")
         marks = [
             mark
-            for one in branches(bands)
+            for branch in branches(bands)
             # Around their medians both directions have the same bands, unless the
             # leftover discrepancy differs between them.
-            if one.temperature == level
-            and (one.loading or (gap is not None and gap.looped))
-            for mark in branch_marks(bands, one, around_median=True)
+            if branch.temperature == level
+            and (branch.loading or (gap is not None and gap.looped))
+            for mark in branch_marks(bands, branch, around_median=True)
         ]
         panels.append(
             Panel(
@@ -80,18 +80,18 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
 
 def distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
     """Return the distance of each reading from the force model alone [N]."""
-    found = left.residual.copy()
+    distance = left.residual.copy()
     gap = bands.with_gap_median_N - bands.physics_median_N
     if not np.isfinite(gap).any():
-        return found
+        return distance
     # The discrepancy is a part of the fit, and does not depend on the temperature.
-    curves = {bands.direction[one.rows[0]]: one.rows for one in branches(bands)}
+    curves = {bands.direction[b.rows[0]]: b.rows for b in branches(bands)}
     for direction, rows in curves.items():
         rising = (left.direction >= 0.0) == (direction == "up")
         here = rising if len(curves) > 1 else slice(None)
         place = left.deformation[here]
-        found[here] += np.interp(place, bands.deformation_mm[rows], gap[rows])
-    return found
+        distance[here] += np.interp(place, bands.deformation_mm[rows], gap[rows])
+    return distance
 
 
 def _reach(bands: Bands, distance: np.ndarray) -> float:
@@ -99,7 +99,8 @@ def _reach(bands: Bands, distance: np.ndarray) -> float:
     inside, middle = np.asarray(bands.tested, bool), bands.physics_median_N
     ends = bands.new_measurement_lo_N, bands.new_measurement_hi_N
     edges = [distance, *((end - middle)[inside] for end in ends)]
-    return 1.12 * float(np.nanmax(np.abs(np.concatenate(edges)))) or 1.0
+    reach = 1.12 * float(np.max(np.abs(np.concatenate(edges))))
+    return reach if np.isfinite(reach) and reach > 0.0 else 1.0
 
 
 def _readings(
@@ -117,17 +118,22 @@ def _readings(
         y: values of all rows.
         here: which rows.
         colour: of the points; empty where it shows the direction.
-        label: what is shown; empty without any.
+        label: of the points; empty without a legend.
         x: places of all rows, by default the deformation.
     """
     x = left.deformation if x is None else x
     words = movement_words(left.deformation)
-    for sense, (marker, own) in _MARKERS.items():
+    for sense, (marker, usual) in _MARKERS.items():
         rows = here & (left.direction == sense)
         if rows.any():
             text = f"{label}, {words[sense]}" if label else ""
-            look = {"colour": colour or own, "marker": marker}
-            yield Points(label=text, x=x[rows], y=y[rows], **look)
+            yield Points(
+                label=text,
+                x=x[rows],
+                y=y[rows],
+                colour=colour or usual,
+                marker=marker,
+            )
 
 
 def residual_chart(left: Residuals, runs: Sequence[str] = ()) -> Chart:

@@ -35,7 +35,7 @@ class ResidualReport(Result):
     """Residuals of a calibration.
 
     Attributes:
-        shapes: found in them.
+        shapes: those that noise would rarely have.
         rms_N: root mean square.
         left: residuals by row.
     """
@@ -77,7 +77,7 @@ def residual_report(left: Residuals) -> ResidualReport:
 
 
 def residual_shapes(left: Residuals) -> tuple[ResidualShape, ...]:
-    """Return the shapes found in residuals, those of the noise last."""
+    """Return the shapes of residuals, those of the noise last."""
     return tuple(
         ResidualShape(name=s.name, p_value=s.p_value, size_N=s.size_N, words=s.words)
         for s in (*left.structure, *left.noise)

@@ -58,7 +58,7 @@ def bands_chart(bands: Bands) -> Chart:
 
 def band_marks(bands: Bands) -> list[Mark]:
     """Return the bands of the force, and upon them the medians."""
-    marks = [mark for one in branches(bands) for mark in branch_marks(bands, one)]
+    marks = [mark for b in branches(bands) for mark in branch_marks(bands, b)]
     return sorted(marks, key=lambda mark: isinstance(mark, Line))
 
 
