@@ -15,7 +15,6 @@ RESULTS = {
 # Class of another result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
-    "Case": "calibration.check.summary.case_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "FleetCauses": "shared_causes.summary.causes_report",
@@ -30,7 +29,6 @@ TELLERS = {
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
     "Bands": "report.tables.own_columns",
-    "Case": "calibration.check.summary.reading_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "FleetCauses": "shared_causes.summary.cause_columns",
@@ -45,7 +43,6 @@ TABLES = {
 # -> its chart.
 CHARTS = {
     "Bands": "prediction.bands.charts.bands_chart",
-    "Case": "calibration.check.chart.case_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
     "InverseDesign": "design.chart.candidate_chart",

@@ -17,7 +17,7 @@ from hdcal.design.springs import best_common, judge, set_points
 from hdcal.design.summary import generator_answer
 from hdcal.design.wave_generator import wave_generator
 from hdcal.errors import InputError
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.engine.causes import causes_of, independent_draws
 
 WINDOW = (0.38, 0.42)
@@ -192,7 +192,7 @@ def test_draws_that_hang_together_are_worth_fewer(given):
 
 def test_the_worth_of_several_causes_is_that_of_their_mean():
     """Against a share that is counted among the draws of both, again and again."""
-    posterior = mixed_posterior({"none": (0.7, single()), "x": (0.3, single())})
+    posterior = ModelAverage({"none": (0.7, single()), "x": (0.3, single())})
     found = design_draws(posterior)
     each = [independent_draws(cause) for cause in causes_of(posterior)]
     rng = np.random.default_rng(0)

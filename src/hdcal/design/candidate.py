@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +10,7 @@ import numpy as np
 from hdcal.design.design_draws import DesignDraws
 from hdcal.design.force_limit import LimitedGear
 from hdcal.design.nearest_point import CLOSE, nearest_kept
+from hdcal.exported import jit
 from hdcal.prediction.engine.sizes import SIZES
 
 # Draws on either side of a quantile that tell its slope.
@@ -77,7 +77,7 @@ def _own(target: LimitedGear, name: str) -> float:
 
 
 # Compiled once for all materials: everything but the names is an argument.
-@partial(jax.jit, static_argnames=("names",))
+@jit(static_argnames=("names",))
 def _excess(target: LimitedGear, z, *, names):
     """Return the logarithms of force and stress over what is allowed."""
     place = dict(zip(names, jnp.exp(z), strict=True))
@@ -86,7 +86,7 @@ def _excess(target: LimitedGear, z, *, names):
     return jnp.log(jnp.stack([force, target.utilisation(place) + 1e-12]))
 
 
-@partial(jax.jit, static_argnames=("names",))
+@jit(static_argnames=("names",))
 def _slopes(target: LimitedGear, z, *, names):
     """Return their derivatives."""
     return jax.jacfwd(lambda y: _excess(target, y, names=names))(z)
@@ -115,7 +115,7 @@ def candidate(
     )
 
 
-@jax.jit
+@jit
 def _draws(target: LimitedGear, sizes):
     return target.forces(sizes), target.stresses(sizes)
 
@@ -138,7 +138,7 @@ def spreads(
     return np.asarray(_spreads(target, dict(sizes), shares)).T
 
 
-@jax.jit
+@jit
 def _spreads(target: LimitedGear, sizes, shares):
     def one(place):
         ranked = jnp.sort(target.forces(place))
@@ -157,7 +157,7 @@ def elasticities(target: LimitedGear, sizes: Mapping[str, float]) -> dict[str, f
     return {name: float(value) for name, value in found.items()}
 
 
-@jax.jit
+@jit
 def _elasticities(target: LimitedGear, place):
     # The slope of a quantile is the mean slope of the draws about it, of which one
     # alone is a rough number: Hong, Operations Research 57 (2009).

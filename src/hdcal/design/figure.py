@@ -1,6 +1,5 @@
 """Figures of a design: spring against gear, force against limit, a ring's shape."""
 
-import jax
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,6 +10,7 @@ from hdcal.design.design_draws import DesignDraws
 from hdcal.design.inverse_design import InverseDesign
 from hdcal.design.sizes import named
 from hdcal.design.wave_generator import WaveGenerator
+from hdcal.exported import jit
 from hdcal.physics.profile import ring_profile
 from hdcal.physics.theory import RING_SERIES
 from hdcal.report.canvas import (
@@ -28,7 +28,7 @@ from hdcal.report.canvas import (
     temperature_colours,
 )
 
-_profile = jax.jit(ring_profile, static_argnames=("terms",))
+_profile = jit(ring_profile, static_argnames=("terms",))
 _TAILS = (0.025, 0.5, 0.975)
 # Points along a curve, and along each side of a map.
 _FINE, _COARSE = 41, 21

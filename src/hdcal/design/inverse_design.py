@@ -38,10 +38,10 @@ from hdcal.design.sizes import (
     with_reference,
 )
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.prediction.engine.conditions import slip_findings
 from hdcal.prediction.engine.loading_sense import capacity_findings
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES
 
 
@@ -78,7 +78,7 @@ class InverseDesign(Shown):
 
 
 def inverse_design(
-    source: Posterior | Gear,
+    source: Models | Gear,
     vary: Mapping[str, tuple[float, float]],
     limit_force: float,
     *,

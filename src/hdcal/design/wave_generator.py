@@ -15,8 +15,8 @@ from hdcal.design.sentences import beyond_tested
 from hdcal.design.sizes import with_reference
 from hdcal.design.springs import Spring, judge_all, set_points, softest
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
+from hdcal.prediction.engine.models import Models
 
 # Default range of the spring rate, relative to the gear's own stiffness.
 RATE_RANGE = (0.01, 100.0)
@@ -65,7 +65,7 @@ class WaveGenerator(Shown):
 
 
 def wave_generator(
-    source: Posterior | Gear,
+    source: Models | Gear,
     window: tuple[float, float],
     *,
     temperatures: Sequence[float] | None = None,

@@ -9,6 +9,7 @@ from scipy.stats import rankdata
 
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
 from hdcal.report.chart_spec import (
     BLUE,
     CYCLE,
@@ -83,7 +84,7 @@ def _density_panel(posterior: Posterior, name: str) -> Panel:
 
 def rank_chart(posterior: Posterior) -> Chart:
     """Return the ranks of each chain's draws; chains that agree are level."""
-    draws = posterior.tree["posterior"].to_dataset()
+    draws = group_of(posterior.tree, "posterior")
     panels = [
         _rank_panel(
             draws[name].values,

@@ -11,9 +11,19 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION, Driver
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
 from hdcal.report.parameters import parameter_estimates
 from hdcal.report.provenance import data_rows, provenance_rows
-from hdcal.report.result import INTERVAL, Count, Interval, Item, Result, Words, quantity
+from hdcal.report.result import (
+    INTERVAL,
+    Count,
+    Digest,
+    Interval,
+    Item,
+    Result,
+    Words,
+    quantity,
+)
 from hdcal.report.words import capital, label, prior_words
 
 _NAME = "[A-Za-z_][A-Za-z0-9_]*"
@@ -73,7 +83,7 @@ class CalibratedData(Item):
 
     name: str
     rows: Annotated[int, Field(ge=1)]
-    sha256: str = Field(json_schema_extra={"pattern": "^[0-9a-f]{64}$"})
+    sha256: Digest
     notes: tuple[str, ...]
 
 
@@ -160,7 +170,7 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
     case, settings, checks = posterior.case, posterior.settings, posterior.checks
     names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
     sampling: dict[str, Any] = {name: settings[name] for name in names}
-    diverging = posterior.tree["sample_stats"].to_dataset()["diverging"]
+    diverging = group_of(posterior.tree, "sample_stats")["diverging"]
     return {
         "reasons": posterior.reasons,
         "part": "part" if posterior.theory == SPRING else "gear",

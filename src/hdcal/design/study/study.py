@@ -20,10 +20,10 @@ from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.sentences import beyond_tested, far_from_tested
 from hdcal.design.sizes import geometry_with
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.gear_forces import gear_forces
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 
 AXES = (*SIZES, "deformation_mm", "temperature_C")
@@ -58,7 +58,7 @@ class Study(Shown):
 
 
 def study(
-    source: Posterior | Gear,
+    source: Models | Gear,
     vary: Mapping[str, Sequence[float]],
     *,
     materials: Sequence[str] = (),
