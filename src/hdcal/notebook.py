@@ -14,15 +14,12 @@ TELLERS = {
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "FleetCauses": "shared_causes.summary.causes_report",
-    "InverseDesign": "design.summary.inverse_report",
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
     "Posterior": "calibration.summary.calibration_report",
     "Residuals": "calibration.residuals_document.residuals_document",
     "Response": "motion.respond.summary.response_report",
-    "Study": "design.study.summary.study_report",
     "Verdict": "diagnosis.summary.verdict_report",
-    "WaveGenerator": "design.summary.generator_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
@@ -31,7 +28,6 @@ TABLES = {
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "FleetCauses": "shared_causes.summary.cause_columns",
-    "InverseDesign": "design.chart.candidate_rows",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
     "Posterior": "report.parameters.posterior_rows",
@@ -39,7 +35,6 @@ TABLES = {
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
     "Verdict": "diagnosis.chart.hypothesis_columns",
-    "WaveGenerator": "design.chart.spring_rows",
 }
 # -> its chart.
 CHARTS = {
@@ -47,14 +42,11 @@ CHARTS = {
     "Case": "calibration.check.chart.case_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
-    "InverseDesign": "design.chart.candidate_chart",
     "NextForce": "fleets.force.chart.force_chart",
     "Posterior": "calibration.chart.posterior_chart",
     "Residuals": "calibration.chart.residuals_chart",
     "Response": "motion.respond.chart.response_chart",
-    "Study": "design.study.chart.study_chart",
     "Verdict": "diagnosis.chart.verdict_chart",
-    "WaveGenerator": "design.chart.generator_chart",
 }
 # -> what draws it where no chart holds it.
 DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}
