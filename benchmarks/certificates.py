@@ -13,6 +13,7 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 
 from benchmarks.children import table
 from hdcal.data.case import Case, Gear
@@ -21,8 +22,8 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.records import Records
 from hdcal.inference import laplace
-from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.sample import sample
 from hdcal.prediction.engine.causes import causes_of
@@ -151,8 +152,8 @@ def sampled(case: Case, seed: int) -> Posterior:
     size = {"chains": 2, "warmup": 300, "draws": 500}
     draws = sample(problem, laplace.fit(problem), seed, **size)
     priors = problem_priors(case, (), shipped, theory)
-    arrays = ArrayTree({"posterior": group_of(draws.values)})
-    return Posterior(case, theory, (), priors, arrays, {}, (), {"with_gap": False})
+    tree = xr.DataTree.from_dict({"posterior": dataset(draws.values)})
+    return Posterior(case, theory, (), priors, tree, {}, (), {"with_gap": False})
 
 
 @jax.jit

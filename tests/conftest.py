@@ -81,3 +81,11 @@ def few_executables() -> Iterator[None]:
         if Path("/proc/self/maps").read_bytes().count(b"\n") > 30_000:
             jax.clear_caches()
             gc.collect()
+
+
+@pytest.fixture(autouse=True)
+def own_traces(request: pytest.FixtureRequest) -> None:
+    """Keep no trace of code that a test has changed, and load none in its place."""
+    if "monkeypatch" in request.fixturenames and "hdcal.exported" in sys.modules:
+        patch = request.getfixturevalue("monkeypatch")
+        patch.setattr("hdcal.exported._is_special", lambda leaves: True)

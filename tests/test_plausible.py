@@ -13,7 +13,6 @@ from moving import still_posterior
 
 import hdcal
 from hdcal.__main__ import hdcal as program
-from hdcal.classical.fit.summary import fit_report
 from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
 from hdcal.data.gear import read_gear
@@ -186,12 +185,7 @@ ASKED: list[tuple[Callable, dict, tuple[str, ...]]] = [
     (
         lambda run, **asked: hdcal.fit(run.case, **asked),
         {},
-        ("degrees",),
-    ),
-    (
-        lambda run, at: fit_report(run.case, hdcal.fit(run.case, [1]), "", at=at),
-        {},
-        ("at",),
+        ("degrees", "at"),
     ),
     (
         lambda run, **asked: hdcal.causes(run.case, **{"seed": -1, **asked}),

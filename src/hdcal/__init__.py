@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
     from hdcal.calibration.summary import summarise
-    from hdcal.classical.fit.fit import fit
+    from hdcal.classical.fit import fit
     from hdcal.comparison.compare import compare
     from hdcal.data.case import Case, Gear
     from hdcal.data.priors import Prior
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hdcal.fleets.fleet import fleet
     from hdcal.fleets.fleet_posterior import FleetPosterior
     from hdcal.inference.dynamic_posterior import DynamicPosterior
+    from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
     from hdcal.inference.residuals import residuals
     from hdcal.motion.dynamic_calibration import calibrate_dynamic
@@ -46,6 +47,7 @@ _HOMES = {
     "Geometry": "data.records",
     "HdcalError": "errors",
     "InputError": "errors",
+    "ModelAverage": "inference.model_average",
     "Noise": "physics.effect",
     "NotUsable": "errors",
     "Posterior": "inference.posterior",
@@ -59,7 +61,7 @@ _HOMES = {
     "causes": "shared_causes.causes",
     "compare": "comparison.compare",
     "diagnose": "diagnosis.diagnose",
-    "fit": "classical.fit.fit",
+    "fit": "classical.fit",
     "fleet": "fleets.fleet",
     "force": "physics.chain",
     "inverse_design": "design.inverse_design.inverse_design",

@@ -17,7 +17,7 @@ from hdcal.calibration.check.command import check
 from hdcal.calibration.command import calibrate
 from hdcal.calibration.effects.command import effects
 from hdcal.calibration.init.command import init
-from hdcal.classical.fit.command import fit
+from hdcal.classical.command import fit
 from hdcal.cli.console import Console, discard_output, usage_error
 from hdcal.cli.here import what_next
 from hdcal.cli.topics import show_topic

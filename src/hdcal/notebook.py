@@ -10,7 +10,6 @@ from typing import Any
 # Class of a result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
-    "Case": "calibration.check.summary.case_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "FleetCauses": "shared_causes.summary.causes_report",
@@ -24,7 +23,6 @@ TELLERS = {
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
     "Bands": "report.tables.own_columns",
-    "Case": "calibration.check.summary.reading_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "FleetCauses": "shared_causes.summary.cause_columns",
@@ -39,7 +37,6 @@ TABLES = {
 # -> its chart.
 CHARTS = {
     "Bands": "prediction.bands.chart.bands_chart",
-    "Case": "calibration.check.chart.case_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
     "NextForce": "fleets.force.chart.force_chart",

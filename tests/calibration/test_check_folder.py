@@ -7,7 +7,7 @@ import numpy as np
 from commands import Hdcal
 from schema_checks import obeys
 
-from hdcal.calibration.check.answer import CheckAnswer
+from hdcal.calibration.check.check import Check
 
 STIFFNESS = {"A": 100.0, "B": 120.0, "C": 90.0}
 HEADERS = {"A": "deformation_mm,force_N", "B": "deformation_um;Load [kN]"}
@@ -28,22 +28,21 @@ def folder_of_gears(place: Path) -> Path:
     return place
 
 
-def test_each_gear_has_a_row_and_fleet_is_pointed_to(here: Hdcal, tmp_path: Path):
+def test_each_gear_has_a_row_and_fleet_is_the_next_step(here: Hdcal, tmp_path: Path):
     folder_of_gears(tmp_path / "line")
     done = here("check", "line", "--json")
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
-    obeys(answer, CheckAnswer)
+    obeys(answer, Check)
     slopes = {s["name"]: s["stiffness_N_per_mm"] for s in answer["specimens"]}
     assert {name: round(slope, 6) for name, slope in slopes.items()} == STIFFNESS
     assert {s["rows"] for s in answer["specimens"]} == {6}
     assert "`fleet`" in answer["next_step"] and answer["case"] == "line"
     assert any("each file is a gear" in note for note in answer["notes"])
-    # For people too.
-    assert "The specimens" in done.stderr
+    assert "Specimens" in done.stderr
 
 
-def test_folders_of_gears_have_gear_files_of_their_own(here: Hdcal, tmp_path: Path):
+def test_each_folder_of_a_gear_has_its_gear_file(here: Hdcal, tmp_path: Path):
     folder_of_gears(tmp_path / "files")
     for name in STIFFNESS:
         (own := tmp_path / "line" / name).mkdir(parents=True)
@@ -55,7 +54,7 @@ def test_folders_of_gears_have_gear_files_of_their_own(here: Hdcal, tmp_path: Pa
     assert answer["gear"]["theory"] == "ring"
 
 
-def test_what_is_wrong_with_any_file_is_said_at_once(here: Hdcal, tmp_path: Path):
+def test_findings_of_all_files_are_reported_at_once(here: Hdcal, tmp_path: Path):
     folder = folder_of_gears(tmp_path / "line")
     (folder / "B.csv").write_text("")
     (folder / "C.csv").write_text(HEADERS["A"] + "\n0.1,abc\n" + "0.2,1\n" * 5)

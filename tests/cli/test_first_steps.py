@@ -29,7 +29,7 @@ def log(tmp_path: Path) -> Path:
 def test_a_file_alone_is_shown(here: Hdcal, log: Path):
     done = here("check", log)
     assert done.returncode == 0
-    assert done.stdout.index("is a spring") < done.stdout.index("gear: part")
+    assert done.stdout.index("is a spring") < done.stdout.index("theory spring")
     assert "'Kraft [kN]' is the force in kN" in done.stdout
 
 

@@ -65,7 +65,7 @@ def test_an_interruption_after_the_end_says_what_is_written(
         assert (tmp_path / "run" / "fit.json").exists()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hdcal.report.terminal.terminal_lines", interrupted)
+    monkeypatch.setattr("hdcal.report.terminal_text.terminal_parts", interrupted)
     done = here("fit", XB1, "--out", "run")
     assert done.returncode == 130 and not done.stdout
     assert done.stderr.strip() == "hdcal: interrupted: run is written"
@@ -75,16 +75,16 @@ def test_an_interruption_after_the_end_says_what_is_written(
 def test_what_appears_meanwhile_is_kept_and_told(
     here: Hdcal, monkeypatch, tmp_path: Path
 ):
-    from hdcal.classical.fit import summary
+    from hdcal.classical import fit
 
-    report = summary.fit_report
+    original = fit.fit
 
     def slow(*given, **named):
         (tmp_path / "made").mkdir()
         (tmp_path / "made" / "thesis.txt").write_text("years of work")
-        return report(*given, **named)
+        return original(*given, **named)
 
-    monkeypatch.setattr(summary, "fit_report", slow)
+    monkeypatch.setattr(fit, "fit", slow)
     done = here("fit", XB1, "--out", "made", "--force", "--json")
     assert done.returncode == 2
     (finding,) = json.loads(done.stdout)["findings"]

@@ -126,4 +126,4 @@ def test_the_command_writes_a_folder_and_refuses_one_result(here: Hdcal, tmp_pat
     assert "'before' is read too" in done.stderr
     assert (tmp_path / "before" / "posterior.nc").exists()
     done = here("compare", "before", "side")
-    assert done.returncode == 2 and "a comparison leaves no posterior" in done.stderr
+    assert done.returncode == 2 and "a comparison has no posterior" in done.stderr

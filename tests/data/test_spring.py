@@ -5,13 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from hdcal.data.full_scale import FullScale
 from hdcal.data.gear import NO_MATERIAL, at_full_scale, read_gear
 from hdcal.data.priors import material_priors, rig_priors
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
-from hdcal.inference.posterior_file import describe_case, restore_case
+from hdcal.inference.case_json import describe_case, restore_case
+from hdcal.inference.posterior_tree import data_groups
 from hdcal.inference.problem import build_problem, influence_prior
 
 SPRING = '[gear]\ntheory = "spring"\n'
@@ -129,22 +131,10 @@ def test_a_case_read_as_a_spring_stays_one(rig):
 
 
 def test_it_is_held_in_a_posterior_file(rig):
-    from hdcal.inference.array_tree import group_of
-    from hdcal.inference.posterior_file import UNITS
-
-    records = rig.records
-    rows = group_of({n: getattr(records, n) for n in UNITS}, ("row",))
-    force = np.asarray(records.force)
     text = describe_case(rig)
     assert "NaN" not in text
-    back = restore_case(text, rows, force)
+    back = restore_case(text, xr.DataTree.from_dict(data_groups(rig.records)))
     assert math.isnan(back.gear.geometry.radius)
     assert replace(back.gear, geometry=None, source={}) == replace(
         rig.gear, geometry=None, source={}
     )
-    with pytest.raises(ValueError, match="lacks the sizes"):
-        restore_case(
-            text.replace('"theory": "spring"', '"theory": "ring"'),
-            rows,
-            force,
-        )

@@ -16,7 +16,7 @@ from hdcal.design.wave_generator import wave_generator as module
 from hdcal.design.wave_generator.springs import best_common, judge, set_points
 from hdcal.design.wave_generator.wave_generator import wave_generator
 from hdcal.errors import InputError
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.engine.causes import causes_of, independent_draws
 from hdcal.report.chart_spec import Band, Points, Span
 
@@ -190,7 +190,7 @@ def test_correlated_draws_have_a_larger_standard_error(given):
 
 def test_the_effective_size_of_several_causes_is_that_of_their_mean():
     """The reference is the variance of a share counted among the draws of both."""
-    posterior = mixed_posterior({"none": (0.7, single()), "x": (0.3, single())})
+    posterior = ModelAverage({"none": (0.7, single()), "x": (0.3, single())})
     found = design_draws(posterior)
     each = [independent_draws(cause) for cause in causes_of(posterior)]
     rng = np.random.default_rng(0)

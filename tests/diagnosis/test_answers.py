@@ -15,7 +15,7 @@ from hdcal.diagnosis.candidate_runs import candidate_runs
 from hdcal.diagnosis.refit import Refits
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.evidence.residual_test import residual_test
-from hdcal.inference.hypotheses import LeftOut
+from hdcal.inference.model_average import LeftOut
 from hdcal.physics.registry import EFFECTS
 
 CURVED = {"progressive_stiffening": {"slope": 0.1}}

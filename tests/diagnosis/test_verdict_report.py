@@ -31,7 +31,7 @@ def test_k_is_said_with_what_it_is_fitted_beside():
     nothing = page(KINDS["none"]())
     assert "It is fitted beside no effect" in nothing
     found = verdict_answer(named())
-    several = [Refit("hysteresis", 0.8, "a.nc"), Refit("none", 0.2, "b.nc")]
+    several = [Refit("hysteresis", 0.8), Refit("none", 0.2)]
     images = {name: b"" for name in ("where", "which", "shrink")}
     for refits, whose in (
         (several, "the average over the 2 models under “The corrected model”"),

@@ -11,17 +11,15 @@ import numpy as np
 import pytest
 from fleets import handmade
 from posteriors import single
-from trees import with_tree
 
 import hdcal
 from hdcal.errors import InputError, NotUsable
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.fleet_posterior import FleetPosterior
-from hdcal.inference import posterior_file
 from hdcal.inference.posterior import Posterior
-from hdcal.inference.posterior_file import CALIBRATION, FLEET, kind_of
+from hdcal.inference.posterior_file import CALIBRATION, FLEET, content, kind_of
 
-CHANGED = "was changed after hdcal wrote it. Take the file .* ask for the fleet again"
+CHANGED = "was changed after hdcal wrote it. Take the file .* run hdcal fleet again"
 
 
 def with_lots() -> Fleet:
@@ -113,31 +111,6 @@ def test_every_edit_is_found(file: Path, edit: Callable):
     assert len(caught.value.findings) == 1
 
 
-def sealed_anew(found: FleetPosterior, path: Path, site: str, value: float) -> Path:
-    """Write a posterior of which a draw is another number, with a digest of it."""
-    tree = found.tree.copy(deep=True)
-    tree["posterior"][site][0, 0] = value
-    path.write_bytes(with_tree(found, tree).to_netcdf())
-    return path
-
-
-@pytest.mark.parametrize(
-    ("site", "value"),
-    [
-        ("sigma", -1.0),
-        ("lot_sd", -0.1),
-        ("off_share", 1.5),
-        ("stiffness", 0.0),
-        ("zero", np.nan),
-        ("specimen_sd", 1e16),
-    ],
-)
-def test_draws_that_no_population_has_are_refused(fleet, tmp_path, site, value):
-    path = sealed_anew(fleet.posterior, tmp_path / "posterior.nc", site, value)
-    with pytest.raises(InputError, match="not a posterior that hdcal wrote"):
-        FleetPosterior.load(path)
-
-
 def test_a_lot_too_many_or_a_fact_too_few_is_refused(fleet, tmp_path):
     path, found = tmp_path / "posterior.nc", fleet.posterior
     one = replace(found, facts=replace(found.facts, lots=("high",)))
@@ -147,18 +120,16 @@ def test_a_lot_too_many_or_a_fact_too_few_is_refused(fleet, tmp_path):
     facts = asdict(found.facts)
     del facts["largest_mm"]
     attributes = {"fleet": json.dumps(facts)}
-    path.write_bytes(
-        posterior_file.sealed(found.arrays, posterior_file.FLEET, attributes)
-    )
+    path.write_bytes(content(found.tree, FLEET, attributes))
     with pytest.raises(InputError, match="not a posterior that hdcal wrote"):
         FleetPosterior.load(path)
 
 
 def test_one_kind_of_posterior_is_not_taken_for_the_other(file: Path, tmp_path):
-    with pytest.raises(InputError, match="is of a fleet, which models no gear"):
+    with pytest.raises(InputError, match="is of a fleet"):
         Posterior.load(file)
     single().save(tmp_path / "gear.nc")
-    with pytest.raises(InputError, match="is of a calibration, not of a fleet"):
+    with pytest.raises(InputError, match="is of a calibration"):
         FleetPosterior.load(tmp_path / "gear.nc")
     assert kind_of(tmp_path / "gear.nc") is CALIBRATION
     with h5py.File(file, "r+") as opened:

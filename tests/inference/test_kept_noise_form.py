@@ -10,8 +10,7 @@ from trees import arrays_of
 
 from hdcal.errors import InputError
 from hdcal.inference import noise_form
-from hdcal.inference.held import PILOT_NOISE
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import PILOT_NOISE, Posterior
 from hdcal.inference.serial_correlation import CORRELATION
 
 

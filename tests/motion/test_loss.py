@@ -6,19 +6,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from arviz_base import from_dict
+import xarray as xr
 from jax.flatten_util import ravel_pytree
 from moving import TRUTH, frictional_case, motion, moving_case, moving_gear
-from trees import arrays_of
 
 from hdcal import InputError, Prior, calibrate_dynamic, respond
-from hdcal.inference import laplace, posterior_file
+from hdcal.inference import laplace
 from hdcal.inference.checks import Check
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution, frozen
-from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
+from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import FRICTION, dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic
+from hdcal.inference.model_average import load_any
+from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.motion import loss
 from hdcal.motion.document import headline, loss_words, next_steps
 from hdcal.motion.dynamic_calibration import highest_peak
@@ -247,15 +248,15 @@ def posterior() -> DynamicPosterior:
     rng, scalars = np.random.default_rng(0), {}
     for name, value in values.items():
         scalars[name] = value * (1.0 + 0.01 * rng.standard_normal((2, 50)))
-    kept = {"posterior": scalars, "observed_data": {"force": case.records.force}}
-    kept |= {"sample_stats": {"diverging": np.zeros((2, 50), bool)}}
-    tree = from_dict(kept | {"constant_data": posterior_file.covariates(case.records)})
-    settings = {"kind": "dynamic", "with_gap": False, "seed": 0, "seconds": 0.0}
+    stats = dataset({"diverging": np.zeros((2, 50), bool)})
+    groups = {"posterior": dataset(scalars), "sample_stats": stats}
+    tree = xr.DataTree.from_dict(groups | data_groups(case.records))
+    settings = {"with_gap": False, "seed": 0, "seconds": 0.0}
     settings |= {"chains": 2, "warmup": 1, "draws": 50, "versions": {}}
     settings |= {"target_acceptance": 0.8}
     checks = (Check("by hand", "passed", "told to"),)
     priors = dynamic_site_priors(case, "ring", (CoulombFriction,))
-    about = (CoulombFriction,), priors, arrays_of(tree), {}, checks, settings
+    about = (CoulombFriction,), priors, tree, {}, checks, settings
     return DynamicPosterior(case, "ring", *about)
 
 
@@ -323,12 +324,6 @@ def test_a_name_needs_nine_tenths_and_residuals_of_noise(name, posterior):
     middle = dynamic_answer(torn).natural_frequency_Hz
     assert ("friction" in headline(middle, found)) == (name != "viscous")
     assert "friction" not in headline(middle, spoiled)
-
-
-def test_a_file_with_probabilities_of_other_models_is_refused(posterior, tmp_path):
-    weighed(posterior, {"plastic": 1.0}).save(tmp_path / "posterior.nc")
-    with pytest.raises(InputError, match="not a posterior"):
-        load_any(tmp_path)
 
 
 def test_a_friction_left_out_is_told_by_the_damping():

@@ -15,9 +15,10 @@ from short import SHORT
 from hdcal import InputError, NotUsable, Prior, calibrate_dynamic, predict, respond
 from hdcal.__main__ import main
 from hdcal.inference.checks import Check
-from hdcal.inference.dynamic_posterior import DynamicPosterior, load_any
+from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import build_dynamic
+from hdcal.inference.model_average import load_any
 from hdcal.motion import dynamic_calibration as calibration
 from hdcal.motion.answer import DynamicCalibrationAnswer
 from hdcal.motion.bands import motion_bands

@@ -15,6 +15,7 @@ from hdcal.motion.respond import respond as asked
 from hdcal.physics import dynamics
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.prediction.engine.gear_forces import gear_forces, gear_values
+from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.untested import PLACES
 
 # One number of points and draws for all: the integration is compiled once.
@@ -119,7 +120,7 @@ def test_a_leftover_that_was_fitted_bends_the_motion():
         for one in (posterior, still_posterior())
     )
     places = np.linspace(0.0, 0.5, 201)
-    values, untested = gear_values(posterior)
+    values, untested = gear_values(pool(posterior))
     where = places, np.full(201, 20.0), 1.0, untested
     forces = np.asarray(gear_forces(posterior.problem, values, *where))[:, 0]
     at_rest = np.interp(60.0, forces - forces[0], places)
@@ -142,7 +143,7 @@ def test_beyond_what_was_tested_the_band_is_wider_and_inside_it_is_not():
 def test_draws_that_are_kept_fill_what_is_open_evenly():
     posterior = still_posterior()
     for most in (50, 100, 128):
-        values, _ = gear_values(posterior, 0, most)
+        values, _ = gear_values(pool(posterior), 0, most)
         assert len(values["K"]) == most
         for score in values[PLACES].T:
             assert 0.4 <= np.mean(score > 0.0) <= 0.6

@@ -1,4 +1,6 @@
-"""The tests of effects catch each an effect that breaks just their promise."""
+"""Each test of effects fails for an effect that breaks its promise."""
+
+from inspect import signature
 
 import jax.numpy as jnp
 import pytest
@@ -34,6 +36,8 @@ class KinkAtNull(Broken):
 
 
 class WrongSlope(Broken):
+    size: float = parameter("N/K", "an amplitude", typical=0.10501, null=0.0)
+
     def apply(self, signal, rows):
         # A step: its derivative is zero wherever it exists.
         return signal + jnp.round(100.0 * self.size) / 100.0 * rows.temperature_rise
@@ -79,114 +83,71 @@ class NotToBeFound(Broken):
         return signal + self.size
 
 
-def register(monkeypatch, effect):
+def check(test, request, given) -> None:
+    """Run a test of effects on the effect named broken."""
+    names = [name for name in signature(test).parameters if name not in given]
+    fixtures = {n: request.getfixturevalue(n) for n in names if n != "name"}
+    test("broken", **given, **fixtures)
+
+
+HONEST = [
+    (test_effects.test_null_changes_nothing, {"seed": 0}),
+    (test_effects.test_at_its_typical_size_it_does_something, {}),
+    (
+        test_effects.test_gradients_are_finite,
+        {"size": test_effects.typical, "moved": False},
+    ),
+    (test_effects.test_gradients_are_right, {"seed": 0}),
+    (test_effects.test_symmetry_is_as_declared, {}),
+    (test_effect_needs.test_it_uses_what_it_needs, {"need": "temperature"}),
+    *[
+        (test_effect_needs.test_it_looks_at_nothing_undeclared, {"covariate": name})
+        for name in test_effect_needs.LICENCES
+    ],
+    (test_effect_units.test_units_do_not_matter, {}),
+]
+BROKEN = [
+    (NotNullAtNull, test_effects.test_null_changes_nothing, {"seed": 0}),
+    (
+        KinkAtNull,
+        test_effects.test_gradients_are_finite,
+        {"size": test_effects.null, "moved": True},
+    ),
+    (WrongSlope, test_effects.test_gradients_are_right, {"seed": 0}),
+    (NotEven, test_effects.test_symmetry_is_as_declared, {}),
+    (
+        LooksAtTime,
+        test_effect_needs.test_it_looks_at_nothing_undeclared,
+        {"covariate": "time"},
+    ),
+    (
+        NeedsNothing,
+        test_effect_needs.test_it_uses_what_it_needs,
+        {"need": "temperature"},
+    ),
+    (OtherUnit, test_effect_units.test_units_do_not_matter, {}),
+    (HardCoded, test_effect_units.test_units_do_not_matter, {}),
+    (NotToBeFound, test_effect_recovery.test_recovered_from_its_own_data, {}),
+    (Broken, test_effect_declarations.test_priors_exist_with_the_declared_unit, {}),
+    (Broken, test_effect_declarations.test_the_documentation_has_a_page, {}),
+    (Broken, test_effect_declarations.test_the_docstring_states_its_source, {}),
+]
+
+
+@pytest.mark.parametrize(("test", "given"), HONEST)
+def test_a_right_effect_passes(monkeypatch, request, test, given):
+    monkeypatch.setitem(EFFECTS, "broken", Broken)
+    check(test, request, given)
+
+
+@pytest.mark.parametrize(("effect", "test", "given"), BROKEN)
+def test_a_broken_effect_fails(monkeypatch, request, effect, test, given):
     monkeypatch.setitem(EFFECTS, "broken", effect)
+    with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
+        check(test, request, given)
 
 
-def test_the_honest_one_passes(
-    monkeypatch, scattered, loading, base, reading, differences
-):
-    register(monkeypatch, Broken)
-    test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
-    test_effects.test_at_its_typical_size_it_does_something(
-        "broken", loading, base, reading
-    )
-    for size in (test_effects.null, test_effects.typical):
-        test_effects.test_gradients_are_finite(
-            "broken", size, False, scattered, base, reading
-        )
-    test_effects.test_gradients_are_right(
-        "broken", 0, scattered, base, reading, differences
-    )
-    test_effects.test_symmetry_is_as_declared("broken", scattered, base, reading)
-    test_effects.test_any_two_compose("outliers", scattered, base, reading)
-    test_effect_needs.test_it_uses_what_it_needs(
-        "broken", "temperature", loading, base, reading
-    )
-    for covariate in test_effect_needs.LICENCES:
-        test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "broken", covariate, loading, base, reading
-        )
-    test_effect_units.test_units_do_not_matter("broken", scattered, base, reading)
-
-
-def test_not_null_at_null(monkeypatch, scattered, base, reading):
-    register(monkeypatch, NotNullAtNull)
-    with pytest.raises(AssertionError):
-        test_effects.test_null_changes_nothing("broken", 0, scattered, base, reading)
-
-
-def test_no_slope_at_null(monkeypatch, scattered, base, reading):
-    register(monkeypatch, KinkAtNull)
-    with pytest.raises(AssertionError):
-        test_effects.test_gradients_are_finite(
-            "broken", test_effects.null, True, scattered, base, reading
-        )
-
-
-def test_wrong_slope(monkeypatch, scattered, base, reading, differences):
-    class OffTheStep(WrongSlope):
-        size: float = parameter("N/K", "an amplitude", typical=0.10501, null=0.0)
-
-    register(monkeypatch, OffTheStep)
-    with pytest.raises(AssertionError):
-        test_effects.test_gradients_are_right(
-            "broken", 0, scattered, base, reading, differences
-        )
-
-
-def test_wrong_symmetry(monkeypatch, scattered, base, reading):
-    register(monkeypatch, NotEven)
-    with pytest.raises(AssertionError):
-        test_effects.test_symmetry_is_as_declared("broken", scattered, base, reading)
-
-
-def test_undeclared_covariate(monkeypatch, loading, base, reading):
-    register(monkeypatch, LooksAtTime)
-    with pytest.raises(AssertionError):
-        test_effect_needs.test_it_looks_at_nothing_undeclared(
-            "broken", "time", loading, base, reading
-        )
-
-
-def test_needless_need(monkeypatch, loading, base, reading):
-    register(monkeypatch, NeedsNothing)
-    with pytest.raises(AssertionError):
-        test_effect_needs.test_it_uses_what_it_needs(
-            "broken", "temperature", loading, base, reading
-        )
-
-
-@pytest.mark.parametrize("effect", [OtherUnit, HardCoded])
-def test_wrong_unit(monkeypatch, scattered, base, reading, effect):
-    register(monkeypatch, effect)
-    with pytest.raises(AssertionError):
-        test_effect_units.test_units_do_not_matter("broken", scattered, base, reading)
-
-
-def test_spoils_others(monkeypatch, scattered, base, reading):
-    register(monkeypatch, SpoilsOthers)
+def test_an_effect_that_spoils_others_fails(monkeypatch, scattered, base, reading):
+    monkeypatch.setitem(EFFECTS, "broken", SpoilsOthers)
     with pytest.raises(AssertionError):
         test_effects.test_any_two_compose("outliers", scattered, base, reading)
-
-
-def test_not_to_be_found(monkeypatch, loading, base, reading):
-    register(monkeypatch, NotToBeFound)
-    with pytest.raises(AssertionError):
-        test_effect_recovery.test_recovered_from_its_own_data(
-            "broken", loading, base, reading
-        )
-
-
-@pytest.mark.parametrize(
-    "promise",
-    [
-        test_effect_declarations.test_priors_exist_with_the_declared_unit,
-        test_effect_declarations.test_the_documentation_has_a_page,
-        test_effect_declarations.test_the_docstring_states_its_source,
-    ],
-)
-def test_undocumented(monkeypatch, promise):
-    register(monkeypatch, Broken)
-    with pytest.raises((AssertionError, KeyError, FileNotFoundError)):
-        promise("broken")

@@ -130,19 +130,6 @@ def test_the_smoothed_corners_are_near_the_sharp_ones(base, reading, loading):
     np.testing.assert_allclose(mean(ProgressiveStiffening(GAIN)), sharp, rtol=5e-5)
 
 
-def test_offsets_shift_and_nothing_else(scattered, base, reading):
-    records = scattered(2)
-    mean = predict_reading(base, (), records, reading)[0]
-    higher = dataclasses.replace(base, force_offset=base.force_offset + 3.0)
-    lifted = predict_reading(higher, (), records, reading)[0]
-    np.testing.assert_allclose(lifted, mean + 3.0, rtol=1e-14)
-    # A gauge whose zero moved by as much as all its readings.
-    later = dataclasses.replace(base, deformation_offset=base.deformation_offset + 0.02)
-    shifted = dataclasses.replace(records, deformation=records.deformation + 0.02)
-    same = predict_reading(later, (), shifted, reading)[0]
-    np.testing.assert_allclose(same, mean, rtol=1e-12, atol=1e-12)
-
-
 def test_a_diametral_reading_is_twice_the_radial_one(scattered, base, reading):
     records = scattered(3)
     diametral = dataclasses.replace(records, deformation=2.0 * records.deformation)
@@ -227,18 +214,6 @@ def test_double_precision(scattered, base, reading):
     np.testing.assert_allclose(change, expected, rtol=1e-4, atol=1e-13)
 
 
-def test_jit_and_vmap(scattered, reading):
-    records = scattered(7)
-
-    def mean(base):
-        return predict_reading(base, EFFECTS, records, reading)[0]
-
-    bases = [random_base(seed) for seed in range(4)]
-    each = jnp.stack([mean(base) for base in bases])
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *bases)
-    np.testing.assert_allclose(jax.jit(jax.vmap(mean))(stacked), each, rtol=1e-12)
-
-
 def test_another_file_needs_no_other_compilation(scattered, reading):
     @jax.jit
     def mean(base, effects, records, reading):
@@ -291,16 +266,3 @@ def test_the_force_is_the_chain_without_effects(gear, scattered, reading, theory
     assert found.shape == (24,)
     mean = predict_reading(base, (), records, reading)[0]
     np.testing.assert_allclose(found, mean, rtol=1e-12, atol=1e-12)
-
-
-def test_the_force_under_jit_and_vmap(gear):
-    deformation = jnp.linspace(0.0, 0.5, 7)
-
-    def curve(influence, geometry):
-        return force(geometry, 207e3, influence, deformation)
-
-    factors = jnp.array([0.5, 1.0, 2.5])
-    batch = jax.jit(jax.vmap(curve, in_axes=(0, None)))(factors, gear)
-    each = jnp.stack([curve(factor, gear) for factor in factors])
-    np.testing.assert_allclose(batch, each, rtol=1e-14)
-    np.testing.assert_allclose(each[2], 5.0 * each[0], rtol=1e-14)

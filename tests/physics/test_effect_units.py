@@ -3,7 +3,6 @@
 import dataclasses
 
 import numpy as np
-import pytest
 from effect_bench import everyone, typical
 
 from hdcal import EFFECTS
@@ -23,14 +22,6 @@ def rescaling(unit: str, scales: dict[str, float]) -> float:
             if symbol != "1":
                 factor *= scales[symbol] ** (sign * int(power or 1))
     return factor
-
-
-def test_rescaling():
-    scales = {"N": 10.0, "mm": 1000.0, "s": 3.0, "K": 7.0}
-    assert rescaling("1/s", scales) == pytest.approx(1.0 / 3.0)
-    assert rescaling("N*s/mm", scales) == pytest.approx(0.03)
-    assert rescaling("N/mm^2/K", scales) == pytest.approx(1e-5 / 7.0)
-    assert rescaling("1", scales) == 1.0
 
 
 @everyone

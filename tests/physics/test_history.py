@@ -66,11 +66,6 @@ def test_leaky_sum(rows):
     np.testing.assert_allclose(found, slow, rtol=1e-12, atol=1e-12)
 
 
-def test_no_decay_forgets_what_was_before():
-    found = leaky_sum(np.array([0.5, 1.0, 0.0, 1.0]), np.array([1.0, 2.0, 3.0, 4.0]))
-    assert found.tolist() == [1.0, 3.0, 3.0, 7.0]
-
-
 @pytest.mark.parametrize("rate", [1e-9, 1e-5, 1e-3, 0.1, 3.0])
 def test_leakage_obeys_its_differential_equation(scattered, rate):
     records = scattered(4)
@@ -86,28 +81,6 @@ def test_leakage_of_a_held_force(scattered):
     shown = leak(1e-3, hold, np.array([112.0, 112.0]))
     assert shown[0] == 112.0
     assert 112.0 - shown[1] == pytest.approx(6.5, abs=0.05)
-
-
-def test_a_first_row_at_time_zero_has_lost_nothing(scattered):
-    records = scattered(5)
-    time = records.time - np.repeat(records.time[::8], 8)
-    records = dataclasses.replace(records, time=time)
-    found = leak(0.05, records, records.force)
-    np.testing.assert_array_equal(found[::8], records.force[::8])
-    np.testing.assert_allclose(
-        found, slow_leak(0.05, records, records.force), rtol=1e-8, atol=1e-7
-    )
-
-
-def test_each_run_starts_anew(scattered):
-    records = scattered(6)
-    whole = leak(0.02, records, records.force)
-    for start in (0, 8, 16):
-        own = slice(start, start + 8)
-        part = jax.tree.map(lambda leaf, own=own: leaf[own], records)
-        np.testing.assert_allclose(
-            leak(0.02, part, part.force), whole[own], rtol=1e-12, atol=1e-12
-        )
 
 
 def test_runs_may_be_interleaved(scattered):

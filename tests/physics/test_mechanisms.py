@@ -30,10 +30,6 @@ def force_on(effect, deformation, records=None) -> np.ndarray:
     return np.asarray(effect.apply(STIFFNESS * rows.deformation, rows))
 
 
-def some_rows(records, count):
-    return jax.tree.map(lambda leaf: leaf[:count], records)
-
-
 def reading_of(effects, base, records, reading):
     return np.asarray(predict_reading(base, effects, records, reading)[0])
 
@@ -198,7 +194,7 @@ def test_yield_leaves_a_set(scattered):
 
 
 def test_the_set_outlives_the_run_but_not_the_specimen(scattered):
-    records = some_rows(scattered(0), 16)
+    records = jax.tree.map(lambda leaf: leaf[:16], scattered(0))
     path = np.tile([0.1, 0.3, 0.5, 0.6, 0.5, 0.3, 0.2, 0.1], 2)
     same = dataclasses.replace(records, specimen=np.zeros(16, int))
     assert np.unique(same.run).size == 2

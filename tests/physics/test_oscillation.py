@@ -17,7 +17,7 @@ from hdcal.physics.dynamics import (
     natural_frequency,
     ring_mass,
 )
-from hdcal.physics.forcing import Chirp, SampledForce, Sine, Step
+from hdcal.physics.forcing import Chirp, SampledForce, Step
 from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
 from hdcal.physics.theory import ring
@@ -35,6 +35,11 @@ def gear(ratio: float, effects=(), reading=None) -> Oscillator:
     reading = reading or Reading(1.0, 20.0)
     damping = 2.0 * ratio * np.sqrt(STIFFNESS * MASS)
     return Oscillator(MASS, damping, base, effects, reading, 20.0)
+
+
+def sine(frequency: float) -> Chirp:
+    """Return a sweep of no width."""
+    return Chirp(FORCE, frequency, frequency, 1.0)
 
 
 @jax.jit
@@ -93,7 +98,7 @@ def test_a_step_is_answered_as_in_the_textbook(ratio):
 @pytest.mark.parametrize("frequency", [5.0, 350.0, 900.0])
 def test_a_sine_is_answered_as_in_the_textbook(ratio, frequency):
     expected = sine_response(ratio, frequency, TIMES)
-    found = move(gear(ratio), Sine(FORCE, frequency), TIMES)[:, 0]
+    found = move(gear(ratio), sine(frequency), TIMES)[:, 0]
     assert worst(found, expected) < 1e-7
 
 
@@ -144,10 +149,10 @@ def test_a_sweep_passes_through_its_frequencies():
     ("force", "end", "rows"),
     [
         (Step(FORCE), 0.05, 800),
-        (Sine(FORCE, 0.1), 2.6, 40_000),
-        (Sine(FORCE, 5.0), 0.3, 5_000),
-        (Sine(FORCE, 100.0), 0.05, 10_000),
-        (Sine(FORCE, 350.0), 0.05, 40_000),
+        (sine(0.1), 2.6, 40_000),
+        (sine(5.0), 0.3, 5_000),
+        (sine(100.0), 0.05, 10_000),
+        (sine(350.0), 0.05, 40_000),
     ],
     ids=["step", "0.1 Hz", "5 Hz", "100 Hz", "350 Hz"],
 )
@@ -173,7 +178,7 @@ def test_friction_of_a_load_sticks_in_a_slow_motion():
     """Quasi-static, k (1 ± μ) y = F on the way out and back."""
     rubbed = gear(0.015, (EFFECTS["load_friction"](share=0.1),))
     times = np.array([0.0, 2.4, 4.9])
-    found = np.asarray(move(rubbed, Sine(FORCE, 0.1), times)[1:, 0])
+    found = np.asarray(move(rubbed, sine(0.1), times)[1:, 0])
     loads = FORCE * np.sin(0.2 * np.pi * times[1:])
     assert found == pytest.approx(loads / (STIFFNESS * np.array([1.1, 0.9])), rel=0.005)
 

@@ -89,13 +89,6 @@ def test_load_cycles(scattered, seed, mixed):
     np.testing.assert_array_equal(found, slow_cycle(*columns))
 
 
-def test_tension_counts_as_many_cycles(scattered):
-    records = scattered(1)
-    there = load_cycle(records.sense, records.run, records.specimen)
-    back = load_cycle(-records.sense, records.run, records.specimen)
-    np.testing.assert_array_equal(there, back)
-
-
 def test_a_tenth_cycle_has_lost_one_decade(scattered):
     up_down = np.repeat([1.0, -1.0], 5)
     records = jax.tree.map(lambda leaf: np.resize(leaf, 100), scattered(0))

@@ -10,7 +10,7 @@ from jax.flatten_util import ravel_pytree
 from scipy import integrate
 
 from hdcal.data.records import Geometry
-from hdcal.physics.theory import RING_SERIES, THEORIES, article, cup, ring
+from hdcal.physics.theory import RING_SERIES, THEORIES, cup, ring
 
 E = 210e3
 
@@ -104,10 +104,6 @@ def test_an_endless_cup_is_a_tube(gear):
     assert float(cup(long, E)) == pytest.approx(tube, rel=1e-6)
 
 
-def test_the_articles_slope(gear):
-    assert float(article(gear, E)) == pytest.approx(1625.19, rel=1e-14)
-
-
 EXPONENTS = {
     "ring": {
         "wall_thickness": 3,
@@ -162,22 +158,3 @@ def test_gradients(theory, differences, seed):
     assert exact.shape == (6,)
     slow = differences(function, point)
     np.testing.assert_allclose(exact, slow, rtol=1e-8, atol=1e-11)
-
-
-def test_jit_and_vmap(theory):
-    gears = [some_gear(seed) for seed in range(5)]
-    each = [float(theory(gear, E)) for gear in gears]
-    compiled = [float(jax.jit(theory)(gear, E)) for gear in gears]
-    stacked = jax.tree.map(lambda *leaves: jnp.stack(leaves), *gears)
-    batch = jax.vmap(theory, in_axes=(0, None))(stacked, E)
-    np.testing.assert_allclose(compiled, each, rtol=1e-14)
-    np.testing.assert_allclose(batch, each, rtol=1e-14)
-
-
-def test_double_precision(gear, theory):
-    exact = jax.tree.map(jnp.asarray, gear)
-    assert theory(exact, jnp.asarray(E)).dtype == jnp.float64
-
-
-def test_sources_are_named(theory):
-    assert "Source:" in theory.__doc__

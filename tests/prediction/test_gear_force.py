@@ -20,6 +20,7 @@ from hdcal.design.study.force_quantiles import (
     is_linear,
 )
 from hdcal.errors import InputError
+from hdcal.inference.model_average import LeftOut, ModelAverage
 from hdcal.physics.effects.loops import Hysteresis
 from hdcal.physics.effects.sensor import RigCompliance
 from hdcal.prediction.engine.gear_forces import gear_forces
@@ -182,21 +183,9 @@ def test_the_nominal_deformation_is_the_gears_own():
     assert replace(draws, gear=gear).nominal_deformation == pytest.approx(0.8)
 
 
-def test_a_cause_that_is_not_settled_is_told():
-    posterior = single(size=100)
-    assert design_draws(posterior).misfits == ()
-    origin = {"hypothesis": "contact_onset", "probabilities": {"contact_onset": 1.0}}
-    settled = {**posterior.settings, "diagnosis": origin}
-    settled |= {"left_out": {"probability": 0.0, "counted_as": "contact_onset"}}
-    assert design_draws(replace(posterior, settings=settled)).misfits == ()
-    settled |= {"left_out": {"probability": 0.08, "counted_as": "contact_onset"}}
-    (words,) = design_draws(replace(posterior, settings=settled)).misfits
-    assert "8 % of the probability" in words and "counts as contact onset" in words
-    # Of an older diagnosis nobody knows what it left out.
-    older = {**posterior.settings, "diagnosis": origin}
-    (words,) = design_draws(replace(posterior, settings=older)).misfits
-    assert "rests on contact onset alone" in words
-    origin = {**origin, "probabilities": {"contact_onset": 0.6, "none": 0.4}}
-    open_one = {**posterior.settings, "diagnosis": origin}
-    (words,) = design_draws(replace(posterior, settings=open_one)).misfits
-    assert "rests on contact onset alone" in words
+def test_what_a_diagnosis_left_out_is_told():
+    weighed = {"contact_onset": (1.0, single(size=100))}
+    for share, told in ((0.0, False), (0.08, True)):
+        left_out = LeftOut(share, "contact_onset")
+        words = design_draws(ModelAverage(weighed, left_out)).misfits
+        assert any("8 % of the probability" in one for one in words) == told

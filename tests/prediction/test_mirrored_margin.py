@@ -16,7 +16,6 @@ from posteriors import (
 )
 from rigs import make_gear
 from slices import slice_of
-from trees import with_tree
 
 import hdcal
 from hdcal.errors import InputError
@@ -304,7 +303,7 @@ def test_a_capacity_is_refused_where_the_zero_is_larger_than_the_load(sense: int
     posterior = single(size=SIZE)
     tree = posterior.tree.copy(deep=True)
     tree["posterior"]["force_offset"] = tree["posterior"]["force_offset"] - 100.0
-    posterior = with_tree(posterior, tree)
+    posterior = replace(posterior, tree=tree)
     posterior = posterior if sense > 0 else mirrored(posterior)
     with pytest.raises(InputError, match="Ask for the quantity load") as refused:
         hdcal.margin(posterior, sense * 0.4, limit_force=70.0, **QUICK)
@@ -325,7 +324,7 @@ def test_the_sense_is_that_of_the_gear_and_not_of_the_gauge(sense: int):
     tree["posterior"]["deformation_offset"] = (
         tree["posterior"]["deformation_offset"] + 0.1
     )
-    posterior = with_tree(posterior, tree)
+    posterior = replace(posterior, tree=tree)
     posterior = posterior if sense > 0 else mirrored(posterior)
     low, high = (
         hdcal.margin(posterior, sense * at, limit_force=5.0, **QUICK)

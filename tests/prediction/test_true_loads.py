@@ -17,6 +17,7 @@ from hdcal.data.certificates import GAINS
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import gear_forces
+from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.population_force import population_force
 from hdcal.tracking.stream_prior import prior_from_posterior
 
@@ -118,7 +119,7 @@ def test_bands_are_of_readings():
 
 
 def test_a_stream_of_readings_begins_as_the_rig_reads():
-    plain, stated = map(prior_from_posterior, pair())
+    plain, stated = map(prior_from_posterior, map(pool, pair()))
     np.testing.assert_allclose(stated.coefficients(), plain.coefficients(), rtol=1e-9)
 
 

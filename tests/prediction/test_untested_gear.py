@@ -11,7 +11,7 @@ import hdcal
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.study.force_quantiles import force_quantiles, general_quantiles
 from hdcal.design.study.study import study
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.posterior import Posterior
 
 SHARES = np.array([0.5, 0.025, 0.975])
@@ -151,7 +151,7 @@ def kept(answer, cases: int, seed: int) -> tuple[float, float]:
     for _ in range(cases):
         plain, curved, truth = narrow(rng)
         models = {"none": (0.5, plain), STIFFENING: (0.5, curved)}
-        ends = answer(mixed_posterior(models)), answer(plain)
+        ends = answer(ModelAverage(models)), answer(plain)
         found.append([low <= truth <= high for low, high in ends])
     mixture, name = np.mean(found, axis=0)
     return mixture, name

@@ -6,7 +6,6 @@ from typing import Literal
 
 import jsonschema
 import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from pydantic import ValidationError
@@ -14,7 +13,7 @@ from pydantic import ValidationError
 from hdcal.report import sentences
 from hdcal.report.chart_spec import Chart, Line, Panel
 from hdcal.report.result import Draws, Interval, Item, Result, quantity
-from hdcal.report.result_folder import csv_file
+from hdcal.report.table_files import columns_csv
 
 HOSTILE = "<img src=x onerror=alert(1)>|*_`a`&amp;\\"
 BODY = """\
@@ -132,7 +131,7 @@ def test_a_table_of_items_by_name_has_their_names():
 def test_csv_has_no_formula_and_no_broken_row():
     columns = {"=a": ["=1+1", "x\ry,z", None], "n": [1.0, np.nan, 1 / 3]}
     columns["ok"] = [True, False, True]
-    text = csv_file(pd.DataFrame(columns)).decode()
+    text = columns_csv(columns)
     assert text.split("\n") == [
         *["'=a,n,ok", "'=1+1,1,true", '"x\ry,z",,false', ",0.333333333,true", ""]
     ]

@@ -4,15 +4,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from arviz_base import from_dict
+import xarray as xr
 from rigs import make_case, make_gear, make_records
-from trees import arrays_of
 
 from hdcal import EFFECTS, Posterior
 from hdcal.data.priors import dynamic_priors, effect_priors
-from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import problem_priors, unit_stiffness
 from hdcal.physics.frictional_response import frictional_response
 from hdcal.physics.linear_response import LinearGear, linear_response
@@ -124,13 +123,8 @@ def still_posterior(
     if gap is not None:
         draws |= {"gap_weights": np.tile(gap, (*shape, 1))}
         draws |= {name: np.ones(shape) for name in ("gap_sd", "gap_length")}
-    tree = from_dict(
-        {
-            "posterior": draws,
-            "observed_data": {"force": records.force},
-            "constant_data": posterior_file.covariates(records),
-        }
-    )
+    groups = {"posterior": dataset(draws), **data_groups(records)}
+    tree = xr.DataTree.from_dict(groups)
     driven = Diagnosis(1.0, 400.0, 400.0, 0.99, 0.0, 1.0, "data")
     check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
     settings = {
@@ -143,5 +137,5 @@ def still_posterior(
     settings |= {"seconds": 0.0, "versions": {}}
     priors = problem_priors(case, chosen, effect_priors(), "ring")
     return Posterior(
-        case, "ring", chosen, priors, arrays_of(tree), {"K": driven}, (check,), settings
+        case, "ring", chosen, priors, tree, {"K": driven}, (check,), settings
     )

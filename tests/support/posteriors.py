@@ -3,19 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
-from arviz_base import from_dict
+import xarray as xr
 from rigs import make_case, make_gear, make_records
-from trees import arrays_of, with_tree
 
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.data.versions import versions
-from hdcal.inference import posterior_file
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
 from hdcal.inference.noise_form import correlates
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.serial_correlation import CORRELATION
 from hdcal.physics.effect import parameters
@@ -41,25 +40,14 @@ def written_posterior(
     size = shaped["K"].shape[1]
     stats = {"diverging": np.zeros((CHAINS, size), bool)}
     stats["n_steps"] = np.full((CHAINS, size), 7)
-    tree = from_dict(
+    labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
+    tree = xr.DataTree.from_dict(
         {
-            "posterior": shaped,
-            "prior": {name: v[:1] for name, v in shaped.items() if v.ndim == 2},
-            "sample_stats": stats,
-            "observed_data": {"force": np.asarray(case.records.force)},
-            "constant_data": posterior_file.covariates(case.records),
-        },
-        dims={
-            "force": ["row"],
-            **{name: ["row"] for name in posterior_file.UNITS},
-            "run_offset": ["run_label"],
-            "specimen_deviation": ["specimen_label"],
-            "gap_weights": ["basis"],
-        },
-        coords={
-            "run_label": list(case.run_labels),
-            "specimen_label": list(case.specimen_labels),
-        },
+            "posterior": dataset(shaped, labels=labels),
+            "prior": dataset({n: v[:1] for n, v in shaped.items() if v.ndim == 2}),
+            "sample_stats": dataset(stats),
+            **data_groups(case.records),
+        }
     )
     diagnoses = {
         name: Diagnosis(
@@ -86,9 +74,7 @@ def written_posterior(
     }
     checks = (Check("written down", "passed", "for a test"),)
     theory = case.gear.theory
-    return Posterior(
-        case, theory, chosen, priors, arrays_of(tree), diagnoses, checks, settings
-    )
+    return Posterior(case, theory, chosen, priors, tree, diagnoses, checks, settings)
 
 
 def plain_draws(case: Case, size: int = 2000, seed: int = 0) -> dict:
@@ -210,4 +196,4 @@ def stiffer(posterior: Posterior, factor: float) -> Posterior:
     tree = posterior.tree.copy(deep=True)
     for name in ("K", "stiffness"):
         tree["posterior"][name] = tree["posterior"][name] * factor
-    return with_tree(posterior, tree)
+    return replace(posterior, tree=tree)

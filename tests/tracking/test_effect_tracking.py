@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from rigs import BASE, make_case, program, ramp
 from scipy import stats
 
 from hdcal.data.priors import effect_priors
 from hdcal.errors import InputError
-from hdcal.inference.array_tree import ArrayTree, group_of
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.physics.registry import EFFECTS
+from hdcal.prediction.engine.pooled import pool
 from hdcal.tracking import effect_tracking
 from hdcal.tracking.normal_inverse_gamma import half_width, match_draws
 from hdcal.tracking.stream_prior import prior_from_posterior
@@ -38,11 +40,10 @@ def handmade(names, **spread) -> Posterior:
     for name, (middle, sd) in spread.items():
         draws[name.replace("__", ".")] = middle + sd * rng.normal(size=DRAWS)
     draws["stiffness"] = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
-    drawn = group_of({name: values[None] for name, values in draws.items()})
+    drawn = dataset({name: values[None] for name, values in draws.items()})
     settings = {"with_gap": False}
-    return Posterior(
-        case, "ring", effects, priors, ArrayTree({"posterior": drawn}), {}, (), settings
-    )
+    tree = xr.DataTree.from_dict({"posterior": drawn})
+    return Posterior(case, "ring", effects, priors, tree, {}, (), settings)
 
 
 ONSET = {"contact_onset__ratio": (0.3, 0.05), "contact_onset__onset": (0.25, 0.02)}
@@ -66,8 +67,9 @@ def test_weights_and_stiffness_are_those_of_a_batch(onset):
     deformation, force = stream(30)
     for reading in zip(deformation.tolist(), force.tolist(), strict=True):
         found = tracker.update(*reading)
-    prior = prior_from_posterior(onset)
-    core, columns = effect_tracking.build_particles(onset, prior, 1.0)
+    known = pool(onset)
+    prior = prior_from_posterior(known)
+    core, columns = effect_tracking.build_particles(known, prior, 1.0)
     rows = np.stack([columns(w, 0.0, 0.0) for w in deformation.tolist()], axis=1)
     law = match_draws(prior.coefficients(), prior.variance)
     ratio = law.rate / law.shape

@@ -1,13 +1,15 @@
 """A fitted leftover is followed with the stiffness, as the calibration left it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from posteriors import beside, plain_draws, ramp_case, written_posterior
 from streams import follow
-from trees import with_tree
 
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.engine.gear_forces import gear_bends, gear_values
+from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
 from hdcal.tracking.tracker import Tracker
@@ -29,7 +31,7 @@ def with_newtons():
 
 def stream(posterior, draw: int, rows: int, rng):
     """Return readings of a gear that is one draw of the posterior."""
-    prior = prior_from_posterior(posterior)
+    prior = prior_from_posterior(pool(posterior))
     at = np.resize(PLACES, rows)
     columns = np.column_stack([at, 0.0 * at, 0.0 * at + 1.0, 0.0 * at])
     left = np.asarray(posterior.problem.discrepancy.columns(at, 0.0 * at))
@@ -91,7 +93,7 @@ def test_what_is_forgotten_of_a_long_wave_fades_to_the_prior_too():
     tree = posterior.tree.copy(deep=True)
     weights = tree["posterior"]["gap_weights"]
     tree["posterior"]["gap_weights"] = weights * 10.0 ** (-4.0 * np.arange(20))
-    tracker = Tracker(with_tree(posterior, tree), forget=0.9)
+    tracker = Tracker(replace(posterior, tree=tree), forget=0.9)
     rng, found = np.random.default_rng(0), []
     for at in np.resize(PLACES, 4000).tolist():
         answer = tracker.update(at, 205.0 * at + rng.normal(0.0, 0.5))
@@ -101,7 +103,7 @@ def test_what_is_forgotten_of_a_long_wave_fades_to_the_prior_too():
 
 def test_the_fit_has_no_part_far_from_what_was_tested():
     posterior = with_newtons()
-    reader, values = UntestedReading(posterior), gear_values(posterior)
+    reader, values = UntestedReading(pool(posterior)), gear_values(pool(posterior))
     for at in (0.01, 0.3, 0.55, 0.58, 1.5, -0.05, -1.0):
         place = np.array([at])
         own = reader.leftover(place) @ posterior.draws["gap_weights"][5]
@@ -133,7 +135,7 @@ def halves():
     """Return a calibration that has the leftover or has none, and both alone."""
     case, other = ramp_case(), with_newtons()
     plain = written_posterior(case, plain_draws(case, 2000))
-    return mixed_posterior({"none": (0.5, plain), "unknown": (0.5, other)}), other
+    return ModelAverage({"none": (0.5, plain), "unknown": (0.5, other)}), other
 
 
 @pytest.mark.thorough

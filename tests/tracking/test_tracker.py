@@ -1,16 +1,18 @@
 """A tracked gear: stiffness, predictions and alarms are what they claim to be."""
 
 import copy
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from posteriors import single
 from rigs import make_gear
 from scipy import stats
 from slices import slice_of
 
 from hdcal.data.priors import Prior
 from hdcal.errors import InputError, NotUsable
+from hdcal.inference.checks import Check
 from hdcal.tracking.stream_prior import prior_from_gear
 from hdcal.tracking.tracker import Tracker
 
@@ -202,8 +204,6 @@ def test_settings_out_of_range_are_all_named(gear):
 
 
 def test_a_failed_calibration_gives_nothing():
-    def refuse():
-        raise NotUsable("failed")
-
+    failed = replace(single(size=40), checks=(Check("mixed", "failed", "by hand"),))
     with pytest.raises(NotUsable):
-        Tracker(SimpleNamespace(require_usable=refuse))  # type: ignore[arg-type]
+        Tracker(failed)

@@ -10,8 +10,8 @@ from streams import follow
 
 import hdcal
 from hdcal.errors import InputError
-from hdcal.inference.hypotheses import LEFT_OUT
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import LeftOut, ModelAverage
+from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.untested_reading import Addition, UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
 from hdcal.tracking.tracker import Tracker
@@ -31,7 +31,7 @@ def spread(added: Addition) -> float:
 
 def test_the_band_widens_as_that_of_predict():
     posterior = single()
-    added = UntestedReading(posterior)
+    added = UntestedReading(pool(posterior))
     for at, warm in ((0.9, 20.0), (0.4, 80.0), (-0.3, 20.0)):
         tested = Tracker(posterior)
         tested._unequal = None
@@ -49,7 +49,7 @@ def test_the_band_widens_as_that_of_predict():
 @pytest.mark.parametrize(("at", "warm"), [(0.4, 80.0), (0.9, 20.0), (-0.3, 20.0)])
 def test_what_is_added_is_what_predict_adds(at, warm):
     posterior = single()
-    added = UntestedReading(posterior).at(at, warm)
+    added = UntestedReading(pool(posterior)).at(at, warm)
     # Few draws have large bends: an end is known by the mean of some seeds.
     far, near = (
         [hdcal.predict(posterior, [where], [heat], seed=seed) for seed in range(6)]
@@ -65,7 +65,7 @@ def test_what_is_added_is_what_predict_adds(at, warm):
 
 
 def test_the_drift_has_no_preferred_sense():
-    added = UntestedReading(single()).at(0.4, 80.0)
+    added = UntestedReading(pool(single())).at(0.4, 80.0)
     shift, sd = added.shift, spread(added)
     assert abs(shift) < 0.2 * sd
 
@@ -91,7 +91,10 @@ def followed(posterior, places, streams: int, rows: int, alarm_rows: float = 100
         Share of streams whose stiffness lies in its interval at the end, share of
         readings in theirs, and alarms over those due.
     """
-    added, prior = UntestedReading(posterior), prior_from_posterior(posterior)
+    added, prior = (
+        UntestedReading(pool(posterior)),
+        prior_from_posterior(pool(posterior)),
+    )
     start = Tracker(posterior, alarm_rows=alarm_rows)
     stiffness, reading, alarms = [], [], 0
     terms = [added.at(place, 20.0) for place in places]
@@ -129,7 +132,7 @@ def test_errors_that_are_taken_as_independent_are_flagged(monkeypatch):
         return Addition(found.shift, 0.0 * found.columns, spread(found))
 
     posterior = single()
-    reader, places = UntestedReading(posterior), np.resize(PLACES, 600).tolist()
+    reader, places = UntestedReading(pool(posterior)), np.resize(PLACES, 600).tolist()
     # A bend that is one sd below its mean.
     bend = {at: a.shift - spread(a) for at in PLACES for a in [reader.at(at, 20.0)]}
 
@@ -160,7 +163,7 @@ def test_a_common_error_is_never_averaged_away_in_long_streams(places):
 def mixture(**shares: float):
     made = {n: beside(single(), n) for n in shares.keys() & {"contact_onset", NOISE}}
     made |= {"none": single(), "unknown": with_leftover()}
-    return mixed_posterior({n: (share, made[n]) for n, share in shares.items()})
+    return ModelAverage({n: (share, made[n]) for n, share in shares.items()})
 
 
 def test_causes_that_can_be_followed_are_and_the_rest_is_said():
@@ -184,10 +187,8 @@ def test_where_most_cannot_be_followed_nothing_is():
 
 
 def test_what_was_left_out_is_said():
-    posterior = mixture(none=0.6, contact_onset=0.4)
-    told = {"probability": 0.02, "counted_as": "none"}
-    settings = {**posterior.settings, LEFT_OUT: told}
-    words = Tracker(replace(posterior, settings=settings)).describe()
+    average = mixture(none=0.6, contact_onset=0.4)
+    words = Tracker(replace(average, left_out=LeftOut(0.02, "none"))).describe()
     assert "2 % of the probability lies on hypotheses" in words
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 
 import numpy as np
+import xarray as xr
 
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
@@ -13,18 +14,16 @@ from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, InputError
 from hdcal.inference import laplace
-from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.flat_directions import remove_members
-from hdcal.inference.held import LOOP, PILOT_NOISE
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.noise_form import (
     noise_grows,
     pilot_fit,
     why_independent,
 )
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import PILOT_NOISE, Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
@@ -187,12 +186,11 @@ def calibrate(
     fitted = laplace.fit(problem)
     found = sample(problem, fitted, seed, progress=progress, **size)
     own = _specifics(case, problem, found, shown=shown)
-    arrays, diagnoses, checks = assemble(case, priors, problem, found, own, seed)
-    kept = ArrayTree({**arrays.groups, laplace.GROUP: laplace.to_group(fitted)})
+    parts = assemble(case, priors, problem, found, own, seed)
+    parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
     settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
-    settings |= {LOOP: True} | run_settings(found, began)
-    parts = case, theory, chosen, priors, kept, diagnoses, checks, settings
-    posterior = Posterior(*parts)
+    settings |= run_settings(found, began)
+    posterior = Posterior(case, theory, chosen, priors, *parts, settings)
     # A million rows are not compressed anew.
     vars(posterior)["problem"] = problem
     return posterior

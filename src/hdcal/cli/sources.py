@@ -4,21 +4,22 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hdcal.data.case import Gear
+    from hdcal.inference.model_average import ModelAverage
     from hdcal.inference.posterior import Posterior
 
 
-def load_posterior(run: str) -> "Posterior":
-    """Load the calibration in a result folder.
+def load_usable(run: str) -> "Posterior | ModelAverage":
+    """Load the calibration or the models of a diagnosis in a result folder.
 
     Raises:
         InputError: there is none, or it was changed.
         NotUsable: it failed its checks.
     """
-    from hdcal.inference.posterior import Posterior
+    from hdcal.inference.model_average import load_models
 
-    posterior = Posterior.load(run)
-    posterior.require_usable()
-    return posterior
+    models = load_models(run)
+    models.require_usable()
+    return models
 
 
 def load_gear(path: str) -> "Gear":

@@ -29,7 +29,7 @@ def compare(console: Console, runs, out, force, **asked):
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`.
     """
     from hdcal.comparison.compare import compare as side_by_side
-    from hdcal.prediction.engine.causes import read_models
+    from hdcal.inference.model_average import load_models
 
     with console.wrong as wrong:
         names = _names(runs)
@@ -37,7 +37,7 @@ def compare(console: Console, runs, out, force, **asked):
         if len(runs) < 2 or len(once) < len(runs):
             words = "two results or more are compared, each once"
             wrong.append(Finding("runs", words, "Name the folders of two results"))
-        results = {n: wrong.attempt(read_models, run) for n, run in names.items()}
+        results = {n: wrong.attempt(load_models, run) for n, run in names.items()}
         console.reserve_folder(out, force)
     read = {name: models for name, models in results.items() if models is not None}
     found = side_by_side(read, **asked)

@@ -1,15 +1,22 @@
-"""What one calibration is about: a gear, how it was read, and the records."""
+"""A case: a gear, how it was read, and the records."""
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
-from hdcal.notebook import Shown
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class Gear:
             the names are not checked here, the effects live on a higher floor.
         dynamic_priors: of the moving gear, merged in the same way; `mass` is among
             them only when the gear file gives it, else `mass_ratio`.
-        density: of the material [N·s²/mm⁴], None where its file says nothing of it.
+        density: of the material [N·s²/mm⁴], None where its file states none.
         gauge_priors: of the gauges' gains and the thermometer's offset, those that a
             certificate states: keys of `GAUGE_UNITS`.
         full_scale: largest readings, of which shipped priors are shares.
@@ -74,7 +81,7 @@ class Gear:
 
 
 @dataclass(frozen=True, repr=False)
-class Case(Shown):
+class Case:
     """Records of one data file on one gear, with where they came from.
 
     Attributes:
@@ -86,13 +93,13 @@ class Case(Shown):
         data_sha256: hash of the data file's bytes.
         notes: remarks for the log, such as ignored columns.
         columns: quantity -> header with its unit, of headers that are not hdcal's own.
-        lots: lot of each specimen index; empty where none is told.
-        operators: who mounted each run index; empty where none is told.
-        rigs: which rig read each run index; empty where none is told.
-        dates: when each run index was measured first, in ISO 8601; an empty one of a
-            run that does not say, and empty where none is told.
-        left_out: specimens of which no row is here, as one of theirs is wrong, each
-            with what that is; empty unless `skip_bad` was asked for.
+        lots: lot of each specimen index; empty where none is stated.
+        operators: who mounted each run index; empty where none is stated.
+        rigs: which rig read each run index; empty where none is stated.
+        dates: first date of each run index in ISO 8601, empty for a run without one;
+            empty where none is stated.
+        left_out: specimens left out because of a faulty row, each with the finding;
+            empty unless `skip_bad` was given.
     """
 
     name: str
@@ -113,9 +120,51 @@ class Case(Shown):
         rows = len(self.records.force)
         return f"<Case {self.name}: {rows} rows on {self.gear.name!r}>"
 
+    def _repr_html_(self) -> str:
+        return self._check()._repr_html_()
+
+    def to_frame(self) -> "pd.DataFrame":
+        """Return the readings under the headers of hdcal's own files.
+
+        Columns that were not measured are left out.
+        """
+        import pandas as pd
+
+        records = self.records
+        columns: dict[str, Any] = {
+            "deformation_mm": records.deformation,
+            "force_N": records.force,
+        }
+        for header in ("temperature_C", "time_s", "angle_rad", "force_sd_N"):
+            name = header.rpartition("_")[0]
+            if name in records.known:
+                columns[header] = getattr(records, name)
+        labels = {"run": self.run_labels, "specimen": self.specimen_labels}
+        for name in sorted(labels.keys() & records.known):
+            columns[name] = np.array(labels[name])[np.asarray(getattr(records, name))]
+        return pd.DataFrame(columns)
+
+    def to_datatree(self) -> "xr.DataTree":
+        """Return the readings as xarray's DataTree, over the dimension `row`."""
+        import xarray as xr
+
+        return xr.DataTree(self.to_frame().rename_axis("row").to_xarray())
+
+    def plot(self, ax: "Axes | None" = None) -> "Axes":
+        """Draw the readings.
+
+        Args:
+            ax: where; by default new axes of pyplot.
+        """
+        return self._check().plot(ax)
+
+    def _check(self) -> Any:
+        # Imported by its name: data are below the questions that are asked of them.
+        return import_module("hdcal.calibration.check.check").check(self)
+
 
 def require_case(given: object) -> None:
-    """Raise InputError where something else was given for a case."""
+    """Raise InputError unless a case was given."""
     if not isinstance(given, Case):
         words = f"a {type(given).__name__} is none"
         remedy = "Read it first, as in read_case(data, gear={'radius_mm': 40.0, …})"

@@ -12,9 +12,6 @@ T = TypeVar("T")
 
 # Of dataclasses, as `__pydantic_config__`: no other fields, no text for a number.
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
-# The same of results, whose numbers need not be finite; and of some fields of many.
-RESULT = ConfigDict(extra="forbid", strict=True)
-PART = ConfigDict(extra="ignore", strict=True)
 # Names of things go into tables and figures: `a`, `a.b`, `a+b` or `a b`.
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9_.+ -]{1,200}$")]
 Share = Annotated[float, Field(ge=0.0, le=1.001)]  # a sum may pass 1 by rounding

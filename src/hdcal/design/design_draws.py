@@ -23,7 +23,6 @@ from hdcal.data.theory_names import SPRING, Theory
 from hdcal.design.materials import read_material
 from hdcal.errors import Finding, Findings
 from hdcal.inference.distributions import frozen, sample_prior
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.residuals import misfits
 from hdcal.inference.values import Values
@@ -31,11 +30,12 @@ from hdcal.physics.chain import Reading
 from hdcal.physics.theory import THEORIES
 from hdcal.prediction.engine.causes import (
     averaging_words,
-    causes_of,
     jointly_worth,
     likeliest,
 )
 from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
+from hdcal.prediction.engine.models import Models
+from hdcal.prediction.engine.pooled import Pooled, pool
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.engine.untested import Untested
 
@@ -171,7 +171,7 @@ class DesignDraws:
 
 
 def design_draws(
-    source: Posterior | Gear, *, draws: int = 4000, seed: int = 0
+    source: Models | Gear, *, draws: int = 4000, seed: int = 0
 ) -> DesignDraws:
     """Return the draws that designs are computed from.
 
@@ -184,46 +184,46 @@ def design_draws(
         NotUsable: the calibration failed its checks.
         InputError: the seed is invalid, or the theory has no sizes.
     """
-    theory = source.theory
+    known = source if isinstance(source, Gear) else pool(source)
     with Findings() as wrong:
         wrong += implausible("seed", seed)
-        if theory == SPRING:
+        if known.theory == SPRING:
             words = "has no sizes, and a design changes sizes"
             remedy = "Calibrate with the sizes of the gear and another theory"
-            wrong.append(Finding(f"theory '{theory}'", words, remedy))
-    if isinstance(source, Posterior):
-        return _calibrated(source, seed)
-    ratio = _formula(source, source.K_theory) / _formula(source, source.theory)
-    priors = {**source.priors, "K": scaled(source.priors["K"], ratio)}
+            wrong.append(Finding(f"theory '{SPRING}'", words, remedy))
+    if isinstance(known, Pooled):
+        return _calibrated(known, seed)
+    ratio = _formula(known, known.K_theory) / _formula(known, known.theory)
+    priors = {**known.priors, "K": scaled(known.priors["K"], ratio)}
     rng = np.random.default_rng(seed)
     values = {
         name: sample_prior(prior, name, rng, draws) for name, prior in priors.items()
     }
     return DesignDraws(
-        gear=source,
-        theory=source.theory,
-        problem=_bare_problem(source),
+        gear=known,
+        theory=known.theory,
+        problem=_bare_problem(known),
         values=values,
-        facts=_material_facts(source),
-        material=source.material,
+        facts=_material_facts(known),
+        material=known.material,
         kind="prior",
         records=None,
     )
 
 
-def _calibrated(posterior: Posterior, seed: int) -> DesignDraws:
-    causes, gear = causes_of(posterior), posterior.case.gear
-    values, untested = gear_values(posterior, seed)
+def _calibrated(pooled: Pooled, seed: int) -> DesignDraws:
+    causes, gear = pooled.causes, pooled.case.gear
+    values, untested = gear_values(pooled, seed)
     main = likeliest(causes).posterior
     return DesignDraws(
         gear=gear,
-        theory=posterior.theory,
-        problem=posterior.problem,
+        theory=pooled.theory,
+        problem=pooled.problem,
         values=values,
         facts=_material_facts(gear),
         material=gear.material,
         kind="posterior",
-        records=posterior.case.records,
+        records=pooled.case.records,
         misfits=(*averaging_words(causes), *misfits(main)),
         untested=untested,
         effective_size=jointly_worth(causes),

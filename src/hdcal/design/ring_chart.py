@@ -1,14 +1,14 @@
 """Chart of a ring that two opposed loads deform: shape, moment and stress."""
 
-import jax
 import numpy as np
 
 from hdcal.data.records import Geometry
+from hdcal.exported import jit
 from hdcal.physics.profile import ring_profile
 from hdcal.physics.theory import RING_SERIES
 from hdcal.report.chart_spec import BLUE, ORANGE, Chart, Line, Mark, Panel
 
-_profile = jax.jit(ring_profile, static_argnames=("terms",))
+_profile = jit(ring_profile, static_argnames=("terms",))
 # Terms of the shorter series.
 _FEW = 3
 # Title, y axis, and the label of each curve by its name in the profile.

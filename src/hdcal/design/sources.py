@@ -5,12 +5,13 @@ from pathlib import Path
 from hdcal.data.case import Gear
 from hdcal.data.gear import read_gear
 from hdcal.errors import Finding, Findings
+from hdcal.inference.model_average import ModelAverage, load_models
 from hdcal.inference.posterior import Posterior
 
 
 def open_source(
     wrong: Findings, run: str | None, gear: str | None, kind: str
-) -> tuple[Posterior | Gear | None, str | None]:
+) -> tuple[Posterior | ModelAverage | Gear | None, str | None]:
     """Return the calibration or gear, and the default folder of the result.
 
     Args:
@@ -30,5 +31,5 @@ def open_source(
     if gear is not None:
         return wrong.attempt(read_gear, gear), f"{Path(gear).stem}-{kind}"
     assert run is not None
-    posterior = wrong.attempt(Posterior.load, run)
-    return posterior, None if posterior is None else f"{posterior.case.name}-{kind}"
+    models = wrong.attempt(load_models, run)
+    return models, None if models is None else f"{models.case.name}-{kind}"

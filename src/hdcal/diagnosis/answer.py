@@ -7,7 +7,7 @@ from hdcal.diagnosis.budget import Budget
 from hdcal.diagnosis.gap import Cell, CovariateShare, Gap, Seen
 from hdcal.diagnosis.verdict import Closure, NextRun, Which
 from hdcal.errors import Finding
-from hdcal.inference.hypotheses import LeftOut
+from hdcal.inference.model_average import LeftOut
 from hdcal.report.answer import (
     Answer,
     Count,
@@ -44,11 +44,10 @@ class WhereAnswer:
 
 @dataclass(frozen=True)
 class Refit:
-    """A corrected model that was calibrated, and its file in the folder."""
+    """A corrected model that was calibrated: a group of posterior.nc."""
 
     hypothesis: Words
     probability: Probability
-    file: Annotated[str, Promise(pattern="^posterior[^/\\\\]*\\.nc$")]
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.evidence.effect_curves import padded_records
+from hdcal.exported import jit
 from hdcal.inference.loop_cells import loop_cells
 from hdcal.physics.history import load_cycle
 
@@ -175,7 +175,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
     )
 
 
-@jax.jit
+@jit
 def _load_cycle(records: Records):
     return load_cycle(records.sense, records.run, records.specimen)
 

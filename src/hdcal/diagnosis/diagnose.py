@@ -30,10 +30,10 @@ from hdcal.diagnosis.which import identify_cause
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.fewer_rows import thin_rows
-from hdcal.inference.mixed_posterior import mixed_posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
+from hdcal.prediction.engine.pooled import pool
 from hdcal.report.words import hypothesis, percent
 
 # Rows from which on a model with a memory takes minutes and more to calibrate.
@@ -110,14 +110,14 @@ def _stiffness(fits: Refits) -> np.ndarray | None:
     """Return draws of the stiffness as read over all models [N/mm]."""
     if not fits.models:
         return None
-    return mixed_posterior(fits.models).draws["stiffness"]
+    return pool([*fits.models.values()]).values["stiffness"]
 
 
 def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     """Refuse priors of unknown effects, and forces that fall with the deformation.
 
     Raises:
-        InputError: an effect has no prior or does not bear padded rows, the gear file
+        InputError: an effect has no prior, the gear file
             names an unknown one, or the force does not grow with the deformation; or
             the seed is none.
     """

@@ -12,7 +12,6 @@ from hdcal.diagnosis.sections import (
 )
 from hdcal.diagnosis.words import nothing_suspected
 from hdcal.evidence.case_evidence import UNKNOWN
-from hdcal.inference.hypotheses import parts_of
 from hdcal.inference.posterior import Posterior
 from hdcal.report.document import (
     Document,
@@ -168,7 +167,7 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
     name, posterior = refit
     bad = "" if posterior.usable else " This fit failed its checks; do not use it."
     words = f"Calibrated again with {hypothesis(name)}.{bad} {_kept(found)}"
-    with_gap = any(UNKNOWN in parts_of(one.hypothesis) for one in found.refits)
+    with_gap = any(UNKNOWN in one.hypothesis.split("+") for one in found.refits)
     gap = "; middle band: the same with the leftover discrepancy" * with_gap
     caption = (
         f"Inner band: where the corrected model lies with 95 % probability{gap}. Outer "
@@ -191,13 +190,12 @@ def _kept(found: VerdictAnswer) -> str:
     if len(found.refits) < 2:
         return f"All draws are in posterior.nc, {numbers}"
     listed = ", ".join(
-        f"{hypothesis(refit.hypothesis)} ({percent(refit.probability)}, {refit.file})"
+        f"{hypothesis(refit.hypothesis)} ({percent(refit.probability)})"
         for refit in found.refits
     )
     return (
-        f"The bands average over {listed}. Draws of all, each with its hypothesis and "
-        f"as many as it is probable, are in posterior.nc, {numbers} Below, the most "
-        "probable one."
+        f"The bands average over {listed}. All draws are in posterior.nc, a group for "
+        f"each of them, {numbers} Below, the most probable one."
     )
 
 

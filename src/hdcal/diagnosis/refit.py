@@ -18,7 +18,7 @@ from hdcal.data.case import Case
 from hdcal.diagnosis.model_posterior import ModelPosterior
 from hdcal.diagnosis.verdict import Which
 from hdcal.evidence.case_evidence import UNKNOWN
-from hdcal.inference.hypotheses import LeftOut, parts_of
+from hdcal.inference.model_average import NONE, LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
@@ -77,7 +77,7 @@ def refit(
 
     def calibrated(name: str) -> Posterior:
         nonlocal finished
-        own, before = parts_of(name), finished
+        own, before = _parts(name), finished
 
         def tell(done: int, total: int) -> None:
             assert progress is not None
@@ -148,16 +148,21 @@ def _open_model(
     What is the likeliest effect and a little more is no gap without that effect.
     """
     usable = {name for name, fit in fits.items() if fit.usable}
-    effects = frozenset().union(*map(parts_of, usable)) - {UNKNOWN}
+    effects = frozenset().union(*map(_parts, usable)) - {UNKNOWN}
 
     def share(effect: str, among: Iterable[str]) -> float:
-        return sum(probabilities[n] for n in among if effect in parts_of(n))
+        return sum(probabilities[n] for n in among if effect in _parts(n))
 
     rest = probabilities.keys() - usable
     likeliest = max(sorted(effects), key=lambda e: share(e, probabilities), default="")
     half = 0.5 * sum(probabilities[name] for name in rest)
     alike = bool(likeliest) and share(likeliest, rest) > half
     return f"{likeliest}+{UNKNOWN}" if alike else UNKNOWN
+
+
+def _parts(hypothesis: str) -> frozenset[str]:
+    """Return the effects of a hypothesis, and `unknown` where it has a leftover."""
+    return frozenset(hypothesis.split("+")) - {NONE}
 
 
 def _widest(fits: Mapping[str, Posterior]) -> str:

@@ -1,7 +1,7 @@
 """A verdict as its JSON answer, and all that its result folder holds."""
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,12 +10,12 @@ from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAns
 from hdcal.diagnosis.document import verdict_document
 from hdcal.diagnosis.verdict import Verdict
 from hdcal.diagnosis.words import answer, headline, limits, next_step
-from hdcal.inference.hypotheses import LEFT_OUT, ORIGIN
-from hdcal.inference.mixed_posterior import mixed_posterior
+from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.prediction.engine.pooled import pool
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
@@ -42,10 +42,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         next_test=verdict.next_test,
         next_test_reason=verdict.no_run,
         budget=verdict.budget,
-        refits=tuple(
-            Refit(name, verdict.posteriors[name][0], file)
-            for name, file in member_files(verdict).items()
-        ),
+        refits=tuple(Refit(name, share) for name, (share, _) in _ranked(verdict)),
         left_out=verdict.left_out,
         stiffness_N_per_mm=_stiffness(verdict),
         library=verdict.library,
@@ -78,7 +75,7 @@ def _stiffness(verdict: Verdict) -> Interval | None:
     """Return the stiffness as read, hypotheses weighed by their probabilities."""
     if verdict.reasons or not verdict.posteriors:
         return None
-    return credible_interval(mixed_posterior(verdict.posteriors).draws["stiffness"])
+    return credible_interval(pool(verdict).values["stiffness"])
 
 
 def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]:
@@ -147,12 +144,9 @@ def write_verdict(
     return told.answer
 
 
-def member_files(verdict: Verdict) -> dict[str, str]:
-    """Return the file of each calibrated hypothesis; of a single one the usual one."""
-    ranked = sorted(verdict.posteriors, key=lambda name: -verdict.posteriors[name][0])
-    if len(ranked) == 1:
-        return {ranked[0]: FILE_NAME}
-    return {name: f"posterior-{name}.nc" for name in ranked}
+def _ranked(verdict: Verdict) -> list[tuple[str, tuple[float, Posterior]]]:
+    """Return the calibrated models by hypothesis, the most probable first."""
+    return sorted(verdict.posteriors.items(), key=lambda item: -item[1][0])
 
 
 def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
@@ -165,19 +159,7 @@ def corrected(verdict: Verdict) -> tuple[str, Posterior] | None:
 
 
 def _models(verdict: Verdict) -> Iterator[tuple[str, bytes]]:
-    """Yield the file of every calibrated model, and of several their mixture."""
-    chances = {name: share for name, (share, _) in verdict.posteriors.items()}
-    left = {} if verdict.left_out is None else {LEFT_OUT: asdict(verdict.left_out)}
-
-    def known(name: str) -> Posterior:
-        posterior = verdict.posteriors[name][1]
-        origin = {"hypothesis": name, "probabilities": chances}
-        return replace(
-            posterior, settings={**posterior.settings, ORIGIN: origin, **left}
-        )
-
-    for name, file in member_files(verdict).items():
-        yield file, known(name).to_netcdf()
-    if len(chances) > 1:
-        models = {name: (share, known(name)) for name, share in chances.items()}
-        yield FILE_NAME, mixed_posterior(models).to_netcdf()
+    """Yield the file of the calibrated models, where there are any."""
+    if verdict.posteriors:
+        average = ModelAverage(verdict.posteriors, verdict.left_out)
+        yield FILE_NAME, average.to_netcdf()

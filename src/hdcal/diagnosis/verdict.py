@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from hdcal.data.case import Case
 from hdcal.diagnosis.budget import Budget
 from hdcal.diagnosis.gap import Gap, Seen, Where
-from hdcal.inference.hypotheses import LeftOut
+from hdcal.inference.model_average import LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.notebook import Shown
 from hdcal.report.answer import (

@@ -11,8 +11,8 @@ from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.prepare import PreparedCase
 from hdcal.evidence.single_evidence import SingleEvidence
 from hdcal.evidence.subspaces import SubspaceEvidence
-from hdcal.inference.hypotheses import NONE as NONE
-from hdcal.inference.hypotheses import UNKNOWN as UNKNOWN
+from hdcal.inference.model_average import NONE as NONE
+from hdcal.inference.model_average import UNKNOWN as UNKNOWN
 
 QUANTISATION = "quantisation"
 # Squared length in noise sds below which an effect of large physical size is unseen.

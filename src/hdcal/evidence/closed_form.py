@@ -25,6 +25,7 @@ from hdcal.evidence.inner_products import (
     PieceProducts,
     SubspaceProducts,
 )
+from hdcal.exported import jit
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_interval
 from hdcal.inference.padding import bucket_size, repeat_last_row
@@ -153,7 +154,7 @@ def _noise_of_cells(common: CommonTerms, own: PieceProducts, cells: AmplitudeCel
     return most_probable_noise(step, 0.5 * jnp.log(own.ee / common.rows))
 
 
-@jax.jit
+@jit
 def _cell_evidence(common, products, cells, sigma: Prior):
     own = _of_cells(products, cells)
     centre = _noise_of_cells(common, own, cells)
@@ -193,7 +194,7 @@ def cell_evidence(
     return evidence, mean, sd
 
 
-@jax.jit
+@jit
 def _subspace_evidence(common, products, scale, log_weight, sigma: Prior):
     def parts(log_sd):
         loose = (scale**2 * jnp.exp(-2.0 * log_sd))[..., None]

@@ -6,6 +6,7 @@ import jax
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.padding import pad_records, repeat_last_row
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
@@ -24,7 +25,7 @@ def padded_records(records: Records) -> Records:
     return pad_records(replace(records, known=frozenset()))
 
 
-@jax.jit
+@jit
 def _base_reading(base: Base, records: Records, reading: Reading):
     return predict_reading(base, (), records, reading)[0]
 
@@ -35,7 +36,7 @@ def base_reading(base: Base, records: Records, reading: Reading) -> np.ndarray:
     return np.asarray(found)[: len(records.force)]
 
 
-@jax.jit
+@jit
 def _curves(effects: Effect, base: Base, records: Records, reading: Reading):
     plain, _ = predict_reading(base, (), records, reading)
 

@@ -19,6 +19,7 @@ from hdcal.data.records import Array
 from hdcal.evidence.effect_curves import padded_records
 from hdcal.evidence.parameter_grid import quantile_grid
 from hdcal.evidence.prepare import PreparedCase
+from hdcal.exported import jit
 from hdcal.inference.distributions import distribution
 from hdcal.inference.likelihood import log_probability, row_precision
 from hdcal.inference.padding import append_zeros, bucket_size, measured, repeat_last_row
@@ -122,7 +123,7 @@ def _row_precision(point, effect, problem: NoiseProblem):
     return row_precision(error, noise)
 
 
-@jax.jit
+@jit
 @partial(jax.vmap, in_axes=(0, None, None, None))
 def _laplace(effect: Effect, problem: NoiseProblem, sigma: Prior, start):
     """Return log evidence and effective precision of each row, of each effect."""

@@ -23,6 +23,7 @@ from hdcal.evidence.inner_products import gram_matrix
 from hdcal.evidence.linear_rows import LinearRows
 from hdcal.evidence.piecewise_effect import PiecewiseEffect
 from hdcal.evidence.single_evidence import SingleEvidence
+from hdcal.exported import jit
 from hdcal.inference.likelihood import log_interval
 
 # Cells of each effect that take part: the most probable ones alone, and some across
@@ -89,7 +90,7 @@ def _amplitudes(pairs: CellPairs, log_sd):
     return det, drawn, mean, (cov11, cov12, cov22)
 
 
-@jax.jit
+@jit
 def _cell_pair_evidence(constant, rows, pairs: CellPairs, sigma: Prior):
     def step(log_sd):
         mean = jnp.clip(_amplitudes(pairs, log_sd)[2], pairs.low, pairs.high)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 from scipy.special import erf
 
@@ -19,6 +18,7 @@ from hdcal.evidence.parameter_grid import (
     make_grid,
 )
 from hdcal.evidence.prepare import PreparedCase
+from hdcal.exported import jit
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.scatter import Scatter, scores
 
@@ -27,7 +27,7 @@ WIDTH = 24
 # Steps of the scale of a subspace of unknown size, as factors of its prior sd.
 _STEPS = 2.0 ** np.arange(-5.0, 5.0)
 
-_scores = jax.jit(scores)
+_scores = jit(scores)
 
 
 @dataclass(frozen=True)

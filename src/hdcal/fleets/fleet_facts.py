@@ -78,7 +78,7 @@ class FleetFacts:
     checks: tuple[Check, ...]
     settings: FleetSettings
     versions: dict[str, str]
-    reach_mm: Size | None = None
+    reach_mm: Size | None
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:

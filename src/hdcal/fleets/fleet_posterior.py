@@ -1,6 +1,6 @@
-"""The population of a fleet as draws: all that gears to come hang on, saved and loaded.
+"""The draws of the population of a fleet, which the forces of new gears rest on.
 
-It is `posterior.nc` in the folder of a fleet.
+They are `posterior.nc` in the folder of a fleet.
 """
 
 import json
@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import xarray as xr
 
 from hdcal.data.plausible import implausible
 from hdcal.data.typed_json import typed_text
-from hdcal.errors import Finding, Findings, InputError, NotUsable
-from hdcal.fleets.fleet_facts import POSITIVE, FleetFacts, facts_of
+from hdcal.errors import Finding, Findings, NotUsable
+from hdcal.fleets.fleet_facts import FleetFacts, facts_of
 from hdcal.fleets.next_force import (
     CONTENTS,
     NextForce,
@@ -23,13 +24,16 @@ from hdcal.fleets.next_force import (
     next_force,
 )
 from hdcal.fleets.next_gear import CONFIDENCE
-from hdcal.inference import posterior_file
-from hdcal.inference.array_tree import ArrayTree, group_of, joined
-from hdcal.inference.posterior_limits import check_draws
+from hdcal.inference.posterior_file import (
+    FLEET,
+    content,
+    file_of,
+    not_a_posterior,
+    read_tree,
+)
+from hdcal.inference.posterior_tree import dataset, group_of, joined_draws
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from hdcal.fleets.fleet import Fleet
 
 _NEXT = "stiffness"
@@ -42,12 +46,12 @@ class FleetPosterior:
     """What is known of the population of a fleet.
 
     Attributes:
-        arrays: of the group posterior the draws of the population by site, of the group
+        tree: in the group posterior the draws of the population by site, in the group
             predictions the stiffness of a gear to come [N/mm as read]; chains by draws.
         facts: what they rest on.
     """
 
-    arrays: ArrayTree
+    tree: xr.DataTree
     facts: FleetFacts
 
     def __repr__(self) -> str:
@@ -61,12 +65,7 @@ class FleetPosterior:
     @property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws of the population by site, chains joined, as `Fleet` has them."""
-        return joined(self.arrays.groups["posterior"])
-
-    @property
-    def tree(self) -> "xr.DataTree":
-        """What ArviZ draws from: its groups as a DataTree."""
-        return self.arrays.datatree
+        return joined_draws(self.tree)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -125,7 +124,7 @@ class FleetPosterior:
             "status": "failed" if self.reasons else "ok",
             "fleet": json.dumps(asdict(self.facts)),
         }
-        return posterior_file.sealed(self.arrays, posterior_file.FLEET, attributes)
+        return content(self.tree, FLEET, attributes)
 
     @classmethod
     def load(cls, path: Path | str) -> "FleetPosterior":
@@ -138,16 +137,26 @@ class FleetPosterior:
             InputError: the file is missing, damaged, changed, from another version or
                 of no fleet.
         """
-        file, kind = posterior_file.file_of(path), posterior_file.FLEET
-        tree = posterior_file.open_tree(file, kind)
-        posterior_file.check_unchanged(tree, file, kind)
+        file = file_of(path)
+        tree = read_tree(file, FLEET)
         try:
             found = cls(tree, typed_text(FleetFacts, tree.attrs["fleet"]))
-            _check_population(found)
-        except (KeyError, ValueError, TypeError, AttributeError) as error:
-            damaged = posterior_file.not_a_posterior(file, kind)
-            raise InputError([damaged]) from error
+            found._check_draws()
+        except (KeyError, ValueError) as error:
+            raise not_a_posterior(file, FLEET) from error
         return found
+
+    def _check_draws(self) -> None:
+        """Check that the draws are those of the population.
+
+        Raises:
+            KeyError, ValueError: they are not.
+        """
+        if self.draws.keys() != self.facts.units.keys():
+            raise ValueError("has other sites than a population")
+        drawn = group_of(self.tree, "posterior")["stiffness"]
+        if group_of(self.tree, "predictions")[_NEXT].shape != drawn.shape:
+            raise ValueError("has another number of gears to come")
 
     @classmethod
     def of(cls, found: "Fleet") -> "FleetPosterior":
@@ -155,16 +164,14 @@ class FleetPosterior:
         facts = facts_of(found)
         chains = facts.settings.chains
         drawn = {name: v.reshape(chains, -1) for name, v in found.draws.items()}
-        population = group_of(drawn)
-        said = {name: {"units": unit} for name, unit in facts.units.items()}
+        population = dataset(drawn, units=facts.units)
         for kind, names in facts.groups.items():
             for place, name in enumerate(names, 1):
-                said.setdefault(f"{kind}_{place}", {})["long_name"] = name
-        for name in said.keys() & drawn.keys():
-            population[name] = population[name]._replace(said=said[name])
-        ahead = group_of({_NEXT: found.next_stiffness.reshape(chains, -1)})
-        ahead[_NEXT] = ahead[_NEXT]._replace(said={"units": "N/mm"})
-        return cls(ArrayTree({"posterior": population, "predictions": ahead}), facts)
+                population[f"{kind}_{place}"].attrs["long_name"] = name
+        stiffness = found.next_stiffness.reshape(chains, -1)
+        ahead = dataset({_NEXT: stiffness}, units={_NEXT: "N/mm"})
+        groups = {"posterior": population, "predictions": ahead}
+        return cls(xr.DataTree.from_dict(groups), facts)
 
 
 def _share_findings(shares: Mapping[str, float], draws: int) -> Iterator[Finding]:
@@ -176,29 +183,3 @@ def _share_findings(shares: Mapping[str, float], draws: int) -> Iterator[Finding
     if 0.0 < shares.get("content", 1.0) <= 0.5:
         words = f"{shares['content']:g} is no more than half of the gears to come"
         yield Finding("content", words, "Ask for more than 0.5")
-
-
-def _check_population(found: FleetPosterior) -> None:
-    """Check that draws are whole, whoever wrote them.
-
-    Raises:
-        KeyError, ValueError: they are not.
-    """
-    draws = found.draws
-    drawn = found.arrays.groups["posterior"]
-    chains = len(drawn["stiffness"].values)
-    if not found.facts.checks or chains != found.facts.settings.chains:
-        raise ValueError("has other chains, or no checks")
-    if draws.keys() != found.facts.units.keys():
-        raise ValueError("has other sites than a population")
-    check_draws(drawn, dict.fromkeys(draws, ()))
-    ahead = found.arrays.groups["predictions"][_NEXT].values
-    if ahead.shape != drawn["stiffness"].values.shape:
-        raise ValueError("has another number of gears to come")
-    if not np.isfinite(ahead).all():
-        raise ValueError("has a gear to come that is not finite")
-    scatter = [f"{kind}_sd" for kind in found.facts.groups]
-    if any(np.min(draws[name]) < 0.0 for name in [*POSITIVE, *scatter]):
-        raise ValueError("has a scatter below nothing")
-    if np.max(draws["off_share"]) > 1.0 or np.min(draws["stiffness"]) <= 0.0:
-        raise ValueError("has numbers that no population has")

@@ -15,7 +15,10 @@ from collections.abc import Mapping
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import numpyro
+import numpyro.distributions as dist
 from jaxtyping import Float
+from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 
@@ -41,9 +44,6 @@ class Grouping(eqx.Module):
 
 def grouping(means: np.ndarray, covariance: np.ndarray) -> Grouping:
     """Return groups from the mean of each, shape (k,), and their covariance."""
-    # Late: only where something is grouped.
-    from scipy.linalg import helmert
-
     basis = helmert(len(means)).T
     return Grouping(basis, basis.T @ means, np.diag(basis.T @ covariance @ basis))
 
@@ -56,9 +56,6 @@ def sample_offsets(kind: str, groups: Grouping, sd) -> dict:
         groups: where they seem to be.
         sd: their scatter.
     """
-    import numpyro
-    import numpyro.distributions as dist
-
     weight = sd**2 / (sd**2 + groups.variance)
     scale = jnp.sqrt(weight * groups.variance)
     plain, places = dist.Normal(0.0, 1.0), range(1, len(groups.basis))

@@ -15,13 +15,16 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import numpyro
 from jaxtyping import Float
 
 from hdcal.data.prior import Prior
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.fleets.gear_sums import GearSums, line_noise, stretched
 from hdcal.fleets.groupings import Grouping, group_offsets, sample_offsets
 from hdcal.inference.density import log_likelihood
+from hdcal.inference.model import sample_site
 from hdcal.inference.sampled_problem import Sampled
 
 # Nodes of the noise of a gear about where it likely is: places in sds, and weights.
@@ -86,10 +89,6 @@ class PopulationProblem(Sampled):
 
     def declare(self) -> None:
         """Declare the joint density of the population and all readings to NumPyro."""
-        import numpyro
-
-        from hdcal.inference.model import sample_site
-
         values = {name: sample_site(name, p) for name, p in self.priors.items()}
         for kind, groups in self.groups.items():
             spread = values[f"{kind}_ratio"] * values[_MEMBERS[kind]]
@@ -228,7 +227,7 @@ class DrawnGears(NamedTuple):
     chance: Float[Array, "t g"]
 
 
-@jax.jit
+@jit
 def draw_gears(problem: PopulationProblem, values: Mapping, seed: int) -> DrawnGears:
     """Draw every gear from what is known of it given each draw of the population.
 

@@ -1,13 +1,13 @@
 """How finely the data see each amplitude: the unit of its sampling coordinate."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import jax
 import numpy as np
 
 from hdcal.data.priors import Prior
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.distributions import frozen
 from hdcal.inference.padding import pad_records
 from hdcal.physics.chain import Base, Reading, predict_reading
@@ -76,7 +76,7 @@ def finest(
     return min(widest, unit) or widest
 
 
-@partial(jax.jit, static_argnames=("effect",))
+@jit(static_argnames=("effect",))
 def _slopes(base: Base, values, prior_sds, records, reading, *, effect):
     """Return the derivative of the reading by each amplitude near its null."""
 

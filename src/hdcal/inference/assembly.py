@@ -5,11 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
 from hdcal.data.versions import versions
-from hdcal.inference.array_tree import ArrayTree
 from hdcal.inference.checks import (
     Check,
     bound_check,
@@ -55,8 +55,8 @@ def assemble(
     found: Draws,
     own: Specifics,
     seed: int,
-) -> tuple[ArrayTree, dict[str, Diagnosis], tuple[Check, ...]]:
-    """Return the groups, diagnoses and checks of a posterior.
+) -> tuple[xr.DataTree, dict[str, Diagnosis], tuple[Check, ...]]:
+    """Return the tree, diagnoses and checks of a posterior.
 
     Args:
         case: data and gear.
@@ -82,7 +82,9 @@ def assemble(
         name: sample_prior(prior, name, rng, _PRIOR_DRAWS)
         for name, prior in sampled.items()
     }
-    arrays = build_tree(case, found, prior_draws, own.log_likelihood, own.observed)
+    units = {name: prior.unit for name, prior in priors.items() if prior.unit}
+    about = units, own.log_likelihood, own.observed
+    tree = build_tree(case, found, prior_draws, *about)
     dead = dead_parameters(own.slopes, problem)
     alive = {name: slope for name, slope in own.slopes.items() if name not in dead}
     checks = (
@@ -92,7 +94,7 @@ def assemble(
         bound_check(scalars, sampled),
         *identification_checks(dead, flat_directions(alive, problem)),
     )
-    return arrays, diagnoses, checks
+    return tree, diagnoses, checks
 
 
 def run_settings(found: Draws, began: float) -> dict[str, object]:

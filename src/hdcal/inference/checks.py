@@ -112,9 +112,11 @@ def mixing_checks(mixed: Mapping[str, Mixing], chains: int) -> tuple[Check, ...]
 
 
 def _explored(energy: np.ndarray) -> np.ndarray:
-    """Return the BFMI of each chain (Betancourt, arXiv:1604.00695, 2016)."""
+    """Return the BFMI of each chain; NaN where the energy stands still."""
+    from arviz_stats.base.array import array_stats
+
     with np.errstate(all="ignore"):
-        return np.mean(np.diff(energy) ** 2, axis=1) / np.var(energy, axis=1, ddof=1)
+        return np.asarray(array_stats.bfmi(energy))
 
 
 def _bad(value: float) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference import compress
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import linear_part
@@ -92,7 +93,7 @@ def densities(problem: Sampled, draws: Values) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(of_prior), np.asarray(of_data)
 
 
-@jax.jit
+@jit
 def _densities(problem: Sampled, values):
     def both(one):
         return log_prior(problem, one), log_likelihood(problem, one)

@@ -1,4 +1,4 @@
-"""Whether data or priors drive each parameter, beside how well its chains mixed."""
+"""Whether the data or the priors decide each parameter, and how well it was sampled."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from hdcal.data.priors import Prior
 from hdcal.inference.distributions import moments
 from hdcal.inference.mixing import Mixing, mixing
 
-# Part of the prior variance that must be gone before the data, not the prior, drive;
-# from the second value on also where power-scaling calls the likelihood weak.
+# Share of the prior variance that the data must remove to decide a parameter; the
+# second value where power-scaling finds the likelihood weak.
 MIN_CONTRACTION, CLEAR_CONTRACTION = 0.75, 0.95
 # Power-scaling sensitivity from which a prior or a likelihood matters.
 SENSITIVE = 0.05
-# By so much a power is changed to see what it does.
+# Change of the power, up and down.
 _POWER = 0.01
 
 Driver = Literal["data", "prior"]
@@ -26,7 +26,7 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class Diagnosis(Mixing):
-    """Mixing, and what drives a parameter.
+    """Convergence of a parameter, and what decides it.
 
     Attributes:
         contraction: 1 − var(posterior)/var(prior), of a lognormal prior in logarithms.
@@ -55,31 +55,30 @@ def diagnose_parameters(
         log_prior: of each draw.
         log_likelihood: of each draw, all data.
     """
-    mixed = mixing(draws)
-    # On draws that stand still the statistics are NaN, which fails its check.
-    with np.errstate(all="ignore"):
-        to_prior = dict(zip(draws, _sensitivity(draws, log_prior), strict=True))
-        to_data = dict(zip(draws, _sensitivity(draws, log_likelihood), strict=True))
+    to_prior = power_sensitivity(draws, log_prior)
+    to_data = power_sensitivity(draws, log_likelihood)
     found = {}
-    for name, values in draws.items():
-        contraction = _contraction(values, priors[name], name)
-        weak = bool(to_data[name] < SENSITIVE < to_prior[name])
+    for name, mixed in mixing(draws).items():
+        contraction = _contraction(draws[name], priors[name], name)
+        weak = to_data[name] < SENSITIVE < to_prior[name]
         enough = CLEAR_CONTRACTION if weak else MIN_CONTRACTION
         found[name] = Diagnosis(
-            **vars(mixed[name]),
+            rhat=mixed.rhat,
+            ess_bulk=mixed.ess_bulk,
+            ess_tail=mixed.ess_tail,
             contraction=contraction,
-            prior_sensitivity=float(to_prior[name]),
-            likelihood_sensitivity=float(to_data[name]),
+            prior_sensitivity=to_prior[name],
+            likelihood_sensitivity=to_data[name],
             driven_by="data" if contraction >= enough else "prior",
         )
     return found
 
 
 def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
-    """Return which share of the prior's variance the data removed.
+    """Return the share of the prior's variance that the data removed.
 
-    What a lognormal prior lets be large may scatter widely too; in logarithms its width
-    is everywhere the same.
+    A lognormal prior is compared in logarithms, in which its width is the same
+    everywhere.
     """
     if prior.family == "lognormal":
         logarithm, sd = np.log(np.maximum(draws, _TINY)), float(prior.numbers[1])
@@ -87,43 +86,28 @@ def _contraction(draws: np.ndarray, prior: Prior, name: str) -> float:
     return float(1.0 - draws.var() / moments(prior, name)[1] ** 2)
 
 
-def _sensitivity(draws: Mapping[str, np.ndarray], log_part: np.ndarray) -> np.ndarray:
+def power_sensitivity(
+    draws: Mapping[str, np.ndarray], log_part: np.ndarray
+) -> dict[str, float]:
     """Return how much each parameter changes with the power of a part of its density.
 
-    Source: Kallioinen, Paananen, Bürkner and Vehtari, Statistics and Computing 34, 57
-    (2024). Weights so near to one have no tail that was worth smoothing.
+    The weights are not Pareto-smoothed: so near to one they have no tail.
 
     Args:
         draws: of each parameter, (chain, draw).
         log_part: log density of prior or likelihood of each draw.
     """
-    flat = np.stack([values.ravel() for values in draws.values()])
-    order = np.argsort(flat, axis=1)
-    width = np.diff(np.take_along_axis(flat, order, axis=1))
-    slopes = []
-    for power in (1.0 - _POWER, 1.0 + _POWER):
-        weight = softmax((power - 1.0) * log_part.ravel())[order]
-        distance = np.maximum(
-            _distance(width, weight), _distance(width[:, ::-1], weight[:, ::-1])
-        )
-        slopes.append(distance / abs(np.log2(power)))
-    return np.mean(slopes, axis=0)
+    from arviz_stats.base.array import array_stats
 
-
-def _distance(width: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Return the cumulative Jensen-Shannon distance of weighted from equal draws.
-
-    Args:
-        width: between neighbours among the sorted draws, shape (k, d − 1).
-        weight: of the sorted draws, sum 1, shape (k, d).
-    """
-    equal = np.arange(1, weight.shape[1]) / weight.shape[1]
-    weighed = np.cumsum(weight, axis=1)[:, :-1]
-    middle = np.log2(0.5 * (equal + weighed))
-    areas = width @ equal, np.sum(width * weighed, axis=1)
-    lean = 0.5 / np.log(2.0) * (areas[1] - areas[0])
-    gains = (
-        np.sum(width * equal * (np.log2(equal) - middle), axis=1) + lean,
-        np.sum(width * weighed * (np.log2(weighed) - middle), axis=1) - lean,
-    )
-    return np.sqrt(sum(np.maximum(gain, 0.0) for gain in gains) / sum(areas))
+    about = {
+        "lower_w": softmax(-_POWER * log_part),
+        "upper_w": softmax(_POWER * log_part),
+        "lower_alpha": 1.0 - _POWER,
+        "upper_alpha": 1.0 + _POWER,
+    }
+    # The distance is 0/0 where all draws are equal.
+    with np.errstate(all="ignore"):
+        return {
+            name: np.asarray(array_stats.power_scale_sense(values, **about)).item()
+            for name, values in draws.items()
+        }

@@ -8,15 +8,18 @@ It knows no temperature.
 """
 
 from collections.abc import Sequence
-from functools import partial
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from numpyro.contrib.hsgp.laplacian import eigenfunctions
+from numpyro.contrib.hsgp.spectral_densities import (
+    diag_spectral_density_squared_exponential,
+)
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference.padding import bucket_size, repeat_last_row
 from hdcal.physics.effect import Effect
 
@@ -86,21 +89,16 @@ class Discrepancy(eqx.Module):
         return jnp.concatenate([own, jnp.full(2, sd), own[:_LOOP_SIZE]])
 
 
-def leftover_size(records: Records, *, loop: bool) -> int:
+def leftover_size(records: Records) -> int:
     """Return the number of weights of the discrepancy of a case.
 
     Args:
         records: of the case.
-        loop: whether it may know loading from unloading; older calibrations may not.
     """
-    return BASIS_SIZE + (2 + _LOOP_SIZE) * _is_directed(records, loop)
+    return BASIS_SIZE + (2 + _LOOP_SIZE) * ("unloading" in records.known)
 
 
-def _is_directed(records: Records, loop: bool) -> bool:
-    return loop and "unloading" in records.known
-
-
-@partial(jax.jit, static_argnames=("directed",))
+@jit(static_argnames=("directed",))
 def _functions(scaled, movement, *, directed: bool):
     """Return the functions before anything is projected off, shape (n, m)."""
     smooth = _basis(scaled)
@@ -111,19 +109,17 @@ def _functions(scaled, movement, *, directed: bool):
 
 
 def _basis(scaled):
-    from numpyro.contrib.hsgp.laplacian import eigenfunctions
-
     # Beyond the interval the eigenfunctions would repeat; hold them at its end.
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
 
-@jax.jit
+@jit
 def _line(scaled):
     return jnp.stack([jnp.ones_like(scaled), scaled], axis=1)
 
 
 def build_discrepancy(
-    records: Records, effects: Sequence[type[Effect]] = (), *, loop: bool = True
+    records: Records, effects: Sequence[type[Effect]] = ()
 ) -> Discrepancy:
     """Project the functions off an offset and a slope at the tested rows.
 
@@ -131,7 +127,6 @@ def build_discrepancy(
         records: tested rows.
         effects: of the model; beside one whose force goes with the direction of the
             movement half a loop would be a second name for the same thing.
-        loop: as `leftover_size`.
     """
     deformation, rows = np.asarray(records.deformation), len(records.deformation)
     low, high = float(np.min(deformation)), float(np.max(deformation))
@@ -140,7 +135,7 @@ def build_discrepancy(
         repeat_last_row(np.asarray(column), bucket_size(rows))
         for column in ((deformation - centre) / half_range, records.sense)
     )
-    directed = _is_directed(records, loop)
+    directed = "unloading" in records.known
     line, found = (
         np.asarray(table)[:rows]
         for table in (_line(place), _functions(place, movement, directed=directed))
@@ -164,7 +159,7 @@ def discrepancy_columns(
     return np.asarray(_columns(discrepancy, records.deformation, records.sense))
 
 
-@jax.jit
+@jit
 def _columns(discrepancy: Discrepancy, deformation, movement):
     return discrepancy.columns(deformation, movement)
 
@@ -176,10 +171,6 @@ def prior_sd(sd, length) -> Float[Array, " m"]:
         sd: of the discrepancy [N].
         length: length-scale as a share of the tested range [-].
     """
-    from numpyro.contrib.hsgp.spectral_densities import (
-        diag_spectral_density_squared_exponential,
-    )
-
     density = diag_spectral_density_squared_exponential(
         sd**2, 2.0 * length, BOUNDARY, BASIS_SIZE, 1
     )

@@ -1,7 +1,7 @@
 """Prior families as NumPyro distributions and as frozen SciPy distributions."""
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,9 +9,6 @@ import numpyro.distributions as dist
 from scipy import stats
 
 from hdcal.data.prior import Prior
-
-if TYPE_CHECKING:
-    from scipy.stats.distributions import rv_frozen
 
 # Parameters that cannot be negative: a normal prior of one is truncated at zero.
 POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
@@ -21,7 +18,7 @@ class _Family(NamedTuple):
     """Both forms of a family, as functions of the prior's numbers."""
 
     numpyro: Callable[..., dist.Distribution]
-    scipy: Callable[..., "rv_frozen"]
+    scipy: Callable[..., Any]
 
 
 _FAMILIES = {
@@ -58,7 +55,7 @@ def distribution(prior: Prior, name: str = "") -> dist.Distribution:
     return _family(prior, name).numpyro(*prior.numbers)
 
 
-def frozen(prior: Prior, name: str = "") -> "rv_frozen":
+def frozen(prior: Prior, name: str = "") -> Any:
     """Return the SciPy distribution of a prior that is not fixed.
 
     Args:

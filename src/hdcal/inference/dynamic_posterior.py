@@ -1,18 +1,18 @@
-"""The calibrated posterior of a moving gear, kept in the same kind of file."""
+"""The calibrated posterior of a moving gear."""
 
 from collections.abc import Mapping
 from functools import cached_property
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from hdcal.data.prior import Prior
 from hdcal.errors import Finding, InputError
-from hdcal.inference import posterior_file
 from hdcal.inference.dynamic_priors import dynamic_sites
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic
-from hdcal.inference.held import LOSS
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
+
+# The setting with the probability of each model of the loss.
+LOSS = "loss"
 
 
 class DynamicPosterior(Posterior):
@@ -25,13 +25,14 @@ class DynamicPosterior(Posterior):
 
     kind: ClassVar[str] = "dynamic"
 
-    def sites(self, case, effects, with_gap) -> dict[str, tuple[int, ...]]:
-        """Return the shape of each parameter that a draw holds."""
-        return dict.fromkeys(dynamic_sites(case, effects), ())
+    @property
+    def sites(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each parameter that a draw holds."""
+        return dict.fromkeys(dynamic_sites(self.case, self.effects), ())
 
     @cached_property
     def effective_priors(self) -> Mapping[str, Prior]:
-        """The priors; none hangs on another parameter."""
+        """The priors; none depends on another parameter."""
         return self.priors
 
     @cached_property
@@ -47,22 +48,10 @@ class DynamicPosterior(Posterior):
 
     @property
     def loss(self) -> Mapping[str, float]:
-        """How probable each model of the loss is; empty where they were not weighed."""
-        found: Any = self.settings.get(LOSS)
-        return found or {}
+        """Probability of each model of the loss; empty where they were not weighed."""
+        return self.settings.get(LOSS, {})
 
     @cached_property
     def moving(self) -> DynamicProblem:
         """The inference problem that was sampled."""
         return build_dynamic(self.case, self.priors, self.theory, self.effects)
-
-
-def load_any(path: Path | str) -> Posterior:
-    """Read a calibration of the gear at rest, or of the moving gear.
-
-    Raises:
-        InputError: as `Posterior.load`.
-    """
-    described = posterior_file.told(path, "model")
-    kind = DynamicPosterior if '"kind": "dynamic"' in described else Posterior
-    return kind.load(path)

@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 
-import jax
-
 from hdcal.data.case import Case, Gear
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import effect_priors
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference.problem import case_reading, influence_prior
 from hdcal.physics.dynamics import ring_mass
 from hdcal.physics.effect import Effect, parameters
@@ -24,7 +23,7 @@ SITES = (
     "initial_velocity",
     "deformation_sigma",
 )
-_ring_mass = jax.jit(ring_mass, static_argnames=("radial_per_read",))
+_ring_mass = jit(ring_mass, static_argnames=("radial_per_read",))
 FRICTION = f"{CoulombFriction.name}.force"
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import numpyro
 from jaxtyping import Float
 
 from hdcal.data.case import Case
@@ -20,6 +21,7 @@ from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution
 from hdcal.inference.dynamic_priors import FRICTION, SITES
 from hdcal.inference.gauges import where_read, with_gains
+from hdcal.inference.model import sample_amplitude, sample_site, sample_stiffness
 from hdcal.inference.padding import measured, pad_records
 from hdcal.inference.problem import (
     case_reading,
@@ -68,10 +70,6 @@ class DynamicProblem(Sampled):
 
     def declare(self) -> None:
         """Declare the joint density of parameters and data to NumPyro."""
-        import numpyro
-
-        from hdcal.inference.model import sample_site, sample_stiffness
-
         values = sample_stiffness(self.priors)
         if self.effects:
             values |= _sample_frictional(self, values)
@@ -223,10 +221,6 @@ def _sample_frictional(problem: DynamicProblem, values: Values) -> dict:
     the deformation there moves on a parabola. The place is sampled instead, and its
     formal law taken off again.
     """
-    import numpyro
-
-    from hdcal.inference.model import sample_amplitude, sample_site
-
     priors, name = problem.priors, "initial_deformation"
     found = {n: sample_site(n, priors[n]) for n in SITES if n != name}
     unit = problem.units.get(FRICTION)

@@ -20,9 +20,9 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.laplace import Whitening, potential, values_at
-from hdcal.inference.mixing import have_mixed
-from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.mixing import have_mixed, pareto_shape
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.t_mixture import TMixture, first_mixture, fitted_mixture
 
@@ -73,8 +73,7 @@ def sample_independently(
     Returns:
         The draws; None where proposals cover the posterior badly.
     """
-    # Apart from what callers draw by the same seed.
-    rng = np.random.default_rng([seed, 1])
+    rng = np.random.default_rng(np.asarray(_entropy(seed)))
     law, efficiency = _adapted(problem, whitening, rng)
     if efficiency < 1.0 / _MOST:
         return None
@@ -100,6 +99,12 @@ def sample_independently(
         # They cover it, and are too few.
         each *= 2
     return None
+
+
+@jit
+def _entropy(seed: int):
+    """Return the key from which `sample` draws too, as numbers."""
+    return jax.random.key_data(jax.random.split(jax.random.key(seed))[0])
 
 
 def _adapted(
@@ -158,7 +163,7 @@ def _log_densities(
     return np.concatenate(found)
 
 
-@jax.jit
+@jit
 def _potentials(
     problem: Sampled, whitening: Whitening, standard: Float[Array, "n d"]
 ) -> Float[Array, " n"]:
@@ -169,7 +174,7 @@ def _potentials(
     return jax.lax.map(one, standard)
 
 
-@jax.jit
+@jit
 def _named(problem: Sampled, whitening: Whitening, standard: Float[Array, "c n d"]):
     def one(place):
         return values_at(problem, whitening.position(place))

@@ -8,12 +8,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+import xarray as xr
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Float
+from numpyro.distributions import biject_to
+from numpyro.handlers import substitute, trace
+from numpyro.infer.util import constrain_fn, potential_energy, unconstrain_fn
 from scipy.optimize import OptimizeResult, minimize
 
 from hdcal.data.records import Array
-from hdcal.inference.array_tree import Group, group_of
+from hdcal.exported import jit
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled, model
 
@@ -46,22 +50,18 @@ class Whitening(eqx.Module):
         return unravel(flat + self.factor @ standard)
 
 
-@jax.jit
+@jit
 def potential(problem: Sampled, position: Position) -> Float[Array, ""]:
     """Return −log posterior density in unconstrained coordinates, up to a constant."""
-    from numpyro.infer.util import potential_energy
-
     return jnp.asarray(potential_energy(model, (problem,), {}, position))
 
 
 def constrained(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return every site at an unconstrained position, and what follows from them."""
-    from numpyro.infer.util import constrain_fn
-
     return constrain_fn(model, (problem,), {}, position, return_deterministic=True)
 
 
-@jax.jit
+@jit
 def values_at(problem: Sampled, position: Position) -> dict[str, Any]:
     """Return the parameters at an unconstrained position, coordinates left out."""
     values = constrained(problem, position)
@@ -99,7 +99,7 @@ def _unflatten(like: Position, flat: np.ndarray) -> Position:
     return jax.tree.unflatten(structure, shaped)
 
 
-@jax.jit
+@jit
 def _expand(problem: Sampled, like: Position, flat):
     """Return the typical potential with its gradient and Hessian.
 
@@ -132,12 +132,9 @@ def _middle(site: dict[str, Any]):
         return site["fn"].mean
 
 
-@jax.jit
+@jit
 def _prior_middle(problem: Sampled) -> Position:
     """Return the middle of the prior, unconstrained."""
-    from numpyro.distributions import biject_to
-    from numpyro.handlers import substitute, trace
-
     sites = trace(substitute(model, substitute_fn=_middle)).get_trace(problem)
     return {
         name: biject_to(site["fn"].support).inv(site["value"])
@@ -146,11 +143,9 @@ def _prior_middle(problem: Sampled) -> Position:
     }
 
 
-@jax.jit
+@jit
 def _moved(problem: Sampled, position: Position, values) -> Position:
     """Return the position with some sites moved to given values."""
-    from numpyro.infer.util import constrain_fn, unconstrain_fn
-
     known = constrain_fn(model, (problem,), {}, position) | values
     return unconstrain_fn(model, (problem,), {}, known)
 
@@ -216,30 +211,22 @@ def _stop_at_kink():
     return stop
 
 
-def to_group(found: Whitening) -> Group:
-    """Return a fit as the group of a posterior file."""
+def to_group(found: Whitening) -> xr.Dataset:
+    """Return a fit as a group of a posterior's tree."""
+    axes = "coordinate", "standard"
     mode, factor = _flatten(found.centre), np.asarray(found.factor)
-    axes = {"mode": ("coordinate",), "factor": ("coordinate", "standard")}
-    return group_of({"mode": mode, "factor": factor}, (), axes)
+    return xr.Dataset({"mode": (axes[:1], mode), "factor": (axes, factor)})
 
 
-def from_group(problem: Sampled, group: Group | None) -> Whitening:
-    """Return the fit that a posterior file holds, or fit where it holds none.
+def from_group(problem: Sampled, group: xr.Dataset) -> Whitening:
+    """Return the fit of a group that `to_group` made.
 
     Args:
         problem: the inference problem.
-        group: from `to_group`; of another problem it counts as none.
+        group: of a posterior of this problem.
     """
-    if group is not None and {"mode", "factor"} <= group.keys():
-        mode, factor = group["mode"].values, group["factor"].values
-        like = _prior_middle(problem)
-        size = len(_flatten(like))
-        fits = mode.shape == (size,) and factor.shape == (size, size)
-        fits = fits and mode.dtype.kind in "iuf" and factor.dtype.kind in "iuf"
-        fits = fits and np.isfinite(mode).all() and np.isfinite(factor).all()
-        if fits and np.linalg.matrix_rank(factor) == size:
-            return Whitening(_unflatten(like, mode), factor)
-    return fit(problem)
+    centre = _unflatten(_prior_middle(problem), group["mode"].values)
+    return Whitening(centre, group["factor"].values)
 
 
 def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
@@ -247,10 +234,8 @@ def sites_at(problem: Sampled, position: Position) -> dict[str, float]:
     return {name: float(value) for name, value in _sites(problem, position).items()}
 
 
-@jax.jit
+@jit
 def _sites(problem: Sampled, position: Position) -> dict[str, Any]:
-    from numpyro.infer.util import constrain_fn
-
     return constrain_fn(model, (problem,), {}, position)
 
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import numpy as np
 
 from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
@@ -78,7 +78,7 @@ def _free_parameters(problem: Problem, values) -> tuple[str, ...]:
     )
 
 
-@partial(jax.jit, static_argnames=("names",))
+@jit(static_argnames=("names",))
 def _derivatives(problem: Problem, values, records: Records, columns, *, names):
     """Return noise sd and derivatives of the mean: by name, by relative stiffness."""
 
@@ -115,6 +115,6 @@ def _members(problem: Problem, values, records: Records, columns, stiffening):
     return np.concatenate(table, axis=1), np.concatenate(place)
 
 
-@jax.jit
+@jit
 def _prior_sd(discrepancy: Discrepancy, sd, length):
     return discrepancy.prior_sd(sd, length)

@@ -1,14 +1,14 @@
 """A loop of any shape: cells that stick and then slip, within shares of the range."""
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.padding import pad_records
 from hdcal.physics.history import stop_cells
 
-_stop_cells = jax.jit(stop_cells)
+_stop_cells = jit(stop_cells)
 
 
 def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:

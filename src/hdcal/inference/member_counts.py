@@ -11,16 +11,15 @@ from hdcal.inference.discrepancy import leftover_size
 _MOST_MEMBERS, _MOST_DENSE = 10_000, 500
 
 
-def member_counts(case: Case, with_gap: bool, *, loop: bool = True) -> dict[str, int]:
+def member_counts(case: Case, with_gap: bool) -> dict[str, int]:
     """Return how many members of each kind have a parameter of their own.
 
     Args:
         case: records and labels.
         with_gap: whether there is a leftover discrepancy.
-        loop: as `leftover_size`.
     """
     known = case.records.known
-    weights = leftover_size(case.records, loop=loop)
+    weights = leftover_size(case.records)
     counts = {
         "run": len(case.run_labels) if "run" in known else 0,
         "specimen": len(case.specimen_labels) if "specimen" in known else 0,

@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.linalg import solve_triangular
 from jaxtyping import Float, Int, Key
+from scipy.linalg import helmert
 
 from hdcal.data.records import Array
 
@@ -168,7 +169,4 @@ def contrasts(count: int) -> Float[Array, "count k"]:
     Deviations from the mean of the tested members: their common part is already
     the population's centre.
     """
-    # Late: only where there are members.
-    from scipy.linalg import helmert
-
     return jnp.asarray(helmert(count).T)

@@ -2,32 +2,42 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
+import xarray as xr
 
 from hdcal.data.case import Case
 from hdcal.data.priors import Prior
-from hdcal.data.theory_names import SPRING, Theory
-from hdcal.data.typed_json import typed, typed_text
+from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError, NotUsable
-from hdcal.inference import posterior_file
-from hdcal.inference.array_tree import CHAIN, DRAW, ArrayTree, Group, joined
+from hdcal.inference.case_json import (
+    describe_case,
+    restore_case,
+    restore_priors,
+    to_json,
+)
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.held import LOOP, PILOT_NOISE, HeldModel, HeldSettings
-from hdcal.inference.hypotheses import HYPOTHESIS, check_hypotheses
-from hdcal.inference.posterior_limits import check_draws
+from hdcal.inference.posterior_file import (
+    CALIBRATION,
+    content,
+    file_of,
+    not_a_posterior,
+    read_tree,
+)
+from hdcal.inference.posterior_tree import OVER_DRAWS, group_of, joined_draws
 from hdcal.inference.problem import Problem, build_problem
 from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
-if TYPE_CHECKING:
-    import xarray as xr
+# The setting with the noise sd that decided the form of the noise [N], and the one with
+# the hypothesis of a diagnosis that the model is of.
+PILOT_NOISE, HYPOTHESIS = "pilot_noise_N", "hypothesis"
 
 
 @dataclass(frozen=True, repr=False)
@@ -39,12 +49,12 @@ class Posterior(Shown):
         theory: which stiffness K multiplies.
         effects: effects in the model.
         priors: of every site, in code units, K under `theory`.
-        arrays: the groups posterior, prior, sample_stats, observed_data,
-            constant_data and log_likelihood.
+        tree: the groups posterior, prior, sample_stats, observed_data, constant_data
+            and log_likelihood, for ArviZ.
         diagnoses: sampling quality and driver by parameter.
         checks: what was checked and what came out.
         settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
-            `PILOT_NOISE`, by which the form of the noise was decided [N].
+            `PILOT_NOISE`.
     """
 
     kind: ClassVar[str] = "static"
@@ -53,27 +63,16 @@ class Posterior(Shown):
     theory: Theory
     effects: tuple[type[Effect], ...]
     priors: Mapping[str, Prior]
-    arrays: ArrayTree
+    tree: xr.DataTree
     diagnoses: Mapping[str, Diagnosis]
     checks: tuple[Check, ...]
-    settings: Mapping[str, object]
-
-    def sites(
-        self, case: Case, effects: Sequence[type[Effect]], with_gap: bool
-    ) -> dict[str, tuple[int, ...]]:
-        """Return the shape of each parameter that a draw of a model holds."""
-        return site_shapes(case, effects, with_gap, self._noise_sd, loop=self._loop)
+    settings: Mapping[str, Any]
 
     @property
-    def _noise_sd(self) -> float | None:
-        """What decided the form of the noise [N]; None in older files."""
-        kept = self.settings.get(PILOT_NOISE)
-        return None if kept is None else float(str(kept))
-
-    @property
-    def _loop(self) -> bool:
-        """Whether the leftover discrepancy may know loading from unloading."""
-        return bool(self.settings.get(LOOP, False))
+    def sites(self) -> dict[str, tuple[int, ...]]:
+        """Shape of each parameter that a draw holds."""
+        with_gap, noise_sd = self.settings["with_gap"], self.settings.get(PILOT_NOISE)
+        return site_shapes(self.case, self.effects, with_gap, noise_sd)
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -94,21 +93,16 @@ class Posterior(Shown):
         failed = (check for check in self.checks if check.outcome == "failed")
         return tuple(f"{check.name}: {check.words}" for check in failed)
 
-    @property
+    @cached_property
     def draws(self) -> dict[str, np.ndarray]:
         """All draws in code units by site, chains joined: [draw, …]."""
-        return joined(self.arrays.groups["posterior"])
+        return joined_draws(self.tree)
 
     @property
     def size(self) -> tuple[int, int]:
-        """Chains, and draws of each."""
-        group = self.arrays.groups["posterior"]
-        return len(group[CHAIN].values), len(group[DRAW].values)
-
-    @property
-    def tree(self) -> "xr.DataTree":
-        """What ArviZ draws from: its groups as a DataTree, which is not saved again."""
-        return self.arrays.datatree
+        """Number of chains, and of draws of each."""
+        sizes = group_of(self.tree, "posterior").sizes
+        return sizes["chain"], sizes["draw"]
 
     @cached_property
     def problem(self) -> Problem:
@@ -118,9 +112,8 @@ class Posterior(Shown):
             self.priors,
             self.effects,
             theory=self.theory,
-            with_gap=bool(self.settings["with_gap"]),
-            noise_sd=self._noise_sd,
-            loop=self._loop,
+            with_gap=self.settings["with_gap"],
+            noise_sd=self.settings.get(PILOT_NOISE),
         )
 
     @cached_property
@@ -147,31 +140,30 @@ class Posterior(Shown):
 
     def to_netcdf(self) -> bytes:
         """Return the content of a NetCDF file that ArviZ opens."""
-        attributes = {
-            "status": "ok" if self.usable else "failed",
-            "case": posterior_file.describe_case(self.case),
-            "model": json.dumps(
-                {
-                    "theory": self.theory,
-                    "effects": [effect.name for effect in self.effects],
-                    "priors": {
-                        name: posterior_file.describe_prior(prior)
-                        for name, prior in self.priors.items()
-                    },
-                    "settings": dict(self.settings),
-                    "diagnoses": {n: vars(d) for n, d in self.diagnoses.items()},
-                    "checks": [vars(check) for check in self.checks],
-                }
-            ),
+        return content(self.tree, CALIBRATION, self.attributes())
+
+    def attributes(self) -> dict[str, str]:
+        """Return everything but the groups, as attributes of a file."""
+        model = {
+            "kind": self.kind,
+            "theory": self.theory,
+            "effects": [effect.name for effect in self.effects],
+            "priors": {n: asdict(prior) for n, prior in self.priors.items()},
+            "settings": dict(self.settings),
+            "diagnoses": {n: asdict(one) for n, one in self.diagnoses.items()},
+            "checks": [asdict(check) for check in self.checks],
         }
-        kind = posterior_file.CALIBRATION
-        return posterior_file.sealed(self.arrays, kind, attributes)
+        return {
+            "status": "ok" if self.usable else "failed",
+            "case": describe_case(self.case),
+            "model": to_json(model),
+        }
 
     @classmethod
     def load(
         cls, path: Path | str, effects: Mapping[str, type[Effect]] | None = None
-    ) -> "Posterior":
-        """Read a posterior back.
+    ) -> Self:
+        """Read the posterior of one model.
 
         Args:
             path: a result folder or its posterior.nc.
@@ -179,65 +171,79 @@ class Posterior(Shown):
                 for effects from outside.
 
         Raises:
-            InputError: the file is missing, damaged, changed or from another
-                version, or names an effect that the library lacks.
+            InputError: the file is missing, damaged, changed, of several models or
+                from another version, or names an effect that the library lacks.
         """
-        file = posterior_file.file_of(path)
-        tree = posterior_file.open_tree(file)
-        posterior_file.check_unchanged(tree, file)
+        file = file_of(path)
+        tree = read_tree(file)
+        if "model" not in tree.attrs:
+            problem = "is of a diagnosis, which averages over several models"
+            remedy = "Load it with hdcal.ModelAverage.load"
+            raise InputError([Finding(str(file), problem, remedy)])
+        return cls.from_tree(tree, file, effects)
+
+    @classmethod
+    def from_tree(
+        cls,
+        tree: xr.DataTree,
+        file: Path,
+        effects: Mapping[str, type[Effect]] | None = None,
+    ) -> Self:
+        """Return the posterior of a tree that was read.
+
+        Args:
+            tree: groups and attributes.
+            file: where it was read, for findings.
+            effects: as `load`.
+
+        Raises:
+            InputError: as `load`.
+        """
         try:
-            model = typed_text(HeldModel, tree.attrs["model"])
-            settings = typed(HeldSettings, model.settings)
-            if settings.kind != cls.kind:
+            model = json.loads(tree.attrs["model"])
+            if model["kind"] != cls.kind:
                 raise InputError([_of_another_kind(file, cls.kind)])
-            case = posterior_file.restore_case(
-                tree.attrs["case"],
-                tree.groups["constant_data"],
-                tree.groups["observed_data"]["force"].values,
-            )
-            if (model.theory == SPRING) != (case.gear.theory == SPRING):
-                raise ValueError("is of another theory than its gear")
-            chosen = _look_up(model.effects, effects, file)
             found = cls(
-                case=case,
-                theory=model.theory,
-                effects=chosen,
-                priors=posterior_file.restore_priors(model.priors),
-                arrays=tree,
-                diagnoses=model.diagnoses,
-                checks=tuple(model.checks),
-                settings=model.settings,
+                case=restore_case(tree.attrs["case"], tree),
+                theory=model["theory"],
+                effects=_look_up(model["effects"], effects, file),
+                priors=restore_priors(model["priors"]),
+                tree=tree,
+                diagnoses={n: Diagnosis(**d) for n, d in model["diagnoses"].items()},
+                checks=tuple(Check(**check) for check in model["checks"]),
+                settings=model["settings"],
             )
-            sites = found.sites(case, chosen, settings.with_gap)
-            draws = tree.groups["posterior"]
-            check_draws(draws, sites)
-            _check_mixture(draws, chosen, settings)
-            model.check_diagnoses(sites)
-            return found
-        except (KeyError, ValueError, TypeError, AttributeError) as error:
-            raise InputError([posterior_file.not_a_posterior(file)]) from error
+            found._check_draws()
+        except (KeyError, ValueError, TypeError) as error:
+            raise not_a_posterior(file) from error
+        return found
+
+    def _check_draws(self) -> None:
+        """Check that the draws are those of the model.
+
+        Raises:
+            KeyError, ValueError: they are not.
+        """
+        drawn = group_of(self.tree, "posterior")
+        for name, shape in self.sites.items():
+            one = drawn[name]
+            if one.dims[:2] != OVER_DRAWS or one.shape[2:] != shape:
+                raise ValueError(f"{name} has another shape")
+            if not np.isfinite(one).all():
+                raise ValueError(f"{name} is not finite")
 
 
-def _check_mixture(draws: Group, effects, settings: HeldSettings) -> None:
-    origin, labelled = settings.diagnosis, HYPOTHESIS in draws
-    if origin is None or origin.hypothesis is not None:
-        if labelled:
-            raise ValueError("has hypotheses of which it says nothing")
-    elif not labelled:
-        raise ValueError("does not say which draws are of which hypothesis")
-    else:
-        check_hypotheses(draws, effects, origin.probabilities)
-
-
-def _of_another_kind(file, wanted: str) -> Finding:
-    needed, found = "of the gear at rest", "of the moving gear"
+def _of_another_kind(file: Path, wanted: str) -> Finding:
+    needed, other = "of the gear at rest", "of the moving gear"
     if wanted == "dynamic":
-        needed, found = found, needed
+        needed, other = other, needed
     remedy = f"Name the folder of a calibration {needed}"
-    return Finding(str(file), f"is a calibration {found}", remedy)
+    return Finding(str(file), f"is a calibration {other}", remedy)
 
 
-def _look_up(names, library, file) -> tuple[type[Effect], ...]:
+def _look_up(
+    names: Sequence[str], library: Mapping[str, type[Effect]] | None, file: Path
+) -> tuple[type[Effect], ...]:
     if library is None:
         from hdcal.physics.registry import EFFECTS as library
     unknown = [name for name in names if name not in library]

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 
 import equinox as eqx
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -14,6 +13,7 @@ from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compress import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
@@ -31,7 +31,7 @@ from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
-_base_columns = jax.jit(linear_columns)
+_base_columns = jit(linear_columns)
 
 
 class Problem(Sampled):
@@ -212,7 +212,6 @@ def build_problem(
     theory: Theory | None = None,
     with_gap: bool = False,
     noise_sd: float | None = None,
-    loop: bool = True,
 ) -> Problem:
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
@@ -223,7 +222,6 @@ def build_problem(
         theory: overrides the gear's theory.
         with_gap: add the leftover discrepancy.
         noise_sd: from `pilot_noise` [N], where it is known; it decides the noise form.
-        loop: whether the leftover discrepancy may know loading from unloading.
 
     Raises:
         InputError: an effect lacks its covariates or a prior.
@@ -232,9 +230,9 @@ def build_problem(
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
     noise_sd = pilot_noise(records) if noise_sd is None else noise_sd
-    members = member_counts(case, with_gap, loop=loop)
+    members = member_counts(case, with_gap)
     rounded, correlated = noise_form(case, effects, members, noise_sd)
-    leftover = build_discrepancy(records, effects, loop=loop) if with_gap else None
+    leftover = build_discrepancy(records, effects) if with_gap else None
     columns, keep = _columns(records, reading), rounded or bool(effects)
     rows = keep_or_compress(records, columns, leftover, keep, correlated)
     linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)

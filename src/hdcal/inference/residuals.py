@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.data.records import Records
+from hdcal.exported import jit
 from hdcal.inference.checks import correlation_check
 from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import moments
-from hdcal.inference.hypotheses import ORIGIN
 from hdcal.inference.linearisation import Linearisation, linearise
 from hdcal.inference.padding import pad_records
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import HYPOTHESIS, Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.residual_noise import noise_faults
 from hdcal.inference.residual_shapes import (
@@ -111,7 +111,7 @@ def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {name: values[::every] for name, values in draws.items()}
 
 
-@jax.jit
+@jit
 def _fit(problem, values, records, columns):
     """Return the posterior mean of each row's mean reading [N], draw after draw."""
 
@@ -164,7 +164,7 @@ def misfits(posterior: Posterior, *, shapes: bool = True) -> tuple[str, ...]:
     """
     left = residuals(posterior)
     alike = correlation_check(posterior.draws, len(posterior.case.records.force))
-    remedies = _DIAGNOSED if ORIGIN in posterior.settings else _DIAGNOSE
+    remedies = _DIAGNOSED if HYPOTHESIS in posterior.settings else _DIAGNOSE
     remedy = remedies[posterior.problem.discrepancy is None]
     noise_sd = float(np.median(posterior.draws["sigma"]))
     told = left.structure if shapes else ()

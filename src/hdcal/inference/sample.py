@@ -12,9 +12,11 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpyro.infer.hmc import hmc
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
+from hdcal.exported import jit
 from hdcal.inference.integrated import draw_members
 from hdcal.inference.laplace import Whitening, potential, values_at
 from hdcal.inference.mixing import ESS_PER_CHAIN, have_mixed
@@ -64,8 +66,6 @@ class Draws:
 
 def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     """Return NUTS' own init and step functions on standard coordinates."""
-    from numpyro.infer.hmc import hmc
-
     init, step = hmc(
         lambda standard: potential(problem, whitening.position(standard)), algo="NUTS"
     )
@@ -79,27 +79,19 @@ def _kernel(problem: Sampled, whitening: Whitening, warmup: int, target):
     return start, step
 
 
-@partial(jax.jit, static_argnames=("warmup", "chains"))
-def _start(problem, whitening, seed, target, *, warmup, chains):
-    """Return the states of chains at their start, as the leaves of NUTS' own."""
+@jit(static_argnames=("warmup", "chains"))
+def _start(problem, whitening, seed, chain, target, *, warmup, chains):
+    """Return the state in which one of the chains starts, as its leaves."""
     own, _ = jax.random.split(jax.random.key(seed))
-    keys = jax.random.split(own, chains)
-    return jax.tree.leaves(_states(problem, whitening, keys, target, warmup))
+    place, walk = jax.random.split(jax.random.split(own, chains)[chain])
+    spread = jax.random.normal(place, (len(whitening.factor),))
+    start, _ = _kernel(problem, whitening, warmup, target)
+    return jax.tree.leaves(start(_OVERDISPERSION * spread, rng_key=walk))
 
 
-def _states(problem, whitening, keys, target, warmup):
-    def one(key):
-        place, walk = jax.random.split(key)
-        spread = jax.random.normal(place, (len(whitening.factor),))
-        start, _ = _kernel(problem, whitening, warmup, target)
-        return start(_OVERDISPERSION * spread, rng_key=walk)
-
-    return jax.vmap(one)(keys)
-
-
-@partial(jax.jit, static_argnames=("warmup", "length"))
+@jit(static_argnames=("warmup", "length"))
 def _advance(problem, whitening, leaves, target, *, warmup, length):
-    """Return the states after so many steps, as leaves, and what is kept of each."""
+    """Return the state of a chain after so many steps, and what is kept of each."""
     start, step = _kernel(problem, whitening, warmup, target)
     # The step function takes its settings from the last call of its init.
     structure = jax.tree.structure(start(jnp.zeros(len(whitening.factor))))
@@ -117,14 +109,12 @@ def _advance(problem, whitening, leaves, target, *, warmup, length):
         )
         return state, kept
 
-    # One chain after the other: side by side all would take as many steps as the one
-    # that takes most, and either way at each fork.
-    states = jax.tree.unflatten(structure, leaves)
-    states, kept = jax.lax.map(partial(jax.lax.scan, one, length=length), states)
-    return jax.tree.leaves(states), kept
+    state = jax.tree.unflatten(structure, leaves)
+    state, kept = jax.lax.scan(one, state, length=length)
+    return jax.tree.leaves(state), kept
 
 
-@jax.jit
+@jit
 def _constrain(problem, whitening, standard, seed):
     _, own = jax.random.split(jax.random.key(seed))
     keys = jax.random.split(own, standard.shape[:2])
@@ -211,10 +201,14 @@ class _Run:
     """All chains of one step size, which may go on."""
 
     def __init__(self, problem, whitening, seed, chains, warmup, progress, target):
-        self._problem, self._whitening, self._seed = problem, whitening, seed
+        # Once, not at each stretch.
+        self._model = jax.device_put((problem, whitening))
+        self._seed = seed
         self._warmup, self._progress, self._target = warmup, progress, target
         size = {"warmup": warmup, "chains": chains}
-        self._states = _start(problem, whitening, seed, target, **size)
+        self._states = [
+            _start(*self._model, seed, chain, target, **size) for chain in range(chains)
+        ]
         self._done, self._kept = 0, []
 
     def advance(self, draws: int, *, in_vain_if_diverging: bool = False) -> None:
@@ -228,12 +222,16 @@ class _Run:
         while self._done < total:
             # Stretches end with the warm-up, so that all but the last ones are alike.
             left = (warmup if self._done < warmup else total) - self._done
-            about = self._problem, self._whitening, self._states, self._target
-            length = min(_STRETCH, left)
-            self._states, new = _advance(*about, warmup=warmup, length=length)
+            size = {"warmup": warmup, "length": min(_STRETCH, left)}
+            each = [
+                _advance(*self._model, state, self._target, **size)
+                for state in self._states
+            ]
+            self._states = [state for state, _ in each]
+            kept = jax.device_get([kept for _, kept in each])
             if self._done >= warmup:
-                self._kept.append(jax.device_get(new))
-            self._done += length
+                self._kept.append([np.stack(part) for part in zip(*kept, strict=True)])
+            self._done += size["length"]
             if self._progress is not None:
                 self._progress(self._done, total)
             if in_vain_if_diverging and self._diverged():
@@ -250,7 +248,7 @@ class _Run:
     def found(self) -> Draws:
         """Return the draws so far, with their parameters by name."""
         standard, *about = self.kept()
-        values = _constrain(self._problem, self._whitening, standard, self._seed)
+        values = _constrain(*self._model, standard, self._seed)
         named = {name: np.asarray(value) for name, value in values.items()}
         return Draws(named, *about, target_acceptance=self._target)
 

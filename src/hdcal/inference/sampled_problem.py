@@ -1,8 +1,4 @@
-"""What samplers can take: a problem with priors and a declared density.
-
-Only what declares a density needs NumPyro, and takes it where it does: a program that
-was traced before draws without it.
-"""
+"""What samplers can take: a problem with priors and a declared density."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING

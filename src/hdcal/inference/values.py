@@ -39,8 +39,6 @@ def site_shapes(
     effects: Sequence[type[Effect]],
     with_gap: bool,
     noise_sd: float | None = None,
-    *,
-    loop: bool = True,
 ) -> dict[str, tuple[int, ...]]:
     """Return the shape of each parameter that a draw of the model holds.
 
@@ -49,7 +47,6 @@ def site_shapes(
         effects: in the model.
         with_gap: whether the leftover discrepancy is.
         noise_sd: from `pilot_noise` [N], where it is known.
-        loop: as `leftover_size`.
     """
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     names += case.gear.gauge_priors
@@ -58,7 +55,7 @@ def site_shapes(
     if correlates(case, effects, with_gap=with_gap, noise_sd=noise_sd):
         names.append(CORRELATION)
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
-    for kind, count in member_counts(case, with_gap, loop=loop).items():
+    for kind, count in member_counts(case, with_gap).items():
         scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
         shapes |= {**dict.fromkeys(scales, ()), MEMBERS[kind]: (count,)}
     return shapes

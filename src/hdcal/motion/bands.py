@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 import jax
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
 from hdcal.report.parameters import INTERVAL
@@ -47,7 +48,7 @@ class MotionBands:
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
 
-@jax.jit
+@jit
 def _predict(problem: DynamicProblem, values, seed):
     keys = jax.random.split(jax.random.key(seed), len(values["mass"]))
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.errors import Finding, InputError
+from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import Check
 from hdcal.inference.density import densities
-from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.dynamic_posterior import LOSS, DynamicPosterior
 from hdcal.inference.dynamic_priors import dynamic_site_priors
 from hdcal.inference.dynamic_problem import DynamicProblem, build_dynamic, pointwise
-from hdcal.inference.held import LOSS
 from hdcal.inference.posterior_tree import MOST_LOG_LIKELIHOODS, TOTAL
 from hdcal.inference.sample import (
     Draws,
@@ -87,7 +87,7 @@ def calibrate_dynamic(
     problem, priors = chosen.problem, chosen.priors
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     found = sample(problem, chosen.whitening, seed, progress=progress, **size)
-    settings = {"kind": DynamicPosterior.kind, "seed": seed, **size, "with_gap": False}
+    settings: dict[str, object] = {"seed": seed, **size, "with_gap": False}
     own = _specifics(problem, found, (rival, *chosen.checks))
     parts = assemble(case, priors, problem, found, own, seed)
     settings |= run_settings(found, began)
@@ -183,7 +183,7 @@ def highest_peak(problem: DynamicProblem) -> tuple[laplace.Whitening, Check]:
     return best, Check(name, "passed", "the search from several ends in one place")
 
 
-@jax.jit
+@jit
 def _pointwise(problem: DynamicProblem, values):
     # Chains side by side, draws one after the other: all at once fill the memory.
     return jax.vmap(partial(jax.lax.map, partial(pointwise, problem)))(values)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from hdcal.data.priors import Prior
+from hdcal.exported import jit
 from hdcal.inference.distributions import frozen
 from hdcal.inference.dynamic_problem import DynamicProblem, step_stiffness, stretch
 from hdcal.inference.padding import measured
@@ -25,7 +26,7 @@ _WINDOW, _WHOLE_BLOCK = 2048, 4
 _NEAR = np.linspace(-1.0, 1.0, 9)
 
 
-@jax.jit
+@jit
 def _residual(problem: DynamicProblem, frequency, ratio):
     """Return the residual sum of squares, and 1/k, y₀, ẏ₀ and zero of the best fit."""
     real = measured(len(problem.time), problem.count)

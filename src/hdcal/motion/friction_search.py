@@ -12,6 +12,7 @@ import jax
 import numpy as np
 
 from hdcal.data.prior import Prior
+from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.amplitude_units import finest
 from hdcal.inference.distributions import frozen
@@ -88,7 +89,7 @@ def motion_slopes(problem: DynamicProblem, values) -> dict[str, np.ndarray]:
     return {n: np.asarray(slope)[: problem.count] for n, slope in slopes.items()}
 
 
-@jax.jit
+@jit
 def _slopes(problem: DynamicProblem, values, free):
     def mean(moved):
         return predict_motion(problem, {**values, **moved})
@@ -96,7 +97,7 @@ def _slopes(problem: DynamicProblem, values, free):
     return jax.jacfwd(mean)(free)
 
 
-predict = jax.jit(predict_motion)
+predict = jit(predict_motion)
 
 
 def swing(problem: DynamicProblem, values) -> float:

@@ -15,17 +15,15 @@ from dataclasses import replace
 
 import diffrax
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry, Records
+from hdcal.exported import jit
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.forcing import Forcing
-from hdcal.physics.theory import RING_SERIES
-
-Scalar = Float[Array, ""] | float
+from hdcal.physics.theory import RING_SERIES, Scalar
 
 # Stiffness of the gear over that of the contact that holds it by friction [-]: a stuck
 # gear has 20 times its natural frequency, critically damped. The deformation differs
@@ -142,7 +140,7 @@ def acting(
     return kept, tuple(effect for effect in effects if not effect.instantaneous)
 
 
-@jax.jit
+@jit
 def natural_frequency(mass: Scalar, stiffness: Scalar) -> Float[Array, ""]:
     """Return √(k/m)/2π of the undamped linear model [Hz]."""
     return jnp.sqrt(stiffness / mass) / (2.0 * jnp.pi)

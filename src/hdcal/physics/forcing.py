@@ -1,4 +1,4 @@
-"""Forces over time that the dynamic model can be driven with."""
+"""Forces over time for the dynamic model."""
 
 from abc import ABC, abstractmethod
 
@@ -7,8 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array
-
-Scalar = Float[Array, ""] | float
+from hdcal.physics.theory import Scalar
 
 
 class Forcing(eqx.Module, ABC):
@@ -16,15 +15,15 @@ class Forcing(eqx.Module, ABC):
 
     @abstractmethod
     def __call__(self, time: Scalar) -> Float[Array, ""]:
-        """Return the force at a time [s] as [N]."""
-
-    def corners(self) -> Float[Array, " c"] | None:
-        """Return the times at which the force bends [s], or None."""
-        return None
+        """Return the force [N] at a time [s]."""
 
     @abstractmethod
     def largest(self) -> Scalar:
-        """Return the largest force in size [N]."""
+        """Return the largest absolute force [N]."""
+
+    def corners(self) -> Float[Array, " c"] | None:
+        """Return the times at which the slope of the force jumps [s], or None."""
+        return None
 
 
 class Step(Forcing):
@@ -37,31 +36,9 @@ class Step(Forcing):
     amplitude: Scalar
 
     def __call__(self, time: Scalar) -> Float[Array, ""]:
-        """Return the force [N]."""
         return jnp.asarray(self.amplitude) + 0.0 * time
 
     def largest(self) -> Scalar:
-        """Return |A| [N]."""
-        return jnp.abs(self.amplitude)
-
-
-class Sine(Forcing):
-    """F = A sin(2π f t).
-
-    Attributes:
-        amplitude: A [N].
-        frequency: f [Hz].
-    """
-
-    amplitude: Scalar
-    frequency: Scalar
-
-    def __call__(self, time: Scalar) -> Float[Array, ""]:
-        """Return the force [N]."""
-        return self.amplitude * jnp.sin(2.0 * jnp.pi * self.frequency * time)
-
-    def largest(self) -> Scalar:
-        """Return |A| [N]."""
         return jnp.abs(self.amplitude)
 
 
@@ -70,7 +47,7 @@ class Chirp(Forcing):
 
     Attributes:
         amplitude: A [N].
-        first: f₀, frequency at the start [Hz].
+        first: f₀, frequency at the start [Hz]; a sine if equal to the last.
         last: f₁, frequency at the end [Hz].
         duration: D [s].
     """
@@ -81,18 +58,16 @@ class Chirp(Forcing):
     duration: Scalar
 
     def __call__(self, time: Scalar) -> Float[Array, ""]:
-        """Return the force [N]."""
         rise = 0.5 * (self.last - self.first) / self.duration
         turns = (self.first + rise * time) * time
         return self.amplitude * jnp.sin(2.0 * jnp.pi * turns)
 
     def largest(self) -> Scalar:
-        """Return |A| [N]."""
         return jnp.abs(self.amplitude)
 
 
 class SampledForce(Forcing):
-    """A force that was sampled: linear between the rows, constant beyond them.
+    """A sampled force: linear between the rows, constant beyond them.
 
     Attributes:
         time: increasing [s], shape (n,).
@@ -103,13 +78,10 @@ class SampledForce(Forcing):
     force: Float[Array, " n"]
 
     def __call__(self, time: Scalar) -> Float[Array, ""]:
-        """Return the force [N]."""
         return jnp.interp(time, self.time, self.force)
 
-    def corners(self) -> Float[Array, " c"]:
-        """Return the times of the rows [s]."""
-        return jnp.asarray(self.time)
-
     def largest(self) -> Scalar:
-        """Return the largest force in size [N]."""
         return jnp.max(jnp.abs(self.force))
+
+    def corners(self) -> Float[Array, " c"]:
+        return jnp.asarray(self.time)

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.physics.theory import Scalar
 
-Scalar = Float[Array, ""] | float
 # Deformation [mm] and speed [mm/s]. Two numbers instead of an array, so that XLA fuses
 # the operations of a row.
 State = tuple[Scalar, Scalar]

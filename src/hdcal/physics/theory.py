@@ -6,11 +6,11 @@ displacement of the loaded point [N/mm]; all of them are linear in the modulus.
 
 from collections.abc import Callable
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
+from hdcal.exported import jit
 
 Scalar = Float[Array, ""] | float
 Stiffness = Callable[[Geometry, Scalar], Scalar]
@@ -38,7 +38,7 @@ def ring(geometry: Geometry, modulus: Scalar) -> Scalar:
     return jnp.pi * modulus * geometry.length * slenderness**3 / (24.0 * RING_SERIES)
 
 
-@jax.jit
+@jit
 def cup(geometry: Geometry, modulus: Scalar) -> Scalar:
     """Return the stiffness of a cup with a held base, deforming inextensionally.
 

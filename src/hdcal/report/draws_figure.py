@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 
 from hdcal.inference.distributions import frozen
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
 from hdcal.report.canvas import (
     BLUE,
     CYCLE,
@@ -97,7 +98,7 @@ def _density(values: np.ndarray, edges: tuple[float, float]):
 
 def sampler_figure(posterior: Posterior) -> Figure:
     """Draw rank plots: chains that agree are level everywhere."""
-    names, drawn = list(posterior.diagnoses), posterior.arrays.groups["posterior"]
+    names, drawn = [*posterior.diagnoses], group_of(posterior.tree, "posterior")
     with style():
         figure, panels = _grid(len(names), 1.75)
         for axes, name in zip(panels, names, strict=True):

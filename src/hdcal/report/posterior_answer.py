@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from hdcal.data.theory_names import Theory
 from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences
 from hdcal.report.parameters import (
     INTERVAL,
@@ -135,7 +136,7 @@ def _warnings(posterior: Posterior) -> tuple[str, ...]:
 
 
 def _sampling(posterior: Posterior) -> Sampling:
-    diverging = posterior.arrays.groups["sample_stats"]["diverging"].values
+    diverging = group_of(posterior.tree, "sample_stats")["diverging"]
     names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
     settings: dict[str, Any] = {name: posterior.settings[name] for name in names}
     return Sampling(**settings, divergences=int(diverging.sum()))

@@ -33,6 +33,8 @@ _RULE = {
 
 Words = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=0)]
+EffectName = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 # Sums of many probabilities may end a rounding error above one.
 Probability = Annotated[float, Field(ge=0.0, le=1.000001)]
 # What charts need and JSON does not hold.

@@ -17,7 +17,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.report.plain import printable
-from hdcal.report.words import number, percent
+from hdcal.report.words import newton, number, percent
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -61,6 +61,7 @@ def _environment(plain: bool) -> Environment:
     environment.filters |= {
         "code": code,
         "median": median,
+        "newton": newton,
         "number": number,
         "percent": percent,
         "span": span,

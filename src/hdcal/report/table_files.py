@@ -9,7 +9,7 @@ import pandas as pd
 from hdcal.data.formula_cells import without_formula
 
 
-def columns_csv(columns: Mapping[str, np.ndarray]) -> str:
+def columns_csv(columns: Mapping[str, Any]) -> str:
     """Text of a CSV file, of which a spreadsheet runs no cell as a formula."""
     frame = pd.DataFrame(dict(columns)).rename(columns=without_formula).infer_objects()
     for name in frame.select_dtypes(exclude="number"):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.tracking.cause_cores import CauseCores, followed_one_by_one
 from hdcal.tracking.effect_tracking import build_particles, force_effects
 from hdcal.tracking.first_rows import FirstRows
@@ -19,20 +19,15 @@ from hdcal.tracking.stream_prior import (
 from hdcal.tracking.unequal_rows import UnequalRows
 
 
-def begin_prior(known: Posterior | Gear, seed: int) -> StreamPrior:
-    """Return what is known before the first row.
-
-    Raises:
-        NotUsable: the calibration failed its checks.
-    """
+def begin_prior(known: Pooled | Gear, seed: int) -> StreamPrior:
+    """Return what is known before the first row."""
     if isinstance(known, Gear):
         return prior_from_gear(known, seed)
-    known.require_usable()
     return prior_from_posterior(known, seed)
 
 
 def begin_core(
-    known: Posterior | Gear,
+    known: Pooled | Gear,
     prior: StreamPrior,
     forget: float,
     unequal: UnequalRows | None,
@@ -71,7 +66,7 @@ def begin_core(
 
 
 def usual_design(
-    known: Posterior | Gear, prior: StreamPrior, unequal: UnequalRows | None
+    known: Pooled | Gear, prior: StreamPrior, unequal: UnequalRows | None
 ) -> np.ndarray:
     """Return columns of rows such as will come, without effects, shape (row, p).
 

@@ -55,11 +55,11 @@ def track(console: Console, known, gear, **settings):
         remedy = "Name a result folder of hdcal calibrate, or --gear GEAR.toml"
         words = "needs either a calibration or a gear file, and not both"
         raise InputError([Finding("hdcal track", words, remedy)])
-    from hdcal.cli.sources import load_gear, load_posterior
+    from hdcal.cli.sources import load_gear, load_usable
     from hdcal.tracking.stream import answer_lines
     from hdcal.tracking.tracker import Tracker
 
-    start = load_gear(gear) if known is None else load_posterior(known)
+    start = load_gear(gear) if known is None else load_usable(known)
     tracker, bad = Tracker(start, **settings), 0
     console.words(tracker.describe())
     try:

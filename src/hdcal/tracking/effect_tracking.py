@@ -10,12 +10,13 @@ import numpy as np
 
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError
-from hdcal.inference.posterior import Posterior
+from hdcal.exported import jit
 from hdcal.inference.values import build_effects
 from hdcal.physics.chain import Base, Reading, predict_reading
 from hdcal.physics.effect import Effect
 from hdcal.physics.effects.noise import HeteroscedasticNoise
 from hdcal.prediction.engine.forces import grid_records
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.tracking.particles import Particles
 from hdcal.tracking.stream_prior import StreamPrior
 
@@ -28,12 +29,12 @@ Draws = tuple[Any, Any, tuple[Effect, ...]]
 
 
 def build_particles(
-    posterior: Posterior, prior: StreamPrior, forget: float
+    known: Pooled, prior: StreamPrior, forget: float
 ) -> tuple[Particles, Callable[[float, float, float], np.ndarray]]:
     """Return particles of a posterior with effects, and what they make of a row.
 
     Args:
-        posterior: that may be used.
+        known: draws of all causes.
         prior: of the stream, from the same posterior.
         forget: has to be 1.
 
@@ -45,14 +46,14 @@ def build_particles(
         InputError: an effect remembers earlier rows, needs what a stream does not
             carry, shapes the noise, or is not linear in the stiffness.
     """
-    findings = unfollowed(posterior, prior)
+    findings = unfollowed(known, prior)
     if forget < 1.0:
         words = "does not go with effects"
         findings.append(Finding("forget", words, "Leave it out"))
     if findings:
         raise InputError(findings)
-    chosen = _particle_draws(posterior)
-    draws = _draws(posterior, chosen)
+    chosen = _particle_draws(known)
+    draws = _draws(known, chosen)
     # As arrays once, not at every row.
     reading = jax.tree.map(jnp.asarray, prior.reading)
     ends = jnp.array([0.8, 1.2]) * float(np.mean(np.asarray(prior.base.stiffness)))
@@ -61,28 +62,28 @@ def build_particles(
         row = np.array([deformation, rise, time])
         return np.asarray(_columns(draws, reading, ends, row)).T
 
-    return _particles(posterior, prior, chosen), columns
+    return _particles(known, prior, chosen), columns
 
 
-def force_effects(posterior: Posterior) -> list[type[Effect]]:
+def force_effects(known: Pooled) -> list[type[Effect]]:
     """Return the effects that have to be followed.
 
     Noise that grows with the force only weighs the rows, see `UnequalRows`.
     """
-    effects = posterior.problem.effects
+    effects = known.problem.effects
     return [effect for effect in effects if effect is not HeteroscedasticNoise]
 
 
-def unfollowed(posterior: Posterior, prior: StreamPrior) -> list[Finding]:
+def unfollowed(known: Pooled, prior: StreamPrior) -> list[Finding]:
     """Return which effects of a posterior cannot be followed row by row.
 
     Args:
-        posterior: that may be used.
+        known: draws of all causes.
         prior: of the stream, from the same posterior.
     """
-    few, findings = _particle_draws(posterior)[::16], []
-    for effect in force_effects(posterior):
-        words = _undeclared(effect) or _tried(effect, posterior, prior, few)
+    few, findings = _particle_draws(known)[::16], []
+    for effect in force_effects(known):
+        words = _undeclared(effect) or _tried(effect, known, prior, few)
         if words:
             remedy = "Calibrate without it, or diagnose blocks of rows"
             problem = f"its effect '{effect.name}' {words}"
@@ -90,8 +91,8 @@ def unfollowed(posterior: Posterior, prior: StreamPrior) -> list[Finding]:
     return findings
 
 
-def _particle_draws(posterior: Posterior) -> np.ndarray:
-    return np.linspace(0, len(posterior.draws["K"]) - 1, PARTICLES).astype(int)
+def _particle_draws(known: Pooled) -> np.ndarray:
+    return np.linspace(0, len(known.values["K"]) - 1, PARTICLES).astype(int)
 
 
 def _undeclared(effect: type[Effect]) -> str | None:
@@ -102,15 +103,15 @@ def _undeclared(effect: type[Effect]) -> str | None:
     return f"needs {', '.join(lacking)}, which a stream lacks" if lacking else None
 
 
-def _tried(effect: type[Effect], posterior, prior, chosen) -> str | None:
+def _tried(effect: type[Effect], known, prior, chosen) -> str | None:
     """Try whether a row's force depends on other rows, or bends in the stiffness.
 
     The trial goes far beyond the tested range, so that what begins there is seen.
     """
-    alpha, offset, effects = _draws(posterior, chosen)
+    alpha, offset, effects = _draws(known, chosen)
     draws = alpha, offset, tuple(e for e in effects if isinstance(e, effect))
     rng, size = np.random.default_rng(0), 40
-    gear = posterior.case.gear
+    gear = known.case.gear
     reach = 0.2 * float(gear.geometry.radius)
     if gear.theory == SPRING:
         reach = 10.0 * gear.full_scale.deformation
@@ -118,7 +119,7 @@ def _tried(effect: type[Effect], posterior, prior, chosen) -> str | None:
     time = np.sort(rng.uniform(0.0, 1e4, size))
     signs = np.where(rng.random(size) < 0.5, -1.0, 1.0)
     rows = np.stack([signs * sizes, rng.uniform(-40.0, 60.0, size), time], axis=1)
-    middle = float(np.median(posterior.draws["stiffness"]))
+    middle = float(np.median(known.values["stiffness"]))
     where = draws, prior.reading, middle * np.array([0.9, 1.0, 1.1]), rows
     together = np.asarray(_readings(*where))
     apart = np.asarray(_readings_apart(*where))
@@ -131,14 +132,14 @@ def _tried(effect: type[Effect], posterior, prior, chosen) -> str | None:
     return None
 
 
-def _draws(posterior: Posterior, chosen: np.ndarray) -> Draws:
+def _draws(known: Pooled, chosen: np.ndarray) -> Draws:
     """Return what particles fix; stiffness and zero are their own to learn."""
-    values = {name: jnp.asarray(v[chosen]) for name, v in posterior.draws.items()}
-    effects = build_effects(posterior.problem, values)
+    values = {name: jnp.asarray(v[chosen]) for name, v in known.values.items()}
+    effects = build_effects(known.problem, values)
     return values["alpha"], values["deformation_offset"], effects
 
 
-@jax.jit
+@jit
 def _readings(draws: Draws, reading: Reading, stiffness, rows):
     """Return the mean reading [N], shape (stiffness, draw, row).
 
@@ -163,7 +164,7 @@ def _readings(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(over_draws, in_axes=(0, None))(stiffness, draws)
 
 
-@jax.jit
+@jit
 def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     """Return the same of rows that know nothing of each other."""
 
@@ -173,7 +174,7 @@ def _readings_apart(draws: Draws, reading: Reading, stiffness, rows):
     return jax.vmap(one, out_axes=2)(rows)
 
 
-@jax.jit
+@jit
 def _columns(draws: Draws, reading: Reading, ends, row):
     """Return the first columns of `Particles` at one row, shape (3, particle)."""
     low, high = _readings(draws, reading, ends, row[None, :])[:, :, 0]
@@ -183,13 +184,13 @@ def _columns(draws: Draws, reading: Reading, ends, row):
     return jnp.stack(parts)
 
 
-def _particles(posterior: Posterior, prior: StreamPrior, chosen) -> Particles:
-    draws = posterior.draws
+def _particles(known: Pooled, prior: StreamPrior, chosen) -> Particles:
+    draws = known.values
     sites = ["alpha", "deformation_offset"]
     noise = f"{HeteroscedasticNoise.name}."
     sites += [
         name
-        for name in posterior.priors
+        for name in known.priors
         if "." in name and name in draws and not name.startswith(noise)
     ]
     fixed = np.stack([draws[name] for name in sites], axis=1)

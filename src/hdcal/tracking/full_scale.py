@@ -3,7 +3,7 @@
 from hdcal.data.case import Gear
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.gear import IN_NEWTONS, at_full_scale
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.pooled import Pooled
 
 # Of a leftover discrepancy a stream that begins with priors makes no use.
 _UNUSED = "gap_sd"
@@ -20,7 +20,7 @@ class AssumedFullScale:
         known: what the stream begins with; a calibration assumes nothing.
     """
 
-    def __init__(self, known: Posterior | Gear):
+    def __init__(self, known: Pooled | Gear):
         self._names, self._largest = "", 0.0
         if isinstance(known, Gear):
             other = at_full_scale(known, FullScale(2.0 * REFERENCE.force))

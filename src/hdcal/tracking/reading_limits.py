@@ -6,7 +6,7 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.tracking.linear_core import STIFFNESS, ZERO
 from hdcal.tracking.stream_prior import StreamPrior
 
@@ -63,7 +63,7 @@ class ReadingLimits:
         return low <= deformation <= high and cold <= temperature <= warm
 
 
-def reading_limits(known: Posterior | Gear, prior: StreamPrior) -> ReadingLimits:
+def reading_limits(known: Pooled | Gear, prior: StreamPrior) -> ReadingLimits:
     """Return the limits of a gear.
 
     Args:

@@ -8,10 +8,9 @@ from hdcal.data.case import Gear
 from hdcal.data.prior import scaled
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.gauges import as_read
-from hdcal.inference.mixed_posterior import causes_of_draws
-from hdcal.inference.posterior import Posterior
 from hdcal.physics.chain import Base, Reading, linear_coefficients
 from hdcal.physics.theory import THEORIES
+from hdcal.prediction.engine.pooled import Pooled
 
 _PRIOR_DRAWS = 20_000
 # Weights of a leftover below this share of the largest one have no part in a reading.
@@ -48,33 +47,33 @@ class StreamPrior:
         return np.concatenate([linear, self.weights], axis=1)
 
 
-def prior_from_posterior(posterior: Posterior, seed: int = 0) -> StreamPrior:
+def prior_from_posterior(known: Pooled, seed: int = 0) -> StreamPrior:
     """Return what a posterior says of the stream.
 
     The stream's mounting is a new one, with a zero of its own; where several gears
     were tested its gear is a new one too.
 
     Args:
-        posterior: of a calibration that may be used.
+        known: draws of all causes.
         seed: of the new mounting and gear.
     """
-    draws, problem = dict(posterior.draws), posterior.problem
+    draws, problem = dict(known.values), known.problem
     rng, size = np.random.default_rng(seed), len(draws["K"])
     stiffness = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
     stiffness = as_read(draws, stiffness)
     if problem.specimens:
         sd = draws["specimen_sd"] * np.sqrt(1.0 + 1.0 / problem.specimens)
         stiffness = stiffness * (1.0 + sd * rng.standard_normal(size))
-    run_sd = sample_prior(posterior.priors["run_offset_sd"], "run_offset_sd", rng, size)
+    run_sd = sample_prior(known.priors["run_offset_sd"], "run_offset_sd", rng, size)
     if problem.runs:
         run_sd = draws["run_offset_sd"] * np.sqrt(1.0 + 1.0 / problem.runs)
     draws["force_offset"] = draws["force_offset"] + run_sd * rng.standard_normal(size)
-    stated = float(np.mean(np.asarray(posterior.case.records.force_sd) ** 2))
+    stated = float(np.mean(np.asarray(known.case.records.force_sd) ** 2))
     reading = problem.reading
     reading = Reading(
         float(reading.radial_per_read), float(reading.reference_temperature)
     )
-    step, cause = float(problem.step), causes_of_draws(posterior)
+    step, cause = float(problem.step), known.index
     return _stream_prior(stiffness, draws, stated, cause, reading, run_sd, step)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
 from hdcal.errors import Findings
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.untested_reading import UNKNOWNS
 from hdcal.tracking.beginning import begin_core, begin_prior, usual_design
 from hdcal.tracking.change_alarm import ChangeAlarm, threshold_for
@@ -60,7 +60,7 @@ class Tracker:
 
     def __init__(
         self,
-        known: Posterior | Gear,
+        known: Models | Gear,
         *,
         alarm_rows: float = ALARM_ROWS,
         forget: float = 1.0,
@@ -72,21 +72,22 @@ class Tracker:
             wrong += implausible("forget", forget) + implausible("reopen", reopen)
             wrong += implausible("seed", seed)
         self._causes, self._unequal = [], None
-        if isinstance(known, Posterior):
-            known, self._causes = followed_causes(known, forget)
-        prior = begin_prior(known, seed)
-        if isinstance(known, Posterior):
-            self._unequal = UnequalRows(known, prior)
-        self._unknowns, self._full_scale = False, AssumedFullScale(known)
-        self._core, self._columns = begin_core(known, prior, forget, self._unequal)
+        if isinstance(known, Gear):
+            begin, prior = known, begin_prior(known, seed)
+        else:
+            begin, self._causes = followed_causes(known, forget)
+            prior = begin_prior(begin, seed)
+            self._unequal = UnequalRows(begin, prior)
+        self._unknowns, self._full_scale = False, AssumedFullScale(begin)
+        self._core, self._columns = begin_core(begin, prior, forget, self._unequal)
         self._slow, self._noise = self._core.slower(), SerialCorrelation()
         self._rounding = CoarseRounding(prior.step, forget)
-        self._limits = reading_limits(known, prior)
+        self._limits = reading_limits(begin, prior)
         self._reference = prior.reading.reference_temperature
         self._remounting = prior.remounting
         self._alarm_rows = alarm_rows
         self._alarm = ChangeAlarm(threshold_for(alarm_rows))
-        self._design = usual_design(known, prior, self._unequal)
+        self._design = usual_design(begin, prior, self._unequal)
         self._source = "a gear's priors" if isinstance(known, Gear) else "a calibration"
         self._since, self._run = 1, None
         self._forget, self._reopen = forget, reopen

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.inference.posterior import Posterior
 from hdcal.physics.effects.noise import HeteroscedasticNoise
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.prediction.engine.untested_reading import UntestedReading
 from hdcal.tracking.stream_prior import StreamPrior
 
@@ -37,14 +37,14 @@ class UnequalRows:
     """What each reading has beside the model and the usual noise.
 
     Args:
-        known: a calibration that may be used.
+        known: draws of all causes.
         prior: of the stream, from the same.
     """
 
-    def __init__(self, known: Posterior, prior: StreamPrior):
+    def __init__(self, known: Pooled, prior: StreamPrior):
         self._untested = UntestedReading(known)
         self._variance = float(np.mean(prior.variance))
-        share = known.draws.get(f"{HeteroscedasticNoise.name}.share")
+        share = known.values.get(f"{HeteroscedasticNoise.name}.share")
         sd = 0.0 if share is None else share * prior.coefficients()[:, 0]
         self._growth = float(np.mean(sd**2)) / self._variance
 

@@ -1,6 +1,7 @@
-"""`hdcal check`: read and validate, compute nothing."""
+"""`hdcal check`: read and validate DATA, and nothing else."""
 
 from functools import partial
+from typing import TYPE_CHECKING
 
 import click
 
@@ -10,17 +11,22 @@ from hdcal.cli.console import Console
 from hdcal.cli.options import case_options, force_option, json_option
 from hdcal.errors import Finding, InputError
 
-# By these letters --force knows an older gear file, and an older picture.
-_GEAR, _PNG, _SVG = b"[gear]\n", b"\x89PNG", b"<?xml"
+if TYPE_CHECKING:
+    from hdcal.data.case import Case
+
+# How files begin that --force may replace.
+_GEAR, _PICTURES = b"[gear]\n", {"png": b"\x89PNG", "svg": b"<?xml"}
 
 
-@command(short_help="Read DATA only, and say what was understood.")
+@command(short_help="Read DATA and report what was read; compute nothing.")
 @case_options
-@click.option("--effects", is_flag=True, help="List what each effect lacks, too.")
+@click.option(
+    "--effects", is_flag=True, help="Also list what the data lack for each effect."
+)
 @click.option(
     "--write-gear",
     metavar="GEAR.toml",
-    help="Without a gear file: write one there, with what was understood of DATA.",
+    help="Without a gear file: write one there, with what is known from DATA.",
 )
 @click.option(
     "--plot",
@@ -31,13 +37,15 @@ _GEAR, _PNG, _SVG = b"[gear]\n", b"\x89PNG", b"<?xml"
 @json_option
 @click.pass_obj
 def check(console: Console, effects, write_gear, plot, force, **given):
-    """Read DATA and its gear file, and say what was understood.
+    """Read DATA and its gear file, and report what was read.
 
-    DATA may be a folder with a file, or a folder, for each gear too.
+    DATA may also be a folder with a file, or a folder, for each gear.
     """
     from hdcal.data.reading import UNSIZED
     from hdcal.report.saving import Target
 
+    kind = "svg" if str(plot).lower().endswith(".svg") else "png"
+    places = {}
     with console.wrong:
         case = read_whole(console, given)
         if write_gear and case is not None and UNSIZED not in case.notes:
@@ -46,29 +54,33 @@ def check(console: Console, effects, write_gear, plot, force, **given):
         if plot is not None and not plot.lower().endswith((".png", ".svg")):
             words = f"'{plot}' ends in neither .png nor .svg"
             raise InputError([Finding("plot", words, "Name such a file")])
-        beginning = _SVG if str(plot).lower().endswith(".svg") else _PNG
-        asked = {write_gear: _GEAR, plot: beginning}
-        places = {}
-        for name, text in asked.items():
+        for name, beginning in ((write_gear, _GEAR), (plot, _PICTURES[kind])):
             if name is not None:
-                reserve = partial(Target, name, force, beginning=text)
+                reserve = partial(Target, name, force, beginning=beginning)
                 places[name] = console.hold(reserve)
     assert case is not None
-    from hdcal.calibration.check.document import check_document
-    from hdcal.calibration.check.summary import check_answer, gear_file
+    from hdcal.calibration.check.check import check as check_case
+    from hdcal.report.chart_drawing import images
 
-    found = check_answer(case)
-    code = console.answer(check_document(found, lacking=effects), found)
+    found = check_case(case, each_effect=effects)
+    code = console.show(found)
     if write_gear:
         with places[write_gear].filled() as path:
-            path.write_text(gear_file(case), "utf-8")
-        console.words(f"the gear file: {write_gear}. Add what it does not know yet")
+            path.write_text(_gear_file(case), "utf-8")
+        console.words(f"the gear file: {write_gear}. Complete it")
     if plot:
-        from hdcal.calibration.check.figure import readings_figure
-        from hdcal.report.canvas import render
-
-        kind = "svg" if beginning == _SVG else "png"
+        (picture,) = images(found.charts()["readings"], case.name, [kind]).values()
         with places[plot].filled() as path:
-            path.write_bytes(render(readings_figure(case), kind, case.name))
+            path.write_bytes(picture)
         console.words(f"the picture: {plot}")
     return code
+
+
+def _gear_file(case: "Case") -> str:
+    """Return a gear file for readings that came without one."""
+    from hdcal.data.gear_text import gear_text
+
+    # Whether they are radial or diametral is unknown, so it is left out.
+    measured = {"reference_temperature_C": case.gear.reference_temperature}
+    named = {"name": case.name, "theory": case.gear.theory}
+    return gear_text(named, measured, case.columns)

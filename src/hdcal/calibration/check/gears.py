@@ -1,4 +1,4 @@
-"""What a check reads: a case, or a folder with a file for each gear as one."""
+"""Reading for a check: a case, or a folder with a file for each gear as one case."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def read_whole(console: Console, given: dict[str, Any]) -> "Case | None":
-    """Read what `case_options` named; what is wrong is kept by the console.
+    """Read what `case_options` named; the console collects the findings.
 
     Args:
         console: of the command.

@@ -1,15 +1,13 @@
 """The library of effects: what each one means, what it needs and its priors."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
-
-from pydantic import Field
+from typing import Literal
 
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.result import Item, Result, Words
+from hdcal.report.result import EffectName, Item, Result, Words
 from hdcal.report.words import prior_words
 
 
@@ -36,7 +34,7 @@ class ListedParameter(Item):
 class ListedEffect(Item):
     """An effect of the library, with the covariates that it needs."""
 
-    name: Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
+    name: EffectName
     stage: str
     family: str
     needs: tuple[str, ...]

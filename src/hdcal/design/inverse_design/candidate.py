@@ -1,7 +1,6 @@
 """The sizes nearest to the tested gear that keep every limit, for one material."""
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import jax
@@ -12,6 +11,7 @@ from hdcal.design.design_draws import DesignDraws
 from hdcal.design.design_result import Stress, counted, stress_fields
 from hdcal.design.inverse_design.force_limit import LimitedGear
 from hdcal.design.inverse_design.nearest_point import CLOSE, nearest_kept
+from hdcal.exported import jit
 from hdcal.prediction.engine.sizes import SIZES
 from hdcal.report.result import Interval, Probability, quantity
 
@@ -90,7 +90,7 @@ def _own(target: LimitedGear, name: str) -> float:
 
 
 # Compiled once for all materials: everything but the names is an argument.
-@partial(jax.jit, static_argnames=("names",))
+@jit(static_argnames=("names",))
 def _excess(target: LimitedGear, z, *, names):
     """Return the logarithms of force and stress over what is allowed."""
     place = dict(zip(names, jnp.exp(z), strict=True))
@@ -99,7 +99,7 @@ def _excess(target: LimitedGear, z, *, names):
     return jnp.log(jnp.stack([force, target.utilisation(place) + 1e-12]))
 
 
-@partial(jax.jit, static_argnames=("names",))
+@jit(static_argnames=("names",))
 def _slopes(target: LimitedGear, z, *, names):
     """Return their derivatives."""
     return jax.jacfwd(lambda y: _excess(target, y, names=names))(z)
@@ -131,7 +131,7 @@ def candidate(
     )
 
 
-@jax.jit
+@jit
 def _draws(target: LimitedGear, sizes):
     return target.forces(sizes), target.stresses(sizes)
 
@@ -154,7 +154,7 @@ def spreads(
     return np.asarray(_spreads(target, dict(sizes), shares)).T
 
 
-@jax.jit
+@jit
 def _spreads(target: LimitedGear, sizes, shares):
     def one(place):
         ranked = jnp.sort(target.forces(place))
@@ -173,7 +173,7 @@ def elasticities(target: LimitedGear, sizes: Mapping[str, float]) -> dict[str, f
     return {name: float(value) for name, value in found.items()}
 
 
-@jax.jit
+@jit
 def _elasticities(target: LimitedGear, place):
     # The slope of a quantile is the mean slope of the draws about it: Hong, Operations
     # Research 57 (2009). That of a single draw would be imprecise.

@@ -34,7 +34,7 @@ from hdcal.design.next_gear import NextGear, next_gear
 from hdcal.design.ring_chart import ring_chart
 from hdcal.design.sizes import geometry_with, named, with_reference
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.models import Models
 from hdcal.report.chart_spec import Chart
 from hdcal.report.result import Words
 
@@ -89,7 +89,7 @@ class InverseDesign(DesignResult):
 
 
 def inverse_design(
-    source: Posterior | Gear,
+    source: Models | Gear,
     vary: Mapping[str, tuple[float, float]],
     limit_force: float,
     *,

@@ -24,8 +24,8 @@ from hdcal.design.sizes import geometry_with
 from hdcal.design.study.charts import study_chart
 from hdcal.design.study.force_quantiles import force_quantiles
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
 from hdcal.physics.profile import peak_stress
+from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 from hdcal.report.chart_spec import Chart
 from hdcal.report.result import Interval
@@ -92,7 +92,7 @@ class Study(DesignResult):
 
 
 def study(
-    source: Posterior | Gear,
+    source: Models | Gear,
     vary: Mapping[str, Sequence[float]],
     *,
     materials: Sequence[str] = (),

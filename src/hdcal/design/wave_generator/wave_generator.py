@@ -13,7 +13,7 @@ from hdcal.design.wave_generator.generator_result import WaveGenerator
 from hdcal.design.wave_generator.springs import Spring, judge_all, softest
 from hdcal.design.wave_generator.window import WindowAsked, window_findings
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.inference.posterior import Posterior
+from hdcal.prediction.engine.models import Models
 
 # Default range of the spring rate, relative to the stiffness of the gear.
 RATE_RANGE = (0.01, 100.0)
@@ -25,7 +25,7 @@ _ALONG = 9
 
 
 def wave_generator(
-    source: Posterior | Gear,
+    source: Models | Gear,
     window: tuple[float, float],
     *,
     temperatures: Sequence[float] | None = None,

@@ -50,7 +50,7 @@ def respond(console: Console, run, force, columns, out, replace, **asked):
     with console.wrong:
         console.reserve_folder(out, replace, "replace")
         drive = read_drive(console, force, columns, asked["amplitude"])
-    from hdcal.inference.dynamic_posterior import load_any
+    from hdcal.inference.model_average import load_any
     from hdcal.motion.respond.respond import respond as ask
     from hdcal.motion.respond.summary import response_report, with_columns
     from hdcal.report.write import write_report

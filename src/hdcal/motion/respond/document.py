@@ -9,7 +9,8 @@ from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.motion.quantities import quantity_table
 from hdcal.motion.respond.answer import QuantityEstimate, ResponseAnswer
-from hdcal.prediction.engine.causes import averaging_words, causes_of
+from hdcal.prediction.engine.causes import averaging_words
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.report.document import Document, Picture, Section, Text, notices
 from hdcal.report.parameters import Interval
 from hdcal.report.provenance import gear_rows
@@ -57,18 +58,19 @@ def _not_seen(posterior: Posterior, driven_by: Mapping[str, str]) -> list[str]:
 
 
 def remarks(
-    posterior: Posterior, times: np.ndarray, estimates: dict, kept, left, tested
+    pooled: Pooled, times: np.ndarray, estimates: dict, kept, left, tested
 ) -> Iterator[str]:
     """Yield what the reader must know, in sentences.
 
     Args:
-        posterior: what the answer rests on.
+        pooled: what the answer rests on.
         times: of the answer [s].
         estimates: of the answer, with their drivers.
         kept: effects taken along.
         left: effects left out.
         tested: from `tested_rows`.
     """
+    posterior = pooled.causes[0].posterior
     not_seen = _not_seen(posterior, {n: e["driven_by"] for n, e in estimates.items()})
     if not_seen:
         yield (
@@ -81,15 +83,14 @@ def remarks(
             f"{outside} of {len(tested)} times lie outside the deformations or the "
             "temperature that were calibrated: extrapolated."
         )
-    yield from averaging_words(causes_of(posterior))
+    yield from averaging_words(pooled.causes)
     if left:
         listed = ", ".join(effect.name for effect in left)
         yield (
             "Left out, because they remember what came before or belong to gauges and "
             f"sensors: {listed}."
         )
-    at_rest = not isinstance(posterior, DynamicPosterior)
-    gap = posterior.problem.discrepancy if at_rest else None
+    gap = None if pooled.moving else pooled.problem.discrepancy
     if gap is not None and gap.looped:
         yield (
             "Of the leftover the middle of loading and unloading acts: what its loop "
@@ -105,7 +106,7 @@ def remarks(
             f"{1.0 / step:.4g} times per second, fewer than {_PER_PERIOD} in a period: "
             "for its peaks use more points or a shorter duration."
         )
-    if len(posterior.case.specimen_labels) > 1:
+    if len(pooled.case.specimen_labels) > 1:
         yield "The stiffness is the mean of the tested gears, not of a new one."
 
 

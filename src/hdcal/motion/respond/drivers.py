@@ -5,6 +5,7 @@ import numpy as np
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.conditions import NEAR_MM, temperature_is_tested
+from hdcal.prediction.engine.pooled import Pooled
 
 
 def drivers(posterior: Posterior, mass, damping) -> dict[str, str]:
@@ -33,17 +34,17 @@ def drivers(posterior: Posterior, mass, damping) -> dict[str, str]:
     }
 
 
-def tested_rows(posterior: Posterior, temperature: float, lo, hi) -> np.ndarray:
+def tested_rows(pooled: Pooled, temperature: float, lo, hi) -> np.ndarray:
     """Return where a band lies within what was calibrated.
 
     Args:
-        posterior: with its records.
+        pooled: draws, with the records.
         temperature: of the gear [°C].
         lo: lower end of the band of the deformation from the unloaded gear [mm].
         hi: its upper end.
     """
-    records = posterior.case.records
-    zero = float(np.median(posterior.draws["deformation_offset"]))
+    records = pooled.case.records
+    zero = float(np.median(pooled.values["deformation_offset"]))
     # From the unloaded gear, where motion begins, in either sense of loading.
     low = min(0.0, float(np.min(records.deformation)) - zero)
     high = max(0.0, float(np.max(records.deformation)) - zero)

@@ -2,7 +2,6 @@
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import equinox as eqx
@@ -10,6 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_priors import mass_prior
@@ -71,7 +71,7 @@ def _with_values(effect: type[Effect], values) -> Effect:
     return effect(**own)
 
 
-@partial(jax.jit, static_argnames=("kept", "with_damping"))
+@jit(static_argnames=("kept", "with_damping"))
 def _each(
     values,
     reading,

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, InputError
-from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Sine, Step
+from hdcal.physics.forcing import Chirp, Forcing, SampledForce, Step
 
 SHAPES = ("step", "sine", "chirp")
 # Time and force of a sampled force, [s] and [N], or the name of a shape.
@@ -86,9 +86,9 @@ def _request(
         return Request(Step(amplitude), f"a step of {amplitude:g} N", times)
     if drive == "sine":
         words = f"a sine of {amplitude:g} N at {tones[0]:g} Hz"
-        return Request(Sine(amplitude, tones[0]), words, times)
-    words = f"a sweep of {amplitude:g} N from {tones[0]:g} to {tones[1]:g} Hz"
-    return Request(Chirp(amplitude, tones[0], tones[1], length), words, times)
+    else:
+        words = f"a sweep of {amplitude:g} N from {tones[0]:g} to {tones[1]:g} Hz"
+    return Request(Chirp(amplitude, tones[0], tones[-1], length), words, times)
 
 
 def _tones(drive, frequency, duration: float, points: int, find) -> list[float]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError, NotUsable
-from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.exported import jit
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import case_reading, without_scatter
 from hdcal.inference.values import MEMBERS
@@ -26,6 +26,8 @@ from hdcal.physics.dynamics import acting, natural_frequency
 from hdcal.physics.forcing import Forcing
 from hdcal.prediction.engine.conditions import temperature_findings, usual_temperature
 from hdcal.prediction.engine.gear_forces import evenly, gear_values
+from hdcal.prediction.engine.models import Models
+from hdcal.prediction.engine.pooled import Pooled, pool
 from hdcal.report.parameters import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
@@ -39,7 +41,7 @@ class Response(Shown):
     """The motion under a force; one entry per time.
 
     Attributes:
-        posterior: what the answer rests on.
+        posterior: what the answer rests on, the most probable of several models.
         time_s: times.
         force_N: on the gear.
         deformation_lo_mm: lower end of the pointwise band of the deformation, as
@@ -81,7 +83,7 @@ class Response(Shown):
 
 
 def respond(
-    posterior: Posterior,
+    models: Models,
     force: Drive,
     *,
     amplitude: float = 80.0,
@@ -99,7 +101,7 @@ def respond(
     Motion begins at rest, from the unloaded gear.
 
     Args:
-        posterior: from `calibrate` or `calibrate_dynamic`.
+        models: from `calibrate`, `diagnose` or `calibrate_dynamic`.
         force: `step`, `sine`, `chirp`, or a pair of times [s] and forces [N].
         amplitude: of a named shape, of either sign [N].
         frequency: of a sine, or first and last of a chirp [Hz].
@@ -117,25 +119,26 @@ def respond(
             integrated.
         InputError: a setting is out of range.
     """
-    posterior.require_usable()
+    pooled = pool(models)
     with Findings() as wrong:
         request = wrong.attempt(
             make_request, force, amplitude, frequency, duration, points
         )
-        wrong += _problems(posterior, temperature, mass, damping, draws, seed)
+        wrong += _problems(pooled, temperature, mass, damping, draws, seed)
     assert request is not None
-    return _move(posterior, request, temperature, mass, damping, draws, seed)
+    return _move(pooled, request, temperature, mass, damping, draws, seed)
 
 
 def _move(
-    posterior: Posterior, request: Request, temperature, mass, damping, draws, seed
+    pooled: Pooled, request: Request, temperature, mass, damping, draws, seed
 ) -> Response:
-    """Integrate every gear of the posterior, and say what its motion rests on."""
-    usual = usual_temperature(posterior.case)
+    """Integrate every gear of the models, and say what its motion rests on."""
+    posterior = pooled.causes[0].posterior
+    usual = usual_temperature(pooled.case)
     at = usual if temperature is None else float(temperature)
-    values, leftover = _what_moves(posterior, draws, seed)
+    values, leftover = _what_moves(pooled, draws, seed)
     moved, ratio = unseen(posterior, values, mass, seed)
-    kept, left = acting(without_scatter(posterior.effects))
+    kept, left = acting(without_scatter(pooled.effects))
     reading = case_reading(posterior.case)
     whole = {**values, "_mass": moved, "_ratio": ratio}
     _check_reach(posterior, request, values, moved)
@@ -149,7 +152,7 @@ def _move(
         name: {**vars(credible_interval(facts[name])), "driven_by": driver}
         for name, driver in drivers(posterior, mass, damping).items()
     }
-    tested = tested_rows(posterior, at, lo, hi)
+    tested = tested_rows(pooled, at, lo, hi)
     return Response(
         posterior,
         request.times,
@@ -164,29 +167,28 @@ def _move(
         len(done),
         tuple(effect.name for effect in kept),
         tuple(effect.name for effect in left),
-        tuple(remarks(posterior, request.times, estimates, kept, left, tested)),
+        tuple(remarks(pooled, request.times, estimates, kept, left, tested)),
     )
 
 
-@jax.jit
+@jit
 def _forces(force: Forcing, times):
     return jax.vmap(force)(times)
 
 
-def _what_moves(posterior: Posterior, draws: int, seed: int):
+def _what_moves(pooled: Pooled, draws: int, seed: int):
     """Return so many draws of one gear, and what a model of the force leaves of it.
 
     Members of what was tested are no part of a gear that moves, and may be many.
     """
-    if isinstance(posterior, DynamicPosterior):
-        every = posterior.draws
-        kept = evenly(len(every["K"]), draws)
-        return {name: values[kept] for name, values in every.items()}, None
-    values, untested = gear_values(posterior, seed, draws)
+    if pooled.moving:
+        kept = evenly(len(pooled.index), draws)
+        return {name: values[kept] for name, values in pooled.values.items()}, None
+    values, untested = gear_values(pooled, seed, draws)
     own = {name: v for name, v in values.items() if name not in MEMBERS.values()}
     if "gap_weights" in values:
         own["gap_weights"] = values["gap_weights"]
-    return own, (posterior.problem, untested)
+    return own, (pooled.problem, untested)
 
 
 def _check_motion(done: np.ndarray, gone: np.ndarray, reach: float) -> None:
@@ -217,7 +219,7 @@ def _band(deformation: np.ndarray) -> np.ndarray:
     return np.concatenate([np.quantile(p, tails, axis=0) for p in parts], axis=1)
 
 
-def _problems(posterior, temperature, mass, damping, draws, seed) -> list[Finding]:
+def _problems(pooled: Pooled, temperature, mass, damping, draws, seed) -> list[Finding]:
     findings = []
 
     def find(name: str, problem: str, remedy: str) -> None:
@@ -225,13 +227,13 @@ def _problems(posterior, temperature, mass, damping, draws, seed) -> list[Findin
 
     findings += implausible("mass", mass) + implausible("damping", damping)
     findings += implausible("draws", draws, "gears") + implausible("seed", seed)
-    if isinstance(posterior, DynamicPosterior):
+    if pooled.moving:
         for name, value in (("mass", mass), ("damping", damping)):
             if value is not None:
                 words = "this calibration of the moving gear knows it already"
                 find(name, words, "Leave it out")
     if temperature is not None:
-        gear, values = posterior.case.gear, posterior.draws
+        gear, values = pooled.case.gear, pooled.values
         findings += temperature_findings(gear, values, np.array([temperature]))
     return findings
 

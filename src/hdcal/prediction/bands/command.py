@@ -43,14 +43,15 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     RUN is a folder of `hdcal calibrate` or `hdcal diagnose`; causes that the latter
     could not tell apart are averaged over by their probability.
     """
-    from hdcal.prediction.engine.causes import averaging_words, causes_of, read_models
+    from hdcal.inference.model_average import load_models
+    from hdcal.prediction.engine.causes import averaging_words, causes_of
     from hdcal.report.saving import Target
 
     file = None
     with console.wrong:
         if out is not None:
             file = console.hold(partial(Target, out, force, beginning=_BEGINNING))
-    models = read_models(run)
+    models = load_models(run)
     causes = causes_of(models)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows

@@ -14,6 +14,7 @@ import numpy as np
 from jax.tree_util import Partial, all_leaves
 from scipy.special import ndtri, stdtrit
 
+from hdcal.exported import jit
 from hdcal.prediction.budget.inputs import InputGroup
 
 # Digits of a standard uncertainty that count.
@@ -71,7 +72,7 @@ def coverage_factor(dof: float, coverage: float = 0.95) -> float:
     return float(stdtrit(dof, share) if dof < 1e9 else ndtri(share))
 
 
-@jax.jit
+@jit
 def _tangent(model, at):
     return jax.value_and_grad(model)(at)
 

@@ -6,13 +6,13 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.gauges import acting, shown
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
-from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.forces import force_of, grid_records
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.prediction.engine.untested import (
     SITES,
     Bends,
@@ -26,28 +26,23 @@ CAUSE, MODULUS = "_cause", "_modulus"
 
 
 def gear_values(
-    posterior: Posterior, seed: int = 0, most: int | None = None
+    pooled: Pooled, seed: int = 0, most: int | None = None
 ) -> tuple[Values, Untested]:
     """Return draws with what they leave open, and what that is for each cause.
 
     Args:
-        posterior: of one model, or a mixture.
+        pooled: draws of all causes.
         seed: of what the draws leave open.
         most: draws to keep, taken evenly; all by default.
 
     Returns:
         The draws; every leaf of what is untested has an axis of causes first.
     """
-    every, causes = posterior.draws, causes_of(posterior)
-    total = len(every["K"])
+    causes, total = pooled.causes, len(pooled.index)
     kept = evenly(total, total if most is None else most)
-    values = {name: draws[kept] for name, draws in every.items()}
+    values = {name: draws[kept] for name, draws in pooled.values.items()}
     # Of what fills a space evenly, a part that was picked from it need not.
-    levels = spread_evenly(len(kept), SITES, seed)
-    # A mixture has its causes in the order of its draws, alike in each chain.
-    chains = posterior.size[0]
-    sizes = [cause.size // chains for cause in causes]
-    index = np.tile(np.repeat(np.arange(len(causes)), sizes), chains)[kept]
+    levels, index = spread_evenly(len(kept), SITES, seed), pooled.index[kept]
     each = [untested_of(cause, levels[index == i]) for i, cause in enumerate(causes)]
     found: dict[str, np.ndarray] = {CAUSE: index}
     for name, first in each[0][1].items():
@@ -64,7 +59,7 @@ def evenly(total: int, count: int) -> np.ndarray:
     return np.linspace(0, total - 1, min(count, total)).astype(int)
 
 
-@jax.jit
+@jit
 def gear_forces(
     problem: Problem,
     values: Values,

@@ -10,13 +10,13 @@ starts at the far end of the tested range, so that its size at this end is learn
 from dataclasses import dataclass
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.special import softmax
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference.likelihood import row_precision
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
@@ -201,7 +201,7 @@ def _fitted(end: float, far: float, deformation, weight, error, change) -> Fitte
     return FittedGrowth(growth, pairs, chances)
 
 
-@jax.jit
+@jit
 def _left(problem: Problem, values: Values, records: Records):
     """Return what a straight model leaves of each row [N], and its precision."""
     mean, noise = predict_rows(problem, values, records, None)

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.exported import jit
 from hdcal.inference.gauges import acting, shown
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
@@ -149,7 +150,7 @@ def _with_scores(cause: Cause, seed: int) -> tuple[dict[str, np.ndarray], Untest
     return {**values, SCORES: ndtri(levels[:, :2]), **open_sites}, untested
 
 
-@jax.jit
+@jit
 def mixtures(
     problem: Problem, values: Values, whose: Whose, conditions: Conditions
 ) -> Mixture:
@@ -249,7 +250,7 @@ def bend_law(force: PopulationForce) -> tuple[float, float]:
     return float(np.mean(mean)), float(np.sqrt(np.mean(sd**2) + np.var(mean)))
 
 
-@jax.jit
+@jit
 def _bends(untested: Untested, values: Values, deformation):
     """Return mean and sd of the bend of each draw [N]."""
     at = jnp.reshape(deformation, 1)

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
+from hdcal.exported import jit
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.physics.effect import Noise
@@ -13,7 +14,7 @@ from hdcal.prediction.engine.population import new_member_sd
 from hdcal.prediction.engine.untested import Untested
 
 
-@jax.jit
+@jit
 def readings(
     problem: Problem,
     values: Values,

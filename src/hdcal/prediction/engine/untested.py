@@ -7,7 +7,6 @@ tested temperatures the rig may drift, for every member alike.
 from dataclasses import replace
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +15,7 @@ from scipy.special import ndtri
 from hdcal.data.full_scale import REFERENCE
 from hdcal.data.priors import effect_priors
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy
 from hdcal.inference.distributions import moments
 from hdcal.inference.problem import Problem
@@ -124,7 +124,7 @@ class Bends(eqx.Module):
         return bend, columns @ value["gap_weights"]
 
 
-@jax.jit
+@jit
 def _outside(temperature, coldest, warmest):
     return temperature - jnp.clip(temperature, coldest, warmest)
 

@@ -7,13 +7,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy
-from hdcal.inference.posterior import Posterior
 from hdcal.inference.problem import Problem
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import CAUSE, gear_values
 from hdcal.prediction.engine.growth import Growth, bend_covariance
+from hdcal.prediction.engine.pooled import Pooled
 from hdcal.prediction.engine.untested import BENDS, Untested, fitted_columns
 
 # Draws that tell: their sd is then known to some 5 %.
@@ -46,20 +47,20 @@ class UntestedReading:
     """The bend and the drift of the rig at conditions that were not tested.
 
     Args:
-        posterior: of one model, or a mixture.
+        pooled: draws of all causes.
     """
 
-    def __init__(self, posterior: Posterior):
-        values, self._untested = gear_values(posterior)
+    def __init__(self, pooled: Pooled):
+        values, self._untested = gear_values(pooled)
         kept = np.linspace(0, len(values["K"]) - 1, _DRAWS).astype(int)
         self._values = {name: column[kept] for name, column in values.items()}
-        self._problem = posterior.problem
+        self._problem = pooled.problem
         sides = self._untested.below, self._untested.above
         self._bends = [
             _Bend(growth, self._values[BENDS][:, side], self._values[CAUSE])
             for side, growth in enumerate(sides)
         ]
-        warm = posterior.case.records.temperature
+        warm = pooled.case.records.temperature
         self._tested = float(np.min(warm)), float(np.max(warm))
 
     def at(self, deformation: float, temperature: float) -> Addition:
@@ -161,19 +162,19 @@ def _powers(place: np.ndarray) -> np.ndarray:
     return place[:, None] ** np.arange(3)
 
 
-@jax.jit
+@jit
 def _reach(growth: Growth, deformation):
     """Return how far beyond the end a deformation is, and the share of the bend."""
     return growth.beyond(deformation), growth.share(deformation)
 
 
-@jax.jit
+@jit
 def _leftover(discrepancy: Discrepancy, growths: tuple[Growth, Growth], deformation):
     """Return the columns of the fitted leftover; growths below and above."""
     return _columns(discrepancy, growths, deformation, jnp.zeros_like(deformation))
 
 
-@jax.jit
+@jit
 def _half_loop(discrepancy: Discrepancy, growths, deformation, weights):
     """Return the mean square over draws of what loading adds to the middle."""
     up, middle = (
@@ -191,7 +192,7 @@ def _columns(discrepancy: Discrepancy, growths, deformation, movement):
     return fitted_columns(discrepancy, ends, (deformation, movement), share)
 
 
-@jax.jit
+@jit
 def _given(growth: Growth, sizes, cause):
     """Return what `Growth.given` says of every draw."""
 
@@ -201,7 +202,7 @@ def _given(growth: Growth, sizes, cause):
     return jax.vmap(one)(sizes, cause)
 
 
-@jax.jit
+@jit
 def _drifts(problem: Problem, values: Values, untested: Untested, at, warm):
     """Return what the rig's drift adds to a reading in every draw [N]."""
     loading = jnp.where(at < 0.0, -1.0, 1.0)

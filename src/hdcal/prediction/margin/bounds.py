@@ -16,6 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.exported import jit
 from hdcal.prediction.engine.causes import independent_draws
 from hdcal.prediction.engine.loading_sense import (
     LoadingSense,
@@ -61,7 +62,7 @@ class PopulationDraws:
     predicted: np.ndarray
 
 
-@jax.jit
+@jit
 def _each_draw(mixture: Mixture, sense, shares, limit):
     """Return quantiles [draw] at each share, centre and share above the limit.
 
@@ -75,7 +76,7 @@ def _each_draw(mixture: Mixture, sense, shares, limit):
     return (*found, mixture.centre(), above)
 
 
-@jax.jit
+@jit
 def _predicted(parts, sense, rounding_sd, shown, exact):
     """Return quantiles of the law of all draws: as shown with rounding, and exact.
 

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.physics.effect import parameters
 from hdcal.prediction.budget.inputs import (
     InputGroup,
@@ -84,7 +85,7 @@ class ForceBudget:
         return sum(component.variance for component in self.components)
 
 
-@jax.jit
+@jit
 def _scatter(problem, values, whose, conditions):
     """Return variance of the noise, mean and sd of the bend, of every draw [N², N]."""
     at = jnp.reshape(jnp.asarray(conditions.deformation, float), 1)

@@ -63,16 +63,18 @@ def margin(console: Console, run, out, force, certificate, **asked):
     could not tell apart are averaged over by their probability. Of a folder of `hdcal
     fleet` it tells what gears to come need.
     """
-    from hdcal.prediction.engine.causes import read_models
+    from hdcal.inference.model_average import load_models
+    from hdcal.prediction.engine.models import model_pairs
     from hdcal.prediction.margin.margin import margin as bounds_of
     from hdcal.prediction.margin.summary import margin_report
 
     with console.wrong as wrong:
-        models = wrong.attempt(read_models, run) or []
+        models = wrong.attempt(load_models, run)
         console.reserve_folder(out, force)
         wrong += options.needs_folder("certificate", certificate, out)
+    assert models is not None
     found = bounds_of(models, **asked)
-    posterior = max(models, key=lambda model: model[0])[1]
+    posterior = max(model_pairs(models), key=lambda model: model[0])[1]
     signed = date.today() if certificate else None
     how = {"seed": asked["seed"], "certificate": signed}
     return console.report(margin_report(found, posterior, console.command, **how))

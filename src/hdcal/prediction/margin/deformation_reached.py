@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from hdcal.exported import jit
 from hdcal.prediction.engine.loading_sense import ends_along, sense_of
 from hdcal.prediction.engine.mixture import Mixture, quantile_weights
 from hdcal.prediction.engine.population_force import PopulationForce, member_mixture
@@ -96,7 +97,7 @@ def deformation_reached(
     return DeformationReached(given, warm, ends, *numbers, tested)
 
 
-@jax.jit
+@jit
 def _solve(problem, values, whose, conditions, given, shares, ends):
     """Return deformations [draw, 3]: at both shares and for the mean, [mm].
 

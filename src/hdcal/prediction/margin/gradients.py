@@ -13,6 +13,7 @@ import numpy as np
 
 from hdcal.data.case import Theory
 from hdcal.data.records import Geometry
+from hdcal.exported import jit
 from hdcal.inference.problem import Problem
 from hdcal.prediction.engine.conditions import Conditions
 from hdcal.prediction.engine.mixture import (
@@ -122,13 +123,13 @@ class Redesign(eqx.Module):
         return mixtures(self.problem, self.values, self.whose, there)
 
 
-@jax.jit
+@jit
 def _mean_slopes(gear: Redesign):
     """Return the derivative of the mean force, averaged over the draws, by input."""
     return jax.jacfwd(lambda point: gear.mixture(point).centre().mean())(gear.origin)
 
 
-@jax.jit
+@jit
 def _bound_slopes(gear: Redesign, weights, content):
     """Return the derivative of a weighted sum of the draws' quantiles, by input.
 

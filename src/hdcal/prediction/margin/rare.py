@@ -22,10 +22,11 @@ from scipy import special
 from scipy.optimize import minimize
 
 from hdcal.data.records import Array
+from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.distributions import distribution
 from hdcal.inference.integrated import gap_law
-from hdcal.inference.pareto import pareto_shape
+from hdcal.inference.mixing import pareto_shape
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population_force import (
@@ -165,7 +166,7 @@ def _heavy(law: tuple[np.ndarray, ...], limit: float) -> np.ndarray:
     return total
 
 
-@jax.jit
+@jit
 def _towards(target: _Target, point, sizes):
     """Return −log of density times tail, and its gradient."""
 
@@ -175,7 +176,7 @@ def _towards(target: _Target, point, sizes):
     return jax.value_and_grad(height)(point)
 
 
-@jax.jit
+@jit
 def _weigh(target: _Target, points, sizes):
     """Return the terms of points, their leading axis."""
 

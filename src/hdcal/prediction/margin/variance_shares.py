@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
+from hdcal.exported import jit
 from hdcal.prediction.engine.causes import Cause, Driver
 from hdcal.prediction.engine.even_points import spread_evenly
 from hdcal.prediction.engine.mixture import Mixture
@@ -49,7 +50,7 @@ class VarianceShare:
     driven_by: Driver
 
 
-@jax.jit
+@jit
 def _mean_forces(problem, values, conditions):
     """Return the mean reading of every draw along the sense of loading [N].
 
@@ -63,7 +64,7 @@ def _mean_forces(problem, values, conditions):
     return jax.vmap(one)(values)
 
 
-@jax.jit
+@jit
 def _member_forces(problem, values, whose, conditions, factor, level):
     """Return forces with their noise, each of draw, factor and level of its own.
 

@@ -1,4 +1,4 @@
-"""`hdcal fit`: polynomials by least squares, as a curve-fitting tool gives them."""
+"""`hdcal fit`: polynomials by least squares."""
 
 import click
 
@@ -30,29 +30,30 @@ from hdcal.cli.options import case_options, json_option, out_option, read_given
 )
 @click.option(
     "--run",
+    "posterior",
     metavar="RUN",
-    help="Show the answer of a calibration of the same data beside the curves.",
+    help="Compare with a calibration of the same data.",
 )
 @out_option
 @json_option
 @click.pass_obj
-def fit(console: Console, degrees, through_origin, at, run, out, force, **given):
+def fit(console: Console, degrees, through_origin, at, posterior, out, force, **given):
     """Fit polynomials of force over deformation to DATA by least squares.
 
-    For who knows polyfit: the same coefficients, with standard errors, confidence
-    intervals, and tests of whether the curve suits the data.
+    The coefficients are those of polyfit, with standard errors, confidence intervals,
+    and tests of whether the curve suits the data.
     """
-    from hdcal.classical.fit.fit import fit as fit_case
-    from hdcal.classical.fit.summary import fit_report
-    from hdcal.cli.sources import load_posterior
+    from hdcal.classical.fit import fit as fit_case
+    from hdcal.cli.sources import load_usable
 
+    found = None
     with console.wrong as wrong:
+        asked = {"through_origin": through_origin, "at": at}
         case = read_given(console, **given)
-        fits = None
-        if case is not None and degrees is not None:
-            fits = wrong.attempt(fit_case, case, degrees, through_origin=through_origin)
+        if posterior is not None:
+            asked["posterior"] = wrong.attempt(load_usable, posterior)
         console.reserve_folder(out, force)
-    assert case is not None and fits is not None
-    posterior = None if run is None else load_posterior(run)
-    told = fit_report(case, fits, console.command, at=at, posterior=posterior)
-    return console.report(told)
+        if case is not None and degrees is not None:
+            found = wrong.attempt(fit_case, case, degrees, **asked)
+    assert found is not None
+    return console.show(found, answer="fit.json")

@@ -1,0 +1,247 @@
+"""Check of a case: what was read, what is assumed and which effects can be tested."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, InstanceOf, computed_field
+
+from hdcal.calibration.check.charts import readings_chart
+from hdcal.data.case import Case
+from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
+from hdcal.data.gear_schema import certificates_in
+from hdcal.data.loading import loading
+from hdcal.data.records import Array
+from hdcal.data.theory_names import SPRING, Theory
+from hdcal.physics.registry import EFFECTS
+from hdcal.physics.theory import THEORIES
+from hdcal.report.chart_spec import Chart
+from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
+from hdcal.report.sentences import rendered
+from hdcal.report.units import UNITS
+
+# Prior standard deviations of log K that contain 99.7 % of it.
+_FAR = 3.0
+
+Ends = tuple[float, float]
+
+
+class CheckedGear(Item):
+    """What the gear file states."""
+
+    name: str
+    material: str
+    theory: Theory
+    deformation: Literal["radial", "diametral"]
+    reference_temperature_C: float
+    force_resolution_N: float | None
+
+
+class StatedError(Item):
+    """A standard uncertainty that a certificate states, the prior of a parameter."""
+
+    parameter: str
+    standard_uncertainty: float
+    unit: str
+    certificate: str
+    words: str
+
+
+class RowsByMovement(Item):
+    """Number of rows by the movement before them; loading is away from no load."""
+
+    loading: Count
+    holding: Count
+    unloading: Count
+
+
+class CheckedData(Item):
+    """What was measured, with the covariates and features that can be used."""
+
+    rows: Annotated[int, Field(ge=1)]
+    runs: tuple[str, ...]
+    specimens: tuple[str, ...]
+    deformation_mm: Ends
+    force_N: Ends
+    temperature_C: Ends
+    temperature_measured: bool
+    direction: RowsByMovement
+    known: tuple[str, ...]
+    sha256: Digest
+
+
+class TestableEffects(Item):
+    """Effects that the data can show, and what the data lack for the others."""
+
+    testable: tuple[EffectName, ...]
+    not_testable: dict[str, tuple[str, ...]]
+
+
+class Specimen(Item):
+    """One of several specimens.
+
+    Attributes:
+        stiffness_N_per_mm: slope of parallel lines through its runs, NaN where the
+            deformation does not change.
+    """
+
+    name: str = quantity("specimen")
+    rows: Count
+    runs: Count
+    stiffness_N_per_mm: float = quantity("stiffness as read", "N/mm")
+
+
+class Check(Result):
+    """What was read of a case.
+
+    Attributes:
+        specimens: empty unless there are several.
+        case: what was read.
+        implausible_K: slope of the readings as K, with the ends of its prior, if it
+            lies outside.
+        each_effect: whether the text lists what each effect lacks.
+    """
+
+    template = "calibration/check/report.md.j2"
+    table = "specimens"
+
+    format: Literal["hdcal.check/1"] = "hdcal.check/1"
+    name: str = Field(serialization_alias="case")
+    gear: CheckedGear
+    certificates: tuple[StatedError, ...]
+    data: CheckedData
+    specimens: tuple[Specimen, ...]
+    effects: TestableEffects
+    case: Annotated[InstanceOf[Case], Field(exclude=True)]
+    implausible_K: tuple[float, float, float] | None = Field(exclude=True)
+    each_effect: bool = Field(exclude=True)
+
+    @computed_field
+    @property
+    def notes(self) -> tuple[Words, ...]:
+        """Doubts, assumptions and remarks."""
+        return self.lines("notes")
+
+    @property
+    def stiffness_range(self) -> float:
+        """Difference of the largest and the smallest stiffness of a specimen [N/mm]."""
+        slopes = np.array([one.stiffness_N_per_mm for one in self.specimens])
+        return float(np.ptp(slopes[np.isfinite(slopes)])) if slopes.size else 0.0
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the readings."""
+        return {"readings": readings_chart(self.case)}
+
+
+def check(case: Case, *, each_effect: bool = False) -> Check:
+    """Return what was read of a case.
+
+    Args:
+        case: from `read_case`.
+        each_effect: list in the text what each effect lacks.
+    """
+    gear, records = case.gear, case.records
+    lacking = {
+        name: tuple(sorted(effect.needs - records.known))
+        for name, effect in EFFECTS.items()
+    }
+    return Check(
+        name=case.name,
+        gear=CheckedGear(
+            name=gear.name,
+            material=gear.material,
+            theory=gear.theory,
+            deformation=gear.reading,
+            reference_temperature_C=gear.reference_temperature,
+            force_resolution_N=gear.force_resolution or None,
+        ),
+        certificates=_certificates(case),
+        data=_data(case),
+        specimens=_specimens(case) if len(case.specimen_labels) > 1 else (),
+        effects=TestableEffects(
+            testable=tuple(name for name, lack in lacking.items() if not lack),
+            not_testable={name: lack for name, lack in lacking.items() if lack},
+        ),
+        case=case,
+        implausible_K=_implausible_K(case),
+        each_effect=each_effect,
+        part="part" if gear.theory == SPRING else "gear",
+    )
+
+
+def _certificates(case: Case) -> tuple[StatedError, ...]:
+    gear = case.gear
+    priors = {name: gear.priors[name] for name in ZEROS} | gear.gauge_priors
+    stated = certificate_priors(certificates_in(gear.source))
+    return tuple(
+        StatedError(
+            parameter=name,
+            standard_uncertainty=float(stated[name].numbers[1]) * UNITS[name][1],
+            unit=UNITS[name][0],
+            certificate=stated[name].source,
+            words=rendered(Check.template, name, {}, plain=True).strip(),
+        )
+        for name, prior in priors.items()
+        if is_stated(prior)
+    )
+
+
+def _implausible_K(case: Case) -> tuple[float, float, float] | None:
+    """Return K of a straight line through the readings, with the ends of its prior.
+
+    None if K lies between them, or if its prior is not lognormal.
+    """
+    gear, records = case.gear, case.records
+    prior, modulus = gear.priors["K"], gear.priors["E0"].numbers[0]
+    if prior.family != "lognormal":
+        return None
+    radial = np.asarray(records.deformation) / (2 if gear.reading == "diametral" else 1)
+    slope = np.polyfit(radial, np.asarray(records.force), 1)[0]
+    K = float(slope / THEORIES[gear.K_theory](gear.geometry, modulus))
+    median, log_sd = map(float, prior.numbers)
+    low, high = median * np.exp([-_FAR * log_sd, _FAR * log_sd])
+    return None if low <= K <= high else (K, low, high)
+
+
+def _data(case: Case) -> CheckedData:
+    records = case.records
+    movement = loading(np.asarray(records.deformation), np.asarray(records.direction))
+    loaded, held, unloaded = (int(np.sum(movement == sign)) for sign in (1, 0, -1))
+    return CheckedData(
+        rows=len(records.force),
+        runs=case.run_labels,
+        specimens=case.specimen_labels,
+        deformation_mm=_ends(records.deformation),
+        force_N=_ends(records.force),
+        temperature_C=_ends(records.temperature),
+        temperature_measured="temperature" in records.known,
+        direction=RowsByMovement(loading=loaded, holding=held, unloading=unloaded),
+        known=tuple(sorted(records.known)),
+        sha256=case.data_sha256,
+    )
+
+
+def _ends(values: Array) -> Ends:
+    return float(np.min(values)), float(np.max(values))
+
+
+def _specimens(case: Case) -> tuple[Specimen, ...]:
+    records = case.records
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    x, y = np.asarray(records.deformation), np.asarray(records.force)
+    first = np.unique(run, return_index=True)[1]
+    # Counted from its first reading, a deformation that is held is exactly zero.
+    x, y = _centred(x - x[first][run], run), _centred(y, run)
+    xx, xy = np.bincount(specimen, x * x), np.bincount(specimen, x * y)
+    slopes = np.divide(xy, xx, out=np.full(len(xx), np.nan), where=xx > 0.0)
+    rows, runs = np.bincount(specimen), np.bincount(specimen[first])
+    columns = case.specimen_labels, rows.tolist(), runs.tolist(), slopes.tolist()
+    return tuple(
+        Specimen(name=name, rows=rows, runs=runs, stiffness_N_per_mm=slope)
+        for name, rows, runs, slope in zip(*columns, strict=True)
+    )
+
+
+def _centred(values: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Return values less the mean of their run."""
+    return values - (np.bincount(run, values) / np.bincount(run))[run]

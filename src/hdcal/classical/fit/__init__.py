@@ -1,1 +1,0 @@
-"""What do classical polynomials give?"""

@@ -1,0 +1,151 @@
+"""The posterior of a diagnosis: several models of the same data, each with its weight.
+
+In its file each model is a group named by its hypothesis, with the groups of a single
+calibration below it and its probability among the attributes.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import xarray as xr
+
+from hdcal.data.case import Case
+from hdcal.inference.dynamic_posterior import DynamicPosterior
+from hdcal.inference.posterior import HYPOTHESIS, Posterior
+from hdcal.inference.posterior_file import (
+    CALIBRATION,
+    content,
+    file_of,
+    not_a_posterior,
+    read_tree,
+)
+from hdcal.physics.effect import Effect
+
+# Hypotheses that name no effect.
+NONE, UNKNOWN = "none", "unknown"
+_WEIGHT, _LEFT_OUT = "probability", "left_out"
+Library = Mapping[str, type[Effect]]
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Hypotheses of a diagnosis that were not calibrated, or whose calibration failed.
+
+    Attributes:
+        probability: of them all.
+        counted_as: the calibrated hypothesis that carries their probability beside its
+            own.
+    """
+
+    probability: float
+    counted_as: str
+
+
+@dataclass(frozen=True)
+class ModelAverage:
+    """Calibrated models of the same data, each with its probability.
+
+    Attributes:
+        posteriors: probability and posterior by hypothesis; the probabilities sum to 1.
+        left_out: what has no model among these; None without any.
+    """
+
+    posteriors: Mapping[str, tuple[float, Posterior]]
+    left_out: LeftOut | None = None
+
+    def __repr__(self) -> str:
+        shares = {name: share for name, (share, _) in self.posteriors.items()}
+        listed = ", ".join(f"{name} {share:.0%}" for name, share in shares.items())
+        return f"<ModelAverage of {self.case.name}: {listed}>"
+
+    @property
+    def case(self) -> Case:
+        """Data and gear."""
+        return next(iter(self.posteriors.values()))[1].case
+
+    @property
+    def tree(self) -> xr.DataTree:
+        """All groups, those of a model below its hypothesis."""
+        tree = xr.DataTree()
+        for name, (share, posterior) in self.posteriors.items():
+            node = posterior.tree.copy()
+            node.attrs = {**posterior.attributes(), _WEIGHT: float(share)}
+            tree[name] = node
+        return tree
+
+    def require_usable(self) -> None:
+        """Raise when nothing may be derived from a model.
+
+        Raises:
+            NotUsable: with the reasons.
+        """
+        for _, posterior in self.posteriors.values():
+            posterior.require_usable()
+
+    def save(self, path: Path | str) -> None:
+        """Write the models as one NetCDF file that ArviZ opens."""
+        Path(path).write_bytes(self.to_netcdf())
+
+    def to_netcdf(self) -> bytes:
+        """Return the content of a NetCDF file that ArviZ opens."""
+        left = None if self.left_out is None else asdict(self.left_out)
+        return content(self.tree, CALIBRATION, {_LEFT_OUT: json.dumps(left)})
+
+    @classmethod
+    def load(cls, path: Path | str, effects: Library | None = None) -> "ModelAverage":
+        """Read the models of a diagnosis.
+
+        Args:
+            path: a result folder of `diagnose`, or its posterior.nc.
+            effects: as `Posterior.load`.
+
+        Raises:
+            InputError: as `Posterior.load`.
+            NotUsable: the diagnosis failed.
+        """
+        file = file_of(path)
+        return cls.from_tree(read_tree(file), file, effects)
+
+    @classmethod
+    def from_tree(
+        cls, tree: xr.DataTree, file: Path, effects: Library | None = None
+    ) -> "ModelAverage":
+        """Return the models of a tree that was read; arguments as `Posterior`."""
+        try:
+            left = json.loads(tree.attrs[_LEFT_OUT])
+            shares = {name: n.attrs[_WEIGHT] for name, n in tree.children.items()}
+            left_out = None if left is None else LeftOut(**left)
+        except (KeyError, ValueError, TypeError) as error:
+            raise not_a_posterior(file) from error
+        posteriors = {}
+        for name, share in sorted(shares.items(), key=lambda item: -item[1]):
+            one = Posterior.from_tree(tree.children[name], file, effects)
+            one = replace(one, settings={**one.settings, HYPOTHESIS: name})
+            posteriors[name] = float(share), one
+        return cls(posteriors, left_out)
+
+
+def load_models(path: Path | str) -> Posterior | ModelAverage:
+    """Read a calibration of the gear at rest, or the models of a diagnosis.
+
+    Raises:
+        InputError: as `Posterior.load`.
+        NotUsable: the diagnosis failed.
+    """
+    return _load(path, {})
+
+
+def load_any(path: Path | str) -> Posterior | ModelAverage:
+    """Read what `load_models` reads, or a calibration of the moving gear."""
+    return _load(path, {DynamicPosterior.kind: DynamicPosterior})
+
+
+def _load(path: Path | str, kinds: Mapping[str, type[Posterior]]):
+    file = file_of(path)
+    tree = read_tree(file)
+    if "model" not in tree.attrs:
+        return ModelAverage.from_tree(tree, file)
+    kind = json.loads(tree.attrs["model"])["kind"]
+    return kinds.get(kind, Posterior).from_tree(tree, file)
