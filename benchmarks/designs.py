@@ -31,7 +31,7 @@ def measure(repeats: int) -> dict:
 
     from hdcal import read_case
     from hdcal.design.design_draws import design_draws
-    from hdcal.design.study.study import force_quantiles, general_quantiles
+    from hdcal.design.study.force_quantiles import force_quantiles, general_quantiles
     from hdcal.physics.effects.stiffness import ProgressiveStiffening
 
     line = design_draws(read_case(CASE).gear, draws=DRAWS)

@@ -64,7 +64,7 @@ _HOMES = {
     "fit": "classical.fit",
     "fleet": "fleets.fleet",
     "force": "physics.chain",
-    "inverse_design": "design.inverse_design",
+    "inverse_design": "design.inverse_design.inverse_design",
     "margin": "prediction.margin.margin",
     "parameter": "physics.effect",
     "predict": "prediction.bands.bands",
@@ -73,7 +73,7 @@ _HOMES = {
     "respond": "motion.respond.respond",
     "study": "design.study.study",
     "summarise": "calibration.calibration",
-    "wave_generator": "design.wave_generator",
+    "wave_generator": "design.wave_generator.wave_generator",
 }
 
 __all__ = [*sorted(_HOMES)]

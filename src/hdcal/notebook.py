@@ -18,13 +18,10 @@ TELLERS = {
     "DynamicPosterior": "motion.summary.dynamic_report",
     "Fleet": "fleets.summary.fleet_report",
     "FleetCauses": "shared_causes.summary.causes_report",
-    "InverseDesign": "design.summary.inverse_report",
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
     "Response": "motion.respond.summary.response_report",
-    "Study": "design.study.summary.study_report",
     "Verdict": "diagnosis.summary.verdict_report",
-    "WaveGenerator": "design.summary.generator_report",
 }
 # -> what its table is made of: rows, or columns by name.
 TABLES = {
@@ -32,25 +29,20 @@ TABLES = {
     "DynamicPosterior": "report.parameters.parameter_estimates",
     "Fleet": "fleets.summary.gear_columns",
     "FleetCauses": "shared_causes.summary.cause_columns",
-    "InverseDesign": "design.chart.candidate_rows",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
     "Verdict": "diagnosis.chart.hypothesis_columns",
-    "WaveGenerator": "design.chart.spring_rows",
 }
 # -> its chart.
 CHARTS = {
     "Bands": "prediction.bands.charts.bands_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
-    "InverseDesign": "design.chart.candidate_chart",
     "NextForce": "fleets.force.chart.force_chart",
     "Response": "motion.respond.chart.response_chart",
-    "Study": "design.study.chart.study_chart",
     "Verdict": "diagnosis.chart.verdict_chart",
-    "WaveGenerator": "design.chart.generator_chart",
 }
 # -> what draws it where no chart holds it.
 DRAWERS = {"Margin": "prediction.margin.figure.draw_margin"}

@@ -1,4 +1,4 @@
-"""What one per cent more changes is what the quantile of the force does."""
+"""Elasticities are slopes of the quantile of the force."""
 
 import equinox as eqx
 import jax
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from hdcal.design.candidate import elasticities
+from hdcal.design.inverse_design.candidate import elasticities
 
 
 class Springs(eqx.Module):
@@ -42,5 +42,5 @@ def test_the_slope_is_that_of_the_quantile(draws, share):
     ends = [np.quantile(k * x + b, share) for x in (9.9, 10.1)]
     true = (ends[1] - ends[0]) / 0.2 * 10.0 / np.quantile(k * 10.0 + b, share)
     assert np.mean(found) == pytest.approx(true, abs=0.01)
-    # Of a single draw it scatters by the law of b given the force.
+    # The slope of a single draw would scatter as b does, given the force.
     assert np.std(found) < 0.05

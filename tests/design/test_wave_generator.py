@@ -1,4 +1,4 @@
-"""The spring found is the softest that holds, and its probabilities are true."""
+"""The spring is the softest that keeps the window, and its probabilities are true."""
 
 from dataclasses import replace
 from inspect import signature
@@ -10,15 +10,15 @@ from posteriors import single
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from hdcal.design import wave_generator as module
 from hdcal.design.design_draws import design_draws
 from hdcal.design.next_gear import NextGear, next_gear
-from hdcal.design.springs import best_common, judge, set_points
-from hdcal.design.summary import generator_answer
-from hdcal.design.wave_generator import wave_generator
+from hdcal.design.wave_generator import wave_generator as module
+from hdcal.design.wave_generator.springs import best_common, judge, set_points
+from hdcal.design.wave_generator.wave_generator import wave_generator
 from hdcal.errors import InputError
 from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.engine.causes import causes_of, independent_draws
+from hdcal.report.chart_spec import Band, Points, Span
 
 WINDOW = (0.38, 0.42)
 
@@ -43,7 +43,7 @@ def test_counting_intervals_is_solving_the_balance():
     draws = bent(40)
     gears = next_gear(draws, {"wall_thickness_mm": 0.02}).gears
     levels = np.array([-20.0, 80.0])
-    forces = NextGear(gears, "").forces(np.array(WINDOW), levels)
+    forces = NextGear(gears).forces(np.array(WINDOW), levels)
     rate, x = 500.0, 0.56
     low, high = set_points(rate, WINDOW, forces)
     for draw in range(draws.size):
@@ -55,7 +55,7 @@ def test_counting_intervals_is_solving_the_balance():
         )
 
         def left(at, level, own=alone):
-            force = NextGear(own, "").forces(np.array([at]), np.array([level]))
+            force = NextGear(own).forces(np.array([at]), np.array([level]))
             return rate * (x - at) - force[0, 0, 0]
 
         rests = [brentq(left, 1e-3, x, args=(level,), xtol=1e-10) for level in levels]
@@ -89,15 +89,15 @@ def test_the_probability_is_that_of_normal_gears(rate):
     x = spring.interference
     # ω ≥ lo ⇔ s ≤ c (x − lo)/lo, ω ≤ hi ⇔ s ≥ c (x − hi)/hi.
     most, least = (rate * (x - end) / end for end in WINDOW)
-    law = norm(200.0, 10.0)
-    true = law.cdf(most) - law.cdf(least)
+    gears = norm(200.0, 10.0)
+    true = gears.cdf(most) - gears.cdf(least)
     error = np.sqrt(true * (1.0 - true) / draws)
     assert spring.together == pytest.approx(true, abs=4.0 * error + 1e-12)
-    assert spring.no_backlash == pytest.approx(law.cdf(most), abs=4e-3)
+    assert spring.no_backlash == pytest.approx(gears.cdf(most), abs=4e-3)
 
     # No other set point is better than the one that was chosen.
     def at(x):
-        return law.cdf(rate * (x / WINDOW[0] - 1.0)) - law.cdf(
+        return gears.cdf(rate * (x / WINDOW[0] - 1.0)) - gears.cdf(
             rate * (x / WINDOW[1] - 1.0)
         )
 
@@ -109,24 +109,24 @@ def test_the_probability_is_that_of_normal_gears(rate):
         assert spring.together == 1.0
 
 
-def test_choosing_on_the_same_draws_flatters_little():
+def test_choosing_on_the_same_draws_has_little_bias():
     """With 4000 draws the chosen point's true probability is what was counted."""
-    law, gaps = norm(200.0, 10.0), []
+    gears, gaps = norm(200.0, 10.0), []
     for seed in range(40):
-        stiffness = law.rvs(4000, random_state=seed)
+        stiffness = gears.rvs(4000, random_state=seed)
         spring = judge(100.0, WINDOW, springs_of(stiffness), np.zeros(4000))
         most, least = (100.0 * (spring.interference / end - 1.0) for end in WINDOW)
-        gaps.append(spring.together - (law.cdf(most) - law.cdf(least)))
+        gaps.append(spring.together - (gears.cdf(most) - gears.cdf(least)))
     error = np.sqrt(0.8 * 0.2 / 4000)
     assert np.mean(gaps) < error
-    # The same count with 40 draws is flattered, and would be seen.
-    stiffness = law.rvs(40, random_state=0)
+    # The same count with 40 draws has a bias that the test would detect.
+    stiffness = gears.rvs(40, random_state=0)
     spring = judge(100.0, WINDOW, springs_of(stiffness), np.zeros(40))
     most, least = (100.0 * (spring.interference / end - 1.0) for end in WINDOW)
-    assert spring.together - (law.cdf(most) - law.cdf(least)) > 3.0 * error
+    assert spring.together - (gears.cdf(most) - gears.cdf(least)) > 3.0 * error
 
 
-def test_the_softest_that_meets_it_is_found(given):
+def test_the_softest_spring_that_meets_the_requirement(given):
     draws = given(known(2000))
     found = wave_generator(draws.gear, WINDOW, temperatures=[-20.0, 80.0])
     assert found.asked.temperature_C == (-20.0, 20.0, 80.0)
@@ -135,12 +135,12 @@ def test_the_softest_that_meets_it_is_found(given):
     assert softer and all(s.together < 0.99 for s in softer)
     rates = [s.rate for s in found.springs]
     assert rates == sorted(rates)
-    # Without errors of its own a stiffer spring is never worse.
+    # With an exact set point a stiffer spring is never worse.
     chances = [s.together for s in found.springs]
     assert np.all(np.diff(chances) > -1e-9)
 
 
-def test_a_spring_set_badly_has_a_best_rate(given):
+def test_with_an_error_of_the_set_point_there_is_a_best_rate(given):
     draws = given(known(2000))
     found = wave_generator(draws.gear, WINDOW, setting_sd=0.012, probability=0.8)
     chances = [s.together for s in found.springs]
@@ -155,21 +155,20 @@ def test_a_spring_set_badly_has_a_best_rate(given):
 def test_the_adjusting_range_is_that_of_the_gears(given):
     draws = given(known(20_000))
     found = wave_generator(draws.gear, WINDOW, rates=(100.0, 10_000.0))
-    told = generator_answer(found)
-    low, high = told.adjusted.interference_mm
+    low, high = found.adjusted.interference_mm
     stiffness = draws.values["K"] * 207e3 * draws.problem.unit_stiffness
     own = 0.4 + 0.4 * stiffness / found.chosen.rate
     assert low == pytest.approx(np.quantile(own, 0.005), rel=1e-9)
     assert high == pytest.approx(np.quantile(own, 0.995), rel=1e-9)
-    force, more = told.adjusted.preload_N
+    force, more = found.adjusted.preload_N
     assert more / force == pytest.approx(np.exp(2 * 2.576 * 0.05), rel=0.02)
-    # All of them; that none will ever be outside nobody knows.
-    assert told.adjusted.probability == 1.0 - 0.5 / 20_000
-    rest = told.set_point.force_N.median
+    # All draws are inside, which does not make it certain.
+    assert found.adjusted.probability == 1.0 - 0.5 / 20_000
+    rest = found.set_point.force_N.median
     assert rest == pytest.approx(0.4 * np.median(stiffness))
 
 
-def test_impossible_requirements_say_what_the_best_is(given):
+def test_the_finding_has_the_best_spring(given):
     draws = given(known(2000))
     with pytest.raises(InputError) as refused:
         wave_generator(draws.gear, (0.399, 0.401), rates=(1.0, 50.0))
@@ -179,19 +178,18 @@ def test_impossible_requirements_say_what_the_best_is(given):
     assert "adjusted gear by gear" in words
 
 
-def test_draws_that_hang_together_are_worth_fewer(given):
-    """What is counted among them is as sure as among so many independent ones."""
-    draws = given(replace(known(2000), worth=1200.0))
-    answer = generator_answer(wave_generator(draws.gear, WINDOW, probability=0.99))
+def test_correlated_draws_have_a_larger_standard_error(given):
+    draws = given(replace(known(2000), effective_size=1200.0))
+    answer = wave_generator(draws.gear, WINDOW, probability=0.99)
     share, error = answer.spring.probability, answer.spring.standard_error
     assert error == pytest.approx(np.sqrt(share * (1.0 - share) / 1200.0))
     assert answer.at_temperature[0].no_jam <= 1.0 - 0.5 / 1200.0
-    with pytest.raises(InputError, match="2000 draws, worth 1200 independent ones"):
+    with pytest.raises(InputError, match="2000 draws, equivalent to 1200 independent"):
         wave_generator(draws.gear, WINDOW, probability=0.993)
 
 
-def test_the_worth_of_several_causes_is_that_of_their_mean():
-    """Against a share that is counted among the draws of both, again and again."""
+def test_the_effective_size_of_several_causes_is_that_of_their_mean():
+    """The reference is the variance of a share counted among the draws of both."""
     posterior = ModelAverage({"none": (0.7, single()), "x": (0.3, single())})
     found = design_draws(posterior)
     each = [independent_draws(cause) for cause in causes_of(posterior)]
@@ -215,7 +213,7 @@ def test_the_stress_is_that_of_gears_as_they_are_made(given):
     )
     plain = wave_generator(draws.gear, WINDOW, probability=0.5)
     (low, high), (least, most) = (
-        _ends(generator_answer(found).stress.stress_MPa) for found in (wide, plain)
+        _ends(found.stress.stress_MPa) for found in (wide, plain)
     )
     own = draws.gear.geometry.wall_thickness
     # Bending stress grows with the wall: 95 % of a uniform tolerance of it.
@@ -238,13 +236,13 @@ def test_a_force_that_falls_is_refused(given):
         ({"window": (0.42, 0.38)}, "0.42:0.38 is empty"),
         ({"window": (0.4, 0.4)}, "0.4:0.4 is empty"),
         ({"window": (np.nan, 0.4)}, "nan:0.4 is empty"),
-        ({"window": (-0.1, 0.4)}, "-0.1:0.4 holds zero"),
+        ({"window": (-0.1, 0.4)}, "-0.1:0.4 contains zero"),
         ({"window": (0.0, 0.4)}, "a deformation that is zero"),
         ({"window": (-0.38, -0.42)}, "-0.38:-0.42 is empty"),
         ({"window": (-400.0, -0.4)}, "-400 mm on a radius of 40 mm"),
         ({"window": (0.4, 400.0)}, "on a radius of 40 mm"),
         ({"probability": 1.0}, "does not lie between 0 and 1"),
-        ({"probability": 0.9999}, "cannot be told from 2000 draws"),
+        ({"probability": 0.9999}, "cannot be estimated from 2000 draws"),
         ({"setting_sd": -1.0}, "-1 mm does not lie between 0 and 1000"),
         ({"rates": (5.0, 2.0)}, "no range of spring rates"),
         ({"temperatures": [-300.0]}, "absolute zero"),
@@ -262,7 +260,7 @@ def test_bad_input_is_refused(given, changed, words):
     assert names <= {*signature(wave_generator).parameters}
 
 
-def test_everything_wrong_is_said_at_once(given):
+def test_all_findings_are_reported(given):
     draws = given(known(2000))
     with pytest.raises(InputError) as refused:
         wave_generator(
@@ -276,16 +274,14 @@ def test_everything_wrong_is_said_at_once(given):
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-def test_a_spring_that_is_named_can_stand_inside_the_gear(given, sense):
-    """Where any spring keeps the window, the softest named is one that can be built."""
+def test_the_softest_spring_fits_inside_the_gear(given, sense):
     draws = given(known(2000))
     window = (0.2, 0.6) if sense > 0 else (-0.6, -0.2)
     found = wave_generator(draws.gear, window, temperatures=[-20.0, 80.0])
-    told = generator_answer(found)
-    assert told.spring.softest_considered
+    assert found.spring.softest_considered
     radius = draws.gear.geometry.radius
-    assert abs(told.spring.interference_mm) < 0.25 * radius
-    assert sense * told.spring.interference_mm > 0.0
+    assert abs(found.spring.interference_mm) < 0.25 * radius
+    assert sense * found.spring.interference_mm > 0.0
     with pytest.raises(InputError) as refused:
         wave_generator(draws.gear, window, rates=(1.0, 100.0))
     (finding,) = refused.value.findings
@@ -293,3 +289,21 @@ def test_a_spring_that_is_named_can_stand_inside_the_gear(given, sense):
     least = float(finding.remedy.split()[2])
     again = wave_generator(draws.gear, window, rates=(least, 100.0))
     assert again.chosen.rate == least
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_charts_show_window_and_choice(given, sense):
+    draws = given(known(400))
+    window = WINDOW if sense > 0 else (-0.42, -0.38)
+    found = wave_generator(
+        draws.gear, window, temperatures=[-20.0, 80.0], probability=0.9
+    )
+    balance, choice = found.charts()["design"].panels
+    (span,) = (mark for mark in balance.marks if isinstance(mark, Span))
+    assert (span.low, span.high, span.axis) == (*window, "x")
+    gears = [mark for mark in balance.marks if isinstance(mark, Band)]
+    assert len(gears) == 2
+    assert all(np.all(sense * band.low > 0.0) for band in gears)
+    (point,) = (mark for mark in choice.marks if isinstance(mark, Points))
+    assert point.x == found.spring.rate_N_per_mm and point.y >= 0.9
+    assert len(found.to_frame()) == len(found.curve.rate_N_per_mm)

@@ -9,7 +9,8 @@ from pulled_further import all_pulled_further
 
 import hdcal
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.design.study.study import force_quantiles, general_quantiles, study
+from hdcal.design.study.force_quantiles import force_quantiles, general_quantiles
+from hdcal.design.study.study import study
 from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.posterior import Posterior
 
@@ -106,7 +107,7 @@ def test_a_study_says_what_may_grow_and_how_much():
     (words,) = found.warnings
     assert "tested were 0.02 … 0.54 mm" in words
     assert f"{design_draws(single()).bend_sd(0.8):.2g} N (sd) at 0.8 mm" in words
-    assert "test there before you rely on it" in words
+    assert "test there before relying on it" in words
     assert not study(single(), {"deformation_mm": [0.3, 0.4]}).warnings
 
 

@@ -13,9 +13,7 @@ from posteriors import single
 from verdicts import named
 
 import hdcal
-from hdcal.data.gear import read_gear
 from hdcal.data.resources import datasets_folder
-from hdcal.design.study.chart import study_chart
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.errors import InputError
 from hdcal.inference.residual_shapes import Structure
@@ -39,15 +37,11 @@ def test_every_public_result_is_shown():
 
 @pytest.fixture(scope="module")
 def results():
-    gear, posterior = read_gear(GEAR), single()
+    posterior = single()
     return {
         "Bands": (hdcal.predict(posterior, [0.2, 0.9]), "extrapolated"),
         "Fleet": (handmade(), "% softer (95 %: "),
         "FleetCauses": (shared(), "Of 4 gears D has relaxation"),
-        "InverseDesign": (
-            hdcal.inverse_design(gear, {"radius_mm": (36, 44)}, 90.0, probability=0.5),
-            "needs at most 90 N",
-        ),
         "Margin": (hdcal.margin(posterior, 0.4, sensitivities=False), "99 %"),
         "Case": (hdcal.read_case(GEAR.parent, theory="ring"), "in order"),
         "NextForce": (handmade().next_force(0.4, 85.0), "gears to come need more"),
@@ -57,12 +51,7 @@ def results():
             hdcal.respond(still_posterior(), "step", points=21, draws=20),
             "The deformation reaches",
         ),
-        "Study": (hdcal.study(gear, {"radius_mm": [38, 40]}), "2 designs"),
         "Verdict": (named(), "Most likely cause"),
-        "WaveGenerator": (
-            hdcal.wave_generator(gear, (0.2, 0.6), probability=0.5),
-            "keeps the gear within",
-        ),
     }
 
 
@@ -174,19 +163,6 @@ def test_what_is_no_case_or_model_is_told_so(results):
         hdcal.margin(case, 0.4)
     with pytest.raises(InputError, match=r"as \['hysteresis'\]"):
         hdcal.calibrate(case, effects="hysteresis")
-
-
-def test_a_study_has_a_curve_for_each_of_what_else_varied(results):
-    gear = read_gear(GEAR)
-    study = hdcal.study(gear, {"radius_mm": [38, 40]}, materials=["steel", "PEEK"])
-    chart = study_chart(study)
-    lines = [one for one in chart.series if one.width]
-    assert [one.label.count("steel") for one in lines] == [1, 0]
-    assert all(list(one.x) == [38.0, 40.0] for one in lines)
-    with pytest.raises(InputError, match="no number"):
-        hdcal.study(gear, {"material": ["steel"]})
-    alone = hdcal.study(gear, {}, materials=["steel", "PEEK"])
-    assert study_chart(alone).x == "design"
 
 
 def test_a_margin_is_drawn_as_its_figure_draws_it(results):

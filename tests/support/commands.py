@@ -68,9 +68,10 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
     They are made as ever; to draw one, as SVG and PNG, takes most of a report's time.
     """
-    from hdcal.report import canvas
+    from hdcal.report import canvas, chart_drawing
 
-    monkeypatch.setattr(canvas, "render", lambda *_: b"<svg/>")
+    for module in (canvas, chart_drawing):
+        monkeypatch.setattr(module, "render", lambda *_: b"<svg/>")
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Make-believe knowledge of gears, for the tests of designs."""
+"""Draws of gears for the tests of designs."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What is refused of a design: unknown names, impossible sizes and places."""
+"""Checks of a request: names, sizes, conditions and probabilities."""
 
 from collections.abc import Iterable, Mapping
 
@@ -11,7 +11,7 @@ from hdcal.errors import Finding
 from hdcal.prediction.engine.conditions import level_findings, temperature_findings
 from hdcal.prediction.engine.sizes import SIZES, matters
 
-# Draws that have to fall outside for a probability to be told from its neighbours.
+# Draws that have to fall outside for a probability to be estimated.
 _LEAST_OUTSIDE = 10
 
 
@@ -27,8 +27,8 @@ def name_findings(
     ]
 
 
-def unseen_findings(draws: DesignDraws, sizes: Iterable[str]) -> list[Finding]:
-    """Return a finding for each varied size that the theory does not know."""
+def unused_findings(draws: DesignDraws, sizes: Iterable[str]) -> list[Finding]:
+    """Return a finding for each varied size that is not in the theory."""
     words = f"changes nothing under the theory '{draws.theory}'"
     return [
         Finding("vary", f"{name} {words}", "leave it out, or use the theory cup")
@@ -53,15 +53,14 @@ def size_findings(draws: DesignDraws, sizes: Mapping[str, np.ndarray]) -> list[F
         return findings
 
     def ends(name: str) -> tuple[float, float]:
-        own = np.array([getattr(draws.gear.geometry, SIZES[name])])
-        values = sizes.get(name, own)
+        values = sizes.get(name, np.array([draws.size_of(name)]))
         return float(np.min(values)), float(np.max(values))
 
     if ends("wall_thickness_mm")[1] >= ends("radius_mm")[0]:
         words = "a wall that is not thinner than the radius"
         findings.append(Finding("vary", words, "Check both sizes"))
-    seen = matters("load_height", draws.gear.geometry, draws.theory)
-    if seen and ends("load_height_mm")[1] > ends("length_mm")[0]:
+    matter = matters("load_height", draws.gear.geometry, draws.theory)
+    if matter and ends("load_height_mm")[1] > ends("length_mm")[0]:
         words = "a load beyond the length of the gear"
         remedy = "Measure the load height from the closed base"
         findings.append(Finding("vary", words, remedy))
@@ -104,18 +103,18 @@ def probability_findings(draws: DesignDraws, probability: float) -> list[Finding
     """Return what is wrong with a required probability."""
     if wrong := implausible("probability", probability):
         return wrong
-    worth = draws.independent
-    if (1.0 - probability) * worth < _LEAST_OUTSIDE * (1.0 - 1e-9):
-        words = f"{probability:g} cannot be told from {draws.size} draws"
-        if worth < draws.size:
-            words += f", worth {worth:.0f} independent ones"
-        most = 1.0 - _LEAST_OUTSIDE / worth
+    size = draws.independent
+    if (1.0 - probability) * size < _LEAST_OUTSIDE * (1.0 - 1e-9):
+        words = f"{probability:g} cannot be estimated from {draws.size} draws"
+        if size < draws.size:
+            words += f", equivalent to {size:.0f} independent ones"
+        most = 1.0 - _LEAST_OUTSIDE / size
         remedy = f"Ask for {most:.4g} or less, or calibrate with more draws"
         return [Finding("probability", words, remedy)]
     return []
 
 
 def no_deformation() -> Finding:
-    """Return the finding for a deformation that nobody named."""
+    """Return the finding for a deformation that was not given."""
     words = "the gear file names no nominal deformation"
     return Finding("deformation", words, "Give one in mm, such as 0.4")

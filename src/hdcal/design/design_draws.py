@@ -1,4 +1,4 @@
-"""What a design rests on: draws of the tested gear, or of what is believed of one.
+"""Draws that a design is computed from: those of a posterior or of a prior.
 
 K is carried over: a gear of other sizes is taken to have the K of the tested one, so
 that its stiffness is that of the tested gear times a ratio of two formulas.
@@ -36,6 +36,7 @@ from hdcal.prediction.engine.causes import (
 from hdcal.prediction.engine.gear_forces import MODULUS, gear_forces, gear_values
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.pooled import Pooled, pool
+from hdcal.prediction.engine.sizes import SIZES
 from hdcal.prediction.engine.untested import Untested
 
 
@@ -52,11 +53,10 @@ class DesignDraws:
         material: its name.
         kind: whether the draws are a posterior's or a prior's.
         records: the tested rows, or None.
-        misfits: warnings: of what the causes leave open, and of shapes that the
-            calibrated model leaves over.
-        untested: what is not known beyond the tested conditions, for each cause; None
-            where no gear was tested.
-        worth: how many independent draws these are worth; None for all of them.
+        misfits: warnings of causes that are not settled and of shapes in the residuals.
+        untested: additional uncertainty beyond the tested conditions, for each cause;
+            None where no gear was tested.
+        effective_size: of the sample; None where the draws are independent.
     """
 
     gear: Gear
@@ -69,7 +69,7 @@ class DesignDraws:
     records: Records | None
     misfits: tuple[str, ...] = ()
     untested: Untested | None = None
-    worth: float | None = None
+    effective_size: float | None = None
 
     @property
     def size(self) -> int:
@@ -78,8 +78,9 @@ class DesignDraws:
 
     @property
     def independent(self) -> float:
-        """How many independent draws these are worth, at most as many as there are."""
-        return self.size if self.worth is None else min(self.worth, self.size)
+        """Effective sample size, at most the number of draws."""
+        effective = self.effective_size
+        return self.size if effective is None else min(effective, self.size)
 
     @property
     def nominal_deformation(self) -> float | None:
@@ -87,16 +88,15 @@ class DesignDraws:
         read = self.gear.nominal_deformation
         return None if read is None else read * self.problem.reading.radial_per_read
 
+    def size_of(self, name: str) -> float:
+        """Return a size of the tested gear [mm], such as that of `radius_mm`."""
+        return float(getattr(self.gear.geometry, SIZES[name]))
+
     @property
     def interval_kind(self) -> str:
         """What an interval from these draws is called."""
         known = {"posterior": "credible", "prior": "prior"}[self.kind]
         return f"equal-tailed {known} interval"
-
-    @property
-    def known_as(self) -> str:
-        """What the gear of the draws is called."""
-        return {"posterior": "the tested gear", "prior": "the gear file"}[self.kind]
 
     @property
     def drawing(self) -> Geometry:
@@ -114,18 +114,18 @@ class DesignDraws:
             return None
         if prior.family == "fixed":
             return np.full(self.size, float(prior.numbers[0]))
-        # Evenly over its distribution, in an order of its own.
+        # Evenly over its distribution, in an independent order.
         places = (np.arange(self.size) + 0.5) / self.size
         shuffled = np.random.default_rng(self.size).permutation(places)
         return np.asarray(frozen(prior).ppf(shuffled))
 
     def usual_force(self, deformation: float) -> float:
-        """Return about what a radial deformation [mm] of the gear takes [N]."""
+        """Return the approximate force [N] at a radial deformation [mm]."""
         stiffness = self.values["K"] * self.values["E0"] * self.problem.unit_stiffness
         return abs(float(np.median(stiffness)) * deformation)
 
     def within_tested(self, deformation: np.ndarray) -> np.ndarray:
-        """Tell where no bend grows: between rest and the ends of the tested range.
+        """Tell which deformations lie between zero and the ends of the tested range.
 
         Args:
             deformation: radial, of the gear [mm].
@@ -138,7 +138,7 @@ class DesignDraws:
         return (read + np.min(zero) >= low) & (read + np.max(zero) <= high)
 
     def bend_sd(self, deformation: float) -> float:
-        """Return the sd of what untested deformation may add to the force [N]."""
+        """Return the sd of the force that untested deformation may add [N]."""
         place = np.array([deformation]), np.array([self.gear.reference_temperature])
         whole, straight = (
             np.asarray(gear_forces(self.problem, self.values, *place, 1.0, untested))
@@ -159,7 +159,7 @@ class DesignDraws:
         if name == self.material:
             return self
         facts = read_material(name)
-        # Apart from the draws of the gear as it is.
+        # Independent of the draws of the gear as it is.
         rng = np.random.default_rng([seed, 1])
         new = {
             site: sample_prior(facts[site], site, rng, self.size)
@@ -173,16 +173,16 @@ class DesignDraws:
 def design_draws(
     source: Models | Gear, *, draws: int = 4000, seed: int = 0
 ) -> DesignDraws:
-    """Return what designs are computed from.
+    """Return the draws that designs are computed from.
 
     Args:
-        source: a calibration, or a gear of which only priors are known.
-        draws: from the priors; a calibration has its own.
+        source: a calibration, or a gear with priors only.
+        draws: number of them from priors; a calibration brings its own.
         seed: of those draws.
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: the seed is none, or there are no sizes to design with.
+        InputError: the seed is invalid, or the theory has no sizes.
     """
     known = source if isinstance(source, Gear) else pool(source)
     with Findings() as wrong:
@@ -204,7 +204,7 @@ def design_draws(
         theory=known.theory,
         problem=_bare_problem(known),
         values=values,
-        facts=_own_facts(known),
+        facts=_material_facts(known),
         material=known.material,
         kind="prior",
         records=None,
@@ -220,19 +220,19 @@ def _calibrated(pooled: Pooled, seed: int) -> DesignDraws:
         theory=pooled.theory,
         problem=pooled.problem,
         values=values,
-        facts=_own_facts(gear),
+        facts=_material_facts(gear),
         material=gear.material,
         kind="posterior",
         records=pooled.case.records,
         misfits=(*averaging_words(causes), *misfits(main)),
         untested=untested,
-        worth=jointly_worth(causes),
+        effective_size=jointly_worth(causes),
     )
 
 
-def _own_facts(gear: Gear) -> dict[str, Prior]:
-    # A material file of the user's stands beside a gear file that may be elsewhere
-    # by now; only its yield strength would be needed of it.
+def _material_facts(gear: Gear) -> dict[str, Prior]:
+    # The material file of a user may have moved since; only its yield strength would
+    # be used.
     shipped = gear.material in material_names()
     return material_priors(gear.material) if shipped else {}
 
@@ -242,7 +242,7 @@ def _formula(gear: Gear, theory: Theory) -> float:
 
 
 def _bare_problem(gear: Gear) -> Problem:
-    """Return the structure of a force model that no data have met."""
+    """Return the structure of a force model without data."""
     half = gear.reading == "diametral"
     return Problem(
         priors={},

@@ -22,7 +22,7 @@ def read_material(name: str) -> dict[str, Prior]:
         name: a shipped one, or the path of a .toml file.
 
     Raises:
-        InputError: there is none, or the file lacks something.
+        InputError: it is unknown, or its file is incomplete.
     """
     if not name.endswith(".toml"):
         if name not in material_names():
@@ -33,6 +33,6 @@ def read_material(name: str) -> dict[str, Prior]:
     facts = read_priors(Path(name), MATERIAL_UNITS, name)
     lacking = [need for need in _FACTS if need not in facts]
     if lacking:
-        words = f"the material says nothing of {' and '.join(lacking)}"
+        words = f"the material has no {' and no '.join(lacking)}"
         raise InputError([Finding(name, words, "Write a table for each")])
     return facts

@@ -1,4 +1,4 @@
-"""The next gear: how it may differ from the tested one, drawn beside each draw."""
+"""The next gear, which may differ from the tested one: one for each draw."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,18 +16,12 @@ from hdcal.prediction.engine.sizes import SIZES
 
 @dataclass(frozen=True)
 class NextGear:
-    """The gears that a design has to serve, one for each draw, none of them tested.
-
-    Attributes:
-        gears: beside the draws of the tested one.
-        words: what the population is.
-    """
+    """The gears that a design has to fit, one for each draw of the tested one."""
 
     gears: SampledGears
-    words: str
 
     def interval_kind(self, draws: DesignDraws) -> str:
-        """What an interval over these gears is called: one with scatter predicts."""
+        """Return the kind of an interval over these gears: predictive with scatter."""
         if not self.gears.shifts and not np.any(self.gears.deviation):
             return draws.interval_kind
         known = {"posterior": "predictive", "prior": "prior predictive"}[draws.kind]
@@ -52,22 +46,22 @@ def next_gear(
     seed: int = 0,
     smallest: Mapping[str, float] | None = None,
 ) -> NextGear:
-    """Draw the gears that a design has to serve.
+    """Draw the gears that a design has to fit.
 
     Args:
         draws: of the tested gear.
         tolerances: ± of a size [mm] by edge name; sizes are uniform within it, which
-            is what limits alone say (JCGM 100:2008, 4.3.7).
+            is the distribution of a size with known limits (JCGM 100:2008, 4.3.7).
         seed: of the scatter.
-        smallest: that a size is to be [mm], where it is less than the tested one.
+        smallest: least value of a size [mm], where it is less than the tested one.
 
     Raises:
-        InputError: a size is unknown, or its tolerance is none.
+        InputError: a size or its tolerance is not valid.
     """
     tolerances = dict(tolerances or {})
     findings = name_findings(tolerances, SIZES, "tolerances")
     for name, width in tolerances.items() if not findings else ():
-        own = float(getattr(draws.gear.geometry, SIZES[name]))
+        own = draws.size_of(name)
         own = min(own, (smallest or {}).get(name, own))
         if wrong := implausible("tolerances", width):
             findings += wrong
@@ -95,23 +89,4 @@ def next_gear(
         untested=draws.untested,
         theory=draws.theory,
     )
-    return NextGear(gears, _words(draws, tested, tolerances))
-
-
-def _words(draws: DesignDraws, tested: int, tolerances: Mapping[str, float]) -> str:
-    sizes = ", ".join(f"{name} ± {width:g}" for name, width in tolerances.items())
-    if draws.kind == "prior":
-        told = "a gear of which only priors are known"
-    elif tested:
-        told = f"the next gear, with the scatter seen between {tested} tested ones"
-    else:
-        told = (
-            "the tested gear: one gear says nothing of how much others differ, so "
-            "this is no statement about a population"
-        )
-        if tolerances:
-            told = (
-                "the next gear as far as its sizes go: beyond their tolerances, one "
-                "tested gear says nothing of how much others differ"
-            )
-    return told + (f"; sizes within {sizes} mm" if sizes else "")
+    return NextGear(gears)

@@ -1,4 +1,4 @@
-"""Sizes, deformations and temperatures of a design: named, and beside the tested."""
+"""Names of sizes, geometries with other sizes, and temperatures of a design."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -11,7 +11,7 @@ from hdcal.prediction.engine.sizes import SIZES
 
 
 def named(name: str) -> str:
-    """Return what a size is called on paper: wall_thickness_mm is wall thickness."""
+    """Return the name of a size without its unit: wall_thickness_mm, wall thickness."""
     return name.removesuffix("_mm").removesuffix("_C").replace("_", " ")
 
 

@@ -1,4 +1,4 @@
-"""What a design starts from: a calibration, or a gear of which priors are known."""
+"""The source of a design: a calibration, or a gear with its priors."""
 
 from pathlib import Path
 
@@ -12,16 +12,16 @@ from hdcal.inference.posterior import Posterior
 def open_source(
     wrong: Findings, run: str | None, gear: str | None, kind: str
 ) -> tuple[Posterior | ModelAverage | Gear | None, str | None]:
-    """Return the calibration or gear, and the usual folder for the result.
+    """Return the calibration or gear, and the default folder of the result.
 
     Args:
-        wrong: gains what is wrong; nothing is raised.
+        wrong: collects the findings; nothing is raised.
         run: folder of a calibration.
-        gear: a gear file, in its place.
+        gear: a gear file, instead of it.
         kind: ending of the folder's name.
 
     Returns:
-        Both None where they cannot be told.
+        Both are None if something is wrong.
     """
     if (run is None) == (gear is None):
         words = "is missing" if run is None else "and `gear` are given both"

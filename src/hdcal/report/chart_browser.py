@@ -80,10 +80,12 @@ class _Columns:
                 each = {"axis": mark.axis, "low": mark.at, "high": mark.at}
                 dashed = mark.dash != "solid"
                 self._rules.append(each | {"colour": mark.colour, "dashed": dashed})
+                self._name(mark, dashed=dashed)
             case Span():
                 each = {"axis": mark.axis, "low": mark.low, "high": mark.high}
                 look = {"colour": mark.colour, "opacity": mark.opacity}
                 self._rules.append(each | look)
+                self._name(mark)
 
     def _curve(self, mark: Line, x: np.ndarray, y: np.ndarray) -> None:
         dashed = mark.dash != "solid"
@@ -105,6 +107,12 @@ class _Columns:
     ) -> None:
         upper = self._append(mark, x, high, edge=True)
         self._bands.append((upper, self._append(mark, x, low, edge=True), opacity))
+
+    def _name(self, mark: Rule | Span, *, dashed: bool = False) -> None:
+        """Add a series without points, so that the legend shows the label."""
+        if mark.label:
+            none = np.empty(0)
+            self._append(mark, none, none, points=True, dashed=dashed)
 
     def _append(
         self,

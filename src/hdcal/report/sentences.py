@@ -52,7 +52,7 @@ def _environment(plain: bool) -> Environment:
     # `autoescape` makes what a template writes Markup; other texts are escaped.
     environment = Environment(
         loader=PackageLoader("hdcal", ""),
-        autoescape=not plain,
+        autoescape=True,
         finalize=_printable if plain else _escaped,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -73,7 +73,9 @@ def _environment(plain: bool) -> Environment:
 
 
 def _printable(value: Any) -> Any:
-    return printable(value) if isinstance(value, str) else value
+    if not isinstance(value, str) or isinstance(value, Markup):
+        return value
+    return Markup(printable(value))
 
 
 def _escaped(value: Any) -> Any:

@@ -42,7 +42,6 @@ def study(console: Console, run, gear, out, force, **asked):
     """
     from hdcal.design.sources import open_source
     from hdcal.design.study.study import study as run_study
-    from hdcal.design.study.summary import study_report
 
     with console.wrong as wrong:
         if not (options.is_given("vary") or options.is_given("materials")):
@@ -52,5 +51,7 @@ def study(console: Console, run, gear, out, force, **asked):
         target = out or usual
         console.reserve_folder(target, force)
     assert source is not None and target is not None
-    told = study_report(run_study(source, **asked), console.command)
-    return console.report(told)
+    found = run_study(source, **asked)
+    return console.show(
+        found, answer="study.json", tables={"study.csv": found.to_frame()}
+    )

@@ -1,60 +1,94 @@
-"""A parameter study: the force on gears of many sizes, every combination of them."""
+"""A parameter study: the force on gears with every combination of some sizes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from math import prod
+from typing import Annotated, Any, Literal
 
 import numpy as np
+import pandas as pd
+from pydantic import Field, computed_field
 
 from hdcal.data.case import Gear
 from hdcal.data.plausible import implausible
-from hdcal.design.assumptions import assumptions
 from hdcal.design.checks import (
     name_findings,
     no_deformation,
     place_findings,
     size_findings,
-    unseen_findings,
+    unused_findings,
 )
 from hdcal.design.design_draws import DesignDraws, design_draws
-from hdcal.design.sentences import beyond_tested, far_from_tested
+from hdcal.design.design_result import DesignResult
+from hdcal.design.extrapolation import extrapolations, far_sizes
 from hdcal.design.sizes import geometry_with
+from hdcal.design.study.charts import study_chart
+from hdcal.design.study.force_quantiles import force_quantiles
 from hdcal.errors import Finding, Findings, InputError
-from hdcal.notebook import Shown
 from hdcal.physics.profile import peak_stress
-from hdcal.prediction.engine.gear_forces import gear_forces
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
+from hdcal.report.chart_spec import Chart
+from hdcal.report.result import Interval
 
 AXES = (*SIZES, "deformation_mm", "temperature_C")
 MOST_DESIGNS, MOST_AXES, MOST_MATERIALS = 100_000, 4, 20
-# Forces held at a time [numbers]: 16 MB.
-_BLOCK = 2_000_000
+Axes = dict[str, np.ndarray]
+_FORCES = ("force_median_N", "force_lo_N", "force_hi_N")
+_COLUMNS = ("material", *_FORCES, "stress_MPa")
 
 
-@dataclass(frozen=True, repr=False)
-class Study(Shown):
-    """The force of every design; one entry of each column per design.
+class Study(DesignResult):
+    """The force of every design.
 
     Attributes:
-        columns: material, the sizes, deformation and temperature by edge name;
-            force_median_N, force_lo_N, force_hi_N with the sign of the deformation;
-            stress_MPa, the median size of the hoop bending stress under the load.
+        designs: an entry of each column per design: material, the sizes, deformation
+            and temperature by name; force_median_N, force_lo_N, force_hi_N with the
+            sign of the deformation; stress_MPa, the median size of the hoop bending
+            stress under the load.
         varied: names of the columns that were varied, in the order given.
         interval: probability inside the band.
-        interval_kind: what kind of interval the band is.
-        basis: what the draws belong to.
-        assumptions: what is taken for granted, in words.
-        warnings: what is extrapolated, in words.
     """
 
-    columns: Mapping[str, np.ndarray]
+    template = "design/study/report.md.j2"
+    table = "designs"
+
+    format: Literal["hdcal.study/1"] = "hdcal.study/1"
+    designs: Annotated[Axes, Field(exclude=True)]
     varied: tuple[str, ...]
-    interval: float
-    interval_kind: str
-    basis: DesignDraws
-    assumptions: tuple[str, ...]
-    warnings: tuple[str, ...]
+
+    @computed_field(alias="columns", json_schema_extra={"required": [*_COLUMNS]})
+    @property
+    def columns_of_designs(self) -> dict[str, tuple[float | str, ...]]:
+        """The designs by column; study.csv."""
+        return {name: tuple(each.tolist()) for name, each in self.designs.items()}
+
+    @property
+    def common(self) -> dict[str, float | str]:
+        """Material, sizes and conditions that are the same in all designs."""
+        columns = self.columns_of_designs
+        varied = self.varied or ("deformation_mm",)
+        return {
+            name: columns[name][0]
+            for name in ("material", *AXES)
+            if name in columns and name not in varied and len({*columns[name]}) == 1
+        }
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The designs, each with the interval of its force."""
+        forces = np.column_stack([self.designs[name] for name in _FORCES])
+        spans = (Interval(median=m, lo=lo, hi=hi) for m, lo, hi in forces)
+        rows = self.to_frame().to_dict("records")
+        pairs = zip(rows, spans, strict=True)
+        return [{**row, "force": span} for row, span in pairs]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the designs."""
+        return pd.DataFrame(dict(self.designs))
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return the force over the size that was varied first."""
+        return {"study": study_chart(self)}
 
 
 def study(
@@ -70,7 +104,7 @@ def study(
     """Compute the force on a gear for every combination of sizes.
 
     Args:
-        source: a calibration; or a gear, for intervals of its priors only.
+        source: a calibration; or a gear, to use its priors.
         vary: values by name: wall_thickness_mm, radius_mm, length_mm, load_height_mm,
             deformation_mm, temperature_C.
         materials: names or .toml files; by default the gear's own.
@@ -81,20 +115,19 @@ def study(
         seed: of the draws of priors.
 
     Returns:
-        The designs, the last of `vary` varying fastest.
+        The designs, the last name of `vary` varying fastest.
 
     Raises:
         NotUsable: the calibration failed its checks.
-        InputError: holds everything that is wrong with the question.
+        InputError: the request is invalid; it has every finding.
     """
     draws = design_draws(source, seed=seed)
     try:
         axes = {name: np.atleast_1d(np.asarray(v, float)) for name, v in vary.items()}
     except (TypeError, ValueError) as error:
-        remedy = "Give numbers by name; materials have an argument of their own"
-        raise InputError(
-            [Finding("vary", "what varies is no number", remedy)]
-        ) from error
+        remedy = "Give numbers by name, and materials as `materials`"
+        words = "a varied value is no number"
+        raise InputError([Finding("vary", words, remedy)]) from error
     axes = _with_place(draws, axes, deformation, temperature)
     with Findings() as wrong:
         wrong += _findings(draws, axes, materials, interval)
@@ -103,10 +136,15 @@ def study(
     return _tabulated(draws, list(filter(None, made)), axes, interval)
 
 
-def _with_place(draws: DesignDraws, axes, deformation, temperature) -> dict:
+def _with_place(
+    draws: DesignDraws,
+    axes: Axes,
+    deformation: float | None,
+    temperature: float | None,
+) -> Axes:
     """Return the axes with deformation and temperature among them."""
     nominal = draws.nominal_deformation
-    # Without any number the finding about it is told with the others.
+    # Without a number the finding about it is reported with the others.
     at = np.nan if nominal is None else nominal
     own = {
         "deformation_mm": at if deformation is None else deformation,
@@ -118,7 +156,9 @@ def _with_place(draws: DesignDraws, axes, deformation, temperature) -> dict:
     return {**axes, **rest}
 
 
-def _findings(draws: DesignDraws, axes, materials, interval) -> list[Finding]:
+def _findings(
+    draws: DesignDraws, axes: Axes, materials: Sequence[str], interval: float
+) -> list[Finding]:
     findings = name_findings(axes, AXES, "vary")
     if findings:
         return findings
@@ -135,7 +175,7 @@ def _findings(draws: DesignDraws, axes, materials, interval) -> list[Finding]:
         findings.append(Finding("materials", words, "Name each of a few once"))
     findings += implausible("interval", interval)
     sizes = {name: values for name, values in axes.items() if name in SIZES}
-    findings += unseen_findings(draws, sizes)
+    findings += unused_findings(draws, sizes)
     wrong = size_findings(draws, sizes)
     radius = sizes.get("radius_mm", np.array([draws.gear.geometry.radius]))
     least = float(np.min(radius)) if not wrong else np.inf
@@ -147,27 +187,34 @@ def _findings(draws: DesignDraws, axes, materials, interval) -> list[Finding]:
     return findings + wrong + place_findings(draws, at, warm, least, names)
 
 
-def _tabulated(draws: DesignDraws, made, axes, interval: float) -> Study:
-    """Return the study over materials, each with draws of its own."""
+def _tabulated(
+    draws: DesignDraws, made: Sequence[DesignDraws], axes: Axes, interval: float
+) -> Study:
+    """Return the study.
+
+    Args:
+        draws: of the tested gear.
+        made: of each material.
+        axes: values of what is varied, by name.
+        interval: probability inside the band.
+    """
     tables = [_of_material(one, axes, interval) for one in made]
     sizes = {name: values for name, values in axes.items() if name in SIZES}
     varied = [name for name, values in axes.items() if len(values) > 1]
+    place = axes["deformation_mm"], axes["temperature_C"]
     return Study(
-        columns={n: np.concatenate([t[n] for t in tables]) for n in tables[0]},
-        varied=(*(["material"] if len(made) > 1 else []), *varied),
+        source=draws,
+        materials=tuple(one.material for one in made),
+        extrapolations=tuple(extrapolations(draws, *place)),
+        far_sizes=far_sizes(draws, sizes),
         interval=interval,
         interval_kind=draws.interval_kind,
-        basis=draws,
-        assumptions=tuple(dict.fromkeys(w for one in made for w in assumptions(one))),
-        warnings=(
-            *beyond_tested(draws, axes["deformation_mm"], axes["temperature_C"]),
-            *far_from_tested(draws, sizes),
-            *draws.misfits,
-        ),
+        designs={n: np.concatenate([t[n] for t in tables]) for n in tables[0]},
+        varied=(*(["material"] if len(made) > 1 else []), *varied),
     )
 
 
-def _of_material(draws: DesignDraws, axes, interval: float) -> dict[str, np.ndarray]:
+def _of_material(draws: DesignDraws, axes: Axes, interval: float) -> Axes:
     grids = np.meshgrid(*axes.values(), indexing="ij")
     table = {name: grid.ravel() for name, grid in zip(axes, grids, strict=True)}
     sizes = {name: values for name, values in table.items() if name in SIZES}
@@ -180,83 +227,9 @@ def _of_material(draws: DesignDraws, axes, interval: float) -> dict[str, np.ndar
     modulus, loss = (np.median(draws.values[name]) for name in ("E0", "alpha"))
     warm_modulus = modulus * (1.0 - loss * (warm - draws.gear.reference_temperature))
     stress = np.broadcast_to(peak_stress(drawing, warm_modulus, np.abs(at)), at.shape)
-    named = ("force_median_N", "force_lo_N", "force_hi_N")
     return {
         "material": np.full(len(at), draws.material),
         **table,
-        **dict(zip(named, forces, strict=True)),
+        **dict(zip(_FORCES, forces, strict=True)),
         "stress_MPa": np.asarray(stress),
     }
-
-
-def force_quantiles(
-    draws: DesignDraws,
-    factor: np.ndarray,
-    deformation: np.ndarray,
-    temperature: np.ndarray,
-    shares: np.ndarray,
-) -> np.ndarray:
-    """Return quantiles of the force over the draws for every design.
-
-    Args:
-        draws: n of them.
-        factor: stiffness over the tested gear's [-], shape (d,).
-        deformation: radial, of the gear [mm], shape (d,).
-        temperature: [°C], shape (d,).
-        shares: probabilities, shape (q,).
-
-    Returns:
-        Forces [N], shape (q, d).
-    """
-    if any(effect.stage == "force" for effect in draws.problem.effects):
-        return general_quantiles(draws, factor, deformation, temperature, shares)
-    # Multiplied by a positive number no draw changes its rank: the quantiles of the
-    # tested gear at each place serve all sizes, and where the force is a straight line
-    # those at 1 mm for each sense of loading every deformation.
-    line = draws.within_tested(deformation) & is_linear(draws)
-    found = np.empty((len(shares), len(factor)))
-    for rows, at, scale, basis in (
-        (
-            line,
-            np.sign(deformation),
-            np.abs(deformation),
-            replace(draws, untested=None),
-        ),
-        (~line, deformation, np.ones_like(deformation), draws),
-    ):
-        if rows.any():
-            places = np.stack([at, temperature])[:, rows]
-            (way, levels), which = np.unique(places, axis=1, return_inverse=True)
-            ones = np.ones_like(levels)
-            unit = general_quantiles(basis, ones, way, levels, shares)
-            found[:, rows] = unit[:, which] * (factor * scale)[rows]
-    return found
-
-
-def is_linear(draws: DesignDraws) -> bool:
-    """Tell whether the model's force is proportional to stiffness and deformation."""
-    bent = any(effect.stage == "force" for effect in draws.problem.effects)
-    return not bent and draws.problem.discrepancy is None
-
-
-def general_quantiles(draws, factor, deformation, temperature, shares) -> np.ndarray:
-    """Evaluate every draw for every design, a block of designs at a time.
-
-    Args and returns are those of `force_quantiles`.
-    """
-    size = min(max(1, _BLOCK // draws.size), len(factor))
-    values, found = dict(draws.values), []
-    for start in range(0, len(factor), size):
-        rows = slice(start, start + size)
-        at, warm, scale = (
-            _filled(a[rows], size) for a in (deformation, temperature, factor)
-        )
-        where = at, warm, scale, draws.untested
-        forces = np.asarray(gear_forces(draws.problem, values, *where))
-        found.append(np.quantile(forces[: len(factor[rows])], shares, axis=1))
-    return np.concatenate(found, axis=1)
-
-
-def _filled(values: np.ndarray, size: int) -> np.ndarray:
-    # Blocks of one length compile once.
-    return np.concatenate([values, np.full(size - len(values), values[0])])

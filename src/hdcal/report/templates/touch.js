@@ -81,7 +81,10 @@ function touch(figure) {
   // What y spans, with some room but not beyond where it can be.
   function spanned(chart, low, high) {
     if (isLog(chart, 1)) return uPlot.rangeLog(low, high, 10, true);
-    const [least, most] = uPlot.rangeNum(low ?? 0, high ?? 1, 0.1, true);
+    const rules = (chart.rules || []).filter(rule => rule.axis === "y");
+    const [least, most] = uPlot.rangeNum(
+      Math.min(low ?? 0, ...rules.map(rule => rule.low)),
+      Math.max(high ?? 1, ...rules.map(rule => rule.high)), 0.1, true);
     const [floor, roof] = chart.limits;
     return [floor == null ? least : Math.max(least, floor),
       roof == null ? most : Math.min(most, roof)];
@@ -212,8 +215,8 @@ function touch(figure) {
         show: label === chart.x || chart.ticks !== false,
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
         ...(label === chart.x && chart.names.length ? named(chart) : {}),
-        ...(isLog(chart, label === chart.y ? 1 : 0)
-          ? {values: (_, places) => places.map(shown)} : {}),
+        ...(label === chart.x && chart.names.length
+          ? {} : {values: (_, places) => places.map(shown)}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({

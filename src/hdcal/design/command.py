@@ -6,7 +6,7 @@ from hdcal.cli import options
 from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import Parsed, read_window
-from hdcal.design.command.options import (
+from hdcal.design.options import (
     OF_LIMIT,
     OF_WINDOW,
     limit_options,
@@ -39,10 +39,9 @@ def design(console: Console, run, gear, out, force, **given):
     With --window: the softest spring of an elastic wave generator that keeps the gear
     inside. With --limit-force: the sizes nearest to the tested ones that keep it.
     """
-    from hdcal.design.inverse_design import inverse_design
+    from hdcal.design.inverse_design.inverse_design import inverse_design
     from hdcal.design.sources import open_source
-    from hdcal.design.summary import generator_report, inverse_report
-    from hdcal.design.wave_generator import wave_generator
+    from hdcal.design.wave_generator.wave_generator import wave_generator
 
     with console.wrong as wrong:
         wrong += question_findings()
@@ -50,11 +49,7 @@ def design(console: Console, run, gear, out, force, **given):
         target = out or usual
         console.reserve_folder(target, force)
     assert source is not None and target is not None
-    spring = given["window"] is not None
-    for name in OF_LIMIT if spring else OF_WINDOW:
+    answer = wave_generator if given["window"] is not None else inverse_design
+    for name in OF_LIMIT if answer is wave_generator else OF_WINDOW:
         del given[name]
-    if spring:
-        told = generator_report(wave_generator(source, **given), console.command)
-    else:
-        told = inverse_report(inverse_design(source, **given), console.command)
-    return console.report(told)
+    return console.show(answer(source, **given), answer="design.json")

@@ -1,4 +1,4 @@
-"""The force and stress that a gear exceeds rarely, differentiable in all its sizes.
+"""Quantiles of force and stress of a gear, differentiable in all its sizes.
 
 Both are sizes, along the sense of loading.
 """
@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from hdcal.data.records import Array, Geometry
-from hdcal.design.answer import LimitAsked
 from hdcal.design.design_draws import DesignDraws
+from hdcal.design.inverse_design.limit import LimitAsked
 from hdcal.design.next_gear import NextGear
 from hdcal.design.sizes import geometry_with
 from hdcal.physics.profile import peak_stress
@@ -24,10 +24,10 @@ from hdcal.prediction.engine.sizes import SIZES
 
 
 class LimitedGear(eqx.Module):
-    """The next gear at the worst of some temperatures, beside what it has to keep.
+    """The next gear at the worst of some temperatures, and its limits.
 
-    Its methods take a place: what differs from the tested gear, by name. That may be
-    sizes by edge name, deformation_mm, and factors on modulus and K.
+    Its methods take a place: the differences from the tested gear, by name. These may
+    be sizes [mm], deformation_mm, and factors on modulus and K.
 
     Attributes:
         gears: one for each draw.
@@ -52,7 +52,7 @@ class LimitedGear(eqx.Module):
 
     @classmethod
     def of(cls, draws: DesignDraws, gear: NextGear, asked: LimitAsked) -> "LimitedGear":
-        """Return the gear of the material whose draws they are."""
+        """Return the gear of the material of these draws."""
         strength = draws.yield_strength
         if asked.limit_stress_MPa is not None:
             strength = np.full(draws.size, asked.limit_stress_MPa)
@@ -66,7 +66,7 @@ class LimitedGear(eqx.Module):
             temperatures=np.asarray(asked.temperature_C),
             limit_force=asked.limit_force_N,
             limit_stress=strength,
-            # Every smaller draw keeps the limit too: never fewer than were asked for.
+            # Every smaller draw keeps the limit too: at least as many as required.
             rank=ceil(asked.probability * draws.size - 1e-9) - 1,
         )
 
@@ -101,9 +101,9 @@ class LimitedGear(eqx.Module):
         return jnp.asarray(peak_stress(made, modulus, self.sense * at))
 
     def force(self, place: Mapping[str, Scalar]) -> Scalar:
-        """Return the force that is kept with the target's probability [N]."""
+        """Return the force that is not exceeded with the required probability [N]."""
         return jnp.sort(self.forces(place))[self.rank]
 
     def utilisation(self, place: Mapping[str, Scalar]) -> Scalar:
-        """Return the share of the allowed stress that is kept with the probability."""
+        """Return the share of the allowed stress that is not exceeded likewise."""
         return jnp.sort(self.stresses(place) / self.limit_stress)[self.rank]

@@ -1,50 +1,63 @@
-"""One material with the sizes nearest to the tested gear that keep every limit."""
+"""The sizes nearest to the tested gear that keep every limit, for one material."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from hdcal.design.design_draws import DesignDraws
-from hdcal.design.force_limit import LimitedGear
-from hdcal.design.nearest_point import CLOSE, nearest_kept
+from hdcal.design.design_result import Stress, counted, stress_fields
+from hdcal.design.inverse_design.force_limit import LimitedGear
+from hdcal.design.inverse_design.nearest_point import CLOSE, nearest_kept
 from hdcal.exported import jit
 from hdcal.prediction.engine.sizes import SIZES
+from hdcal.report.result import Interval, Probability, quantity
 
-# Draws on either side of a quantile that tell its slope.
+# Draws on either side of a quantile from which its slope is computed.
 _BESIDE = 50
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """One material with the best sizes that were found for it.
+class CandidateForce(Interval):
+    """A force, and the one that is not exceeded with the required probability."""
 
-    Forces are along the sense of loading.
+    kept: float
+
+
+class Candidate(Stress):
+    """One material with the sizes that were found best for it.
 
     Attributes:
-        basis: draws, of this material.
-        sizes: [mm] by edge name.
+        material: name.
+        sizes_mm: by name, without the unit.
         met: whether every limit is kept.
-        change: √Σ (ln x/x₀)², the distance from the tested gear [-].
-        force: kept with the required probability [N].
-        utilisation: share of the allowed stress that is kept with it; None where no
-            strength is known.
-        forces: of each draw [N].
-        stresses: hoop bending stress under the load of each draw [MPa].
-        kept: share of the draws whose force keeps the limit.
+        change: √Σ (ln x/x₀)², the distance from the tested gear.
+        force_N: with its sign.
+        probability: that the force keeps the limit.
+        standard_error: of the probability.
+        utilisation_kept: share of the allowed stress that is not exceeded with the
+            required probability; None where no strength is known.
     """
 
-    basis: DesignDraws
-    sizes: Mapping[str, float]
-    met: bool
-    change: float
-    force: float
-    utilisation: float | None
-    forces: np.ndarray
-    stresses: np.ndarray
-    kept: float
+    material: str = quantity("material")
+    sizes_mm: dict[str, float] = quantity("sizes", "mm")
+    met: bool = quantity("limits kept")
+    change: float = quantity("distance from the tested gear")
+    force_N: CandidateForce = quantity("force", "N")
+    probability: Probability = quantity("probability of keeping the limit")
+    standard_error: float = quantity("standard error of the probability")
+    utilisation_kept: float | None = quantity("share of the allowed stress kept")
+
+    @property
+    def sizes(self) -> dict[str, float]:
+        """Sizes [mm] by name with the unit, such as `radius_mm`."""
+        return {f"{name}_mm": value for name, value in self.sizes_mm.items()}
+
+    def columns(self) -> dict[str, Any]:
+        """Return numbers and texts by the names of columns, the sizes among them."""
+        kept = {"force_kept_N": self.force_N.kept}
+        return {**super().columns(), **kept, **self.sizes}
 
 
 def best_candidate(
@@ -55,7 +68,7 @@ def best_candidate(
     Args:
         draws: of this material.
         target: of the same.
-        bounds: of each free size [mm] by edge name.
+        bounds: of each free size [mm] by name.
     """
     names = tuple(bounds)
     own = np.log([_own(target, name) for name in names])
@@ -95,23 +108,26 @@ def _slopes(target: LimitedGear, z, *, names):
 def candidate(
     draws: DesignDraws, target: LimitedGear, sizes: Mapping[str, float]
 ) -> Candidate:
-    """Return what given sizes [mm] come to, by edge name."""
+    """Return force, stress and probability of given sizes [mm], by name."""
     forces, stresses = map(np.asarray, _draws(target, dict(sizes)))
     share = float(np.sort(stresses / target.limit_stress)[target.rank])
     force = float(np.sort(forces)[target.rank])
     limited = bool(np.isfinite(target.limit_stress).all())
     steps = [np.log(value / _own(target, name)) for name, value in sizes.items()]
     most = target.limit_force * (1.0 + CLOSE)
+    probability, error = counted(float(np.mean(forces <= most)), draws)
+    sense = float(target.sense)
+    interval = Interval.of(sense * forces)
     return Candidate(
-        basis=draws,
-        sizes=sizes,
+        **stress_fields(draws, stresses),
+        material=draws.material,
+        sizes_mm={name.removesuffix("_mm"): value for name, value in sizes.items()},
         met=force <= most and (not limited or share <= 1.0 + CLOSE),
         change=float(np.sqrt(np.sum(np.square(steps)))),
-        force=force,
-        utilisation=share if limited else None,
-        forces=forces,
-        stresses=stresses,
-        kept=float(np.mean(forces <= most)),
+        force_N=CandidateForce(**dict(interval), kept=sense * force),
+        probability=probability,
+        standard_error=error,
+        utilisation_kept=share if limited else None,
     )
 
 
@@ -128,8 +144,8 @@ def spreads(
     All of them are along the sense of loading.
 
     Args:
-        target: tells the population.
-        sizes: [mm] by edge name, shape (m,).
+        target: of the population.
+        sizes: [mm] by name, shape (m,).
         shares: probabilities, shape (q,).
 
     Returns:
@@ -159,8 +175,8 @@ def elasticities(target: LimitedGear, sizes: Mapping[str, float]) -> dict[str, f
 
 @jit
 def _elasticities(target: LimitedGear, place):
-    # The slope of a quantile is the mean slope of the draws about it, of which one
-    # alone is a rough number: Hong, Operations Research 57 (2009).
+    # The slope of a quantile is the mean slope of the draws about it: Hong, Operations
+    # Research 57 (2009). That of a single draw would be imprecise.
     order = jnp.argsort(target.forces(place))
     half = min(_BESIDE, target.rank, len(order) - 1 - target.rank)
     about = order[target.rank - half : target.rank + half + 1]

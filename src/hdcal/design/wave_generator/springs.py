@@ -1,4 +1,4 @@
-"""Springs against gears: with which probability one set point serves all of them.
+"""The probability that one set point of a spring keeps gears inside a window.
 
 A spring of rate c presses on the gear from inside at each of two opposed places. Its
 free end stands at x beyond the undeformed gear, so that in balance
@@ -6,42 +6,41 @@ free end stands at x beyond the undeformed gear, so that in balance
     c (x − ω) = F(ω, T),
 
 with force F and radial deformation ω of one side. F grows with ω; so does ω + F(ω)/c,
-and ω ≥ lo just when x ≥ lo + F(lo)/c, ω ≤ hi just when x ≤ hi + F(hi)/c. A gear is
-inside the window at all temperatures just when x lies in one interval, which makes
-every probability here a count of intervals: no equation has to be solved.
+and ω ≥ lo exactly if x ≥ lo + F(lo)/c, ω ≤ hi exactly if x ≤ hi + F(hi)/c. A gear is
+inside the window at all temperatures exactly if x lies in one interval, so that
+every probability here is a count of intervals: no equation has to be solved.
 Deformations, forces and set points are along the sense of loading
-(`hdcal.prediction.engine.loading_sense`): a gear that is pulled has the same balance.
+(`hdcal.prediction.engine.loading_sense`): the balance of a pulled gear is the same.
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 
-# Rates that are looked at, evenly in their logarithm.
+from hdcal.report.result import Item, quantity
+
+# Number of rates, evenly spaced in their logarithm.
 _RATES = 61
 # Bisections between two of them: the rate is then known to 1 %.
 _HALVINGS = 4
 
 
-@dataclass(frozen=True)
-class Spring:
-    """One spring rate, and what a common set point can do with it.
+class Spring(Item):
+    """One spring rate, and what a common set point achieves with it.
 
     Attributes:
-        rate: c [N/mm].
-        interference: x of the best common set point [mm].
+        rate: c.
+        interference: x of the best common set point.
         together: probability that a gear is in the window at all temperatures.
         no_backlash: probability of ω ≥ lo at all temperatures.
         no_jam: probability of ω ≤ hi at all temperatures.
         adjusted: probability with x adjusted gear by gear, not by temperature.
     """
 
-    rate: float
-    interference: float
-    together: float
-    no_backlash: float
-    no_jam: float
-    adjusted: float
+    rate: float = quantity("spring rate", "N/mm")
+    interference: float = quantity("set point", "mm")
+    together: float = quantity("probability inside the window")
+    no_backlash: float = quantity("probability of no backlash")
+    no_jam: float = quantity("probability of no jam")
+    adjusted: float = quantity("probability inside the window, each gear adjusted")
 
 
 def set_points(rate: float, window, forces: np.ndarray, error=0.0) -> np.ndarray:
@@ -64,7 +63,7 @@ def set_points(rate: float, window, forces: np.ndarray, error=0.0) -> np.ndarray
 def best_common(low: np.ndarray, high: np.ndarray) -> float:
     """Return the point that lies in most of the intervals [low, high].
 
-    Of several stretches that are equally good, the middle of the longest.
+    If several stretches are equally good, it is the middle of the longest one.
     """
     full = low <= high
     starts, ends = np.sort(low[full]), np.sort(high[full])
@@ -81,22 +80,22 @@ def best_common(low: np.ndarray, high: np.ndarray) -> float:
 
 
 def judge(rate: float, window, forces, error) -> Spring:
-    """Return what the best common set point does at one spring rate [N/mm]."""
+    """Return the best common set point at one spring rate [N/mm]."""
     low, high = set_points(rate, window, forces, error)
     x = best_common(low, high)
-    enough, free = x >= low, x <= high
+    above, below = x >= low, x <= high
     return Spring(
         rate=float(rate),
         interference=x,
-        together=float(np.mean(enough & free)),
-        no_backlash=float(np.mean(enough)),
-        no_jam=float(np.mean(free)),
+        together=float(np.mean(above & below)),
+        no_backlash=float(np.mean(above)),
+        no_jam=float(np.mean(below)),
         adjusted=_adjusted(rate, window, forces, error),
     )
 
 
 def _adjusted(rate: float, window, forces, error) -> float:
-    """Return the probability with each gear's set point in the middle of its own."""
+    """Return the probability with a set point for each gear, in its own middle."""
     low, high = set_points(rate, window, forces)
     x = 0.5 * (low + high) + error
     return float(np.mean((x >= low) & (x <= high)))

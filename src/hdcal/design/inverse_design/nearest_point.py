@@ -1,8 +1,8 @@
 """The nearest point at which every limit is kept, by sequential quadratic programming.
 
-First to where nothing is exceeded (or least), then to the nearest such point. In
-logarithms of the sizes both are nearly quadratic with straight limits, so that a few
-steps do.
+The first search leads to where no limit is exceeded (or least exceeded), the second one
+to the nearest such point. In logarithms of the sizes both are nearly quadratic with
+straight limits, so that a few steps suffice.
 """
 
 from collections.abc import Callable
@@ -50,7 +50,7 @@ def nearest_kept(
         1e-14,
     )
     better = np.clip(found, *bounds.T)
-    # A solver that lost its way may not cost what was already found.
+    # A solver that failed must not replace a point that keeps the limits.
     return better if kept(better) else start
 
 

@@ -1,1 +1,0 @@
-"""`hdcal design` and its options."""

@@ -1,0 +1,1 @@
+"""Which sizes keep a limit of the force?"""

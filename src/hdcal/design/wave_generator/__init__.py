@@ -1,0 +1,1 @@
+"""Which spring of an elastic wave generator keeps a gear inside a window?"""
