@@ -163,50 +163,26 @@ def test_a_failed_calibration_gives_no_design(run: Path, here: Hdcal, tmp_path: 
         (["design", "RUN", "--window", "0.3:0.5", "--limit-force", "7"], ["both ask"]),
         (["design", "--window", "0.3:0.5"], ["RUN: is missing"]),
         (["design", "RUN", "--gear", "g.toml", "--window", ".3:.5"], ["given both"]),
-        (["design", "RUN", "--window", "0.4:0.3"], ["0.4:0.3 is empty"]),
         (["design", "RUN", "--window", "0.4"], ["'0.4' is not LO:HI"]),
-        (
-            ["design", "RUN", "--window", ".3:.5", "--vary", WALL],
-            ["--vary: has no meaning with --window"],
-        ),
+        (["design", "RUN", "--window", ".3:.5", "--vary", WALL], ["--vary: has no"]),
         (
             ["design", "RUN", "--limit-force", "70 mm", "--vary", "wall_tickness=1:x"],
             ["'70 mm' is not a force", "Did you mean 'wall_thickness_mm'", "LO:HI"],
-        ),
-        (
-            [
-                "design",
-                "RUN",
-                "--limit-force",
-                "7",
-                "--vary",
-                "wall_thickness_mm=.5:.6",
-            ],
-            ["no wall thickness between 0.5 and 0.6 mm meets 7 N at 0.4 mm"],
         ),
         (
             ["design", "nowhere", "--limit-force", "x", "--vary", WALL],
             ["there is no such file", "'x' is no number"],
         ),
         (["study", "RUN"], ["nothing is varied"]),
-        (["study", "RUN", "--vary", "radius=1,2"], ["Did you mean 'radius_mm'"]),
         (["study", "RUN", "--vary", "radius_mm=a"], ["neither start:stop:count"]),
         (["study", "RUN", "--vary", "radius_mm"], ["is not NAME=…"]),
-        (
-            ["study", "RUN", "--vary", "radius_mm=38", "--vary", "radius_mm=39"],
-            ["given twice"],
-        ),
         (
             ["study", "RUN", "--vary", "wall_thickness_mm=60", "--material", "stel"],
             ["not thinner than the radius", "Did you mean 'steel'"],
         ),
-        (
-            ["study", "RUN", "--vary", "radius_mm=38", "--deformation", "3 N"],
-            ["is not a length"],
-        ),
     ],
 )
-def test_bad_input_is_told_and_nothing_written(
+def test_bad_input_is_refused_and_nothing_written(
     run: Path, here: Hdcal, tmp_path: Path, asked: list[str], words: list[str]
 ):
     done = here(*(run if text == "RUN" else text for text in asked))
@@ -244,9 +220,10 @@ def test_pages_can_be_read_and_names_are_only_text(run: Path, tmp_path: Path):
         assert seen.frames["phone"]["width"] <= PHONE
 
 
-def test_a_long_study_is_cut_in_a_terminal():
+def test_a_long_study_is_cut():
     gear = read_gear(XB1 / "gear.toml")
     many = study(gear, {"wall_thickness_mm": [0.6 + 1e-4 * i for i in range(201)]})
     assert len(many.to_frame()) == 201
-    assert "101 more rows" in many.text()
+    assert "The first 100 of 201 designs" in many.text()
+    assert many.page().count("<tr>") == 101
     assert "deformation 0.4 mm" in many.text()

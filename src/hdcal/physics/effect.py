@@ -80,9 +80,10 @@ class Effect(eqx.Module, ABC):
     """One unmodelled mechanism of the rig or the gear.
 
     Its name, the key of the registry and prefix of the posterior sites, is that of the
-    class in snake case.
+    class in snake case. The attributes are declared by keywords of the class. A
+    subclass without a stage inherits all of them, and the name, from its base.
 
-    Class keywords, each also a class attribute:
+    Attributes:
         stage: where in the measurement chain it acts.
         groups: of `physics.groups`; effects of a group look alike or share a remedy.
         needs: features of the records without which it cannot be tested.
@@ -96,8 +97,6 @@ class Effect(eqx.Module, ABC):
             [mm], for an effect with several amplitudes. Records shorter than one
             period cannot show the effect, unless its prior says so.
         twin: a mechanism outside the library that obeys the same equation.
-
-    A subclass without a stage inherits all of them, and the name, from its base.
     """
 
     name: ClassVar[str]

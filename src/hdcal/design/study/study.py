@@ -1,6 +1,6 @@
 """A parameter study: the force on gears with every combination of some sizes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from math import prod
 from typing import Annotated, Any, Literal
 
@@ -28,6 +28,7 @@ from hdcal.physics.profile import peak_stress
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.sizes import SIZES, stiffness_ratio
 from hdcal.report.chart_spec import Chart
+from hdcal.report.markdown import MOST_ROWS
 from hdcal.report.result import Interval
 
 AXES = (*SIZES, "deformation_mm", "temperature_C")
@@ -74,13 +75,12 @@ class Study(DesignResult):
         }
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The designs, each with the interval of its force."""
-        forces = np.column_stack([self.designs[name] for name in _FORCES])
-        spans = (Interval(median=m, lo=lo, hi=hi) for m, lo, hi in forces)
-        rows = self.to_frame().to_dict("records")
-        pairs = zip(rows, spans, strict=True)
-        return [{**row, "force": span} for row, span in pairs]
+    def rows(self) -> list[dict[Hashable, Any]]:
+        """The first designs, each with the interval of its force."""
+        first = self.to_frame()[:MOST_ROWS]
+        forces = np.column_stack([first[name] for name in _FORCES])
+        spans = [Interval(median=middle, lo=lo, hi=hi) for middle, lo, hi in forces]
+        return first.assign(force=spans).to_dict("records")
 
     def to_frame(self) -> pd.DataFrame:
         """Return the designs."""
