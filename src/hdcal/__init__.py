@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hdcal.calibration.calibrate import calibrate
-    from hdcal.calibration.summary import summarise
+    from hdcal.calibration.calibration import summarise
     from hdcal.classical.fit import fit
     from hdcal.comparison.compare import compare
     from hdcal.data.case import Case, Gear
@@ -72,7 +72,7 @@ _HOMES = {
     "residuals": "inference.residuals",
     "respond": "motion.respond.respond",
     "study": "design.study.study",
-    "summarise": "calibration.summary",
+    "summarise": "calibration.calibration",
     "wave_generator": "design.wave_generator.wave_generator",
 }
 

@@ -7,7 +7,12 @@ before it is asked for.
 from importlib import import_module
 from typing import Any
 
-# Class of a result -> who tells of it.
+# Class -> what makes a `report.result.Result` of it.
+RESULTS = {
+    "Posterior": "calibration.calibration.calibration_of",
+    "Residuals": "calibration.residual_report.residual_report",
+}
+# Class of another result -> who tells of it.
 TELLERS = {
     "Bands": "prediction.bands.document.bands_document",
     "DynamicPosterior": "motion.summary.dynamic_report",
@@ -15,8 +20,6 @@ TELLERS = {
     "FleetCauses": "shared_causes.summary.causes_report",
     "Margin": "prediction.margin.document.margin_document",
     "NextForce": "fleets.force.document.force_document",
-    "Posterior": "calibration.summary.calibration_report",
-    "Residuals": "calibration.residuals_document.residuals_document",
     "Response": "motion.respond.summary.response_report",
     "Verdict": "diagnosis.summary.verdict_report",
 }
@@ -28,20 +31,16 @@ TABLES = {
     "FleetCauses": "shared_causes.summary.cause_columns",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",
-    "Posterior": "report.parameters.posterior_rows",
-    "Residuals": "calibration.residuals_document.residual_columns",
     "Response": "report.tables.own_columns",
     "Study": "report.tables.own_columns",
     "Verdict": "diagnosis.chart.hypothesis_columns",
 }
 # -> its chart.
 CHARTS = {
-    "Bands": "prediction.bands.chart.bands_chart",
+    "Bands": "prediction.bands.charts.bands_chart",
     "Fleet": "fleets.chart.fleet_chart",
     "FleetCauses": "shared_causes.chart.causes_chart",
     "NextForce": "fleets.force.chart.force_chart",
-    "Posterior": "calibration.chart.posterior_chart",
-    "Residuals": "calibration.chart.residuals_chart",
     "Response": "motion.respond.chart.response_chart",
     "Verdict": "diagnosis.chart.verdict_chart",
 }
@@ -53,12 +52,22 @@ class Shown:
     """A result that shows what matters most of it in a notebook's cell."""
 
     def __repr__(self) -> str:
-        name, document = type(self).__name__, self._document
-        said = "FAILED, do not use" if document.failed else document.headline
-        return f"<{name}: {said}>"
+        result = self._result
+        shown = result or self._document
+        failed = result.reasons if result else shown.failed
+        said = "FAILED, do not use" if failed else shown.headline
+        return f"<{type(self).__name__}: {said}>"
 
     def _repr_html_(self) -> str:
+        if (result := self._result) is not None:
+            return result._repr_html_()
         return import_module("hdcal.report.html").notebook_html(self._document)
+
+    @property
+    def _result(self) -> Any:
+        """The result of a class that has one; else None."""
+        address = RESULTS.get(type(self).__name__)
+        return None if address is None else _room(address)(self)
 
     @property
     def _document(self) -> Any:
@@ -70,12 +79,16 @@ class Shown:
 
         It holds parameters, rows, levels, hypotheses or designs.
         """
+        if (result := self._result) is not None:
+            return result.to_frame()
         return import_module("hdcal.data.frames").frame_of(self._columns)
 
     def to_datatree(self) -> Any:
         """Return its main table as xarray's DataTree; draws are in ArviZ' groups."""
         if (tree := getattr(self, "tree", None)) is not None:
             return tree
+        if (result := self._result) is not None:
+            return result.to_datatree()
         return import_module("hdcal.report.tables").datatree(self._columns)
 
     def plot(self, ax: Any = None) -> Any:
@@ -87,6 +100,8 @@ class Shown:
         Returns:
             These Axes.
         """
+        if (result := self._result) is not None:
+            return result.plot(ax)
         drawer = import_module("hdcal.report.chart_figure")
         if (own := DRAWERS.get(type(self).__name__)) is not None:
             return _room(own)(self, drawer.axes_or_new(ax))

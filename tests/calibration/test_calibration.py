@@ -18,7 +18,7 @@ from rigs import (
 from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
-from hdcal.calibration.summary import summarise
+from hdcal.calibration.calibration import summarise
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.errors import InputError
 from hdcal.inference.density import log_likelihood

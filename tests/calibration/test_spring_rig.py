@@ -9,7 +9,7 @@ from commands import ROOT, Hdcal
 from schema_checks import obeys
 from short import SHORT, options
 
-from hdcal.calibration.answer import CalibrationAnswer
+from hdcal.calibration.calibration import Calibration
 from hdcal.diagnosis.answer import VerdictAnswer
 
 DAMPER = ROOT / "datasets" / "slit-damper"
@@ -24,7 +24,7 @@ def calibrated(here: Hdcal, tmp_path: Path) -> Path:
 
 def test_every_question_that_needs_no_sizes_is_answered(here: Hdcal, calibrated: Path):
     found = json.loads((calibrated / "summary.json").read_text())
-    obeys(found, CalibrationAnswer)
+    obeys(found, Calibration)
     assert found["K_by_theory"] == dict.fromkeys(("ring", "cup", "article"))
     assert found["parameters"]["K"]["unit"] == "N/mm"
     K, stiffness = found["parameters"]["K"], found["stiffness_N_per_mm"]

@@ -6,7 +6,7 @@ from rigs import make_case, make_gear
 from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate
-from hdcal.calibration.summary import K_by_theory
+from hdcal.calibration.calibration import K_by_theory
 from hdcal.data.priors import Prior
 from hdcal.data.reading import read_case
 from hdcal.data.resources import datasets_folder

@@ -7,7 +7,7 @@ from rigs import autoregression, make_records
 from scipy import stats
 
 import hdcal
-from hdcal.calibration.summary import calibration_answer
+from hdcal.calibration.calibration import calibration_of
 from hdcal.inference.residual_noise import NEIGHBOURS, SCATTER, WILD, noise_faults
 from hdcal.inference.residual_shapes import FALSE_ALARM, Whitened
 from hdcal.inference.residuals import residuals
@@ -124,7 +124,7 @@ def test_every_answer_says_so():
     posterior = regressed(X, 200.0 * X + 0.5 * correlated(0.8, rng), rng, 400)
     found = hdcal.margin(posterior, 0.4, sensitivities=False)
     assert any("Neighbouring readings err alike" in said for said in found.remarks)
-    answer = calibration_answer(posterior)
+    answer = calibration_of(posterior)
     assert any("Neighbouring readings err alike" in said for said in answer.warnings)
     assert NEIGHBOURS in [shape.name for shape in answer.residuals]
     assert any("other mountings" in step for step in answer.next_steps)
@@ -152,8 +152,8 @@ def test_a_slip_is_the_first_thing_to_look_at():
     force = 200.0 * x + 0.3 * np.random.default_rng(2).normal(size=60)
     force[17] /= 10.0
     case = hdcal.read_case({"deformation_mm": x, "force_N": force})
-    found = calibration_answer(hdcal.calibrate(case, warmup=300, draws=500))
-    assert found.next_steps[0].startswith("Look at that reading first")
+    found = calibration_of(hdcal.calibrate(case, warmup=300, draws=500))
+    assert found.next_steps[0].startswith("Check that reading first")
     (told,) = [words for words in found.warnings if "as far as readings" in words]
     assert told.startswith(f"Reading 18, {force[17]:.4g} N at {x[17]:.4g} mm, lies ")
     off = float(told.partition("lies ")[2].partition(" N off")[0])

@@ -11,7 +11,7 @@ from rigs import make_case, make_gear, make_records
 from short import SHORT
 
 from hdcal.calibration.calibrate import calibrate, check_effect_priors
-from hdcal.calibration.summary import summarise
+from hdcal.calibration.calibration import summarise
 from hdcal.data.priors import Prior, effect_priors, rig_priors
 from hdcal.errors import InputError
 from hdcal.inference import model

@@ -8,7 +8,7 @@ import pytest
 from rigs import cycles, make_case
 
 import hdcal
-from hdcal.calibration.figure.bands import distance_from_model
+from hdcal.calibration.charts import distance_from_model
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.bands.bands import default_bands
 from hdcal.tracking.tracker import Tracker

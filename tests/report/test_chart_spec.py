@@ -141,7 +141,7 @@ class Marks(Result):
 
     format: Literal["hdcal.marks/1"] = "hdcal.marks/1"
 
-    def block(self, name, command="", *, plain=False):
+    def block(self, name, command="", **_):
         return "![all](all 'All')" if name == "body" else ""
 
     def make_charts(self):

@@ -17,11 +17,11 @@ from hdcal.data.resources import datasets_folder
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.errors import InputError
 from hdcal.inference.residual_shapes import Structure
-from hdcal.notebook import TELLERS, Shown
+from hdcal.notebook import RESULTS, TELLERS, Shown
 from hdcal.prediction.margin.chart import margin_chart
 
 GEAR = datasets_folder() / "xb1-100-80" / "gear.toml"
-NAMES = sorted({*TELLERS, "Case"} - {"DynamicPosterior"})
+NAMES = sorted({*TELLERS, *RESULTS, "Case"} - {"DynamicPosterior"})
 
 
 def test_every_public_result_is_shown():
@@ -31,7 +31,7 @@ def test_every_public_result_is_shown():
     called.append(hdcal.FleetPosterior.next_force)
     returned = [inspect.signature(one).return_annotation for one in called]
     results = {c for c in returned if inspect.isclass(c) and is_dataclass(c)}
-    assert {c.__name__ for c in results} == {*TELLERS, "Case"}
+    assert {c.__name__ for c in results} == {*TELLERS, *RESULTS, "Case"}
     assert all(issubclass(c, Shown) for c in results - {hdcal.Case})
 
 
@@ -134,7 +134,7 @@ def test_a_case_says_what_was_guessed_of_it(results):
 def test_residuals_say_their_shapes(results):
     left = results["Residuals"][0]
     assert (left.structure, left.noise) == ((), ())
-    assert "No shape was found" in repr(left)
+    assert "have no shape" in repr(left)
     bend = Structure("curvature", 0.001, 2.0, "They bend.")
     noise = Structure("scatter", 0.001, 2.0, "They grow.")
     shaped = replace(left, structure=(bend,), noise=(noise,))

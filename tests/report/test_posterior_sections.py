@@ -8,10 +8,8 @@ from posteriors import plain_draws, ramp_case, single, written_posterior
 from rich.console import Console
 from rigs import make_gear
 
-from hdcal.calibration.figure.residuals import residual_figure
 from hdcal.data.prior import Prior
 from hdcal.inference.checks import Check
-from hdcal.inference.residuals import residuals
 from hdcal.report.document import Document, Tag
 from hdcal.report.html import html_page
 from hdcal.report.parameters import Interval, parameter_estimates
@@ -24,7 +22,7 @@ from hdcal.report.posterior_sections import (
     prior_section,
 )
 from hdcal.report.terminal import terminal_lines
-from hdcal.report.words import estimate, with_labels
+from hdcal.report.words import estimate
 
 
 def shown(*sections) -> tuple[str, str]:
@@ -35,22 +33,6 @@ def shown(*sections) -> tuple[str, str]:
     with terminal.capture() as caught:
         terminal.print(*terminal_lines(document), sep="\n")
     return html_page(document, images), caught.get()
-
-
-def test_a_sentence_calls_parameters_what_they_are_called_on_paper():
-    names = ["K", "E0", "alpha", "hysteresis.width"]
-    said = ["K and E0 are alike, in 1/K", "hysteresis.width: Kraft of alphas"]
-    assert with_labels(said, names) == [
-        "Influence coefficient K and Young's modulus E₀ are alike, in 1/K",
-        "Hysteresis: width: Kraft of alphas",
-    ]
-
-
-def test_no_words_lie_on_the_readings():
-    posterior = single()
-    figure = residual_figure(posterior, residuals(posterior))
-    for axes in figure.axes:
-        assert not axes.texts and "±2 sd" in axes.get_title(loc="right")
 
 
 def test_a_terminal_has_room_for_fewer_columns():

@@ -31,10 +31,11 @@ def with_newtons():
 
 def stream(posterior, draw: int, rows: int, rng):
     """Return readings of a gear that is one draw of the posterior."""
-    prior = prior_from_posterior(pool(posterior))
+    known = pool(posterior)
+    prior = prior_from_posterior(known)
     at = np.resize(PLACES, rows)
     columns = np.column_stack([at, 0.0 * at, 0.0 * at + 1.0, 0.0 * at])
-    left = np.asarray(posterior.problem.discrepancy.columns(at, 0.0 * at))
+    left = np.asarray(known.problem.discrepancy.columns(at, 0.0 * at))
     coefficients, sd = prior.coefficients()[draw], np.sqrt(prior.variance[draw])
     force = np.hstack([columns, left]) @ coefficients + sd * rng.normal(size=rows)
     return at, force, np.hstack([columns, left]), coefficients
@@ -62,7 +63,7 @@ def followed(posterior, streams: int, rows: int = 300) -> tuple[float, float, fl
     start, inside, read, alarms = Tracker(posterior, alarm_rows=100.0), [], [], 0
     for seed in range(streams):
         rng = np.random.default_rng(400 + seed)
-        draw = rng.integers(len(posterior.draws["K"]))
+        draw = rng.integers(len(pool(posterior).index))
         at, force, _, truth = stream(posterior, draw, rows, rng)
         held, readings, called = follow(start, at, force, truth[0])
         inside.append(held)

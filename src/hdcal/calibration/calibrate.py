@@ -1,7 +1,7 @@
 """Calibrate a case: from records and gear to a checked posterior."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 
@@ -12,7 +12,7 @@ from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
-from hdcal.errors import Finding, InputError
+from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
@@ -80,20 +80,13 @@ def check_names(
     Raises:
         InputError: a name is not; the nearest one is suggested.
     """
-    findings = []
-    for name in names:
-        if name not in registry:
-            near = get_close_matches(name, registry, n=1)
-            hint = f"Did you mean '{near[0]}'? " if near else ""
-            findings.append(
-                Finding(
-                    parameter,
-                    f"no effect is called '{name}'",
-                    f"{hint}The library holds: {', '.join(sorted(registry))}",
-                )
-            )
-    if findings:
-        raise InputError(findings)
+    with Findings() as findings:
+        for name in names:
+            if name not in registry:
+                problem = f"no effect is called '{name}'"
+                library = f"The library holds: {', '.join(sorted(registry))}"
+                remedy = f"{_nearest(name, registry)}{library}"
+                findings.append(Finding(parameter, problem, remedy))
 
 
 def check_effect_priors(
@@ -115,24 +108,27 @@ def check_effect_priors(
         for name, effect in registry.items()
         if issubclass(effect, Scatter)
     }
-    findings = []
-    for name, prior in case.gear.effect_priors.items():
-        if name in scatter:
-            problem = "has its prior under another name"
-            remedy = f"Give it as {scatter[name]}"
-        elif name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f"Did you mean '{near[0]}'? " if near else ""
-            problem = "is no parameter of an effect in the library"
-            remedy = f"{hint}`hdcal effects` lists them"
-        elif prior.unit not in ("", known[name]):
-            problem = f"has the unit {prior.unit}, not {known[name]}"
-            remedy = f"Give it in {known[name]}"
-        else:
-            continue
-        findings.append(Finding("gear file", problem, remedy, column=f"priors.{name}"))
-    if findings:
-        raise InputError(findings)
+    with Findings() as findings:
+        for name, prior in case.gear.effect_priors.items():
+            if name in scatter:
+                problem = "has its prior under another name"
+                remedy = f"Give it as {scatter[name]}"
+            elif name not in known:
+                problem = "is no parameter of an effect in the library"
+                remedy = f"{_nearest(name, known)}`hdcal effects` lists them"
+            elif prior.unit not in ("", known[name]):
+                problem = f"has the unit {prior.unit}, not {known[name]}"
+                remedy = f"Give it in {known[name]}"
+            else:
+                continue
+            column = f"priors.{name}"
+            findings.append(Finding("gear file", problem, remedy, column=column))
+
+
+def _nearest(name: str, known: Collection[str]) -> str:
+    """Return a question for the nearest known name; empty if none is near."""
+    near = get_close_matches(name, known, n=1)
+    return f"Did you mean '{near[0]}'? " if near else ""
 
 
 def calibrate(

@@ -1,6 +1,6 @@
 """`hdcal calibrate`: from measurements to a result folder."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,9 @@ from hdcal.cli.options import (
     take_reading,
 )
 from hdcal.errors import Finding
+
+if TYPE_CHECKING:
+    from hdcal.data.case import Case
 
 
 @command(short_help="From measurements to a result folder.")
@@ -52,6 +55,7 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
     gear set in motion, and mass, damping and stiffness are calibrated.
     """
     from hdcal.cli.progress import progress_bar
+    from hdcal.inference.posterior_file import FILE_NAME
     from hdcal.inference.sample import check_settings
 
     if dynamic:
@@ -74,19 +78,33 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
             out = f"{case.name}-calibration"
         console.reserve_folder(out, force)
     assert case is not None and out is not None
-    if dynamic:
-        from hdcal.motion.dynamic_calibration import calibrate_dynamic as sample
-        from hdcal.motion.summary import dynamic_report as report
-
-        # With none given the data decide.
-        settings["effects"] = settings["effects"] or None
-    else:
-        from hdcal.calibration.calibrate import calibrate as sample
-        from hdcal.calibration.summary import calibration_report as report
-
-        settings["adapt_noise"] = not settings.pop("constant_noise")
     for note in case.notes:
         console.words(note)
+    if dynamic:
+        return _dynamic(console, case, settings)
+    from hdcal.calibration.calibrate import calibrate as sample
+    from hdcal.calibration.calibration import calibration_of
+
+    settings["adapt_noise"] = not settings.pop("constant_noise")
     with progress_bar() as progress:
-        posterior: Any = sample(case, progress=progress, **settings)
-    return console.report(report(posterior, console.command))
+        posterior = sample(case, progress=progress, **settings)
+    found = calibration_of(posterior)
+    return console.show(
+        found,
+        figures=["calibration"],
+        tables={"bands.csv": found.bands.to_frame()},
+        others={FILE_NAME: posterior.to_netcdf},
+    )
+
+
+def _dynamic(console: Console, case: "Case", settings: dict[str, Any]) -> int:
+    """Calibrate a gear that moves, and return the exit code."""
+    from hdcal.cli.progress import progress_bar
+    from hdcal.motion.dynamic_calibration import calibrate_dynamic
+    from hdcal.motion.summary import dynamic_report
+
+    # Without effects the data decide.
+    settings["effects"] = settings["effects"] or None
+    with progress_bar() as progress:
+        posterior = calibrate_dynamic(case, progress=progress, **settings)
+    return console.report(dynamic_report(posterior, console.command))

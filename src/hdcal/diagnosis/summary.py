@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
@@ -16,6 +17,7 @@ from hdcal.inference.posterior_file import FILE_NAME
 from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.prediction.engine.pooled import pool
+from hdcal.report.chart_spec import Chart
 from hdcal.report.parameters import INTERVAL, Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
@@ -87,11 +89,20 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
     def bands() -> Bands:
         return default_bands(list(verdict.posteriors.values()))
 
+    @cache
+    def bands_chart() -> Chart:
+        from hdcal.calibration.charts import calibration_chart
+
+        assert refit is not None
+        fit = refit[1]
+        chart = calibration_chart(fit, bands(), residuals(fit))
+        return replace(chart, failed=not fit.usable)
+
     def figures():
-        from hdcal.calibration.figure.bands import calibration_figure
         from hdcal.diagnosis.figure.closure import shrink_figure
         from hdcal.diagnosis.figure.where import where_figure
         from hdcal.diagnosis.figure.which import which_figure
+        from hdcal.report.chart_drawing import draw
 
         drawn = {
             "where": where_figure(verdict),
@@ -99,18 +110,18 @@ def verdict_report(verdict: Verdict, command: str = "") -> Report[VerdictAnswer]
             "shrink": shrink_figure(verdict),
         }
         if refit is not None:
-            fit = refit[1]
-            drawn["bands"] = calibration_figure(fit, bands(), residuals(fit))
+            drawn["bands"] = draw(bands_chart())
         return drawn
 
     def charts():
-        from hdcal.calibration.chart import calibration_charts
         from hdcal.diagnosis.chart import where_charts
 
         # Of a failed fit there is the marked figure alone.
-        made = {"where": where_charts(verdict)} if verdict.status == "ok" else {}
+        made: dict[str, Any] = {}
+        if verdict.status == "ok":
+            made["where"] = where_charts(verdict)
         if refit is not None and refit[1].usable:
-            made["bands"] = calibration_charts(bands(), residuals(refit[1]))
+            made["bands"] = bands_chart()
         return made
 
     return Report(

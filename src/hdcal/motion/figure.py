@@ -12,13 +12,13 @@ from hdcal.report.canvas import (
     DARK,
     GREY,
     ORANGE,
-    beyond,
     heading,
     plain,
     style,
     thinned,
     watermark,
 )
+from hdcal.report.chart_spec import beyond
 
 
 def response_figure(response: Response) -> Figure:

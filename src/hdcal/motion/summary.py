@@ -1,5 +1,6 @@
 """A dynamic calibration as an answer, and all that its result folder holds."""
 
+from dataclasses import replace
 from functools import cache
 from typing import Any, cast
 
@@ -86,12 +87,15 @@ def dynamic_report(
 
     def figures():
         from hdcal.motion.figure import motion_figure
-        from hdcal.report.draws_figure import prior_figure, sampler_figure
+        from hdcal.report.chart_drawing import draw
+        from hdcal.report.draws_charts import prior_chart, rank_chart
+
+        failed = not posterior.usable
 
         return {
             "motion": motion_figure(posterior, bands()),
-            "priors": prior_figure(posterior),
-            "sampler": sampler_figure(posterior),
+            "priors": draw(replace(prior_chart(posterior), failed=failed)),
+            "sampler": draw(replace(rank_chart(posterior), failed=failed)),
         }
 
     return Report(

@@ -13,7 +13,6 @@ contact. No speed enters, so slow motions stick and slip as fast ones do.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -174,6 +173,9 @@ def integrate(
         to its end within the allowed number of steps, and whether it ended at the
         reach.
     """
+    # Half a second, which only motion needs.
+    import diffrax
+
     pace = jnp.sqrt(oscillator.stiffness / oscillator.mass)
     size = force.largest() / oscillator.stiffness
     size = jnp.where(size > 0.0, size, 1.0)

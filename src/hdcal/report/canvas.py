@@ -164,15 +164,6 @@ def name_rows(axes: Axes, names: Sequence[str], *, size: float = 8.5) -> None:
     axes.grid(False, axis="y")
 
 
-def beyond(tested: np.ndarray) -> np.ndarray:
-    """Return the rows that are drawn as not tested, with those next to them.
-
-    Neighbouring stretches share a point, else a white slit opens between them.
-    """
-    before, after = np.append(False, ~tested[:-1]), np.append(~tested[1:], False)
-    return ~tested | after | before
-
-
 def thinned(size: int) -> np.ndarray:
     """Return the rows to draw: all of them, or an even-handed choice, in order."""
     if size <= MOST_DRAWN:

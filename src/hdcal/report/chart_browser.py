@@ -37,6 +37,7 @@ class _Columns:
         self._bands: list[tuple[int, int, float]] = []
         self._errors: list[tuple[int, int, int]] = []
         self._rules: list[dict[str, Any]] = []
+        self._labelled: dict[str, Any] = {}
         for mark in panel.marks:
             self._add(mark)
 
@@ -47,7 +48,8 @@ class _Columns:
             "x": panel.x,
             "y": panel.y,
             "title": panel.title,
-            "height": 380 if panel.wide else 300,
+            "height": round(110 * panel.height) or (380 if panel.wide else 300),
+            "ticks": panel.y_ticks,
             "wide": panel.wide,
             "names": list(panel.names),
             "marked": [],
@@ -125,7 +127,10 @@ class _Columns:
     ) -> int:
         """Add a series and return its place; an `edge` has no line and no legend."""
         look = {"points": points and not edge, "width": width, "dashed": dashed}
-        self._series.append({"label": mark.label, "colour": mark.colour, **look})
+        # Of marks with the same label the legend shows the first one.
+        first = self._labelled.setdefault(mark.label, mark) is mark
+        label = mark.label if first else ""
+        self._series.append({"label": label, "colour": mark.colour, **look})
         self._values.append((np.asarray(x, float), np.asarray(y, float), points))
         return len(self._series) - 1
 

@@ -30,7 +30,7 @@ _WIDTH = 7.6
 _MANY = 300
 # More names, or longer ones, leave an axis no room.
 _MOST_NAMES, _LONGEST_NAME, _LEVEL = 60, 26, 70
-_MOST_LEGENDS, _LONGEST_LEGEND = 10, 60
+_MOST_LEGENDS, _LONGEST_LEGEND = 12, 60
 
 
 def images(
@@ -61,9 +61,16 @@ def draw(chart: Chart) -> Figure:
             draw_panel(panel, axes, named)
             if not panel.wide:
                 first = first or axes
+                if chart.columns > 1 and not (panel.names or panel.x_log):
+                    axes.locator_params(axis="x", nbins=5)
                 if chart.share_y and column:
                     axes.tick_params(labelleft=False)
                     axes.set_ylabel("")
+        if chart.share_x and chart.columns > 1:
+            # Side by side there is no room for the same label again.
+            for axes in figure.axes:
+                axes.set_xlabel("")
+            figure.supxlabel(plain(chart.panels[-1].x), fontsize=10)
         if chart.failed:
             watermark(figure)
     return figure
@@ -109,7 +116,8 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
     for order, mark in enumerate(panel.marks):
         handle = _DRAWERS[type(mark)](axes, mark, panel.horizontal, 2.0 + 0.01 * order)
         if mark.label:
-            entries.setdefault(mark.label, []).append(handle)
+            handles = handle if isinstance(handle, list) else [handle]
+            entries.setdefault(mark.label, []).extend(handles)
     x, y = ("y", "x") if panel.horizontal else ("x", "y")
     for axis, label, limits, log in (
         (x, panel.x, panel.x_limits, panel.x_log),
@@ -135,7 +143,10 @@ def draw_panel(panel: Panel, axes: Axes, named: set[str] | None = None) -> Axes:
         names = [plain(name, _LONGEST_LEGEND) for name in entries]
         look: dict[str, Any] = {"frameon": True, "framealpha": 0.8, "edgecolor": "none"}
         combined = {tuple: HandlerTuple(ndivide=1)}
-        axes.legend(handles, names, loc="best", handler_map=combined, **look)
+        place: dict[str, Any] = {"loc": "best"}
+        if panel.legend_beside:
+            place = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0)}
+        axes.legend(handles, names, handler_map=combined, **place, **look)
     return axes
 
 
@@ -205,13 +216,14 @@ def _points(axes: Axes, mark: Points, turned: bool, order: float) -> Any:
 
 def _band(axes: Axes, mark: Band, turned: bool, order: float) -> Any:
     fill = axes.fill_betweenx if turned else axes.fill_between
+    ends = mark.x, mark.low, mark.high
     shade = {"color": mark.colour, "linewidth": 0.0, "zorder": order}
-    area = fill(mark.x, mark.low, mark.high, alpha=mark.opacity, **shade)
+    found = [fill(*ends, alpha=mark.opacity, **shade)]
     if mark.hatched:
+        # By itself: in an SVG the opacity of an area is that of its hatching too.
         edge = {"facecolor": "none", "edgecolor": mark.colour, "linewidth": 0.0}
-        ends = mark.x, mark.low, mark.high
-        fill(*ends, hatch="////", alpha=0.45, zorder=order, **edge)
-    return area
+        found.append(fill(*ends, hatch="////", alpha=0.45, zorder=order, **edge))
+    return found
 
 
 def _bars(axes: Axes, mark: Bars, turned: bool, order: float) -> Any:

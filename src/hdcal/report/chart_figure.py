@@ -4,6 +4,8 @@ from matplotlib.axes import Axes
 
 from hdcal.report.canvas import plain
 from hdcal.report.chart import Chart
+from hdcal.report.chart_drawing import draw_panel
+from hdcal.report.chart_spec import Chart as ChartSpec
 
 _INK = "#222222"
 # A legend of more lines hides what it explains.
@@ -14,7 +16,7 @@ _MOST_PLACES, _LONGEST_PLACE = 60, 16
 _LEVEL = 60
 
 
-def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
+def draw_chart(chart: Chart | ChartSpec, axes: Axes | None = None) -> Axes:
     """Draw a chart, and return where.
 
     Args:
@@ -22,6 +24,8 @@ def draw_chart(chart: Chart, axes: Axes | None = None) -> Axes:
         axes: where; by default new ones of pyplot's.
     """
     axes = axes_or_new(axes)
+    if isinstance(chart, ChartSpec):
+        return draw_panel(chart.panels[0], axes)
     for high, low, strength in chart.bands:
         top, bottom = chart.series[high], chart.series[low]
         look = {"color": top.colour, "alpha": strength, "linewidth": 0.0}

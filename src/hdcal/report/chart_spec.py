@@ -14,6 +14,7 @@ import numpy as np
 BLUE, ORANGE, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 YELLOW, SKY, GREY, RED, INK = "#E69F00", "#56B4E9", "#8a8a8a", "#b00020", ""
 CYCLE = (BLUE, ORANGE, GREEN, PURPLE, YELLOW, SKY)
+_ASCENDING = (BLUE, SKY, GREEN, YELLOW, ORANGE, RED)
 # More points than this make large files and show no more.
 MOST_DRAWN = 4000
 Dash = Literal["solid", "dashed", "dotted", "dashdot"]
@@ -115,6 +116,7 @@ class Panel:
         y_ticks: whether the y axis has a scale; a density needs none.
         wide: takes a whole row of the chart.
         height: in inches; by default one that suits the marks.
+        legend_beside: whether the legend is outside, so that it covers no mark.
     """
 
     x: str
@@ -130,6 +132,7 @@ class Panel:
     y_ticks: bool = True
     wide: bool = False
     height: float = 0.0
+    legend_beside: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,6 +152,21 @@ class Chart:
     share_x: bool = False
     share_y: bool = False
     failed: bool = False
+
+
+def ascending_colours(count: int) -> list[str]:
+    """Return a colour for each of some ascending levels, from cold to hot."""
+    places = np.round(np.linspace(0.0, len(_ASCENDING) - 1.0, count)).astype(int)
+    return [_ASCENDING[place] for place in places]
+
+
+def beyond(tested: np.ndarray) -> np.ndarray:
+    """Return the rows of a curve that are drawn as not tested.
+
+    Those beside them are included, else a gap would open between both parts.
+    """
+    before, after = np.append(False, ~tested[:-1]), np.append(~tested[1:], False)
+    return ~tested | after | before
 
 
 def drawn_rows(y: np.ndarray) -> np.ndarray:

@@ -10,6 +10,8 @@ from typing import NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 
 from hdcal.report.chart import Chart, charts_json
+from hdcal.report.chart_browser import chart_json
+from hdcal.report.chart_spec import Chart as ChartSpec
 from hdcal.report.document import Document, Table
 from hdcal.report.plain import printable
 
@@ -30,7 +32,7 @@ def html_page(
     document: Document,
     images: Mapping[str, bytes],
     template: str = "page.html.j2",
-    charts: Mapping[str, Sequence[Chart]] | None = None,
+    charts: Mapping[str, Sequence[Chart] | ChartSpec] | None = None,
 ) -> str:
     """Return a document as the text of an HTML file.
 
@@ -43,7 +45,10 @@ def html_page(
     Raises:
         KeyError: a picture has no drawing.
     """
-    touched = {name: charts_json(each) for name, each in (charts or {}).items()}
+    touched = {
+        name: chart_json(each) if isinstance(each, ChartSpec) else charts_json(each)
+        for name, each in (charts or {}).items()
+    }
     drawings = {
         name: Drawing(_address(image), touched.get(name, ""))
         for name, image in images.items()

@@ -47,7 +47,7 @@ def html_page(
         image += _INTERACTIVE.format(Markup(chart_json(charts[name])))
         return _FIGURE.format(Markup(" data-touch"), image, caption)
 
-    body = html(parsed(result.block("body", command)), figure)
+    body = html(parsed(result.block("body", command, on_page=True)), figure)
     more = folded(result.block("page", command), figure)
     style, script = _part("style.css"), ""
     if "data-touch" in body + more:

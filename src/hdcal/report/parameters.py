@@ -93,15 +93,6 @@ def parameter_estimates(posterior: Posterior) -> dict[str, ParameterEstimate]:
     }
 
 
-def posterior_rows(posterior: Posterior) -> dict[str, Mapping | ParameterEstimate]:
-    """Return stiffness as read, which is none of the parameters, and these, by name."""
-    stiffness = vars(credible_interval(posterior.draws["stiffness"]))
-    return {
-        "stiffness": {**stiffness, "unit": "N/mm"},
-        **parameter_estimates(posterior),
-    }
-
-
 def measured(
     parameters: Mapping[str, ParameterEstimate], theory: Theory
 ) -> dict[str, ParameterEstimate]:

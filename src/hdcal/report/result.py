@@ -177,7 +177,10 @@ class Result(Item):
     @computed_field
     @property
     def headline(self) -> Words:
-        """The answer in one sentence."""
+        """The answer in one sentence, or why there is none."""
+        if self.reasons:
+            why = "; ".join(self.reasons)
+            return f"This result failed its checks and must not be used: {why}."
         return self.line("headline")
 
     @computed_field
@@ -186,15 +189,28 @@ class Result(Item):
         """What to do next in one sentence."""
         return self.line("next_step") or None
 
-    def block(self, name: str, command: str = "", *, plain: bool = False) -> str:
+    def block(
+        self,
+        name: str,
+        command: str = "",
+        *,
+        plain: bool = False,
+        on_page: bool = False,
+    ) -> str:
         """Return a block of the template in Markdown; empty if there is none.
 
         Args:
             name: of the block.
             command: the command line that made the result.
             plain: without the escapes of Markdown.
+            on_page: whether it is for the page, which folds sections away.
         """
-        values = {"result": self, "part": self.part, "command": command}
+        values = {
+            "result": self,
+            "part": self.part,
+            "command": command,
+            "on_page": on_page,
+        }
         return rendered(self.template, name, values, plain=plain)
 
     def line(self, name: str) -> str:

@@ -1,6 +1,6 @@
 """The folder of a result: page, JSON, charts, tables and other files."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
 from hdcal.report.chart_drawing import images
@@ -22,6 +22,7 @@ def write_result(
     *,
     command: str = "",
     answer: str = "summary.json",
+    figures: Collection[str] | None = None,
     tables: "Mapping[str, pd.DataFrame] | None" = None,
     others: Mapping[str, Callable[[], bytes]] | None = None,
 ) -> None:
@@ -32,17 +33,23 @@ def write_result(
         target: where.
         command: the command line that made the result.
         answer: name of the JSON file.
+        figures: names of the charts that become files too; by default all of them.
         tables: by the names of their CSV files.
         others: content of other files by their names.
     """
-    drawn = {name: images(chart, name) for name, chart in result.charts().items()}
+    charts = result.charts()
+    kept = charts if figures is None else figures
+    drawn = {
+        name: images(chart, name, ("svg", "png") if name in kept else ("svg",))
+        for name, chart in charts.items()
+    }
     page = html_page(result, command, {n: each["svg"] for n, each in drawn.items()})
     contents = {
         answer: result.to_json().encode(),
         PAGE: page.encode("utf-8", "xmlcharrefreplace"),
     }
-    for name, each in drawn.items():
-        contents |= {f"{name}.{kind}": image for kind, image in each.items()}
+    for name in kept:
+        contents |= {f"{name}.{kind}": image for kind, image in drawn[name].items()}
     contents |= {
         name: columns_csv(dict(table)).encode()
         for name, table in (tables or {}).items()

@@ -3,8 +3,8 @@
 A template defines the blocks `title`, `subtitle`, `headline`, `next_step`, `body` and
 `page`. A terminal, a notebook and the page show all but the last one, which is shown on
 the page only: there each `##` heading begins a folded section, and each `#` heading a
-group of them. Its variables are `result`, `part` (the word for what was measured) and
-`command` (the command line).
+group of them. Its variables are `result`, `part` (the word for what was measured),
+`command` (the command line) and `on_page` (whether the body is for the page).
 """
 
 import re
@@ -17,7 +17,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.report.plain import printable
-from hdcal.report.words import newton, number, percent
+from hdcal.report.words import capital, label, newton, number, percent, unit
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -59,12 +59,15 @@ def _environment(plain: bool) -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= {
+        "capital": capital,
         "code": code,
+        "label": label,
         "median": median,
         "newton": newton,
         "number": number,
         "percent": percent,
         "span": span,
+        "unit": unit,
     }
     return environment
 

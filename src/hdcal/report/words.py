@@ -1,11 +1,11 @@
 """Numbers, priors and names in the form in which people read them."""
 
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
+from hdcal.data.theory_names import SPRING
 from hdcal.report.parameters import Interval
 from hdcal.report.units import UNITS
 
@@ -110,25 +110,14 @@ def prior_words(name: str, prior: Prior) -> str:
     return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
 
 
-def label(name: str) -> str:
-    """Return what a parameter is called on paper."""
+def label(name: str, theory: str = "") -> str:
+    """Return what a parameter is called on paper, under some theory."""
+    if name == "K" and theory == SPRING:
+        return "stiffness K"
     effect, dot, parameter = name.partition(".")
     if dot:
         return f"{effect}: {parameter}".replace("_", " ")
     return LABELS.get(name, name.replace("_", " "))
-
-
-def with_labels(sentences: Sequence[str], names: Iterable[str]) -> list[str]:
-    """Return sentences with parameters called what they are called on paper.
-
-    Args:
-        sentences: that hold names of parameters.
-        names: of all parameters that they may hold.
-    """
-    longest = "|".join(re.escape(name) for name in sorted(names, key=len, reverse=True))
-    name = re.compile(rf"(?<![\w./])(?:{longest})(?![\w.]\w|\w)")
-    told = (name.sub(lambda found: label(found[0]), words) for words in sentences)
-    return [capital(words) for words in told]
 
 
 def capital(text: str) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from hdcal.report.chart import Chart
+from hdcal.report.chart_spec import Chart as ChartSpec
 from hdcal.report.document import Document, answer_spoken_of, spoken_of
 from hdcal.report.plain import as_json
 from hdcal.report.saving import Target
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 A = TypeVar("A", covariant=True)
 Tables = Mapping[str, Mapping[str, np.ndarray]]
-Charts = Mapping[str, Sequence[Chart]]
+Charts = Mapping[str, Sequence[Chart] | ChartSpec]
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from hdcal.motion.respond.respond import Response
-from hdcal.report.canvas import beyond
 from hdcal.report.chart import COLOURS, Chart, Series
+from hdcal.report.chart_spec import beyond
 
 
 def response_charts(response: Response) -> tuple[Chart, Chart]:

@@ -212,10 +212,10 @@ function touch(figure) {
       }},
       axes: [chart.x, chart.y].map(label => ({
         label: label, stroke: text, grid: {stroke: line, width: 1},
+        show: label === chart.x || chart.ticks !== false,
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
-        ...(label === chart.x && chart.names.length ? named(chart) : {}),
         ...(label === chart.x && chart.names.length
-          ? {} : {values: (_, places) => places.map(shown)}),
+          ? named(chart) : {values: (_, places) => places.map(shown)}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({
@@ -238,10 +238,11 @@ function touch(figure) {
     drawn.forEach((plot, which) => {
       syncs[charts[which].x].sub(plot);
       // Both ends of a band share a line; bands of several curves would fill the page.
-      const {series, bands} = charts[which], band = bandsOf(charts[which]);
+      const {series} = charts[which], band = bandsOf(charts[which]);
+      const many = Object.keys(band).filter(k => series[k].label).length > 4;
       const rows = plot.root.querySelectorAll(".u-legend .u-series");
       series.forEach((each, k) => {
-        if (!each.label || isEdge(each) && (bands.length > 3 || !(k in band)))
+        if (!each.label || isEdge(each) && (many || !(k in band)))
           rows[k + 1].style.display = "none";
       });
     });

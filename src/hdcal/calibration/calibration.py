@@ -1,0 +1,206 @@
+"""A calibration as a result: estimates, findings and what to do about them."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Literal, get_args
+
+from pydantic import Field, InstanceOf, computed_field
+
+from hdcal.calibration.charts import calibration_chart, residual_chart
+from hdcal.calibration.residual_report import ResidualShape, residual_shapes
+from hdcal.data.theory_names import SPRING, THEORY_WORDS, Theory
+from hdcal.errors import Finding, InputError
+from hdcal.inference.checks import INDEPENDENT, NOISY, PLAUSIBLE
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.residual_noise import WILD
+from hdcal.inference.residuals import Residuals, residuals
+from hdcal.physics.theory import THEORIES
+from hdcal.prediction.bands.bands import Bands, default_bands
+from hdcal.report.chart_spec import Chart
+from hdcal.report.draws_charts import prior_chart, rank_chart
+from hdcal.report.posterior_result import (
+    PARAMETER_NAMES,
+    ParameterEstimate,
+    PosteriorResult,
+    posterior_fields,
+)
+from hdcal.report.result import Interval, Words
+
+_ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
+_SIZED = [name for name in get_args(Theory) if name != SPRING]
+# Covariates whose absence leaves a question open.
+_WANTED = ("unloading", "specimen", "temperature")
+
+
+class Calibration(PosteriorResult):
+    """What `hdcal calibrate` answers; summary.json.
+
+    Attributes:
+        parameters: by name, those that were fixed last.
+        K_by_theory: from the one posterior by every theory; None of a spring.
+        residuals: their shapes that noise would rarely have.
+        effects: in the model.
+        with_gap: whether the model has a leftover discrepancy.
+        specimens: of several, by label, the stiffness of each as read [N/mm].
+        steps: names of what to do next, most urgent first.
+        left: residuals by row.
+    """
+
+    template = "calibration/report.md.j2"
+
+    format: Literal["hdcal.calibration/1"] = "hdcal.calibration/1"
+    parameters: dict[str, ParameterEstimate] = Field(
+        json_schema_extra={"required": [*_ALWAYS], "propertyNames": {**PARAMETER_NAMES}}
+    )
+    K_by_theory: dict[str, Interval | None] = Field(
+        json_schema_extra={"required": [*_SIZED]}
+    )
+    residuals: tuple[ResidualShape, ...]
+    effects: tuple[str, ...]
+    with_gap: bool
+    specimens: dict[str, Interval]
+    steps: tuple[str, ...] = Field(exclude=True)
+    left: InstanceOf[Residuals] = Field(exclude=True)
+
+    @computed_field
+    @property
+    def K_note(self) -> str:
+        """What K under the theory `article` means."""
+        return self.line("K_note")
+
+    @computed_field
+    @property
+    def next_steps(self) -> tuple[Words, ...]:
+        """What would make the answer better, most urgent first."""
+        return self.lines("next_steps")
+
+    @property
+    def known(self) -> frozenset[str]:
+        """Covariates and features that the data have."""
+        return frozenset(self.posterior.case.records.known)
+
+    @property
+    def acting(self) -> list[str]:
+        """The effects that change the force."""
+        return [e.name for e in self.posterior.effects if e.stage != "noise"]
+
+    @property
+    def shapes(self) -> set[str]:
+        """Names of the shapes that the residuals have."""
+        return {shape.name for shape in self.residuals}
+
+    @property
+    def reference_temperature(self) -> float | None:
+        """That of the stiffness [°C]; None where no temperature was measured."""
+        if "temperature" not in self.known:
+            return None
+        return self.posterior.case.gear.reference_temperature
+
+    @property
+    def theories(self) -> list[tuple[str, str, Interval | None]]:
+        """Name, meaning and K of each theory; none of a spring."""
+        if self.gear.theory == SPRING:
+            return []
+        return [(n, THEORY_WORDS.get(n, ""), K) for n, K in self.K_by_theory.items()]
+
+    @cached_property
+    def bands(self) -> Bands:
+        """Force with its bands over the tested range and beyond; bands.csv."""
+        return default_bands(self.posterior)
+
+    def make_charts(self) -> Mapping[str, Chart]:
+        """Return bands with readings, residuals, priors and ranks."""
+        posterior, left = self.posterior, self.left
+        return {
+            "calibration": calibration_chart(posterior, self.bands, left),
+            "residuals": residual_chart(left, posterior.case.run_labels),
+            "priors": prior_chart(posterior),
+            "sampler": rank_chart(posterior),
+        }
+
+
+def calibration_of(posterior: Posterior) -> Calibration:
+    """Return a calibration as a result.
+
+    Args:
+        posterior: from `calibrate`.
+    """
+    left = residuals(posterior)
+    fields = posterior_fields(posterior)
+    shapes = residual_shapes(left)
+    fields["warnings"] += tuple(shape.words for shape in shapes)
+    return Calibration(
+        **fields,
+        K_by_theory=K_by_theory(posterior),
+        residuals=shapes,
+        effects=tuple(effect.name for effect in posterior.effects),
+        with_gap=bool(posterior.settings["with_gap"]),
+        specimens=_specimens(posterior),
+        steps=tuple(dict.fromkeys(_steps(posterior, left))),
+        left=left,
+    )
+
+
+def summarise(posterior: Posterior) -> dict:
+    """Return a calibration as plain data: the content of summary.json.
+
+    Args:
+        posterior: from `calibrate`.
+
+    Raises:
+        InputError: it is another result.
+    """
+    if not isinstance(posterior, Posterior):
+        words = f"a {type(posterior).__name__} is no calibration"
+        remedy = "Its numbers are in .to_frame() and .to_datatree()"
+        raise InputError([Finding("posterior", words, remedy)])
+    return calibration_of(posterior).to_dict()
+
+
+def K_by_theory(posterior: Posterior) -> dict[str, Interval | None]:
+    """Return K under every theory from the one posterior: K_a k_a = K_b k_b.
+
+    None where there are no sizes: the stiffness of a spring is no factor of a theory.
+    """
+    if posterior.theory == SPRING:
+        return dict.fromkeys(_SIZED)
+    geometry, K = posterior.case.gear.geometry, posterior.draws["K"]
+    unit = {name: float(THEORIES[name](geometry, 1.0)) for name in _SIZED}
+    used = unit[posterior.theory]
+    return {name: Interval.of(K * (used / each)) for name, each in unit.items()}
+
+
+def _specimens(posterior: Posterior) -> dict[str, Interval]:
+    """Return the stiffness of each of several specimens [N/mm as read]."""
+    deviation = posterior.draws.get("specimen_deviation")
+    if deviation is None:
+        return {}
+    each = posterior.draws["stiffness"][:, None] * (1.0 + deviation)
+    labels = posterior.case.specimen_labels
+    return dict(zip(labels, map(Interval.of, each.T), strict=True))
+
+
+def _steps(posterior: Posterior, left: Residuals) -> Iterator[str]:
+    """Yield names of what would make the answer better, most urgent first.
+
+    The sentences are in the template.
+    """
+    if not posterior.usable:
+        yield "failed"
+        return
+    known = posterior.case.records.known
+    warned = {check.name for check in posterior.checks if check.outcome == "warning"}
+    noise = [shape.name for shape in left.noise]
+    if PLAUSIBLE in warned:
+        yield "implausible"
+    if WILD in noise:
+        yield WILD
+    if "specimens" in known:
+        yield "several specimens"
+    if INDEPENDENT in warned and "unloading" in known:
+        yield "strong correlation"
+    yield from (shape.name for shape in left.structure)
+    yield from noise
+    if NOISY in warned and not left.structure:
+        yield "much noise"
+    yield from (f"no {name}" for name in _WANTED if name not in known)

@@ -1,0 +1,187 @@
+"""Charts of a calibration: readings with bands, and residuals."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hdcal.data.loading import movement_words
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.residuals import Residuals
+from hdcal.prediction.bands.bands import Bands
+from hdcal.prediction.bands.charts import (
+    FORCE,
+    band_marks,
+    branch_marks,
+    branches,
+)
+from hdcal.report.chart_spec import (
+    CYCLE,
+    GREY,
+    INK,
+    Chart,
+    Panel,
+    Points,
+    Rule,
+    Span,
+    ascending_colours,
+)
+
+_MOST_COLUMNS, _MOST_GROUPS = 3, 6
+# Marker of each direction, and its colour where colours show nothing else.
+_MARKERS = {1: ("^", INK), -1: ("v", GREY)}
+
+
+def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Chart:
+    """Return force over deformation, and below it the distance from the fit.
+
+    Args:
+        posterior: that was calibrated.
+        bands: over the tested range, at one or more temperatures.
+        left: residuals of the posterior.
+    """
+    gear, gap = posterior.case.gear, posterior.problem.discrepancy
+    axis = f"deformation as read ({gear.reading}) [mm]"
+    levels = np.unique(bands.temperature_C)
+    colours = ascending_colours(len(levels))
+    nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
+    distance = distance_from_model(bands, left)
+    reach = _reach(bands, distance)
+    top, panels = [*band_marks(bands)], []
+    for index, (level, colour) in enumerate(zip(levels, colours, strict=True)):
+        here = nearest == index
+        points = "" if len(levels) == 1 else colour
+        top += _readings(left, left.measured, here, points, "measured")
+        marks = [
+            mark
+            for branch in branches(bands)
+            # Around their medians both directions have the same bands, unless the
+            # leftover discrepancy differs between them.
+            if branch.temperature == level
+            and (branch.loading or (gap is not None and gap.looped))
+            for mark in branch_marks(bands, branch, around_median=True)
+        ]
+        panels.append(
+            Panel(
+                x=axis,
+                y="measured − fit [N]",
+                title="distance from the fit"
+                if len(levels) == 1
+                else f"at {level:g} °C",
+                marks=[*marks, Rule(at=0.0), *_readings(left, distance, here, points)],
+                y_limits=(-reach, reach),
+                height=2.3,
+            )
+        )
+    title = f"{gear.name}: force as read"
+    first = Panel(x=axis, y=FORCE, title=title, marks=top, wide=True, height=4.6)
+    columns = min(len(levels), _MOST_COLUMNS)
+    return Chart(panels=[first, *panels], columns=columns, share_x=True, share_y=True)
+
+
+def distance_from_model(bands: Bands, left: Residuals) -> np.ndarray:
+    """Return the distance of each reading from the force model alone [N]."""
+    distance = left.residual.copy()
+    gap = bands.with_gap_median_N - bands.physics_median_N
+    if not np.isfinite(gap).any():
+        return distance
+    # The discrepancy is a part of the fit, and does not depend on the temperature.
+    curves = {bands.direction[b.rows[0]]: b.rows for b in branches(bands)}
+    for direction, rows in curves.items():
+        rising = (left.direction >= 0.0) == (direction == "up")
+        here = rising if len(curves) > 1 else slice(None)
+        place = left.deformation[here]
+        distance[here] += np.interp(place, bands.deformation_mm[rows], gap[rows])
+    return distance
+
+
+def _reach(bands: Bands, distance: np.ndarray) -> float:
+    """Return the largest distance of a reading or a band in the tested range [N]."""
+    inside, middle = np.asarray(bands.tested, bool), bands.physics_median_N
+    ends = bands.new_measurement_lo_N, bands.new_measurement_hi_N
+    edges = [distance, *((end - middle)[inside] for end in ends)]
+    reach = 1.12 * float(np.max(np.abs(np.concatenate(edges))))
+    return reach if np.isfinite(reach) and reach > 0.0 else 1.0
+
+
+def _readings(
+    left: Residuals,
+    y: np.ndarray,
+    here: np.ndarray,
+    colour: str,
+    label: str = "",
+    x: np.ndarray | None = None,
+) -> Iterator[Points]:
+    """Yield some rows as points, each direction with its marker.
+
+    Args:
+        left: residuals.
+        y: values of all rows.
+        here: which rows.
+        colour: of the points; empty where it shows the direction.
+        label: of the points; empty without a legend.
+        x: places of all rows, by default the deformation.
+    """
+    x = left.deformation if x is None else x
+    words = movement_words(left.deformation)
+    for sense, (marker, usual) in _MARKERS.items():
+        rows = here & (left.direction == sense)
+        if rows.any():
+            text = f"{label}, {words[sense]}" if label else ""
+            yield Points(
+                label=text,
+                x=x[rows],
+                y=y[rows],
+                colour=colour or usual,
+                marker=marker,
+            )
+
+
+def residual_chart(left: Residuals, runs: Sequence[str] = ()) -> Chart:
+    """Return standardised residuals over deformation, order and temperature.
+
+    Args:
+        left: residuals.
+        runs: labels of the runs.
+    """
+    y, order = left.standardised, np.arange(1.0, len(left.residual) + 1.0)
+    places = {"deformation as read [mm]": left.deformation, "row of the data": order}
+    if np.ptp(left.temperature) > 0.0:
+        places["temperature [°C]"] = left.temperature
+    reach = max(3.0, 1.1 * float(np.max(np.abs(y))))
+    panels = []
+    for axis, x in places.items():
+        points = [
+            mark
+            for label, here, colour in _groups(left, runs)
+            for mark in _readings(left, y, here, colour, label, x)
+        ]
+        panels.append(
+            Panel(
+                x=axis,
+                y="(measured − fit) / sd",
+                marks=[Span(low=-2.0, high=2.0, label="±2 sd"), Rule(at=0.0), *points],
+                y_limits=(-reach, reach),
+                wide=True,
+                height=2.5,
+                legend_beside=True,
+            )
+        )
+    return Chart(panels=panels)
+
+
+def _groups(
+    left: Residuals, runs: Sequence[str]
+) -> Iterator[tuple[str, np.ndarray, str]]:
+    """Yield label, rows and colour by temperature, or else by run."""
+    warmth, labels = np.round(left.temperature, 1), np.unique(left.run)
+    levels = np.unique(warmth)
+    if 1 < len(levels) <= _MOST_GROUPS:
+        colours = ascending_colours(len(levels))
+        for level, colour in zip(levels, colours, strict=True):
+            yield f"{level:g} °C", warmth == level, colour
+    elif len(levels) == 1 and 1 < len(labels) <= _MOST_GROUPS:
+        for run, colour in zip(labels, CYCLE, strict=False):
+            name = runs[run] if len(runs) else run
+            yield f"run {name}", left.run == run, colour
+    else:
+        yield "measured", np.ones(len(warmth), bool), ""

@@ -1,1 +1,0 @@
-"""Figures of a calibration: bands, residuals and draws."""

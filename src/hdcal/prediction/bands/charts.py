@@ -1,0 +1,148 @@
+"""Bands as a chart: the curves of each temperature and direction."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.data.loading import loading_side, movement_words
+from hdcal.prediction.bands.bands import Bands
+from hdcal.report.chart_spec import (
+    Band,
+    Chart,
+    Dash,
+    Line,
+    Mark,
+    Panel,
+    ascending_colours,
+    beyond,
+)
+
+AXIS, FORCE = "deformation as read [mm]", "force [N]"
+# Kind of a band, its label and its opacity; each lies on those before it.
+_BANDS = (
+    ("new_measurement", "one new reading", 0.16),
+    ("with_gap", "with the leftover discrepancy", 0.22),
+    ("physics", "force model", 0.38),
+)
+_UNTESTED = "not tested: extrapolated"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """The curves of one temperature and direction.
+
+    Attributes:
+        temperature: of the specimen [°C].
+        rows: of the bands, in the order of the deformation.
+        colour: that of the temperature.
+        loading: whether the movement loads the specimen.
+        label: of the median, empty where another branch has the label.
+        first: whether the legend shows the bands of this branch.
+        opacity: that of the bands, less where many lie upon each other.
+    """
+
+    temperature: float
+    rows: np.ndarray
+    colour: str
+    loading: bool
+    label: str
+    first: bool
+    opacity: float
+
+
+def bands_chart(bands: Bands) -> Chart:
+    """Return force over deformation."""
+    return Chart(panels=[Panel(x=AXIS, y=FORCE, marks=band_marks(bands))])
+
+
+def band_marks(bands: Bands) -> list[Mark]:
+    """Return the bands of the force, and upon them the medians."""
+    marks = [mark for b in branches(bands) for mark in branch_marks(bands, b)]
+    return sorted(marks, key=lambda mark: isinstance(mark, Line))
+
+
+def branches(bands: Bands) -> list[Branch]:
+    """Return temperatures in ascending order, each with its directions."""
+    levels = np.unique(bands.temperature_C)
+    colours = ascending_colours(len(levels))
+    # The tested side; the curves may go beyond zero to a nominal deformation.
+    tested = np.asarray(bands.tested, bool)
+    places = bands.deformation_mm[tested if tested.any() else slice(None)]
+    side, words = loading_side(places), movement_words(places)
+    found: list[Branch] = []
+    for level, colour in zip(levels.tolist(), colours, strict=True):
+        here = bands.temperature_C == level
+        ways = list(dict.fromkeys(bands.direction[here].tolist()))
+        for way in ways:
+            rows = np.flatnonzero(here & (bands.direction == way))
+            loads = len(ways) == 1 or way == ("down" if side < 0 else "up")
+            label = f"median at {level:g} °C" if len(levels) > 1 else "median"
+            if not loads:
+                label = f"median, {words[1 if way == 'up' else -1]}"
+                label = "" if len(found) > 1 else label
+            order = np.argsort(bands.deformation_mm[rows], kind="stable")
+            found.append(
+                Branch(
+                    temperature=level,
+                    rows=rows[order],
+                    colour=colour,
+                    loading=loads,
+                    label=label,
+                    first=not found,
+                    opacity=1.0 / np.sqrt(len(levels)),
+                )
+            )
+    return found
+
+
+def branch_marks(
+    bands: Bands, branch: Branch, *, around_median: bool = False
+) -> Iterator[Mark]:
+    """Yield bands and medians of one temperature and direction.
+
+    Args:
+        bands: of any number of branches.
+        branch: which one.
+        around_median: as distances from the median, without labels.
+    """
+    rows, colour = branch.rows, branch.colour
+    x, tested = bands.deformation_mm[rows], np.asarray(bands.tested[rows], bool)
+    untested = beyond(tested)
+    middle = bands.physics_median_N[rows]
+    zero = middle if around_median else np.zeros(len(x))
+
+    def part(values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        return np.where(shown, values - zero, np.nan)
+
+    def label(text: str) -> str:
+        return text if branch.first and not around_median else ""
+
+    for kind, words, full in _BANDS:
+        low, high = (getattr(bands, f"{kind}_{end}_N")[rows] for end in ("lo", "hi"))
+        hatched = kind == "new_measurement"
+        for shown, text, opacity, lined in (
+            (tested, words, full, False),
+            (untested, _UNTESTED if hatched else "", full / 3.0, hatched),
+        ):
+            if np.isfinite(part(low, shown)).any():
+                yield Band(
+                    label=label(text),
+                    x=x,
+                    low=part(low, shown),
+                    high=part(high, shown),
+                    colour=colour,
+                    opacity=opacity * branch.opacity,
+                    hatched=lined,
+                )
+    dash: Dash = "solid" if branch.loading else "dashed"
+    name = "" if around_median else branch.label
+    curves: list[tuple[np.ndarray, np.ndarray, str, Dash, float]] = [
+        (middle, tested, name, dash, 1.6),
+        (middle, untested, label(_UNTESTED), "dotted", 1.6),
+        (bands.with_gap_median_N[rows], tested | untested, "", "dashdot", 1.0),
+    ]
+    for values, shown, text, how, width in curves:
+        if np.isfinite(part(values, shown)).any():
+            y = part(values, shown)
+            yield Line(label=text, x=x, y=y, colour=colour, dash=how, width=width)

@@ -1,0 +1,198 @@
+"""The part of a result that follows from its posterior."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cached_property
+from typing import Annotated, Any
+
+from pydantic import Field, InstanceOf
+
+from hdcal.data.theory_names import SPRING, Theory
+from hdcal.inference.checks import Check
+from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION, Driver
+from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior_tree import group_of
+from hdcal.report.parameters import parameter_estimates
+from hdcal.report.provenance import data_rows, provenance_rows
+from hdcal.report.result import (
+    INTERVAL,
+    Count,
+    Digest,
+    Interval,
+    Item,
+    Result,
+    Words,
+    quantity,
+)
+from hdcal.report.words import capital, label, prior_words
+
+_NAME = "[A-Za-z_][A-Za-z0-9_]*"
+# What a schema says of the names of parameters.
+PARAMETER_NAMES = {"pattern": f"^{_NAME}(\\.{_NAME})?$"}
+
+
+class Quantity(Interval):
+    """An interval with its unit."""
+
+    unit: Words
+
+
+class ParameterEstimate(Quantity):
+    """A parameter with its sampling quality; NaN where the gear file fixes it.
+
+    Attributes:
+        rhat: rank-normalised split R-hat.
+        ess_bulk: effective draws for the centre.
+        ess_tail: effective draws for the interval's ends.
+        contraction: share of the prior's variance that the data removed.
+        prior_sensitivity: to power-scaling of the priors.
+        likelihood_sensitivity: to power-scaling of the likelihood.
+        driven_by: whether the data or the prior decide it.
+    """
+
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+    contraction: float = Field(json_schema_extra={"maximum": 1})
+    prior_sensitivity: float
+    likelihood_sensitivity: float
+    driven_by: Driver
+
+
+class Sampling(Item):
+    """How the draws were sampled."""
+
+    chains: Annotated[int, Field(ge=2)]
+    warmup: Annotated[int, Field(ge=1)]
+    draws: Annotated[int, Field(ge=1)]
+    target_acceptance: float
+    seconds: Annotated[float, Field(ge=0.0)]
+    divergences: Count
+
+
+class CalibratedGear(Item):
+    """The gear and the theory of its model."""
+
+    name: str
+    material: str
+    theory: Theory
+
+
+class CalibratedData(Item):
+    """The data; notes are from reading them."""
+
+    name: str
+    rows: Annotated[int, Field(ge=1)]
+    sha256: Digest
+    notes: tuple[str, ...]
+
+
+class PosteriorResult(Result):
+    """A result with a sampled posterior.
+
+    Attributes:
+        warnings: sentences.
+        parameters: by name, those that were fixed last.
+        stiffness_N_per_mm: at the reference temperature, per mm as read.
+        flat_directions: in sentences, what the data do not determine.
+        interval: probability that every interval holds.
+        interval_kind: kind of the intervals.
+        checks: all of them.
+        sampling: how the draws were sampled.
+        seed: of the draws.
+        versions: of the packages that made them.
+        gear: that was calibrated.
+        data: that it was calibrated with.
+        posterior: the draws.
+    """
+
+    table = "quantities"
+
+    warnings: tuple[Words, ...]
+    parameters: dict[str, ParameterEstimate] = Field(
+        json_schema_extra={"propertyNames": {**PARAMETER_NAMES}}
+    )
+    stiffness_N_per_mm: Interval = quantity("stiffness as read", "N/mm")
+    flat_directions: tuple[Words, ...]
+    interval: float = Field(default=INTERVAL, gt=0.0, lt=1.0)
+    interval_kind: str = "equal-tailed credible interval"
+    checks: tuple[Check, ...] = Field(min_length=1)
+    sampling: Sampling
+    seed: Count
+    versions: dict[str, str] = Field(json_schema_extra={"required": ["hdcal"]})
+    gear: CalibratedGear
+    data: CalibratedData
+    posterior: InstanceOf[Posterior] = Field(exclude=True)
+
+    @cached_property
+    def quantities(self) -> Mapping[str, Quantity]:
+        """The stiffness as read, which is no parameter, and the parameters."""
+        stiffness = Quantity(**self.stiffness_N_per_mm.model_dump(), unit="N/mm")
+        return {"stiffness": stiffness, **self.parameters}
+
+    @property
+    def measured(self) -> Mapping[str, ParameterEstimate]:
+        """The parameters without those that the theory defines."""
+        defined = {"E0"} if self.gear.theory == SPRING else set()
+        return {n: one for n, one in self.parameters.items() if n not in defined}
+
+    @property
+    def contraction_limits(self) -> tuple[float, float]:
+        """Contractions from which data drive a parameter."""
+        return MIN_CONTRACTION, CLEAR_CONTRACTION
+
+    @property
+    def data_facts(self) -> list[tuple[str, str]]:
+        """The data, as pairs of name and text."""
+        return data_rows(self.posterior.case)
+
+    @property
+    def provenance(self) -> list[tuple[str, str]]:
+        """How the result was made, as pairs of name and text."""
+        return provenance_rows(self.posterior, "")
+
+    @property
+    def priors(self) -> list[tuple[str, str, str]]:
+        """Label, prior and source of each parameter."""
+        return [
+            (
+                label(name, self.gear.theory),
+                prior_words(name, prior),
+                prior.source or "the gear file",
+            )
+            for name, prior in self.posterior.priors.items()
+            if name in self.posterior.draws
+        ]
+
+
+def posterior_fields(posterior: Posterior) -> dict[str, Any]:
+    """Return the fields of a `PosteriorResult`."""
+    case, settings, checks = posterior.case, posterior.settings, posterior.checks
+    names = ("chains", "warmup", "draws", "target_acceptance", "seconds")
+    sampling: dict[str, Any] = {name: settings[name] for name in names}
+    diverging = group_of(posterior.tree, "sample_stats")["diverging"]
+    return {
+        "reasons": posterior.reasons,
+        "part": "part" if posterior.theory == SPRING else "gear",
+        "warnings": tuple(capital(c.words) for c in checks if c.outcome == "warning"),
+        "parameters": {
+            name: ParameterEstimate(**asdict(one))
+            for name, one in parameter_estimates(posterior).items()
+        },
+        "stiffness_N_per_mm": Interval.of(posterior.draws["stiffness"]),
+        "flat_directions": tuple(c.words for c in checks if c.outcome == "note"),
+        "checks": checks,
+        "sampling": Sampling(**sampling, divergences=int(diverging.sum())),
+        "seed": settings["seed"],
+        "versions": settings["versions"],
+        "gear": CalibratedGear(
+            name=case.gear.name, material=case.gear.material, theory=posterior.theory
+        ),
+        "data": CalibratedData(
+            name=case.name,
+            rows=len(case.records.force),
+            sha256=case.data_sha256,
+            notes=case.notes,
+        ),
+        "posterior": posterior,
+    }
