@@ -188,12 +188,8 @@ def test_the_chart_shows_limit_and_choice(given, sense):
         ({}, {}, "nothing may change"),
         ({"wal_thickness_mm": (0.5, 0.6)}, {}, "Did you mean 'wall_thickness_mm'"),
         ({"wall_thickness_mm": (0.6, 0.5)}, {}, "0.6:0.5 is empty"),
-        ({"wall_thickness_mm": (-0.1, 0.5)}, {}, "-0.1 mm does not lie"),
-        ({"wall_thickness_mm": (0.5, 50.0)}, {}, "not thinner than the radius"),
-        ({"load_height_mm": (50.0, 60.0)}, {}, "changes nothing under the theory"),
         (WALL, {"limit_force": -1.0}, "-1 N is no limit of the force at 0.4 mm"),
         (WALL, {"limit_force": 0.0}, "0 is no limit"),
-        (WALL, {"limit_force": np.nan}, "nan N does not lie between"),
         (WALL, {"limit_force": 120_000.0}, "takes about 70.2 N. Give it in N"),
         (WALL, {"limit_force": 0.06}, "takes about 70.2 N. Give it in N"),
         (WALL, {"limit_stress": 0.0}, "0 MPa does not lie between"),
@@ -202,9 +198,6 @@ def test_the_chart_shows_limit_and_choice(given, sense):
             {"tolerances": {"wall_thickness_mm": 0.2}},
             "0.2 is no tolerance of 0.1 mm",
         ),
-        (WALL, {"deformation": 50.0}, "50 mm on a radius of 40 mm"),
-        (WALL, {"probability": 0.0}, "does not lie between 0 and 1"),
-        (WALL, {"materials": ["stel"]}, "Did you mean 'steel'"),
     ],
 )
 def test_bad_input_is_refused(given, vary, changed, words):

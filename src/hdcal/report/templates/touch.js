@@ -214,9 +214,8 @@ function touch(figure) {
         label: label, stroke: text, grid: {stroke: line, width: 1},
         show: label === chart.x || chart.ticks !== false,
         ticks: {stroke: line, width: 1}, size: label === chart.y ? 62 : 44,
-        ...(label === chart.x && chart.names.length ? named(chart) : {}),
         ...(label === chart.x && chart.names.length
-          ? {} : {values: (_, places) => places.map(shown)}),
+          ? named(chart) : {values: (_, places) => places.map(shown)}),
       })),
       series: [{label: chart.x, value: (_, value) => placed(chart, value)}].concat(
         chart.series.map((each, k) => ({
