@@ -1,12 +1,11 @@
 """Which hypotheses are calibrated, and who carries the probability of the rest."""
 
-from threading import Event
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hdcal.diagnosis.refit import _Together, weighed
+from hdcal.diagnosis.refit import weighed
 
 
 def calibrated(failing=(), widths=None):
@@ -105,32 +104,3 @@ def test_of_many_small_ones_the_likeliest_is_kept():
     found = weighed(chances, run)
     assert sorted(asked) == sorted(["none", "unknown"])
     assert shares(found) == pytest.approx({"none": 0.04, "unknown": 0.96})
-
-
-def test_calibrations_side_by_side_tell_how_far_all_are():
-    told = []
-    together = _Together(lambda done, total: told.append((done, total)), 3)
-    for name, done in (("a", 50), ("b", 50), ("a", 100), ("b", 100), ("c", 100)):
-        together(name, done, 100)
-    assert told == [(50, 300), (100, 300), (150, 300), (200, 300), (300, 300)]
-    # A model of what is left over comes after them.
-    together("d", 50, 100)
-    assert told[-1] == (350, 400)
-
-
-def test_an_interruption_waits_for_no_other_calibration():
-    begun, released = Event(), Event()
-
-    def run(name: str):
-        if name == "a":
-            begun.set()
-            released.wait(60.0)
-        begun.wait(60.0)
-        raise KeyboardInterrupt
-
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            weighed({"b": 0.5, "a": 0.5}, run)
-        assert not released.is_set()
-    finally:
-        released.set()

@@ -6,7 +6,6 @@ import pytest
 import xarray as xr
 from posteriors import plain_draws, ramp_case, written_posterior
 from rigs import make_gear
-from trees import arrays_of
 
 from hdcal.errors import InputError
 from hdcal.inference import noise_form
@@ -41,7 +40,7 @@ def test_the_kept_form_decides_whether_a_file_is_whole(tmp_path):
         tree = found.tree.copy()
         bare = tree["posterior"].to_dataset().drop_vars(CORRELATION)
         tree["posterior"] = xr.DataTree(bare)
-        found = replace(found, arrays=arrays_of(tree), diagnoses={})
+        found = replace(found, tree=tree, diagnoses={})
         found.save(tmp_path / "posterior.nc")
         if correlated:
             with pytest.raises(InputError, match="damaged"):

@@ -74,10 +74,10 @@ def test_too_short_a_run_stays_what_was_asked_for():
 def test_a_run_is_given_up_at_the_first_divergence(monkeypatch, diverging: bool):
     """After the warm-up, where trajectories may diverge, and only if that is asked."""
 
-    def stretch(problem, whitening, states, target, *, warmup, length):
-        kept = [np.zeros((2, length)) for _ in range(7)]
-        kept[sample._DIVERGING] = np.full((2, length), diverging)
-        return states, kept
+    def stretch(problem, whitening, state, target, *, warmup, length):
+        kept = [np.zeros(length) for _ in range(7)]
+        kept[sample._DIVERGING] = np.full(length, diverging)
+        return state, kept
 
     monkeypatch.setattr(sample, "_start", lambda *_, **__: [])
     monkeypatch.setattr(sample, "_advance", stretch)

@@ -129,8 +129,6 @@ BROKEN = [
     (HardCoded, test_effect_units.test_units_do_not_matter, {}),
     (NotToBeFound, test_effect_recovery.test_recovered_from_its_own_data, {}),
     (Broken, test_effect_declarations.test_priors_exist_with_the_declared_unit, {}),
-    (Broken, test_effect_declarations.test_the_documentation_has_a_page, {}),
-    (Broken, test_effect_declarations.test_the_docstring_states_its_source, {}),
 ]
 
 

@@ -184,7 +184,8 @@ def test_indices_are_those_of_ishigamis_function():
     both = 8.0 * b**2 * np.pi**8 / 225.0
     total = np.array([alone[0] + both, alone[1], both])
     whole = sum(alone) + both
-    for seed in range(4):
-        first, every = sobol_indices(ishigami, 3, 4096, seed)
-        np.testing.assert_allclose(first, np.array(alone) / whole, atol=0.01)
-        np.testing.assert_allclose(every, total / whole, atol=0.01)
+    # The error of one set of points is 0.0045 rms, that of the mean of eight 0.0016.
+    found = [sobol_indices(ishigami, 3, 4096, seed) for seed in range(8)]
+    first, every = np.mean(found, axis=0)
+    np.testing.assert_allclose(first, np.array(alone) / whole, atol=0.0064)
+    np.testing.assert_allclose(every, total / whole, atol=0.0064)
