@@ -88,4 +88,4 @@ def own_traces(request: pytest.FixtureRequest) -> None:
     """Keep no trace of code that a test has changed, and load none in its place."""
     if "monkeypatch" in request.fixturenames and "hdcal.exported" in sys.modules:
         patch = request.getfixturevalue("monkeypatch")
-        patch.setattr("hdcal.exported._is_special", lambda leaves: True)
+        patch.setattr("hdcal.exported._needs_plain_jit", lambda leaves: True)

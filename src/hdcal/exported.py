@@ -1,8 +1,8 @@
-"""`jax.jit` that keeps its traces between processes, by `jax.export`.
+"""`jax.jit` that caches traced programs across processes, by `jax.export`.
 
-To trace and lower the programs of a calibration takes Python longer than to run them.
-Where JAX has a folder for its compilation cache, what was lowered is kept there, and a
-later process loads it. Otherwise, and under a transformation, `jit` is `jax.jit`.
+Tracing and lowering the programs of a calibration takes longer than running them.
+Where JAX has a folder for its compilation cache, lowered programs are cached there, and
+a later process loads them. Otherwise, and under a transformation, `jit` is `jax.jit`.
 """
 
 import hashlib
@@ -23,8 +23,8 @@ from jax.core import Tracer
 _TRACED = ("jax", "jaxlib", "numpy", "numpyro", "equinox", "diffrax", "optimistix")
 
 
-class _Foreign(Exception):
-    """A class of which the digest holds no code, such as an effect of the user."""
+class _NotCacheable(Exception):
+    """A class whose code the digest does not cover, such as an effect of the user."""
 
 
 def jit(
@@ -33,15 +33,15 @@ def jit(
     """Return a compiled function; serves as a decorator like `jax.jit`.
 
     Args:
-        function: of a module, of pytrees of arrays.
-        static_argnames: keyword arguments that are no arrays.
+        function: module-level; arguments and results are pytrees of arrays.
+        static_argnames: keyword arguments that are not arrays.
     """
     if function is None:
         return partial(jit, static_argnames=static_argnames)
-    return _Exported(function, static_argnames)
+    return _CachedJit(function, static_argnames)
 
 
-class _Exported:
+class _CachedJit:
     def __init__(self, function: Callable, static: tuple[str, ...]):
         update_wrapper(self, function)
         self._function, self._static = function, static
@@ -52,11 +52,12 @@ class _Exported:
         static = {name: named.pop(name) for name in self._static if name in named}
         leaves, structure = jax.tree.flatten((args, named))
         folder = _setting("jax_compilation_cache_dir")
-        if folder is None or _is_special(leaves):
+        if folder is None or _needs_plain_jit(leaves):
             return self._jitted(*args, **named, **static)
         leaves = [x if isinstance(x, jax.Array) else np.asarray(x) for x in leaves]
         shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-        kind = structure, tuple(static.items()), shapes
+        settings = jax.default_backend(), _setting("jax_enable_x64")
+        kind = structure, tuple(static.items()), shapes, settings
         if kind not in self._loaded:
             self._loaded[kind] = self._load(Path(folder), kind, leaves)
         loaded = self._loaded[kind]
@@ -65,8 +66,8 @@ class _Exported:
         return loaded(*leaves)
 
     def _load(self, folder: Path, kind: tuple, leaves: list) -> Callable | None:
-        """Return the kept program, or trace and keep it; None if it cannot be kept."""
-        structure, static, shapes = kind
+        """Load the cached program, or trace and cache it; None if it cannot be."""
+        structure, static, *rest = kind
 
         def flat(*leaves):
             args, named = jax.tree.unflatten(structure, leaves)
@@ -75,13 +76,13 @@ class _Exported:
         flat.__name__ = self._function.__name__
         try:
             parts = self.__module__, flat.__name__, _outline(structure), _text(static)
-        except _Foreign:
+        except _NotCacheable:
             return None
-        settings = jax.default_backend(), _setting("jax_enable_x64")
-        text = repr((parts, shapes, settings))
+        text = repr((parts, *rest))
         file = folder / f"export-{_code()}" / hashlib.sha256(text.encode()).hexdigest()
         with suppress(Exception):
-            return jax.jit(_read(file).call)
+            content: Any = bytearray(file.read_bytes())
+            return jax.jit(jax.export.deserialize(content).call)
         try:
             exported = jax.export.export(jax.jit(flat))(*leaves)
             _write(file, exported.serialize())
@@ -90,35 +91,25 @@ class _Exported:
             return None
         return jax.jit(exported.call)
 
-    def clear_cache(self) -> None:
-        """Release what was compiled."""
-        self._jitted.clear_cache()
-        self._loaded.clear()
-
 
 def _setting(name: str) -> Any:
-    # `jax.config.read` refuses those that a context may change.
+    # `jax.config.read` rejects options that a context manager may override.
     return getattr(jax.config, name)
 
 
-def _is_special(leaves: list) -> bool:
+def _needs_plain_jit(leaves: list) -> bool:
     """Return whether a transformation or a debugging mode needs `jax.jit` itself."""
     modes = "jax_disable_jit", "jax_debug_nans", "jax_debug_infs"
     tracing = any(isinstance(leaf, Tracer) for leaf in leaves)
     return tracing or any(map(_setting, modes))
 
 
-def _read(file: Path) -> Any:
-    content: Any = bytearray(file.read_bytes())
-    return jax.export.deserialize(content)
-
-
 def _write(file: Path, content: bytes | bytearray) -> None:
     """Write a file, whole or not at all."""
     file.parent.mkdir(0o700, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=file.parent, delete=False) as part:
-        part.write(content)
-    os.replace(part.name, file)
+    with tempfile.TemporaryDirectory(dir=file.parent) as part:
+        (Path(part) / file.name).write_bytes(content)
+        os.replace(Path(part) / file.name, file)
 
 
 @cache
@@ -142,10 +133,10 @@ def _outline(structure: Any) -> str:
 
 
 def _text(value: Any) -> str:
-    """Return what is no array as text.
+    """Return a value that is not an array as text.
 
     Raises:
-        _Foreign: it is, or is an instance of, a class of other code.
+        _NotCacheable: the value is a class, or an instance of one, of other packages.
     """
     if isinstance(value, tuple | list):
         return f"({','.join(map(_text, value))})"
@@ -155,5 +146,5 @@ def _text(value: Any) -> str:
         return _text(sorted(value.items()))
     kind = value if isinstance(value, type) else type(value)
     if kind.__module__.partition(".")[0] not in ("builtins", "hdcal", *_TRACED):
-        raise _Foreign
+        raise _NotCacheable
     return f"{kind.__module__}.{kind.__qualname__}" if kind is value else repr(value)

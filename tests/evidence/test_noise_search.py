@@ -81,9 +81,9 @@ def test_modes_are_those_of_a_slow_search(misfit):
 @pytest.fixture
 def few_steps(monkeypatch) -> Iterator[None]:
     monkeypatch.setattr(noise, "_STEPS", 3)
-    noise._laplace.clear_cache()
+    jax.clear_caches()
     yield
-    noise._laplace.clear_cache()
+    jax.clear_caches()
 
 
 @pytest.mark.usefixtures("few_steps")

@@ -148,10 +148,10 @@ def summarise(posterior: Posterior) -> dict:
         posterior: from `calibrate`.
 
     Raises:
-        InputError: it is another result.
+        InputError: `posterior` is not a calibration.
     """
     if not isinstance(posterior, Posterior):
-        words = f"a {type(posterior).__name__} is no calibration"
+        words = f"a {type(posterior).__name__} is not a calibration"
         remedy = "Its numbers are in .to_frame() and .to_datatree()"
         raise InputError([Finding("posterior", words, remedy)])
     return calibration_of(posterior).to_dict()

@@ -1,4 +1,4 @@
-"""The posterior of a diagnosis: several models of the same data, each with its weight.
+"""The posterior of a diagnosis: models of the same data with their probabilities.
 
 In its file each model is a group named by its hypothesis, with the groups of a single
 calibration below it and its probability among the attributes.
@@ -76,7 +76,7 @@ class ModelAverage:
         return tree
 
     def require_usable(self) -> None:
-        """Raise when nothing may be derived from a model.
+        """Raise if any model failed its checks.
 
         Raises:
             NotUsable: with the reasons.

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 INTERVAL = 0.95
 _FIRST = ("schema", "status", "reasons", "headline", "next_step")
-# A result that failed has reasons, another one has none.
+# A failed result has reasons, any other result has none.
 _RULE = {
     "if": {"properties": {"status": {"const": "failed"}}},
     "then": {"properties": {"reasons": {"minItems": 1}}},
@@ -35,7 +35,7 @@ Words = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=0)]
 EffectName = Annotated[str, Field(pattern="^[A-Za-z_][A-Za-z0-9_]*$")]
 Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-# Sums of many probabilities may end a rounding error above one.
+# Sums of probabilities may exceed one by a rounding error.
 Probability = Annotated[float, Field(ge=0.0, le=1.000001)]
 # What charts need and JSON does not hold.
 Draws = Annotated[np.ndarray, Field(exclude=True)]
@@ -47,10 +47,10 @@ def quantity(
     """Declare a field.
 
     Args:
-        label: as axes and tables show it.
-        unit: of the number; empty for a pure one.
+        label: shown on axes and in tables.
+        unit: of the number; empty for a dimensionless one.
         column: name in tables; by default the name of the field.
-        limits: those of pydantic's `Field`.
+        limits: further constraints, as of pydantic's `Field`.
     """
     extra = {"unit": unit, "column": column}
     given = {name: text for name, text in extra.items() if text}
@@ -104,7 +104,7 @@ class Item(BaseModel):
         return str(extra.get(key, "")) if isinstance(extra, Mapping) else ""
 
     def columns(self) -> dict[str, Any]:
-        """Return numbers and texts by the names of columns.
+        """Return numbers and texts keyed by column name.
 
         The ends of an interval stand beside its median as `_lo` and `_hi`: those of
         `stiffness_N_per_mm` are `stiffness_lo` and `stiffness_hi`.
@@ -142,7 +142,7 @@ class Interval(Item):
 
     @classmethod
     def of(cls, draws: np.ndarray, probability: float = INTERVAL) -> "Interval":
-        """Return the interval that holds so much of the probability of draws."""
+        """Return the equal-tailed interval of draws with this probability."""
         tail = (1.0 - probability) / 2.0
         lo, median, hi = np.quantile(draws, [tail, 0.5, 1.0 - tail])
         return cls(median=float(median), lo=float(lo), hi=float(hi))
@@ -223,7 +223,7 @@ class Result(Item):
         return tuple(filter(None, found))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the result as JSON holds it."""
+        """Return the result as a JSON-compatible dict."""
         found = json.loads(self.model_dump_json())
         return {name: found.pop(name) for name in _FIRST} | found
 

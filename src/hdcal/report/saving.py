@@ -22,16 +22,16 @@ MARKER = "hdcal-result.json"
 
 @dataclass
 class Target:
-    """Folder or file that only this process writes, from creation to context exit.
+    """Output folder or file, locked by this process until the context exits.
 
     Attributes:
-        name: as given by the user; links are followed.
+        name: as given by the user; symbolic links are resolved.
         force: whether an older result may be replaced.
         option: the parameter that sets `force`.
         beginning: first bytes of a file that may be replaced; None for a folder.
 
     Raises:
-        InputError: it exists, is in use or cannot be written.
+        InputError: the target exists, is in use or cannot be written.
     """
 
     name: str
@@ -84,8 +84,8 @@ class Target:
         """Path of an empty folder, or of a new file, that is renamed at the end.
 
         Raises:
-            InputError: the target appeared or was edited; the result is beside it.
-            NotWritable: the disk refused.
+            InputError: the target was created or edited; the new result is beside it.
+            NotWritable: writing failed.
         """
         try:
             if self.beginning is None:
@@ -129,10 +129,10 @@ class Target:
         return None
 
     def _refusal(self, problem: str) -> InputError:
-        return InputError([Finding(self.name or ".", problem, "Choose another one")])
+        return InputError([Finding(self.name or ".", problem, "Choose another name")])
 
     def _clean(self) -> None:
-        """Undo an exchange of results that was interrupted, remove what is left."""
+        """Roll back an interrupted replacement and remove temporary files."""
         if self._new.exists() and self._old.exists() and not self.path.exists():
             self._old.rename(self.path)
         for part in (self._new.parent, self._old.parent):
@@ -140,7 +140,7 @@ class Target:
 
 
 def _contents(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file below a folder, by its name, and other entries."""
+    """SHA-256 of each file by relative path; "link" or "folder" for other entries."""
     found = {}
     for path in sorted(folder.rglob("*")):
         content = "link" if path.is_symlink() else "folder"

@@ -53,7 +53,7 @@ class CoulombFriction(
 ):
     """F → F + F_c s, with s the sign of the last movement; a hold keeps it.
 
-    Dry friction of guides and contacts: a force against the movement.
+    Dry friction of guides and contacts: a force opposing the motion.
 
     Source: handbook (Coulomb's law of dry friction).
     """
@@ -109,12 +109,12 @@ class Hysteresis(
 
     force: Scalar = parameter(
         "N",
-        "force of all cells slipping, half the width of the loop",
+        "force when all cells slip, half the width of the loop",
         typical=4.0,
         null=0.0,
     )
     reach: Scalar = parameter(
-        "mm", "deformation from rest until every cell slips", typical=0.1
+        "mm", "deformation from rest at which all cells slip", typical=0.1
     )
 
     def apply(self, signal: PerRow, rows: Rows) -> PerRow:
