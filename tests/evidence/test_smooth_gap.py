@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import NOISE, rich, simulated
 
+from hdcal import diagnose, read_case
 from hdcal.data.priors import effect_priors
 from hdcal.evidence.linear_rows import remove_base, restore_base
 from hdcal.evidence.prepare import prepare
@@ -49,3 +50,11 @@ def test_a_gap_of_half_the_noise_is_no_larger_for_what_is_looked_for_in_vain():
     ]
     assert middles[0] == pytest.approx(1.0, abs=0.15)
     assert middles[1] > 1.15
+
+
+def test_rows_that_the_gap_nearly_interpolates_are_fitted():
+    """More functions than rows: the noise of some draws falls to nearly nothing."""
+    force = [0.5, 12.1, 22.0, 33.4, 42.5, 53.7, 41.6, 30.0, 20.9, 9.6, -1.2]
+    columns = {"deformation_mm": [0, 1, 2, 3, 4, 5, 4, 3, 2, 1, 0], "force_N": force}
+    verdict = diagnose(read_case(columns), quick=True)
+    assert sum(verdict.which.probabilities.values()) == pytest.approx(1.0)

@@ -121,14 +121,19 @@ def fit_smooth_gap(
 def _gibbs(target, columns, groups, noise_sd: float, floor: float, rng):
     """Draw weights given inverse-gamma(½, b/2) scales: half-Cauchy-like, from zero."""
     gram, product = columns.T @ columns, columns.T @ target
+    rows = np.linalg.qr(columns, mode="r")
     count = np.bincount(groups)
     least = (floor * noise_sd) ** 2 / 2.0
     scale, variance = np.full(len(count), noise_sd**2), noise_sd**2
     draws, noise, kept = [], [], []
     for step in range(_DRAWS + _BURN_IN):
-        factor = np.linalg.cholesky(gram / variance + np.diag(1.0 / scale[groups]))
-        centre = np.linalg.solve(factor, product / variance)
-        weights = np.linalg.solve(factor.T, centre + rng.normal(size=len(centre)))
+        # By QR: the sum of both squares would lose the smaller one where readings are
+        # nearly interpolated.
+        stacked = np.vstack([rows / np.sqrt(variance), np.diag(scale[groups] ** -0.5)])
+        upper = np.linalg.qr(stacked, mode="r")
+        upper *= np.sign(np.diag(upper))[:, None]
+        centre = np.linalg.solve(upper.T, product / variance)
+        weights = np.linalg.solve(upper, centre + rng.normal(size=len(centre)))
         squares = np.bincount(groups, weights**2)
         scale = (least + 0.5 * squares) / rng.gamma(0.5 + 0.5 * count)
         left = target - columns @ weights

@@ -42,7 +42,7 @@ FLEET = Kind("hdcal.fleet-posterior", "of a fleet", "run hdcal fleet again")
 _WITHOUT = {
     "hdcal.compare/1": "a comparison has no posterior",
     "hdcal.causes/1": "causes across gears have no posterior",
-    "hdcal.verdict/2": "this diagnosis holds no calibrated model",
+    "hdcal.verdict/2": "a quick diagnosis holds no calibrated model",
 }
 
 
