@@ -103,5 +103,5 @@ def test_forces_are_asked_at_numbers(one):
 
 
 def test_another_result_is_no_calibration(one):
-    with pytest.raises(InputError, match="a Margin is no calibration"):
+    with pytest.raises(InputError, match="a Margin is not a calibration"):
         hdcal.summarise(hdcal.margin(one, 0.3, sensitivities=False))
