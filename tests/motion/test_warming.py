@@ -46,7 +46,8 @@ def test_alpha_is_found_in_a_record_that_warms(posterior):
     assert posterior.usable, posterior.reasons
     alpha = posterior.draws["alpha"]
     assert posterior.diagnoses["alpha"].driven_by == "data"
-    low, high = np.quantile(alpha, [0.0005, 0.9995])
+    # 99.9 % of a normal posterior; its quantiles would rest on one draw in a thousand.
+    low, high = alpha.mean() + 3.3 * alpha.std() * np.array([-1.0, 1.0])
     assert low <= ALPHA <= high and high < 2.0 * ALPHA
     answer = dynamic_answer(posterior)
     assert any("follows the temperature" in words for words in answer.assumptions)
