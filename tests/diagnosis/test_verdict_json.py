@@ -18,7 +18,7 @@ from hdcal.diagnosis.places import places
 from hdcal.diagnosis.summary import verdict_answer
 from hdcal.diagnosis.words import NO_PROOF, PROPORTIONAL
 from hdcal.report.answer import json_schema
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.plain import as_json
 from hdcal.report.words import likely, newton, percent
 

@@ -16,7 +16,7 @@ from hdcal.fleets.over_time import TimeAnswer
 from hdcal.fleets.summary import fleet_answer, fleet_report
 from hdcal.fleets.time_words import time_words
 from hdcal.report.document import Table
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 
 def off_in(**kinds: list[bool]):

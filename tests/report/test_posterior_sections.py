@@ -12,7 +12,8 @@ from hdcal.data.prior import Prior
 from hdcal.inference.checks import Check
 from hdcal.report.document import Document, Tag
 from hdcal.report.html import html_page
-from hdcal.report.parameters import Interval, parameter_estimates
+from hdcal.report.intervals import Interval
+from hdcal.report.parameters import parameter_estimates
 from hdcal.report.plain import as_plain
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.posterior_sections import (

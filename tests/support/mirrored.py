@@ -9,7 +9,7 @@ from posteriors import written_posterior
 
 from hdcal.data.case import Case
 from hdcal.inference.posterior import Posterior
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 # Columns and draws that change their sign with the loading. Parameters of effects are
 # those of effects whose contribution does not change it.

@@ -19,7 +19,7 @@ from hdcal.diagnosis.verdict import (
     Which,
 )
 from hdcal.diagnosis.where import about
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 NOISE = 0.3
 CLOSED = Interval(0.91, 0.85, 0.95)

@@ -11,7 +11,7 @@ from hdcal.evidence.noise_evidence import weighted_quantiles
 from hdcal.evidence.single_evidence import CellEvidence
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
-from hdcal.report.parameters import INTERVAL, Interval
+from hdcal.report.intervals import INTERVAL, Interval
 
 _DRAWS = 4000
 

@@ -19,7 +19,7 @@ from hdcal.report.answer import (
     Sentences,
     Words,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.posterior_answer import CalibratedGear
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hdcal.report.answer import Words
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from hdcal.evidence.row_features import (
     scale_to_unit,
 )
 from hdcal.evidence.smooth_gap import SmoothGap
-from hdcal.report.parameters import INTERVAL, Interval
+from hdcal.report.intervals import INTERVAL, Interval
 
 _SAMPLES = 1000
 # A free curve of as many parameters may be this large, in noise sds.

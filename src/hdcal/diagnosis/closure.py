@@ -21,7 +21,7 @@ from hdcal.evidence.smooth_gap import (
     SmoothGap,
     fit_smooth_gap,
 )
-from hdcal.report.parameters import credible_interval
+from hdcal.report.intervals import credible_interval
 
 # Sds of its own error by which a remainder must lower the noise variance to count.
 _VISIBLE = 1.64

@@ -20,7 +20,7 @@ from hdcal.evidence.smooth_gap import (
     additive_basis,
     fit_smooth_gap,
 )
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.intervals import Interval, credible_interval
 
 # An AR(1) coefficient of this probability stands alone among those weighed.
 _DECIDED = 0.9

@@ -6,7 +6,7 @@ import numpy as np
 
 from hdcal.data.records import Records
 from hdcal.report.answer import Count, Probability, Real, Words
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from hdcal.inference.model_average import NONE, LeftOut
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.sample import Progress
 from hdcal.physics.effect import Effect
-from hdcal.report.parameters import credible_interval
+from hdcal.report.intervals import credible_interval
 
 # Least probability of a hypothesis that is calibrated; more than the second is not left
 # to a model of something else.

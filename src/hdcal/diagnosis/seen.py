@@ -26,7 +26,7 @@ from hdcal.inference.residual_shapes import (
     find_structure,
 )
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.report.parameters import INTERVAL, Interval
+from hdcal.report.intervals import INTERVAL, Interval
 from hdcal.report.words import newton
 
 # Below this share of the largest force what is seen is said to be immaterial.

@@ -16,7 +16,7 @@ from hdcal.evidence.hypothesis_design import design_of
 from hdcal.evidence.prepare import log_moments
 from hdcal.inference.distributions import moments
 from hdcal.physics.theory import THEORIES
-from hdcal.report.parameters import INTERVAL, Interval
+from hdcal.report.intervals import INTERVAL, Interval
 
 _Z = float(ndtri(0.5 + 0.5 * INTERVAL))
 # Half of a range that was read off drawings, in sds: nine of ten lie in it.

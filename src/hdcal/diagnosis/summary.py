@@ -18,7 +18,7 @@ from hdcal.inference.residuals import residuals
 from hdcal.prediction.bands.bands import Bands, default_bands
 from hdcal.prediction.engine.pooled import pool
 from hdcal.report.chart_spec import Chart
-from hdcal.report.parameters import INTERVAL, Interval, credible_interval
+from hdcal.report.intervals import INTERVAL, Interval, credible_interval
 from hdcal.report.posterior_answer import CalibratedGear
 from hdcal.report.write import Report, report_files, write_files, write_numbers
 

@@ -17,7 +17,7 @@ from hdcal.report.answer import (
     Real,
     Words,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 VerdictWord = Literal["none", "named", "group", "ambiguous", "unknown"]
 _PAIR = "^[A-Za-z_][A-Za-z0-9_]*(\\+[A-Za-z_][A-Za-z0-9_]*)?$"

@@ -11,7 +11,7 @@ from hdcal.evidence.case_evidence import CaseEvidence
 from hdcal.evidence.local_structure import direction_families
 from hdcal.evidence.residual_test import Directions, ResidualTest
 from hdcal.evidence.smooth_gap import SmoothGap
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.intervals import Interval, credible_interval
 
 # Family-wise probability that pure noise is called a gap.
 FALSE_ALARM = 0.05

@@ -35,7 +35,7 @@ from hdcal.evidence.resampled_evidence import resampled_evidence
 from hdcal.evidence.single_evidence import rescaled_change
 from hdcal.physics.effect import Effect
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.parameters import credible_interval
+from hdcal.report.intervals import credible_interval
 
 # Probability from which on what acts beside an effect is told, where neither is named.
 _LIKELY = 0.5

@@ -9,7 +9,7 @@ from hdcal.fleets.misfit import Misfit
 from hdcal.fleets.next_force import NextForce
 from hdcal.fleets.over_time import TimeAnswer
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences, Words
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hdcal.report.answer import Real
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.intervals import Interval, credible_interval
 
 # Widths of a 97 % interval of the gauge that fit into the gears' scatter.
 _CATEGORIES = 1.41

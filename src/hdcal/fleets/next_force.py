@@ -11,7 +11,7 @@ from hdcal.errors import Finding
 from hdcal.fleets.next_gear import CONFIDENCE, new_group_sd, quantile_of_mixture
 from hdcal.notebook import Shown
 from hdcal.report.answer import Probability, Real
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.intervals import Interval, credible_interval
 
 # Shares of gears to come for which bounds are told.
 CONTENTS = (0.9, 0.99)

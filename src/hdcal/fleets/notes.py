@@ -13,7 +13,7 @@ from hdcal.fleets.fleet_problem import population_priors
 from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import linked_rigs
 from hdcal.fleets.misfit import misfit_words
-from hdcal.report.parameters import credible_interval
+from hdcal.report.intervals import credible_interval
 from hdcal.report.words import estimate
 
 RESTS_ON = (

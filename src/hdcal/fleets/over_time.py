@@ -11,7 +11,7 @@ from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.groupings import group_offsets
 from hdcal.fleets.groups import groups
 from hdcal.report.answer import Count, Probability, Promise, Real, Words
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 # Probability from which a change is told.
 CHANGED = 0.95

@@ -30,7 +30,7 @@ from hdcal.fleets.notes import notes_of
 from hdcal.fleets.off_in import FALSE_CALLS
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.inference.posterior_file import FILE_NAME
-from hdcal.report.parameters import INTERVAL, Interval, credible_interval
+from hdcal.report.intervals import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
 
 # Ends and middle of an interval.

@@ -13,10 +13,6 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
-from numpyro.contrib.hsgp.laplacian import eigenfunctions
-from numpyro.contrib.hsgp.spectral_densities import (
-    diag_spectral_density_squared_exponential,
-)
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
@@ -109,6 +105,8 @@ def _functions(scaled, movement, *, directed: bool):
 
 
 def _basis(scaled):
+    from numpyro.contrib.hsgp.laplacian import eigenfunctions
+
     # Beyond the interval the eigenfunctions would repeat; hold them at its end.
     return eigenfunctions(jnp.clip(scaled, -BOUNDARY, BOUNDARY), BOUNDARY, BASIS_SIZE)
 
@@ -171,6 +169,10 @@ def prior_sd(sd, length) -> Float[Array, " m"]:
         sd: of the discrepancy [N].
         length: length-scale as a share of the tested range [-].
     """
+    from numpyro.contrib.hsgp.spectral_densities import (
+        diag_spectral_density_squared_exponential,
+    )
+
     density = diag_spectral_density_squared_exponential(
         sd**2, 2.0 * length, BOUNDARY, BASIS_SIZE, 1
     )

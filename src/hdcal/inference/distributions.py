@@ -1,58 +1,48 @@
 """Prior families as NumPyro distributions and as frozen SciPy distributions."""
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
-import numpyro.distributions as dist
-from scipy import stats
 
 from hdcal.data.prior import Prior
+
+if TYPE_CHECKING:
+    import numpyro.distributions as dist
 
 # Parameters that cannot be negative: a normal prior of one is truncated at zero.
 POSITIVE = frozenset({"E0", "sigma", "mass", "damping_ratio", "deformation_sigma"})
 
 
-class _Family(NamedTuple):
-    """Both forms of a family, as functions of the prior's numbers."""
-
-    numpyro: Callable[..., dist.Distribution]
-    scipy: Callable[..., Any]
-
-
-_FAMILIES = {
-    "normal": _Family(dist.Normal, stats.norm),
-    "lognormal": _Family(
-        lambda median, log_sd: dist.LogNormal(jnp.log(median), log_sd),
-        lambda median, log_sd: stats.lognorm(log_sd, scale=median),
-    ),
-    "half_normal": _Family(dist.HalfNormal, lambda sd: stats.halfnorm(scale=sd)),
-    "uniform": _Family(dist.Uniform, lambda low, high: stats.uniform(low, high - low)),
-    "beta": _Family(dist.Beta, stats.beta),
-}
-_POSITIVE_NORMAL = _Family(
-    lambda mean, sd: dist.TruncatedNormal(mean, sd, low=0.0),
-    lambda mean, sd: stats.truncnorm(-mean / sd, float("inf"), mean, sd),
-)
-
-
-def _family(prior: Prior, name: str) -> _Family:
-    if prior.family == "normal" and name in POSITIVE:
-        return _POSITIVE_NORMAL
-    if prior.family not in _FAMILIES:
-        raise ValueError(f"no distribution for the prior family {prior.family!r}")
-    return _FAMILIES[prior.family]
-
-
-def distribution(prior: Prior, name: str = "") -> dist.Distribution:
+def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
     """Return the NumPyro distribution of a prior that is not fixed.
 
     Args:
         prior: family and numbers.
         name: of the parameter.
+
+    Raises:
+        ValueError: the family has none.
     """
-    return _family(prior, name).numpyro(*prior.numbers)
+    import numpyro.distributions as dist
+
+    first, second = (*prior.numbers, None)[:2]
+    match prior.family:
+        case "normal" if name in POSITIVE:
+            return dist.TruncatedNormal(first, second, low=0.0)
+        case "normal":
+            return dist.Normal(first, second)
+        case "lognormal":
+            return dist.LogNormal(jnp.log(first), second)
+        case "half_normal":
+            return dist.HalfNormal(first)
+        case "uniform":
+            return dist.Uniform(first, second)
+        case "beta":
+            return dist.Beta(first, second)
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
 
 
 def frozen(prior: Prior, name: str = "") -> Any:
@@ -61,8 +51,27 @@ def frozen(prior: Prior, name: str = "") -> Any:
     Args:
         prior: family and numbers.
         name: of the parameter.
+
+    Raises:
+        ValueError: the family has none.
     """
-    return _family(prior, name).scipy(*map(float, prior.numbers))
+    from scipy import stats
+
+    first, second = (*map(float, prior.numbers), math.nan)[:2]
+    match prior.family:
+        case "normal" if name in POSITIVE:
+            return stats.truncnorm(-first / second, math.inf, first, second)
+        case "normal":
+            return stats.norm(first, second)
+        case "lognormal":
+            return stats.lognorm(second, scale=first)
+        case "half_normal":
+            return stats.halfnorm(scale=first)
+        case "uniform":
+            return stats.uniform(first, second - first)
+        case "beta":
+            return stats.beta(first, second)
+    raise ValueError(f"no distribution for the prior family {prior.family!r}")
 
 
 def moments(prior: Prior, name: str = "") -> tuple[float, float]:

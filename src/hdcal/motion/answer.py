@@ -4,7 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from hdcal.report.answer import Probability, Promise, Sentences
-from hdcal.report.parameters import Interval, ParameterEstimate
+from hdcal.report.intervals import Interval
+from hdcal.report.parameters import ParameterEstimate
 from hdcal.report.posterior_answer import PARAMETER_NAMES, PosteriorAnswer
 
 _ALWAYS = ["K", "E0", "alpha", "mass", "damping_ratio", "deformation_offset"]

@@ -9,7 +9,7 @@ import numpy as np
 from hdcal.exported import jit
 from hdcal.inference.dynamic_posterior import DynamicPosterior
 from hdcal.inference.dynamic_problem import DynamicProblem, predict_states, stretch
-from hdcal.report.parameters import INTERVAL
+from hdcal.report.intervals import INTERVAL
 
 # Draws from which the bands of a record are made.
 _DRAWS = 1000

@@ -11,7 +11,7 @@ from hdcal.report.document import (
     Text,
     notices,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.posterior_sections import (
     check_section,
     parameter_section,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from hdcal.report.document import Cell, Table
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.posterior_sections import driver_tag
 from hdcal.report.words import estimate, unit
 

@@ -19,7 +19,7 @@ from hdcal.motion.document import (
 )
 from hdcal.motion.friction_search import dry_share, swing
 from hdcal.motion.loss import LEFT_OVER, LOOKED, WHITENESS
-from hdcal.report.parameters import Interval, credible_interval
+from hdcal.report.intervals import Interval, credible_interval
 from hdcal.report.posterior_answer import posterior_entries
 from hdcal.report.write import Report
 

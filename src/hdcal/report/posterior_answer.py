@@ -9,13 +9,8 @@ from hdcal.inference.checks import Check
 from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_tree import group_of
 from hdcal.report.answer import Answer, Count, Digest, Promise, Sentences
-from hdcal.report.parameters import (
-    INTERVAL,
-    Interval,
-    ParameterEstimate,
-    credible_interval,
-    parameter_estimates,
-)
+from hdcal.report.intervals import INTERVAL, Interval, credible_interval
+from hdcal.report.parameters import ParameterEstimate, parameter_estimates
 from hdcal.report.words import capital
 
 _OneOrMore = Annotated[int, Promise(minimum=1)]

@@ -14,7 +14,7 @@ from hdcal.report.answer import (
     Sentences,
     Words,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 
 @dataclass(frozen=True)

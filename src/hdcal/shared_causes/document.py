@@ -16,7 +16,7 @@ from hdcal.report.document import (
     Text,
     notices,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.words import capital, label, percent, percent_span
 from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause
 from hdcal.shared_causes.causes import FleetCauses

@@ -11,7 +11,7 @@ from hdcal.diagnosis.naming import naming
 from hdcal.evidence.case_evidence import NONE, UNKNOWN
 from hdcal.fleets.left_out import left_out_of, with_left_out
 from hdcal.physics.registry import EFFECTS
-from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.intervals import INTERVAL, credible_interval
 from hdcal.report.words import capital, label, percent
 from hdcal.report.write import Report
 from hdcal.shared_causes.answer import CausesAnswer, LotWithCauses, SharedCause

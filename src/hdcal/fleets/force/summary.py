@@ -4,7 +4,7 @@ from hdcal.fleets.fleet_facts import FleetFacts
 from hdcal.fleets.force.answer import ForceAnswer
 from hdcal.fleets.force.document import force_words, whole_document
 from hdcal.fleets.next_force import NextForce
-from hdcal.report.parameters import INTERVAL
+from hdcal.report.intervals import INTERVAL
 from hdcal.report.write import Report
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from hdcal.motion.quantities import QUANTITIES
 from hdcal.report.answer import Answer, Promise, Sentences
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 COLUMNS = ["time_s", "force_N", "deformation_lo_mm", "deformation_median_mm"]
 COLUMNS += ["deformation_hi_mm", "tested"]

@@ -12,7 +12,7 @@ from hdcal.motion.respond.answer import QuantityEstimate, ResponseAnswer
 from hdcal.prediction.engine.causes import averaging_words
 from hdcal.prediction.engine.pooled import Pooled
 from hdcal.report.document import Document, Picture, Section, Text, notices
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.provenance import gear_rows
 from hdcal.report.words import estimate
 

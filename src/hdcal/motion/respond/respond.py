@@ -28,7 +28,7 @@ from hdcal.prediction.engine.conditions import temperature_findings, usual_tempe
 from hdcal.prediction.engine.gear_forces import evenly, gear_values
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.pooled import Pooled, pool
-from hdcal.report.parameters import INTERVAL, credible_interval
+from hdcal.report.intervals import INTERVAL, credible_interval
 
 # More take minutes, and a band that long past its start says nothing new.
 _MOST_SWINGS = 20_000

@@ -10,7 +10,7 @@ from hdcal.motion.respond.answer import (
 )
 from hdcal.motion.respond.document import headline, next_steps, response_document
 from hdcal.motion.respond.respond import Response
-from hdcal.report.parameters import INTERVAL
+from hdcal.report.intervals import INTERVAL
 from hdcal.report.write import Report
 
 

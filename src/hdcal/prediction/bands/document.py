@@ -3,7 +3,7 @@
 from hdcal.data.records import Records
 from hdcal.prediction.bands.bands import Bands
 from hdcal.report.document import Document, Section, Table, Tag, Text
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.words import estimate, number
 
 # Rows of a table; all are in the columns.

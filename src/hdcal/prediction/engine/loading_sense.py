@@ -13,7 +13,7 @@ from typing import Literal
 
 from hdcal.errors import Finding
 from hdcal.prediction.engine.causes import Cause
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 # +1: pressed, deformation and force are positive; −1: pulled, both are negative.
 LoadingSense = Literal[1, -1]

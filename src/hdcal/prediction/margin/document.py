@@ -28,7 +28,7 @@ from hdcal.report.document import (
     Text,
     notices,
 )
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.provenance import gear_rows
 from hdcal.report.words import capital, estimate, hypothesis, number
 

@@ -15,7 +15,7 @@ from hdcal.prediction.margin.stated import Chance, Decision, Size, StatedUncerta
 from hdcal.prediction.margin.variance_shares import VarianceShare
 from hdcal.prediction.shares import BASES
 from hdcal.report.answer import Promise, Real, Sentences, Words
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 
 INTERVAL = 0.95
 Fraction = Annotated[float, Promise(exclusiveMinimum=0, exclusiveMaximum=1)]
