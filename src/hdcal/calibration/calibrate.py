@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from difflib import get_close_matches
 
 import numpy as np
@@ -18,15 +18,12 @@ from hdcal.inference.assembly import Specifics, assemble, run_settings
 from hdcal.inference.checks import correlation_check, growth_check, rounding_check
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
-from hdcal.inference.noise_form import (
-    noise_grows,
-    pilot_fit,
-    why_independent,
-)
-from hdcal.inference.posterior import PILOT_NOISE, Posterior
+from hdcal.inference.noise_form import noise_grows, pilot_fit
+from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.inference.structure import Structure, decide_structure
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.noise import HeteroscedasticNoise
@@ -136,7 +133,7 @@ def calibrate(
     *,
     effects: Sequence[str] = (),
     theory: Theory | None = None,
-    with_gap: bool = False,
+    with_gap: bool | None = None,
     adapt_noise: bool = True,
     chains: int = 4,
     warmup: int = 1000,
@@ -153,7 +150,8 @@ def calibrate(
         case: from `read_case`.
         effects: names of effects to include.
         theory: overrides the gear's.
-        with_gap: add a leftover discrepancy, orthogonal to the base model.
+        with_gap: whether the model has a leftover discrepancy, orthogonal to the base
+            model; by default where the readings show a bend, and never with effects.
         adapt_noise: let the noise grow with the force where it clearly does.
         chains: independent chains, two or more so that they can be compared.
         warmup: iterations of adaptation per chain.
@@ -169,23 +167,24 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    case, chosen, noise_sd = _chosen(case, effects, registry, adapt_noise)
+    case, chosen = _chosen(case, effects, registry, adapt_noise)
+    asked = choose_effects(effects, registry)
+    form = decide_structure(case, asked, with_gap)
     # Readings showed that noise grows, and nobody asked for it.
     shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in effects
     shipped = effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
     theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
-    model = {"theory": theory, "with_gap": with_gap, "noise_sd": noise_sd}
-    problem = build_problem(case, shipped, chosen, **model)
+    problem = build_problem(case, shipped, chosen, theory=theory, structure=form)
     require_scatter(case)
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     fitted = laplace.fit(problem)
     found = sample(problem, fitted, seed, progress=progress, **size)
-    own = _specifics(case, problem, found, shown=shown)
+    own = _specifics(case, problem, form, found, shown=shown)
     parts = assemble(case, priors, problem, found, own, seed)
     parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
-    settings = {"seed": seed, **size, "with_gap": with_gap, PILOT_NOISE: noise_sd}
-    settings |= run_settings(found, began)
+    settings = {"seed": seed, **size, "with_gap": form.with_gap}
+    settings |= {STRUCTURE: asdict(form)} | run_settings(found, began)
     posterior = Posterior(case, theory, chosen, priors, *parts, settings)
     # A million rows are not compressed anew.
     vars(posterior)["problem"] = problem
@@ -197,8 +196,8 @@ def _chosen(
     names: Sequence[str],
     registry: Mapping[str, type[Effect]],
     adapt_noise: bool,
-) -> tuple[Case, tuple[type[Effect], ...], float]:
-    """Return case, effects and the noise sd of the pilot fit [N].
+) -> tuple[Case, tuple[type[Effect], ...]]:
+    """Return case and effects.
 
     With noise that grows where it does and no effect is of noise.
     """
@@ -209,9 +208,9 @@ def _chosen(
     decided = spoken_of or (stated is not None and stated.family == "fixed")
     grows = adapt_noise and not decided and noise_grows(case, pilot)
     if not grows:
-        return case, effects, pilot.noise_sd
+        return case, effects
     case = _with_constant_part(case, pilot.noise_sd)
-    return case, (*effects, HeteroscedasticNoise), pilot.noise_sd
+    return case, (*effects, HeteroscedasticNoise)
 
 
 def _with_constant_part(case: Case, noise_sd: float) -> Case:
@@ -228,7 +227,7 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
 
 
 def _specifics(
-    case: Case, problem: Problem, found: Draws, *, shown: bool = False
+    case: Case, problem: Problem, form: Structure, found: Draws, *, shown: bool = False
 ) -> Specifics:
     """Return what the model of the force adds to what every calibration has."""
     centre = {
@@ -236,8 +235,7 @@ def _specifics(
     }
     near = linearise(problem, centre, case.records)
     members = near.members / near.sd[:, None]
-    sigma, with_gap = found.values["sigma"], problem.discrepancy is not None
-    form = {"rounded": problem.rounded, "with_gap": with_gap}
+    sigma, rows = found.values["sigma"], len(case.records.force)
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
@@ -247,11 +245,7 @@ def _specifics(
         mixed=_other_quantities(problem, found),
         checks=[
             rounding_check(float(problem.step), problem.rounded, sigma),
-            correlation_check(
-                found.values,
-                len(case.records.force),
-                why_independent(case, problem.effects, **form),
-            ),
+            correlation_check(found.values, rows, form.why_independent),
             growth_check(found.values, unasked=shown),
         ],
     )

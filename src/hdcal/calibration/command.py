@@ -30,9 +30,10 @@ if TYPE_CHECKING:
     help="Include an effect of the library; may be repeated.",
 )
 @click.option(
-    "--with-gap",
-    is_flag=True,
-    help="Fit what no effect explains as a smooth leftover discrepancy.",
+    "--with-gap/--no-gap",
+    default=None,
+    help="Fit what no effect explains as a smooth leftover discrepancy, or leave it "
+    "out [default: fit it where the readings show a bend; never with an effect].",
 )
 @click.option(
     "--constant-noise",

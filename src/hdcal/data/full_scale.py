@@ -14,12 +14,16 @@ class FullScale:
     """The largest readings of a rig; by default those that priors are written for.
 
     Attributes:
-        force: largest force [N].
-        deformation: largest radial deformation [mm].
+        force: largest force, or the range of the forces where that is smaller [N].
+        deformation: likewise of the radial deformations [mm].
+        slope: range of the force over that of the radial deformation [N/mm].
+        zero_sd: sd of the prior of a force zero that nobody stated [N].
     """
 
     force: float = 100.0
     deformation: float = 0.5
+    slope: float = 200.0
+    zero_sd: float = 5.0
 
     def own(self, prior: Prior) -> Prior:
         """Return a shipped prior, written for the default, as it is on this rig."""
@@ -30,14 +34,22 @@ class FullScale:
         return prior if ratio == 1.0 else scaled(prior, ratio)
 
     def own_stiffness(self, prior: Prior) -> Prior:
-        """Return the shipped stiffness of a spring as `own` does, within its range."""
-        median, log_sd = self.own(prior).numbers
+        """Return the shipped stiffness of a spring on this rig, within its range."""
         known = range_of("spring_stiffness")
-        within = min(max(float(median), known.low), known.high)
-        return Prior(prior.family, (within, log_sd), prior.unit, prior.source)
+        within = min(max(self.slope, known.low), known.high)
+        return Prior(prior.family, (within, prior.numbers[1]), prior.unit, prior.source)
+
+    def own_zero(self, prior: Prior) -> Prior:
+        """Return the prior of a force zero that nobody states, wide."""
+        middle, _ = prior.numbers
+        return Prior(prior.family, (middle, self.zero_sd), prior.unit, prior.source)
 
 
 REFERENCE = FullScale()
+
+
+# A zero may lie so many times farther off than what was read goes.
+_FAR = 10.0
 
 
 def scale_of(force: np.ndarray, deformation: np.ndarray, reading: str) -> FullScale:
@@ -48,10 +60,21 @@ def scale_of(force: np.ndarray, deformation: np.ndarray, reading: str) -> FullSc
         deformation: as read, shape (n,) [mm].
         reading: of the deformation, `radial` or `diametral`.
     """
-    largest, far = (
-        float(np.quantile(np.abs(values), 0.99, method="higher"))
-        for values in (force, deformation)
-    )
-    radial = far * (0.5 if reading == "diametral" else 1.0)
+    radial = deformation * (0.5 if reading == "diametral" else 1.0)
+    (largest, width, level), (far, stroke, centre) = map(_reach, (force, radial))
     # Where nothing was read but zeros, nothing is known of the scale.
-    return FullScale(largest or REFERENCE.force, radial or REFERENCE.deformation)
+    largest, far = largest or REFERENCE.force, far or REFERENCE.deformation
+    if not (width > 0.0 and stroke > 0.0):
+        return FullScale(largest, far, largest / far, _FAR * largest)
+    slope = width / stroke
+    zero_sd = _FAR * (width + level + slope * centre)
+    # An origin far from the readings says nothing of their scale.
+    return FullScale(min(largest, width), min(far, stroke), slope, zero_sd)
+
+
+def _reach(values: np.ndarray) -> tuple[float, float, float]:
+    """Return the largest size, the range and the distance of the middle from zero."""
+    size = float(np.quantile(np.abs(values), 0.99, method="higher"))
+    low = float(np.quantile(values, 0.01, method="lower"))
+    high = float(np.quantile(values, 0.99, method="higher"))
+    return size, high - low, abs(low + high) / 2.0

@@ -7,8 +7,6 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_args
 
-import numpy as np
-
 from hdcal.data.case import Gear
 from hdcal.data.certificates import GAUGE_UNITS, certificate_priors, contact_as_read
 from hdcal.data.full_scale import FullScale
@@ -37,13 +35,13 @@ from hdcal.data.priors import (
     rig_priors,
 )
 from hdcal.data.records import Geometry
-from hdcal.data.rig_facts import filtered, rig_fact_priors
+from hdcal.data.rig_facts import rig_fact_priors
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 # Shipped priors of the base model that are written for a full scale.
-IN_NEWTONS = ("force_offset", "sigma", "run_offset_sd", "gap_sd")
+IN_NEWTONS = ("sigma", "run_offset_sd", "gap_sd")
 # The material of a spring that names none.
 NO_MATERIAL = "not stated"
 # That of any other gear that names none.
@@ -168,8 +166,9 @@ def _theory_of_K(sizes: GearTable, chosen: Theory, given: dict[str, Prior]) -> T
 def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
     """Return a gear whose shipped priors are those of its own rig.
 
-    What the gear file states stays. The zero of the deformation is found by hand
-    whatever the stroke, and keeps its own size.
+    What the gear file states stays. A force zero that nobody states may be anywhere:
+    in the sum of both zeros, which is all that readings show, the deformation's keeps
+    its own size.
     """
     shipped = rig_priors()
 
@@ -180,29 +179,15 @@ def at_full_scale(gear: Gear, full_scale: FullScale) -> Gear:
             if name in table and table[name].source == shipped[name].source
         }
 
-    stiffness = shipped["spring_stiffness"]
+    zero, stiffness = shipped["force_offset"], shipped["spring_stiffness"]
+    if gear.priors["force_offset"].source == zero.source:
+        wide = {"force_offset": full_scale.own_zero(zero)}
+        gear = replace(gear, priors=gear.priors | wide)
     if gear.priors["K"].source == stiffness.source:
         own_K = {"K": full_scale.own_stiffness(stiffness)}
         gear = replace(gear, priors=gear.priors | own_K)
     tables = {"priors": own(gear.priors), "scale_priors": own(gear.scale_priors)}
     return replace(gear, full_scale=full_scale, **tables)
-
-
-def behind_filter(gear: Gear, time: np.ndarray | None) -> Gear:
-    """Return a gear whose neighbouring readings err alike as behind its rig's filter.
-
-    Args:
-        gear: what its file states of the correlation stays.
-        time: of the readings [s], shape (n,); None where it was not measured.
-    """
-    name, cutoff = "noise_correlation", gear.source.get("rig", {}).get("filter_Hz")
-    shipped = rig_priors()[name]
-    own = gear.scale_priors.get(name)
-    stated = own is None or own.source != shipped.source
-    if cutoff is None or time is None or stated:
-        return gear
-    table = gear.scale_priors | {name: filtered(shipped, cutoff, time)}
-    return replace(gear, scale_priors=table)
 
 
 def _in_gear(toml: TomlFile, key: str, given: Any = None) -> Any:

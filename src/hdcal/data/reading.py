@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.case import Case, Gear
+from hdcal.data.correlation_prior import with_correlation_prior
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
-from hdcal.data.gear import at_full_scale, behind_filter, read_gear, unsized
+from hdcal.data.gear import at_full_scale, read_gear, unsized
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import (
     ASSUMED,
@@ -137,7 +138,9 @@ def case_of(
         measured.columns.values, measured.specimen, measured.run
     )
     values = measured.columns.values
-    found = behind_filter(found, values.get("time"))
+    found = with_correlation_prior(
+        found, values["deformation"], measured.run.index, values.get("time")
+    )
     scale = scale_of(values["force"], values["deformation"], found.reading)
     return Case(
         name=name,

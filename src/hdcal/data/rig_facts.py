@@ -1,17 +1,15 @@
 """Facts of a rig that sharpen priors of the diagnosis: the table [rig]."""
 
-import math
 from typing import Annotated
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from hdcal.data.full_scale import REFERENCE, FullScale
 from hdcal.data.prior import Prior
 from hdcal.data.typed_json import within
 
-# A pitch by its drawing, and how many neighbours that err alike a filter stands for.
-_PITCH_LOG_SD, _AS_GOOD_AS = 0.02, 20.0
+# Of a pitch by its drawing.
+_PITCH_LOG_SD = 0.02
 
 
 class RigTable(BaseModel):
@@ -60,25 +58,3 @@ def rig_fact_priors(
 
 def _sourced(prior: Prior, source: str) -> Prior:
     return Prior(prior.family, prior.numbers, prior.unit, source)
-
-
-def filtered(shipped: Prior, cutoff: float, time: np.ndarray) -> Prior:
-    """Return the prior of neighbours' correlation behind a low-pass filter.
-
-    White noise behind a filter of first order is correlated by e^(−2π f Δt). Where
-    that is little nothing is known: what else there is may err alike for longer.
-
-    Args:
-        shipped: the prior where no filter is known, a beta.
-        cutoff: f, of the filter [Hz].
-        time: of the readings [s], shape (n,).
-    """
-    steps = np.diff(time)
-    steps = steps[steps > 0.0]
-    if not len(steps):
-        return shipped
-    likely = math.exp(-2.0 * math.pi * cutoff * float(np.median(steps)))
-    a, b = map(float, shipped.numbers)
-    known = _AS_GOOD_AS * likely
-    numbers = (a + known * likely, b + known * (1.0 - likely))
-    return Prior("beta", numbers, shipped.unit, "[rig] filter_Hz, at the typical step")

@@ -20,7 +20,7 @@ from hdcal.evidence.row_features import (
     take_rows,
 )
 from hdcal.inference import distributions
-from hdcal.inference.noise_form import pilot_noise
+from hdcal.inference.noise_form import pilot_fit
 from hdcal.inference.problem import case_reading, problem_priors
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.physics.chain import Base, Reading
@@ -94,7 +94,7 @@ def prepare(
     # Computed readings have no noise, and a noise of zero has no density.
     least = _LEAST_NOISE * float(np.max(np.abs(records.force)))
     least = max(least, case.gear.force_resolution / np.sqrt(12.0))
-    noise_sd = float(noise_sd or max(pilot_noise(records), least))
+    noise_sd = float(noise_sd or max(pilot_fit(records).noise_sd, least))
     scale = stiffness_prior(case, own)
     base, columns, mean = _linearise(records, reading, own, scale, noise_sd, stiffness)
     relative = np.sqrt(1.0 + (np.asarray(records.force_sd) / noise_sd) ** 2)

@@ -24,8 +24,6 @@ from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.theory import Scalar
 
-# What a correlation keeps away from 0 and 1.
-_OPEN = 1e-12
 CONTACT = "deformation_offset"
 
 
@@ -103,26 +101,6 @@ def _sample_contact(problem: Problem, values: Mapping):
     return numpyro.deterministic(CONTACT, corner - taken)
 
 
-def _sample_correlation(prior: Prior):
-    """Sample the correlation ρ of neighbouring readings from its prior.
-
-    A beta one is sampled as ρ = tanh² v. To either side of v = 0 everything is the
-    same, so that no correlation lies in the middle and not at the end of a long tail.
-    The normal law of v is where a search starts, and is taken off again.
-    """
-    if prior.family != "beta":
-        return sample_site(CORRELATION, prior)
-    formal = dist.Normal(0.5, 1.0)
-    v = jnp.asarray(numpyro.sample(f"_{CORRELATION}", formal))
-    # At exactly 0 or 1 a beta law has no logarithm.
-    size = _OPEN + (1.0 - 2.0 * _OPEN) * jnp.tanh(v) ** 2
-    log_cosh = jnp.logaddexp(v, -v) - jnp.log(2.0)
-    log_jacobian = 0.5 * jnp.log(size) - 2.0 * log_cosh
-    log_prior = distribution(prior).log_prob(size) + log_jacobian
-    numpyro.factor(f"_{CORRELATION}_prior", log_prior - formal.log_prob(v))
-    return numpyro.deterministic(CORRELATION, size)
-
-
 def _sample_noise(problem: Problem, values: dict) -> None:
     """Sample what noise there is: its sd, how neighbours err alike, and its growth.
 
@@ -132,7 +110,7 @@ def _sample_noise(problem: Problem, values: dict) -> None:
     """
     name, prior, unshared = "sigma", problem.priors["sigma"], 1.0
     if problem.correlated:
-        values[CORRELATION] = _sample_correlation(problem.priors[CORRELATION])
+        values[CORRELATION] = sample_site(CORRELATION, problem.priors[CORRELATION])
         unshared = jnp.sqrt(1.0 - values[CORRELATION] ** 2)
     if problem.correlated and prior.family != "fixed":
         law = _scaled_and_moved(distribution(prior, name), unshared, 0.0)

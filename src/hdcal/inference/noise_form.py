@@ -1,6 +1,5 @@
-"""Which form the noise of a case has, decided by a pilot fit before any sampling."""
+"""A pilot fit, and whether the noise that it leaves grows with the deformation."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,24 +8,8 @@ from scipy.special import fdtrc, ndtr
 from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.inference.loop_cells import loop_cells
-from hdcal.inference.member_counts import member_counts
-from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
-from hdcal.physics.effect import Effect
+from hdcal.inference.serial_correlation import previous_rows, whiten
 
-# Up to this many rows the noise that a fit leaves is a rough number, and the exact
-# rounding likelihood is cheap.
-_FEW_ROWS = 500
-# Largest rounding step, in noise sds, for which Sheppard's correction is used: the
-# noise sd is then above 0.71 steps and the correction's error 2 exp(−2π²·0.71²) ~ 1e-4.
-_FINE_STEP = 1.3
-# The same where the noise sd is roughly known.
-_FINE_STEP_OF_FEW = 0.5
-# The same beside a mixture: the sd that a fit leaves is that of wild readings too, any
-# times that of the others. Its rows are kept one by one anyway.
-_FINE_STEP_OF_A_MIXTURE = 1e-3
-# Rows from which on correlation is inferred beside a leftover discrepancy: the first
-# number of a bucket, so that all of it share their programs.
-_BESIDE_A_GAP = 49
 # Fewer rows do not show how their noise depends on anything.
 _LEAST_ROWS = 12
 # Noise sds over a range that differ by less are one: of very many rows any would show.
@@ -54,11 +37,6 @@ class Pilot:
     residual: np.ndarray
     noise_sd: float
     free: int
-
-
-def pilot_noise(records: Records) -> float:
-    """Return the noise sd left by `pilot_fit` [N]."""
-    return pilot_fit(records).noise_sd
 
 
 def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
@@ -162,60 +140,3 @@ def growth_p_value(square, deformation) -> float:
     scale = np.sqrt((off @ off) * (left @ left))
     tied = float(off @ left) / scale if scale > 0.0 else 0.0
     return float(ndtr(-np.sqrt(len(far)) * tied))
-
-
-def correlates(
-    case: Case,
-    effects: Sequence[type[Effect]],
-    *,
-    with_gap: bool = False,
-    noise_sd: float | None = None,
-) -> bool:
-    """Return whether the model of a case has a correlation of neighbouring readings.
-
-    Args:
-        case: records and gear.
-        effects: in the model.
-        with_gap: whether the leftover discrepancy is.
-        noise_sd: from `pilot_noise` [N], where it is known.
-    """
-    noise_sd = pilot_noise(case.records) if noise_sd is None else noise_sd
-    return noise_form(case, effects, member_counts(case, with_gap), noise_sd)[1]
-
-
-def noise_form(case: Case, effects, members, noise_sd: float) -> tuple[bool, bool]:
-    """Return whether the noise needs its exact rounding, and may be correlated."""
-    step, records = case.gear.force_resolution, case.records
-    few = len(records.force) <= _FEW_ROWS and not members
-    fine = _FINE_STEP_OF_FEW if few else _FINE_STEP
-    if any(effect.mixture for effect in effects):
-        fine = _FINE_STEP_OF_A_MIXTURE
-    rounded = step > fine * noise_sd
-    beside = "discrepancy" in members
-    return rounded, not why_independent(case, effects, rounded=rounded, with_gap=beside)
-
-
-def why_independent(case: Case, effects, *, rounded: bool, with_gap: bool) -> str:
-    """Return why no correlation of neighbours is inferred; empty where it is.
-
-    Of rounded readings no exact likelihood is known whose noise is correlated, nor of
-    mixtures. A leftover discrepancy is told from correlated noise by many rows only.
-
-    Args:
-        case: records and gear.
-        effects: in the model.
-        rounded: whether the noise needs its exact rounding.
-        with_gap: whether the leftover discrepancy is in the model.
-    """
-    prior, records = case.gear.scale_priors[CORRELATION], case.records
-    if prior.family == "fixed" and float(prior.numbers[0]) == 0.0:
-        return "its prior says that there is none"
-    if not np.any(previous_rows(records) >= 0):
-        return "no reading follows another one in its run"
-    if any(effect.mixture for effect in effects):
-        return "no exact likelihood is known beside noise that is a mixture"
-    if rounded:
-        return "the steps of the reading are too wide beside the noise"
-    if with_gap and len(records.force) < _BESIDE_A_GAP:
-        return f"fewer than {_BESIDE_A_GAP} rows do not tell it from the leftover"
-    return ""

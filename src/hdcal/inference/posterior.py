@@ -31,13 +31,14 @@ from hdcal.inference.posterior_file import (
 )
 from hdcal.inference.posterior_tree import OVER_DRAWS, group_of, joined_draws
 from hdcal.inference.problem import Problem, build_problem
+from hdcal.inference.structure import Structure
 from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
 
-# The setting with the noise sd that decided the form of the noise [N], and the one with
-# the hypothesis of a diagnosis that the model is of.
-PILOT_NOISE, HYPOTHESIS = "pilot_noise_N", "hypothesis"
+# The setting with the structure of the model, and the one with the hypothesis of a
+# diagnosis that the model is of.
+STRUCTURE, HYPOTHESIS = "structure", "hypothesis"
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,7 +55,7 @@ class Posterior(Shown):
         diagnoses: sampling quality and driver by parameter.
         checks: what was checked and what came out.
         settings: seed, chains, warmup, draws, seconds, with_gap, versions; and
-            `PILOT_NOISE`.
+            `STRUCTURE`.
     """
 
     kind: ClassVar[str] = "static"
@@ -71,8 +72,12 @@ class Posterior(Shown):
     @property
     def sites(self) -> dict[str, tuple[int, ...]]:
         """Shape of each parameter that a draw holds."""
-        with_gap, noise_sd = self.settings["with_gap"], self.settings.get(PILOT_NOISE)
-        return site_shapes(self.case, self.effects, with_gap, noise_sd)
+        return site_shapes(self.case, self.effects, self.structure)
+
+    @property
+    def structure(self) -> Structure:
+        """What the model contains beside line and effects."""
+        return Structure(**self.settings[STRUCTURE])
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"
@@ -112,8 +117,7 @@ class Posterior(Shown):
             self.priors,
             self.effects,
             theory=self.theory,
-            with_gap=self.settings["with_gap"],
-            noise_sd=self.settings.get(PILOT_NOISE),
+            structure=self.structure,
         )
 
     @cached_property

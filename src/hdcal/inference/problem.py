@@ -23,9 +23,9 @@ from hdcal.inference.member_counts import (
     integrated_kinds,
     member_counts,
 )
-from hdcal.inference.noise_form import noise_form, pilot_noise
 from hdcal.inference.padding import pad_records
 from hdcal.inference.sampled_problem import Sampled
+from hdcal.inference.structure import Structure, decide_structure
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
@@ -210,8 +210,7 @@ def build_problem(
     effects: Sequence[type[Effect]] = (),
     *,
     theory: Theory | None = None,
-    with_gap: bool = False,
-    noise_sd: float | None = None,
+    structure: Structure | None = None,
 ) -> Problem:
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
@@ -220,8 +219,7 @@ def build_problem(
         shipped: priors of every effect in the library.
         effects: in the model; those of scatter change nothing, members carry them.
         theory: overrides the gear's theory.
-        with_gap: add the leftover discrepancy.
-        noise_sd: from `pilot_noise` [N], where it is known; it decides the noise form.
+        structure: of the model; by default what the readings show.
 
     Raises:
         InputError: an effect lacks its covariates or a prior.
@@ -229,25 +227,27 @@ def build_problem(
     effects, theory = _checked(case, effects), theory or case.gear.theory
     priors = problem_priors(case, effects, shipped, theory)
     records, reading = case.records, case_reading(case)
-    noise_sd = pilot_noise(records) if noise_sd is None else noise_sd
-    members = member_counts(case, with_gap)
-    rounded, correlated = noise_form(case, effects, members, noise_sd)
-    leftover = build_discrepancy(records, effects) if with_gap else None
-    columns, keep = _columns(records, reading), rounded or bool(effects)
-    rows = keep_or_compress(records, columns, leftover, keep, correlated)
-    linear = _linear_members(effects, rounded, compressed=rows["blocks"] is not None)
+    form = structure or decide_structure(case, effects)
+    members = member_counts(case, form.with_gap)
+    leftover = build_discrepancy(records, effects) if form.with_gap else None
+    columns, keep = _columns(records, reading), form.rounded or bool(effects)
+    rows = keep_or_compress(records, columns, leftover, keep, form.correlated)
+    compressed = rows["blocks"] is not None
+    linear = _linear_members(effects, form.rounded, compressed=compressed)
     integrated = integrated_kinds(members, linear)
     check_member_counts(case.name, members, integrated)
     return Problem(
         priors=without_texts(priors),
-        units=amplitude_units(records, columns, reading, effects, priors, noise_sd),
+        units=amplitude_units(
+            records, columns, reading, effects, priors, form.noise_sd
+        ),
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         discrepancy=leftover,
         step=case.gear.force_resolution,
         effects=effects,
-        rounded=rounded,
-        correlated=correlated,
+        rounded=form.rounded,
+        correlated=form.correlated,
         runs=members.get("run", 0),
         specimens=members.get("specimen", 0),
         integrated=integrated,

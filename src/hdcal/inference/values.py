@@ -11,9 +11,9 @@ from hdcal.data.records import Array, Records
 from hdcal.inference import compress
 from hdcal.inference.gauges import as_read
 from hdcal.inference.member_counts import member_counts
-from hdcal.inference.noise_form import correlates
 from hdcal.inference.problem import Problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.structure import Structure
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
@@ -37,25 +37,23 @@ LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 def site_shapes(
     case: Case,
     effects: Sequence[type[Effect]],
-    with_gap: bool,
-    noise_sd: float | None = None,
+    structure: Structure,
 ) -> dict[str, tuple[int, ...]]:
     """Return the shape of each parameter that a draw of the model holds.
 
     Args:
         case: records and gear.
         effects: in the model.
-        with_gap: whether the leftover discrepancy is.
-        noise_sd: from `pilot_noise` [N], where it is known.
+        structure: of the model.
     """
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     names += case.gear.gauge_priors
     for effect in without_scatter(effects):
         names += [f"{effect.name}.{field}" for field in parameters(effect)]
-    if correlates(case, effects, with_gap=with_gap, noise_sd=noise_sd):
+    if structure.correlated:
         names.append(CORRELATION)
     shapes: dict[str, tuple[int, ...]] = dict.fromkeys([*names, "stiffness"], ())
-    for kind, count in member_counts(case, with_gap).items():
+    for kind, count in member_counts(case, structure.with_gap).items():
         scales = [MEMBER_SD[kind]] if kind in MEMBER_SD else ["gap_sd", "gap_length"]
         shapes |= {**dict.fromkeys(scales, ()), MEMBERS[kind]: (count,)}
     return shapes

@@ -6,7 +6,7 @@ probable.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,6 @@ from hdcal.data.case import Case
 from hdcal.data.prior import Prior
 from hdcal.data.theory_names import Theory
 from hdcal.inference.dynamic_posterior import DynamicPosterior
-from hdcal.inference.posterior import PILOT_NOISE
 from hdcal.inference.posterior_tree import group_of
 from hdcal.inference.problem import Problem, build_problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
@@ -77,8 +76,7 @@ class Pooled:
             self.priors,
             self.effects,
             theory=posterior.theory,
-            with_gap=self.with_gap,
-            noise_sd=posterior.settings.get(PILOT_NOISE),
+            structure=replace(posterior.structure, with_gap=self.with_gap),
         )
 
 

@@ -1,0 +1,218 @@
+"""What the model of a case contains beside line and effects, decided once.
+
+Two questions are answered before any sampling: do the readings show that neighbours
+err alike, and does the curve bend? Each answer is that of the larger evidence, whose
+coefficients and noise are integrated out. A form that the readings do not show is left
+out: where they are independent and straight the model is that of least squares.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from hdcal.data.case import Case
+from hdcal.data.records import Records
+from hdcal.inference.discrepancy import build_discrepancy, discrepancy_columns
+from hdcal.inference.noise_form import pilot_fit
+from hdcal.inference.padding import pad_records
+from hdcal.inference.serial_correlation import CORRELATION, previous_rows
+from hdcal.physics.effect import Effect
+
+# Largest rounding step, in noise sds, for which Sheppard's correction is used, with an
+# error of 2 exp(−2π²·0.71²) ~ 1e-4. That noise is known roughly from few rows, and
+# beside a mixture it is that of wild readings too.
+_FINE_STEP, _FINE_STEP_OF_FEW, _FINE_STEP_OF_A_MIXTURE = 1.3, 0.5, 1e-3
+_FEW_ROWS = 500
+# Without and with.
+_EITHER = (False, True)
+# Points of the hyperparameters: correlation as quantiles of its prior, size of the
+# leftover in noise sds, its length as quantiles of its prior.
+_CORRELATIONS, _LENGTHS = 8, 4
+_SIZES = np.logspace(-0.5, 3.0, 8)
+# Zeros and slopes of so many members have columns; of more runs the zeros are means.
+_MOST_MEMBERS = 50
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Form of a model beside its effects.
+
+    Attributes:
+        noise_sd: left by a pilot fit [N].
+        rounded: whether the noise needs the exact likelihood of rounded readings.
+        with_gap: whether the leftover discrepancy is in the model.
+        correlated: whether the correlation of neighbouring readings is in the model.
+        why_independent: why it is not; empty where it is.
+    """
+
+    noise_sd: float
+    rounded: bool
+    with_gap: bool
+    correlated: bool
+    why_independent: str
+
+
+def decide_structure(
+    case: Case, effects: Sequence[type[Effect]] = (), with_gap: bool | None = None
+) -> Structure:
+    """Return the structure that the readings of a case show.
+
+    Args:
+        case: records and gear.
+        effects: in the model. What they explain cannot be told from a bend here, so
+            that with effects a leftover is in the model only where it is asked for.
+        with_gap: whether the leftover discrepancy is in the model; None decides.
+    """
+    records = case.records
+    noise_sd = pilot_fit(records).noise_sd
+    rounded = _needs_exact_rounding(case, effects, noise_sd)
+    if with_gap is None and effects:
+        with_gap = False
+    reason = _why_independent(case, effects, rounded)
+    weights = _Evidence(records, case.gear.scale_priors, generous=bool(effects))
+    if with_gap is None and _line_suffices(case, weights.residual):
+        with_gap = False
+    gaps = (False, True) if with_gap is None else (with_gap,)
+    forms = [(gap, tied) for gap in gaps for tied in ((False,) if reason else _EITHER)]
+    gap, tied = max(forms, key=lambda form: weights.log_evidence(*form))
+    if not (reason or tied):
+        reason = "the readings show none"
+    return Structure(noise_sd, rounded, gap, tied, reason)
+
+
+def _needs_exact_rounding(case: Case, effects, noise_sd: float) -> bool:
+    known, rows = case.records.known, len(case.records.force)
+    members = known & {"run", "specimen"}
+    fine = _FINE_STEP_OF_FEW if rows <= _FEW_ROWS and not members else _FINE_STEP
+    if any(effect.mixture for effect in effects):
+        fine = _FINE_STEP_OF_A_MIXTURE
+    return case.gear.force_resolution > fine * noise_sd
+
+
+def _line_suffices(case: Case, residual: np.ndarray) -> bool:
+    """Return whether a line passes within one step of every reading."""
+    return float(np.max(np.abs(residual))) <= case.gear.force_resolution
+
+
+def _why_independent(case: Case, effects, rounded: bool) -> str:
+    """Return why no correlation of neighbours can be in the model, empty if it can."""
+    prior, records = case.gear.scale_priors[CORRELATION], case.records
+    if prior.family == "fixed" and float(prior.numbers[0]) == 0.0:
+        return "its prior says that there is none"
+    if not np.any(previous_rows(records) >= 0):
+        return "no reading follows another one in its run"
+    if any(effect.mixture for effect in effects):
+        return "no exact likelihood is known beside noise that is a mixture"
+    if rounded:
+        return "the steps of the reading are too wide beside the noise"
+    return ""
+
+
+class _Evidence:
+    """Evidence of forms of the noise and the curve, from Gram matrices.
+
+    With rows z = [base, leftover, residual] all that a form needs are the sums of
+    z zᵀ over rows, over rows that follow another one, and of neighbours.
+    """
+
+    def __init__(self, records: Records, priors, generous: bool):
+        base, force = _base(records, generous)
+        self.residual = force - base @ (base.T @ force)
+        gap = build_discrepancy(records)
+        padded = pad_records(records)
+        shapes = np.asarray(discrepancy_columns(gap, padded))[: len(force)]
+        shapes = shapes - base @ (base.T @ shapes)
+        table = np.column_stack([base, shapes, self.residual])
+        before = previous_rows(records)
+        follows = before >= 0
+        earlier, later = table[before[follows]], table[follows]
+        self._all, self._first = table.T @ table, table[~follows].T @ table[~follows]
+        self._before, self._now = earlier.T @ earlier, later.T @ later
+        crossed = later.T @ earlier
+        self._crossed = crossed + crossed.T
+        self._rows, self._following = len(force), int(np.count_nonzero(follows))
+        self._base = base.shape[1]
+        self._alike = _quantiles(priors[CORRELATION], CORRELATION, _CORRELATIONS)
+        self._scales = [
+            np.asarray(gap.prior_sd(1.0, length))
+            for length in _quantiles(priors["gap_length"], "gap_length", _LENGTHS)
+        ]
+
+    def log_evidence(self, gap: bool, tied: bool) -> float:
+        """Return the log probability of the readings under a form, up to a constant.
+
+        Args:
+            gap: whether the leftover discrepancy is in the model.
+            tied: whether neighbouring readings are correlated.
+        """
+        correlations = self._alike if tied else np.zeros(1)
+        each = [list(self._given(rho, gap)) for rho in correlations]
+        return float(logsumexp(each) - np.log(np.size(each)))
+
+    def _given(self, correlation: float, gap: bool) -> Iterator[float]:
+        """Yield log probabilities at the points of the leftover's size and length."""
+        gram = self._all
+        if correlation > 0.0:
+            changed = self._now - correlation * self._crossed
+            changed = changed + correlation**2 * self._before
+            gram = self._first + changed / (1.0 - correlation**2)
+        p, free = self._base, self._rows - self._base
+        base, cross, rest = gram[:p, :p], gram[:p, p:], gram[p:, p:]
+        rest = rest - cross.T @ np.linalg.solve(base, cross)
+        volume = 0.5 * self._following * np.log1p(-(correlation**2))
+        volume += 0.5 * np.linalg.slogdet(base)[1]
+        square = max(rest[-1, -1], 1e-300)
+        if not gap:
+            yield -volume - 0.5 * free * np.log(square)
+            return
+        for scale in self._scales:
+            inner = scale[:, None] * rest[:-1, :-1] * scale
+            size, turn = np.linalg.eigh(inner)
+            size, along = np.maximum(size, 0.0), turn.T @ (scale * rest[:-1, -1])
+            for gain in _SIZES**2:
+                left = square - np.sum(gain * along**2 / (1.0 + gain * size))
+                left = max(left, 1e-12 * square)
+                volumes = volume + 0.5 * np.sum(np.log1p(gain * size))
+                yield -volumes - 0.5 * free * np.log(left)
+
+
+def _base(records: Records, generous: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return orthonormal columns of the base model, shape (n, p), and the force [N].
+
+    Args:
+        records: the rows.
+        generous: also a cubic and a step for the direction, which stand for effects.
+    """
+    run, specimen = np.asarray(records.run), np.asarray(records.specimen)
+    force, place = (
+        np.asarray(values, float) for values in (records.force, records.deformation)
+    )
+    place = (place - place.mean()) / (np.ptp(place) or 1.0)
+    rise = np.asarray(records.temperature) - np.mean(records.temperature)
+    columns = [place * (specimen == i) for i in np.unique(specimen)[:_MOST_MEMBERS]]
+    if np.ptp(rise) > 0.0:
+        columns += [rise, rise * place]
+    if generous:
+        columns += [place**2, place**3, np.asarray(records.sense, float)]
+    runs = np.unique(run)
+    if len(runs) <= _MOST_MEMBERS:
+        columns += [(run == i).astype(float) for i in runs]
+    else:
+        count = np.bincount(run)
+        *columns, force = (
+            values - (np.bincount(run, values) / count)[run]
+            for values in (*columns, force)
+        )
+    left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+    return left[:, size > 1e-10 * size[0]], force
+
+
+def _quantiles(prior, name: str, count: int) -> np.ndarray:
+    """Return quantiles of a prior that stand for it with equal weights."""
+    from hdcal.inference.distributions import frozen
+
+    if prior.family == "fixed":
+        return np.array([float(prior.numbers[0])])
+    return np.asarray(frozen(prior, name).ppf((np.arange(count) + 0.5) / count))
