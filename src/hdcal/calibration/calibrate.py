@@ -23,6 +23,7 @@ from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
+from hdcal.inference.straight_line import line_check
 from hdcal.inference.structure import Structure, decide_structure
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
@@ -180,7 +181,7 @@ def calibrate(
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     fitted = laplace.fit(problem)
     found = sample(problem, fitted, seed, progress=progress, **size)
-    own = _specifics(case, problem, form, found, shown=shown)
+    own = _specifics(case, problem, form, found, asked=bool(asked), shown=shown)
     parts = assemble(case, priors, problem, found, own, seed)
     parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
@@ -227,7 +228,13 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
 
 
 def _specifics(
-    case: Case, problem: Problem, form: Structure, found: Draws, *, shown: bool = False
+    case: Case,
+    problem: Problem,
+    form: Structure,
+    found: Draws,
+    *,
+    asked: bool,
+    shown: bool,
 ) -> Specifics:
     """Return what the model of the force adds to what every calibration has."""
     centre = {
@@ -247,6 +254,8 @@ def _specifics(
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(found.values, rows, form.why_independent),
             growth_check(found.values, unasked=shown),
+            # An effect is a reason for another stiffness.
+            *([] if asked else [line_check(case.records, found.values["stiffness"])]),
         ],
     )
 

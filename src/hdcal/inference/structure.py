@@ -14,7 +14,11 @@ from scipy.special import logsumexp
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records
-from hdcal.inference.discrepancy import build_discrepancy, discrepancy_columns
+from hdcal.inference.discrepancy import (
+    BASIS_SIZE,
+    build_discrepancy,
+    discrepancy_columns,
+)
 from hdcal.inference.noise_form import pilot_fit
 from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
@@ -25,6 +29,9 @@ from hdcal.physics.effect import Effect
 # beside a mixture it is that of wild readings too.
 _FINE_STEP, _FINE_STEP_OF_FEW, _FINE_STEP_OF_A_MIXTURE = 1.3, 0.5, 1e-3
 _FEW_ROWS = 500
+# Three readings for each function of a leftover: of fewer its priors would decide what
+# is bend and what is noise. A line then has both as its noise, and a wider interval.
+_LEAST_ROWS_OF_A_GAP = 3 * BASIS_SIZE
 # Without and with.
 _EITHER = (False, True)
 # Points of the hyperparameters: correlation as quantiles of its prior, size of the
@@ -68,7 +75,7 @@ def decide_structure(
     records = case.records
     noise_sd = pilot_fit(records).noise_sd
     rounded = _needs_exact_rounding(case, effects, noise_sd)
-    if with_gap is None and effects:
+    if with_gap is None and (effects or len(records.force) < _LEAST_ROWS_OF_A_GAP):
         with_gap = False
     reason = _why_independent(case, effects, rounded)
     weights = _Evidence(records, case.gear.scale_priors, generous=bool(effects))
