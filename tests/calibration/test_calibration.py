@@ -16,6 +16,7 @@ from rigs import (
     simulate,
 )
 from short import SHORT
+from structures import form_of
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
 from hdcal.calibration.calibration import summarise
@@ -235,7 +236,8 @@ def test_a_gap_beside_an_effect_is_integrated_too():
     """Rows are kept for the effect; drawn members must not count in the likelihood."""
     case = make_case(with_force(cycles(48)))
     chosen = choose_effects(["coulomb_friction"])
-    problem = build_problem(case, effect_priors(), chosen, with_gap=True)
+    form = form_of(case, chosen, True)
+    problem = build_problem(case, effect_priors(), chosen, structure=form)
     assert problem.blocks is None
     assert "discrepancy" in problem.integrated
     of_truth, of_members = jax.random.split(jax.random.key(0))

@@ -5,7 +5,6 @@ import pytest
 from rigs import make_gear
 
 from hdcal.data.full_scale import REFERENCE, FullScale
-from hdcal.data.gear import at_full_scale
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
 from hdcal.data.reading import read_case
@@ -22,6 +21,11 @@ deformation = "diametral"
 [priors]
 coulomb_friction.force = { family = "half_normal", sd = 7.0, unit = "N" }
 """
+SPRING = {
+    "theory": "spring",
+    "deformation": "radial",
+    "reference_temperature_C": 20.0,
+}
 RIG = FullScale(force=3700.0, deformation=0.1)
 
 
@@ -82,17 +86,28 @@ def test_gears_that_are_left_out_have_no_part_in_it():
     others = {header: column[name != "B"] for header, column in frame.items()}
     sizes = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
     read = read_fleet(still, sizes)
-    assert read.case.gear.full_scale.force == 4000.0
+    assert read.case.gear.full_scale.force > 3900.0
     left, alone = usable(read, skip_bad=True)[0], read_fleet(others, sizes)
     assert left.case.gear == alone.case.gear
     whole = read_fleet(frame, sizes)
     assert usable(whole)[0].case.gear == whole.case.gear
 
 
-def test_the_zero_of_the_deformation_keeps_its_size():
-    gear = at_full_scale(make_gear(), RIG)
+def test_a_zero_that_nobody_states_may_be_anywhere():
+    x = np.linspace(100.0, 101.0, 20)
+    gear = read_case({"deformation_mm": x, "force_N": 5.0 * x}, gear=SPRING).gear
     before = make_gear().priors
     assert gear.priors["deformation_offset"] == before["deformation_offset"]
-    assert gear.priors["force_offset"].numbers[1] == pytest.approx(
-        37.0 * before["force_offset"].numbers[1]
-    )
+    # Ten times the range, the level and the way to the origin, 5 N/mm · 100.5 mm.
+    zero = gear.priors["force_offset"].numbers
+    assert zero == pytest.approx((0.0, 10.0 * (5.0 + 502.5 + 502.5)), rel=0.02)
+    assert gear.full_scale.force == pytest.approx(5.0, rel=0.02)
+    assert gear.full_scale.deformation == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_zero_that_the_gear_file_states_stays():
+    stated = {"force_offset": {"family": "normal", "mean": 1.0, "sd": 0.2, "unit": "N"}}
+    x = np.linspace(0.0, 1.0, 20)
+    gear = {**SPRING, "priors": stated}
+    found = read_case({"deformation_mm": x, "force_N": 5.0 * x}, gear=gear).gear
+    assert found.priors["force_offset"].numbers == (1.0, 0.2)

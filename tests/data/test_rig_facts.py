@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from hdcal.data.correlation_prior import rows_of_half_cycle
 from hdcal.data.gear import read_gear
 from hdcal.data.priors import rig_priors
 from hdcal.data.reading import read_case
-from hdcal.data.rig_facts import filtered
 from hdcal.errors import InputError
 
 SPRING = '[gear]\ntheory = "spring"\n'
@@ -79,13 +79,24 @@ def test_noise_behind_a_filter_errs_alike_as_the_prior_expects(tmp_path):
     assert a / (a + b) == pytest.approx(likely, abs=0.06)
 
 
-def test_a_filter_that_is_faster_than_the_logger_says_nothing(tmp_path):
-    shipped = rig_priors()["noise_correlation"]
+def test_a_filter_that_is_faster_than_the_logger_says_little(tmp_path):
     slow = correlation_of(tmp_path, SPRING + FACTS, step=2.0)
-    np.testing.assert_allclose(slow.numbers, shipped.numbers, atol=1e-3)
+    assert slow.family == "beta"
+    np.testing.assert_allclose(slow.numbers, (0.5, 1.5), atol=1e-3)
+
+
+def test_without_a_clock_a_filter_says_nothing(tmp_path):
     without = correlation_of(tmp_path, SPRING + FACTS, "deformation_mm,force_N")
-    assert without == shipped
-    assert filtered(shipped, 2.0, np.zeros(5)) == shipped
+    assert without.family == rig_priors()["noise_correlation"].family == "uniform"
+
+
+def test_a_half_cycle_is_the_way_between_two_turns():
+    up = np.linspace(0.0, 1.0, 21)
+    path = np.concatenate([up, up[-2::-1], up[1:]])
+    rows = rows_of_half_cycle(path, np.zeros(len(path), int))
+    assert rows == pytest.approx(20.0, abs=1.0)
+    twice = np.tile(path, 2)
+    assert rows_of_half_cycle(twice, np.repeat([0, 1], len(path))) == rows
 
 
 @pytest.mark.parametrize(

@@ -3,13 +3,14 @@
 A certificate states the gauge's own zero. Draws stand near the mode: none is sampled.
 """
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import jax
 import numpy as np
 import pytest
 from rigs import make_case, make_gear, make_records
 from scipy import stats
+from structures import form_of
 
 from hdcal.calibration.calibrate import _specifics
 from hdcal.data.certificates import ForceCertificate, certificate_priors
@@ -20,7 +21,7 @@ from hdcal.inference.checks import conflict_check
 from hdcal.inference.density import log_prior
 from hdcal.inference.distributions import effective_priors
 from hdcal.inference.integrated import draw_members
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.residuals import residuals
 from hdcal.inference.sample import Draws
@@ -76,12 +77,15 @@ def near_the_mode(problem, chains: int = 2, draws: int = 200) -> Draws:
 def posterior() -> Posterior:
     case = stated_case()
     shipped, theory = effect_priors(), case.gear.theory
-    problem = build_problem(case, shipped)
+    form = form_of(case)
+    problem = build_problem(case, shipped, structure=form)
     found = near_the_mode(problem)
     priors = problem_priors(case, (), shipped, theory)
-    own = _specifics(case, problem, found)
+    own = _specifics(case, problem, form, found, asked=False, shown=False)
     parts = assemble(case, priors, problem, found, own, 2)
-    return Posterior(case, theory, (), priors, *parts, {"with_gap": False})
+    return Posterior(
+        case, theory, (), priors, *parts, {"with_gap": False, STRUCTURE: asdict(form)}
+    )
 
 
 def test_the_mean_of_mountings_is_believed_as_wide_as_they_differ():

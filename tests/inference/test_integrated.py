@@ -9,6 +9,7 @@ import pytest
 from numpyro.handlers import seed, trace
 from scipy import stats
 from slices import slice_of
+from structures import form_of
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.priors import (
@@ -143,10 +144,11 @@ def test_compressed_is_row_by_row(loading, rows, runs, specimens, sds, seed, rea
 
 def test_a_compressed_problem_is_its_rows(loading, gear):
     records = labelled(loading, 5, known={"force_sd"}, sds=(0.1, 0.4))
-    problem = build_problem(case_of(records, gear), SHIPPED)
+    case = case_of(records, gear)
+    problem = build_problem(case, SHIPPED, structure=form_of(case))
     assert problem.records is None
     values = random_values(1)
-    rows = rows_form(problem, case_of(records, gear))
+    rows = rows_form(problem, case)
     mean, noise = predict_rows(rows, values, records, None)
     slow = stats.multivariate_normal(
         mean, noise_covariance(records, noise.sd[0], values["noise_correlation"])
@@ -335,7 +337,8 @@ def structured(request, loading, gear):
         sds=(0.1, 0.6) if "force_sd" in known else (0.0,),
     )
     case = case_of(records, gear, resolution=0.3)
-    problem = build_problem(case, SHIPPED, with_gap=with_gap)
+    form = form_of(case, (), with_gap)
+    problem = build_problem(case, SHIPPED, structure=form)
     return case, problem
 
 
@@ -381,7 +384,7 @@ def test_a_draw_holds_what_is_said_of_it(structured):
     values |= jax.jit(integrated.draw_members)(problem, values, jax.random.key(0))
     shapes = {name: np.shape(value) for name, value in values.items()}
     with_gap = problem.discrepancy is not None
-    assert shapes == of_draw.site_shapes(case, (), with_gap)
+    assert shapes == of_draw.site_shapes(case, (), form_of(case, (), with_gap))
 
 
 def test_drawn_members_explain_the_data(structured):
@@ -503,7 +506,8 @@ def test_what_is_eliminated_is_decided_in_one_place(linear, counts, order):
 def test_runs_by_the_thousand_are_integrated_out(loading, gear):
     many = jax.tree.map(lambda leaf: np.resize(np.asarray(leaf), 4_000), loading)
     records = labelled(many, 1, known={"run"}, runs=2_000)
-    problem = build_problem(case_of(records, gear), SHIPPED)
+    case = case_of(records, gear)
+    problem = build_problem(case, SHIPPED, structure=form_of(case))
     values = random_values(3)
     linear = jax.jit(integrated.linear_part)(problem, values)
     # No array has an entry for each pair of runs.

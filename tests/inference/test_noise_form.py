@@ -8,6 +8,7 @@ import pytest
 from rigs import autoregression, draw_truth, make_case, make_gear, make_records
 from scipy import stats
 from stated_density import base_places, off_the_stated_density
+from structures import form_of
 
 from hdcal.calibration.calibrate import calibrate
 from hdcal.data.priors import Prior, effect_priors
@@ -15,18 +16,11 @@ from hdcal.inference import model
 from hdcal.inference import noise_form as noise_form_module
 from hdcal.inference.checks import correlation_check, growth_check
 from hdcal.inference.density import log_likelihood
-from hdcal.inference.member_counts import member_counts
-from hdcal.inference.noise_form import (
-    correlates,
-    growth_p_value,
-    noise_form,
-    noise_grows,
-    pilot_noise,
-    why_independent,
-)
+from hdcal.inference.noise_form import growth_p_value, noise_grows, pilot_fit
 from hdcal.inference.problem import build_problem
 from hdcal.inference.residuals import misfits
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows, whiten
+from hdcal.inference.structure import NONE_SHOWN, decide_structure
 from hdcal.inference.values import stiffness
 from hdcal.physics.effect import Noise, Rows, parameters
 from hdcal.physics.registry import EFFECTS
@@ -45,14 +39,16 @@ def case_of(noise, *, x=X, gear=None, **columns):
 def both_forms():
     """Correlated noise that grows, and places in the sampler's coordinates."""
     rng = np.random.default_rng(0)
-    problem = build_problem(case_of(rng.normal(size=ROWS)), effect_priors(), (GROWS,))
+    case = case_of(rng.normal(size=ROWS))
+    form = form_of(case, (GROWS,))
+    problem = build_problem(case, effect_priors(), (GROWS,), structure=form)
     noise = f"{GROWS.name}.share"
     names = ["E0", "K", "alpha", "force_offset", "deformation_offset", "sigma"]
     places = {
         **base_places(rng),
         "deformation_offset": 0.02 * rng.normal(size=8),
         "_added_sd": rng.normal(size=8),
-        f"_{CORRELATION}": 0.8 + 0.3 * rng.normal(size=8),
+        CORRELATION: rng.normal(size=8),
         f"_{noise}": 3.0 * rng.normal(size=8),
     }
     return problem, [*names, CORRELATION, noise], places
@@ -107,25 +103,10 @@ def test_a_mixture_is_declared_as_one():
             assert (len(found.log_weight) > 1) == effect.mixture, name
 
 
-def test_correlation_is_asked_where_it_can_be_told():
-    noise = np.random.default_rng(0).normal(0.0, 0.6, ROWS)
-    assert correlates(case_of(noise), ())
-    assert not correlates(case_of(noise), (EFFECTS["outliers"],))
-    assert not correlates(case_of(noise, run=np.arange(ROWS)), ())
-    # Within steps wider than the noise neighbours are alike anyway.
-    assert not correlates(case_of(noise, gear=make_gear(resolution=0.98)), ())
-    assert correlates(case_of(noise, gear=make_gear(resolution=0.1)), ())
-    # Few rows cannot tell it from a leftover discrepancy.
-    assert correlates(case_of(noise), (), with_gap=True)
-    few = case_of(noise[:14], x=X[:14])
-    assert correlates(few, ()) and not correlates(few, (), with_gap=True)
-
-
 def reason(case, effects=(), with_gap=False) -> str:
-    form = noise_form(case, effects, member_counts(case, with_gap), 0.6)
-    found = why_independent(case, effects, rounded=form[0], with_gap=with_gap)
-    assert form[1] == (not found)
-    return found
+    found = decide_structure(case, effects, with_gap)
+    assert found.correlated == (not found.why_independent)
+    return found.why_independent
 
 
 @pytest.mark.parametrize("wild", [6.0, 60.0])
@@ -134,9 +115,9 @@ def test_wild_readings_do_not_hide_that_the_others_are_rounded(wild):
     noise = np.random.default_rng(0).normal(0.0, 0.3, ROWS)
     noise[::10] += np.tile([wild, -wild], ROWS // 20)
     case = case_of(np.round(noise, 1), gear=make_gear(resolution=0.5))
-    assert 0.5 * pilot_noise(case.records) > 0.5
+    assert 0.5 * pilot_fit(case.records).noise_sd > 0.5
     plain, mixed = (
-        noise_form(case, effects, {}, pilot_noise(case.records))[0]
+        decide_structure(case, effects).rounded
         for effects in ((), (EFFECTS["outliers"],))
     )
     assert mixed and not plain
@@ -145,11 +126,12 @@ def test_wild_readings_do_not_hide_that_the_others_are_rounded(wild):
 def test_why_no_correlation_is_asked_for_is_said():
     noise = np.random.default_rng(0).normal(0.0, 0.6, ROWS)
     none = make_gear(noise_correlation=Prior("fixed", (0.0,)))
-    assert reason(case_of(noise)) == ""
+    alike = autoregression(noise, 0 * X, 0.7)
+    assert reason(case_of(alike)) == ""
+    assert reason(case_of(noise)) == NONE_SHOWN
     assert "mixture" in reason(case_of(noise), (EFFECTS["outliers"],))
     assert "follows" in reason(case_of(noise, run=np.arange(ROWS)))
     assert "steps" in reason(case_of(noise, gear=make_gear(resolution=0.98)))
-    assert "49 rows" in reason(case_of(noise[:14], x=X[:14]), with_gap=True)
     assert "prior" in reason(case_of(noise, gear=none))
 
 
@@ -174,7 +156,7 @@ def test_a_correlation_held_at_none_is_independent_noise():
     for rho in (0.0, 0.5):
         gear = make_gear(noise_correlation=Prior("fixed", (rho,)))
         case = case_of(noise, gear=gear)
-        problem = build_problem(case, effect_priors())
+        problem = build_problem(case, effect_priors(), structure=form_of(case))
         values = draw_truth(problem, jax.random.key(1)) | {"sigma": np.float64(0.6)}
         found[rho] = float(log_likelihood(problem, values))
         mean = stiffness(problem, values) * (X - values["deformation_offset"])

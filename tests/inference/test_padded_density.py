@@ -8,6 +8,7 @@ import pytest
 from moving import moving_case
 from rigs import draw_truth, make_case, make_gear, program
 from slices import slice_of
+from structures import form_of
 
 from hdcal.data.priors import effect_priors
 from hdcal.inference import compress, density
@@ -104,7 +105,9 @@ def test_padded_rows_have_the_density_of_the_measured_ones(name: str):
     effects, data = PROBLEMS[name]
     with_gap = data.get("with_gap", False)
     case = case_of(**{k: v for k, v in data.items() if k != "with_gap"})
-    problem = build_problem(case, effect_priors(), effects, with_gap=with_gap)
+    problem = build_problem(
+        case, effect_priors(), effects, structure=form_of(case, effects, with_gap)
+    )
     rows = len(case.records.force)
     assert len(problem.rows.force) == bucket_size(rows)
     assert problem.count == rows
@@ -179,7 +182,9 @@ def test_groups_of_one_sd_are_not_padded():
 def test_derivatives_of_measured_rows_are_those_without_padding():
     case = case_of(runs=3, specimens=2)
     effects = of_stage("force")
-    problem = build_problem(case, effect_priors(), effects, with_gap=True)
+    problem = build_problem(
+        case, effect_priors(), effects, structure=form_of(case, effects, True)
+    )
     values = values_of(problem)
     columns = np.asarray(problem.discrepancy.columns(*moves(case)))
     found = linearise(problem, values, case.records)

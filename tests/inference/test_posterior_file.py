@@ -10,8 +10,8 @@ import xarray as xr
 from posteriors import batch, single
 
 from hdcal.errors import InputError, NotUsable
-from hdcal.inference import noise_form
-from hdcal.inference.posterior import PILOT_NOISE, Posterior
+from hdcal.inference import problem as problem_module
+from hdcal.inference.posterior import Posterior
 from hdcal.inference.posterior_file import DIGEST, FORMAT
 
 
@@ -143,9 +143,8 @@ def _with_effect(file: Path) -> Path:
     return file
 
 
-def test_the_form_of_the_noise_is_read_and_not_fitted_again(file: Path, monkeypatch):
-    found = single(size=20)
-    replace(found, settings={**found.settings, PILOT_NOISE: 0.6}).save(file)
-    monkeypatch.setattr(noise_form, "pilot_fit", None)
+def test_the_structure_is_read_and_not_decided_again(file: Path, monkeypatch):
+    single(size=20).save(file)
+    monkeypatch.setattr(problem_module, "decide_structure", None)
     problem = Posterior.load(file).problem
     assert problem.correlated and not problem.rounded

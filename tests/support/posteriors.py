@@ -1,10 +1,11 @@
 """Posteriors that nobody sampled: draws written down, for what only reads them."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import xarray as xr
 from rigs import make_case, make_gear, make_records
+from structures import form_of
 
 from hdcal.calibration.calibrate import choose_effects
 from hdcal.data.case import Case, Gear
@@ -12,8 +13,7 @@ from hdcal.data.priors import Prior, effect_priors
 from hdcal.data.versions import versions
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
-from hdcal.inference.noise_form import correlates
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.inference.serial_correlation import CORRELATION
@@ -31,7 +31,8 @@ def written_posterior(
     """Return a usable posterior with these draws [draw, …] in two chains."""
     chosen = choose_effects(effects)
     priors = problem_priors(case, chosen, effect_priors(), case.gear.theory)
-    if correlates(case, chosen, with_gap=with_gap):
+    form = form_of(case, chosen, with_gap)
+    if form.correlated:
         draws = {CORRELATION: np.zeros(len(draws["K"])), **draws}
     shaped = {
         name: np.asarray(v, float).reshape(CHAINS, -1, *np.shape(v)[1:])
@@ -68,6 +69,7 @@ def written_posterior(
         "warmup": 1,
         "draws": size,
         "with_gap": with_gap,
+        STRUCTURE: asdict(form),
         "target_acceptance": 0.8,
         "versions": versions(),
         "seconds": 0.0,

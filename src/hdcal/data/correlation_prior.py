@@ -10,10 +10,9 @@ from hdcal.data.prior import Prior
 from hdcal.data.priors import rig_priors
 from hdcal.data.turning_points import TURN_MOST, turning_points
 
-# Noise is what is faster than the loading: readings err alike over this share of a half
-# cycle at most. What is slower is a bend, which a leftover discrepancy follows down to
-# a tenth of the range.
-_FAST = 0.05
+# Noise is what is faster than the loading: readings err alike over a fifth of a half
+# cycle at most, so that each holds five independent stretches. Slower is a bend.
+_FAST = 0.2
 # How many neighbours that err alike a filter stands for, and what is believed of the
 # correlation where it is hardly any.
 _AS_GOOD_AS, _UNFILTERED = 20.0, (0.5, 1.5)

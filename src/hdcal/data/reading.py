@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from hdcal.data.case import Case, Gear
 from hdcal.data.correlation_prior import with_correlation_prior
+from hdcal.data.deformation_scatter import without_scatter
 from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
@@ -133,6 +135,7 @@ def case_of(
         told: notes on how that was found.
         name: of the case.
     """
+    measured, smoothed = _steadied(measured)
     motion = _motion(measured)
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
@@ -154,11 +157,31 @@ def case_of(
             *told,
             *reading_notes(measured, found, motion),
             *of_further,
+            *smoothed,
         ),
         columns=measured.columns.as_named(),
         left_out=measured.left_out,
         **further,
     )
+
+
+def _steadied(measured: Measurements) -> tuple[Measurements, list[str]]:
+    """Return measurements without the scatter of the displacement gauge, and a note."""
+    values = measured.columns.values
+    steady, force, scatter = without_scatter(
+        values["deformation"], values["force"], measured.run.index
+    )
+    if scatter == 0.0:
+        return measured, []
+    columns = replace(
+        measured.columns, values=values | {"deformation": steady, "force": force}
+    )
+    words = (
+        f"the displacement gauge scatters by {scatter:.2g} mm (sd), which would make the "
+        "stiffness too small: each reading is moved along its line to the deformation "
+        "smoothed over the rows"
+    )
+    return replace(measured, columns=columns), [words]
 
 
 def asked_columns(

@@ -1,9 +1,9 @@
 """What the model of a case contains beside line and effects, decided once.
 
 Two questions are answered before any sampling: do the readings show that neighbours
-err alike, and does the curve bend? Each answer is that of the larger evidence, whose
-coefficients and noise are integrated out. A form that the readings do not show is left
-out: where they are independent and straight the model is that of least squares.
+err alike, and does the curve bend? Each answer is that of the evidence of the
+readings, coefficients and noise integrated out. A form that the readings do not show
+is left out: where they are independent and straight the model is that of least squares.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,6 +32,11 @@ _FEW_ROWS = 500
 # Three readings for each function of a leftover: of fewer its priors would decide what
 # is bend and what is noise. A line then has both as its noise, and a wider interval.
 _LEAST_ROWS_OF_A_GAP = 3 * BASIS_SIZE
+# What a further part of the model needs: positive evidence, 3 : 1 (Kass and Raftery,
+# Journal of the American Statistical Association 90, 1995).
+_LOG_POSITIVE = np.log(3.0)
+# Why a correlation that could be is not in the model.
+NONE_SHOWN = "the readings show none"
 # Without and with.
 _EITHER = (False, True)
 # Points of the hyperparameters: correlation as quantiles of its prior, size of the
@@ -83,9 +88,11 @@ def decide_structure(
         with_gap = False
     gaps = (False, True) if with_gap is None else (with_gap,)
     forms = [(gap, tied) for gap in gaps for tied in ((False,) if reason else _EITHER)]
-    gap, tied = max(forms, key=lambda form: weights.log_evidence(*form))
+    gap, tied = max(
+        forms, key=lambda form: weights.log_evidence(*form) - sum(form) * _LOG_POSITIVE
+    )
     if not (reason or tied):
-        reason = "the readings show none"
+        reason = NONE_SHOWN
     return Structure(noise_sd, rounded, gap, tied, reason)
 
 

@@ -1,0 +1,63 @@
+"""Correlation and bend are in the model where the readings show them, else not."""
+
+import numpy as np
+import pytest
+
+import hdcal
+from hdcal.inference.structure import Structure, decide_structure
+from hdcal.physics.registry import EFFECTS
+
+ROWS = 200
+SPRING = {
+    "name": "spring",
+    "theory": "spring",
+    "deformation": "radial",
+    "reference_temperature_C": 20.0,
+}
+
+
+def case(bend: float, correlation: float, seed: int, rows: int = ROWS) -> hdcal.Case:
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=rows)
+    for row in range(1, rows):
+        own = np.sqrt(1.0 - correlation**2) * noise[row]
+        noise[row] = correlation * noise[row - 1] + own
+    x = np.linspace(0.0, 1.0, rows)
+    y = 100.0 * x + bend * (2.0 * x - 1.0) ** 2 + noise
+    return hdcal.read_case({"deformation_mm": x, "force_N": y}, gear=SPRING)
+
+
+def form(bend: float, correlation: float, seed: int) -> tuple[bool, bool]:
+    found = decide_structure(case(bend, correlation, seed))
+    return found.correlated, found.with_gap
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.7])
+@pytest.mark.parametrize("bend", [0.0, 5.0])
+def test_the_form_is_that_of_the_simulated_readings(bend: float, correlation: float):
+    right = sum(
+        form(bend, correlation, seed) == (correlation > 0.0, bend > 0.0)
+        for seed in range(20)
+    )
+    assert right >= 18
+
+
+def test_correlation_is_of_what_is_faster_than_the_loading():
+    # 200 rows of one ramp: neighbours may err alike over 40 rows.
+    prior = case(0.0, 0.0, 0).gear.scale_priors["noise_correlation"]
+    assert prior.numbers == pytest.approx((0.0, np.exp(-1.0 / 40.0)))
+
+
+def test_a_bend_is_not_fitted_beside_effects_or_few_rows():
+    bent = case(20.0, 0.0, 0)
+    assert decide_structure(bent).with_gap
+    assert not decide_structure(bent, [EFFECTS["progressive_stiffening"]]).with_gap
+    assert not decide_structure(case(20.0, 0.0, 0, rows=40)).with_gap
+    assert decide_structure(bent, [EFFECTS["hysteresis"]], with_gap=True).with_gap
+
+
+def test_a_posterior_keeps_its_structure():
+    posterior = hdcal.calibrate(case(0.0, 0.7, 0), warmup=200, draws=200)
+    assert posterior.structure == decide_structure(posterior.case)
+    assert isinstance(posterior.structure, Structure)
+    assert posterior.structure.correlated and "noise_correlation" in posterior.draws

@@ -1,0 +1,14 @@
+"""Structures of models that tests ask for, whatever the readings show."""
+
+from dataclasses import replace
+
+from hdcal.data.case import Case
+from hdcal.inference.structure import NONE_SHOWN, Structure, decide_structure
+
+
+def form_of(case: Case, effects=(), with_gap: bool = False) -> Structure:
+    """Return a structure with correlated noise wherever its likelihood is known."""
+    found = decide_structure(case, effects, with_gap)
+    if found.why_independent != NONE_SHOWN:
+        return found
+    return replace(found, correlated=True, why_independent="")
