@@ -22,7 +22,7 @@ _LEAST_ROWS = 20
 def without_scatter(
     deformation: np.ndarray, force: np.ndarray, run: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return deformation and force without scatter in the deformation, and that scatter.
+    """Return readings without scatter in the deformation, and that scatter.
 
     Args:
         deformation: in the order it was taken [mm], shape (n,).

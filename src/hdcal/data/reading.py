@@ -177,10 +177,11 @@ def _steadied(measured: Measurements) -> tuple[Measurements, list[str]]:
         measured.columns, values=values | {"deformation": steady, "force": force}
     )
     words = (
-        f"the displacement gauge scatters by {scatter:.2g} mm (sd), which would make the "
-        "stiffness too small: each reading is moved along its line to the deformation "
-        "smoothed over the rows"
+        f"the displacement gauge scatters by {scatter:.2g} mm (sd), which would make "
+        "the stiffness too small: each reading is moved along its line to the "
+        "deformation smoothed over the rows"
     )
+    columns = replace(measured.columns, values=moved)
     return replace(measured, columns=columns), [words]
 
 
