@@ -23,10 +23,15 @@ class AssumedFullScale:
     def __init__(self, known: Pooled | Gear):
         self._names, self._largest = "", 0.0
         if isinstance(known, Gear):
-            other = at_full_scale(known, FullScale(2.0 * REFERENCE.force))
+            twice = FullScale(
+                force=2.0 * REFERENCE.force,
+                slope=2.0 * REFERENCE.slope,
+                zero_sd=2.0 * REFERENCE.zero_sd,
+            )
+            other = at_full_scale(known, twice)
             own, moved = (g.priors | g.scale_priors for g in (known, other))
             # The stiffness of a spring is such a prior too.
-            names = ("K", *IN_NEWTONS)
+            names = ("K", "force_offset", *IN_NEWTONS)
             shipped = [name for name in names if own[name] != moved[name]]
             self._names = ", ".join(name for name in shipped if name != _UNUSED)
 
