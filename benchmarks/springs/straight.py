@@ -56,8 +56,8 @@ def main() -> None:
     )
     for name, column in zip(("stiffness", "sd", "width"), np.abs(found).T, strict=True):
         print(
-            f"{name}: {np.mean(column < ALLOWED):.1%} within {ALLOWED:.0%} of the width "
-            f"of the interval; median {np.median(column):.2%}, most {column.max():.1%}"
+            f"{name}: {np.mean(column < ALLOWED):.1%} within {ALLOWED:.0%} of the "
+            f"interval's width; median {np.median(column):.2%}, most {column.max():.1%}"
         )
 
 
