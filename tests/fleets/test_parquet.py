@@ -14,7 +14,7 @@ from pyarrow import parquet as pq
 
 import hdcal as api
 from hdcal.data import parquet, parquet_head
-from hdcal.data.parquet_table import is_parquet
+from hdcal.data.tables.parquet_files import is_parquet
 from hdcal.errors import InputError
 from hdcal.fleets.pool import Pool
 from hdcal.fleets.read_fleet import read_fleet

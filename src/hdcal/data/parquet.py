@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,12 +11,8 @@ import pandas as pd
 
 from hdcal.data.bad_gears import bad_gears, offer
 from hdcal.data.case import Case, Gear
-from hdcal.data.cells import NOT_STATED
-from hdcal.data.columns import LABELS, Column
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import read_measurements
-from hdcal.data.parquet_cells import label_cells, number_cells
 from hdcal.data.parquet_head import (
     first_rows,
     placed,
@@ -24,9 +20,16 @@ from hdcal.data.parquet_head import (
     rows_of_others,
     runs_told,
 )
-from hdcal.data.parquet_table import parquet_files, parquet_table
 from hdcal.data.reading import GEAR_NAME, read_case
+from hdcal.data.tables.arrow_grid import arrow_grid
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.columns import Column
+from hdcal.data.tables.headers import GROUPINGS, LABELS
+from hdcal.data.tables.parquet_files import parquet_files, parquet_table
+from hdcal.data.tables.values import read_labels, read_values
 from hdcal.data.too_far import beyond_radius
+from hdcal.data.value_checks import wild_rows
 from hdcal.errors import Finding, InputError
 
 # Rows of a batch.
@@ -158,22 +161,33 @@ def read_batches(
     with FileFindings(file) as findings:
         dataset = parquet_table([file], root, findings)
     row, headers = 1, [column.header for column in used.values()]
+    placed = {
+        quantity: replace(column, position=place)
+        for place, (quantity, column) in enumerate(used.items())
+    }
+    numeric = {q: column for q, column in placed.items() if q not in LABELS}
     for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
-        values, labels = {}, {}
         with FileFindings(file) as findings:
-            for quantity, column in used.items():
-                if quantity in LABELS:
-                    labels[quantity] = label_cells(batch, column, row, findings)
-                else:
-                    values[quantity] = number_cells(batch, column, row, findings)
-            rows = np.arange(row, row + batch.num_rows)
+            size = batch.num_rows
+            grid = arrow_grid(batch.schema, batch.column, size, row, days=True)
+            table = Table(tuple(headers), row, grid, size)
+            values, _ = read_values(table, numeric, findings)
+            labels = {
+                quantity: read_labels(table, column, findings, [])
+                for quantity, column in placed.items()
+                if quantity in LABELS
+            }
+            for quantity, column in numeric.items():
+                wild = wild_rows(values[quantity], quantity, table.rows)
+                findings.add_rows(wild, column.header)
+            rows = table.rows
             fine = ~np.isin(rows, [*findings.rows])
             read, of = values["deformation"][fine], labels["specimen"][0][fine]
             beyond = beyond_radius(read, of, rows[fine], gear)
             findings.add_rows(beyond, used["deformation"].header)
             found = _batch(values, labels, rows, findings, skip_bad=skip_bad)
-        row += batch.num_rows
-        if batch.num_rows:
+        row += size
+        if size:
             yield found
 
 

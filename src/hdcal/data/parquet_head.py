@@ -10,9 +10,9 @@ import pandas as pd
 
 from hdcal.data.case import Case
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import guess_header
 from hdcal.data.measurements import read_measurements
 from hdcal.data.reading import gear_of
+from hdcal.data.tables.headers import parse_header
 from hdcal.errors import Finding, InputError
 
 if TYPE_CHECKING:
@@ -95,8 +95,7 @@ def placed(
 def quantity_of(header: str, columns: Mapping[str, str] | None) -> str:
     """Return which quantity a header is taken for, or said to be."""
     said = {name: quantity for quantity, name in (columns or {}).items()}
-    guess = guess_header(header)
-    return said.get(header, guess.quantity if guess is not None else "")
+    return said.get(header, parse_header(header).quantity)
 
 
 def runs_told(frame: pd.DataFrame, gear, columns, asked) -> dict[str, np.ndarray]:
