@@ -5,25 +5,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
-
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.inference.diagnostics import Diagnosis, Driver
 from hdcal.inference.posterior import Posterior
 from hdcal.physics.effect import parameters
 from hdcal.report.answer import Promise, Real, Words
+from hdcal.report.intervals import INTERVAL as INTERVAL
+from hdcal.report.intervals import Interval, credible_interval
 from hdcal.report.units import UNITS
-
-INTERVAL = 0.95
-
-
-@dataclass(frozen=True)
-class Interval:
-    """An equal-tailed interval with its median; which probability, says its owner."""
-
-    median: Real
-    lo: Real
-    hi: Real
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,13 +40,6 @@ class ParameterEstimate(Interval):
     prior_sensitivity: Real
     likelihood_sensitivity: Real
     driven_by: Driver
-
-
-def credible_interval(values: np.ndarray) -> Interval:
-    """Return median and equal-tailed 95 % credible interval."""
-    tail = (1.0 - INTERVAL) / 2.0
-    lo, median, hi = np.quantile(values, [tail, 0.5, 1.0 - tail])
-    return Interval(float(median), float(lo), float(hi))
 
 
 def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:

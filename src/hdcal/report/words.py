@@ -6,7 +6,7 @@ from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.theory_names import SPRING
-from hdcal.report.parameters import Interval
+from hdcal.report.intervals import Interval
 from hdcal.report.units import UNITS
 
 LABELS = {

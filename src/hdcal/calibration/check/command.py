@@ -60,7 +60,6 @@ def check(console: Console, effects, write_gear, plot, force, **given):
                 places[name] = console.hold(reserve)
     assert case is not None
     from hdcal.calibration.check.check import check as check_case
-    from hdcal.report.chart_drawing import images
 
     found = check_case(case, each_effect=effects)
     code = console.show(found)
@@ -69,6 +68,8 @@ def check(console: Console, effects, write_gear, plot, force, **given):
             path.write_text(_gear_file(case), "utf-8")
         console.words(f"the gear file: {write_gear}. Complete it")
     if plot:
+        from hdcal.report.chart_drawing import images
+
         (picture,) = images(found.charts()["readings"], case.name, [kind]).values()
         with places[plot].filled() as path:
             path.write_bytes(picture)
