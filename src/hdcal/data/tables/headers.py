@@ -46,67 +46,16 @@ _ALIASES = {
 }
 _LETTERS = {"F": "force", "T": "temperature", "t": "time", "M": "torque"}
 # What says that a column is something else about the quantity.
-_OTHERWISE = {
-    *[
-        "setpoint",
-        "set",
-        "target",
-        "command",
-        "soll",
-        "sollwert",
-        "consigne",
-        "rate",
-        "speed",
-        "error",
-        "max",
-    ],
-    *[
-        "maximum",
-        "min",
-        "minimum",
-        "peak",
-        "mean",
-        "average",
-        "sd",
-        "std",
-        "deviation",
-        "offset",
-        "tare",
-    ],
-    *[
-        "limit",
-        "grenze",
-        "diameter",
-        "durchmesser",
-        "diametre",
-        "thickness",
-        "dicke",
-        "epaisseur",
-    ],
-    *[
-        "width",
-        "breite",
-        "largeur",
-        "length",
-        "lange",
-        "longueur",
-        "height",
-        "hohe",
-        "hauteur",
-    ],
-    *[
-        "position",
-        "separation",
-        "ecartement",
-        "abstand",
-        "compensation",
-        "radius",
-        "pitch",
-    ],
-    *["corrected", "korrigiert", "corrige"],
-}
+_OTHERWISE = """
+    setpoint set target command soll sollwert consigne rate speed error max
+    maximum min minimum peak mean average sd std deviation offset tare limit
+    grenze diameter durchmesser diametre thickness dicke epaisseur width
+    breite largeur length lange longueur height hohe hauteur position
+    separation ecartement abstand compensation radius pitch corrected
+    korrigiert corrige
+"""
 # What says no more about a column.
-_FILLERS = {*["no", "nr", "number", "nummer", "id", "numero", "ch", "channel", "in"]}
+_FILLERS = "no nr number nummer id numero ch channel in"
 # A travel in degrees is an angle, a load in Nm a torque.
 _TURNING = {("deformation", "angle"): "angle", ("force", "torque"): "torque"}
 _OWN = re.compile(
@@ -118,36 +67,12 @@ _TRAILING = re.compile(r"(.*\S)(?:\s*[/,]\s*|\s+in\s+|[\s_]+)(\S+)\s*")
 _WIDE = re.compile("[\u3040-\u30ff\u4e00-\u9fff]")
 _LONGEST = 120
 # Units of other things, which a row of units may hold.
-_OTHER_UNITS = {
-    *[
-        "%",
-        "V",
-        "mV",
-        "A",
-        "mA",
-        "Hz",
-        "kHz",
-        "-",
-        "--",
-        "1",
-        "d",
-        "bar",
-        "Pa",
-        "kPa",
-        "MPa",
-        "GPa",
-        "psi",
-        "g",
-        "kg",
-        "t",
-        "lb",
-        "lbs",
-        "oz",
-    ],
-    *["με", "με", "mm/mm", "mm²", "mm^2", "mm2", "J", "W", "℃", "Volt", "Volts", "dB"],
-}
+_OTHER_UNITS = """
+    % V mV A mA Hz kHz - -- 1 d bar Pa kPa MPa GPa psi g kg t lb lbs oz με με
+    mm/mm mm² mm^2 mm2 J W ℃ Volt Volts dB
+"""
 # Those of them that behind a header are more likely a part of its name.
-_NAMES = {*["-", "--", "1", "d", "t", "A", "J", "W"]}
+_NAMES = "- -- 1 d t A J W"
 _ADVICE = {
     "a mass; its weight is": ("g", "kg", "t"),
     "a mass or a force; as a force it is": ("lb", "lbs", "oz"),
@@ -202,7 +127,7 @@ def parse_header(text: str) -> Header:
     if quantity in LABELS and unit is not None:
         # A blank and a letter may be part of a label's name, brackets are not.
         quantity, unit = ("", unit) if bare.endswith((")", "]")) else (quantity, None)
-    others = {*words} - _FILLERS - named
+    others = {*words} - {*_FILLERS.split()} - named
     # Without a unit a header has to name the quantity and nothing else.
     if others and unit is None and not _WIDE.search(name):
         quantity = ""
@@ -215,7 +140,7 @@ def split_unit(text: str) -> tuple[str, str]:
     if found is not None:
         return found[1], found[2]
     found = _TRAILING.fullmatch(text)
-    if found is not None and found[2] not in _NAMES and is_unit_text(found[2]):
+    if found is not None and found[2] not in _NAMES.split() and is_unit_text(found[2]):
         return found[1], found[2]
     return text, ""
 
@@ -224,7 +149,7 @@ def is_unit_text(text: str) -> bool:
     """Tell whether a cell holds a unit and nothing else, of whatever it is."""
     bare = unicodedata.normalize("NFC", text.strip().strip("()[]").strip())
     ratio = re.fullmatch(r"[^\W\d]{1,3}/[^\W\d]{1,3}[²^2]*", bare)
-    return bool(find_unit(text) or bare in _OTHER_UNITS or ratio)
+    return bool(find_unit(text) or bare in _OTHER_UNITS.split() or ratio)
 
 
 def unit_advice(text: str, quantity: str) -> str:
@@ -254,7 +179,7 @@ def _words(name: str) -> list[str]:
 
 
 def _is_other(word: str) -> bool:
-    return word in _OTHERWISE or word.startswith("soll")
+    return word in _OTHERWISE.split() or word.startswith("soll")
 
 
 def _quantity(name: str, words: list[str], unit: Unit | None) -> tuple[str, set[str]]:

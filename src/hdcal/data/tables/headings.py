@@ -17,9 +17,7 @@ from hdcal.data.units import find_unit
 # Lines above the readings among which the names stand.
 _NEAR = 20
 # Words before a row of units, and names of columns of them.
-UNIT_LABELS = {
-    *["unit", "units", "einheit", "einheiten", "unité", "単位", "单位", "y_unit_label"]
-}
+UNIT_LABELS = "unit units einheit einheiten unité 単位 单位 y_unit_label"
 _MARK = re.compile(r"\A\s*[#%*/]+\s*")
 
 
@@ -112,7 +110,7 @@ def _is_unit_line(line: Line, near: list[Line]) -> bool:
     filled = [cell for cell in line.cells if cell]
     if not filled or line.numbers:
         return False
-    if filled[0].strip(" :").casefold() in UNIT_LABELS:
+    if filled[0].strip(" :").casefold() in UNIT_LABELS.split():
         return any(map(is_unit_text, filled[1:]))
     units = [cell for cell in filled if is_unit_text(cell)]
     return line in near and any(map(find_unit, filled)) and 2 * len(units) > len(filled)

@@ -28,7 +28,7 @@ def with_unit_columns(table: Table, findings: FileFindings) -> Table:
     headers, notes = [*table.headers], [*table.notes]
     for place in range(1, len(headers)):
         label = headers[place].strip().casefold()
-        if label not in UNIT_LABELS:
+        if label not in UNIT_LABELS.split():
             continue
         units = [*dict.fromkeys(filter(None, table.grid.texts(place)))]
         name = headers[place - 1]
