@@ -146,8 +146,8 @@ class TextGrid(Grid):
         lines = self.text
         if self.has_commas():
             # Beside decimal commas a point is no part of a number.
-            signs = str.maketrans({",": ".", ".": "?"})
-            lines = "\n".join(lines).translate(signs).split("\n")
+            text = "\n".join(lines).replace(".", "?").replace(",", ".")
+            lines = text.split("\n")
         try:
             found = np.loadtxt(
                 lines,
