@@ -15,8 +15,9 @@ import hdcal
 from hdcal.__main__ import hdcal as program
 from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
+from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
-from hdcal.data.measurements import read_measurements
+from hdcal.data.measurements import read_columns, read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
 from hdcal.data.tables.headers import DIMENSIONS
 from hdcal.data.units import unit_names
@@ -52,6 +53,15 @@ def column(quantity: str, value, folder: Path) -> None:
     others = [name for name in rest if name != header]
     rows = [f"{value!r},{','.join(['0'] * len(others))}\n" for _ in range(6)]
     (folder / "data.csv").write_text(",".join([header, *others]) + "\n" + "".join(rows))
+    if quantity == "torque":
+        with FileFindings("data.csv") as findings:
+            read_columns(
+                folder / "data.csv",
+                None,
+                findings,
+                quantities=("torque",),
+                required=("torque",),
+            )
     read_measurements(folder / "data.csv")
 
 
@@ -85,8 +95,7 @@ def material(name: str, value, folder: Path) -> None:
 def read_entries() -> Iterator[tuple[str, str, Callable]]:
     """Yield the quantity, how a finding names it, and what reads it from a file."""
     for name in DIMENSIONS:
-        if name != "torque":
-            yield name, own_header(name), partial(column, name)
+        yield name, own_header(name), partial(column, name)
     sizes = ("wall_thickness", "radius", "length", "load_height", "nominal_deformation")
     for key in [
         *(f"gear.{name}_mm" for name in sizes),

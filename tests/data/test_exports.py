@@ -4,6 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from hdcal.data.findings import FileFindings
+from hdcal.data.measurements import read_columns
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 
@@ -174,6 +176,24 @@ def test_a_torque_over_an_angle_is_called_so(tmp_path):
     text = "Drehmoment [Nm];Verdrehwinkel [arcmin]\n" + rows(F, X, separator=";")
     (found,) = refused(tmp_path, text)
     assert "torsion" in found
+
+
+@pytest.mark.parametrize(
+    ("headers", "newton_metres", "radians"),
+    [
+        ("Torque (mNm),Twist (arcmin)", 1e-3, np.pi / 10800),
+        ("load [lbf*in],travel [deg]", 0.112984829, np.pi / 180),
+        ("torque_Nm,angle_rad", 1.0, 1.0),
+    ],
+)
+def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radians):
+    (tmp_path / "log.csv").write_text(f"{headers}\n" + rows(F, X))
+    with FileFindings("log.csv") as findings:
+        spring = ("torque", "angle")
+        how = {"quantities": spring, "required": spring}
+        found = read_columns(tmp_path / "log.csv", None, findings, **how)
+    np.testing.assert_allclose(found.values["torque"], newton_metres * F, rtol=1e-8)
+    np.testing.assert_allclose(found.values["angle"], radians * X, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
