@@ -12,7 +12,7 @@ import numpy as np
 
 from hdcal.data.tables.cells import is_number
 
-SEPARATORS = "\t;,|"
+SEPARATORS = "\t;|,"
 T = TypeVar("T")
 
 

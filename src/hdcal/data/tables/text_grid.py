@@ -63,24 +63,24 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 
 def _dialect(lines: list[str]) -> tuple[str, int]:
-    """Return the separator with which most cells are numbers, and the cells of a line.
+    """Return the separator with which most lines hold numbers, and their cells.
 
-    The separator is empty where no line holds two numbers, a blank for any blanks.
+    The separator is empty where no line holds two numbers, a blank for any blanks. A
+    tab or a semicolon is never part of a number; a comma may be one.
     """
     step = max(1, len(lines) // _SAMPLE)
     sample = [
         line for line in (*lines[:_SAMPLE], *lines[_SAMPLE::step]) if line.strip()
     ]
     tabs = any("\t" in line.strip() for line in sample)
-    best, found = 0.0, ("", 0)
+    most, found = 0, ("", 0)
     for separator in SEPARATORS if tabs else SEPARATORS + " ":
         shares = [*filter(None, (_numbers(line, separator) for line in sample))]
         if not shares or (separator == " " and len(shares) < _FEWEST):
             continue
-        width = Counter(cells for cells, _ in shares).most_common(1)[0][0]
-        score = sum(share for cells, share in shares if cells == width)
-        if score > best:
-            best, found = score, (separator, width)
+        width, lines = Counter(cells for cells, _ in shares).most_common(1)[0]
+        if lines > most:
+            most, found = lines, (separator, width)
     return found
 
 
