@@ -12,7 +12,7 @@ from hdcal.data.tables.grid import TextGrid
 
 
 def read(cell: str) -> np.ndarray:
-    grid = TextGrid(np.array([1]), 2, [], ";", [f"0;{cell}"])
+    grid = TextGrid(np.array([1]), 2, [], ";", [f"0;{cell}"], '"' in cell)
     return grid.read([1])[1]
 
 

@@ -107,7 +107,7 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[Table, tuple[str, ..
     table = replace(
         table,
         filled=len(readings.rows) + others.add_findings(),
-        skipped=_skipped(readings.rows, [*grid.rows, *(one.row for one in grid.loose)]),
+        skipped=_skipped(readings.rows, grid),
     )
     return table, headings[0].titles
 
@@ -122,14 +122,14 @@ def _check_width(
         findings.refuse(words, "Name every column", heading.row)
 
 
-def _skipped(readings: np.ndarray, lines: list[int]) -> int:
+def _skipped(readings: np.ndarray, grid: Grid) -> int:
     """Return how many lines between the first and the last reading are empty."""
     if not len(readings):
         return 0
     first, last = readings[0], readings[-1]
-    filled = np.array(lines)
-    between = np.sum((filled >= first) & (filled <= last))
-    return int(last - first + 1 - between)
+    filled = np.sum((grid.rows >= first) & (grid.rows <= last))
+    filled += sum(first < line.row < last for line in grid.loose)
+    return int(last - first + 1 - filled)
 
 
 def _sample(grid: Grid) -> Grid:

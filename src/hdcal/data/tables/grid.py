@@ -105,6 +105,7 @@ class TextGrid(Grid):
         loose: likewise.
         separator: of the cells.
         text: the lines.
+        quoted: some cells stand in quotation marks.
     """
 
     rows: np.ndarray
@@ -112,6 +113,7 @@ class TextGrid(Grid):
     loose: list[Line]
     separator: str
     text: list[str]
+    quoted: bool
 
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
         """As in `Grid`."""
@@ -128,7 +130,7 @@ class TextGrid(Grid):
     def texts(self, column: int) -> list[str]:
         """As in `Grid`."""
         mark = self.separator
-        if self._quoted:
+        if self.quoted:
             return [split_line(line, mark)[column] for line in self.text]
         return [line.split(mark, column + 1)[column].strip() for line in self.text]
 
@@ -154,7 +156,7 @@ class TextGrid(Grid):
                 delimiter=self.separator,
                 usecols=columns,
                 comments=None,
-                quotechar='"' if self._quoted else None,
+                quotechar='"' if self.quoted else None,
                 ndmin=2,
             )
         except ValueError:
@@ -170,10 +172,6 @@ class TextGrid(Grid):
     def has_commas(self) -> bool:
         """As in `Grid`."""
         return self.separator != "," and any("," in line for line in self.text)
-
-    @cached_property
-    def _quoted(self) -> bool:
-        return any('"' in line for line in self.text)
 
 
 @dataclass(frozen=True)

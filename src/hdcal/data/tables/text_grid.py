@@ -15,6 +15,8 @@ _SAMPLE = 300
 _MOST_REMARKS = 2
 # Lines of numbers between blanks that make a table.
 _FEWEST = 5
+# What an empty line may hold.
+_BLANKS = ' \t;,|"'
 _MARK = re.compile(r"\s*[#%*/]+\s*")
 _GAP = re.compile(r"\s{2,}")
 
@@ -36,13 +38,19 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
     if not separator:
         separator, width = _first_line(lines)
     counts = np.fromiter((line.count(separator) for line in lines), int, len(lines)) + 1
-    for index in (i for i, line in enumerate(lines) if '"' in line):
+    quoted = '"' in text
+    for index in (i for i, line in enumerate(lines) if quoted and '"' in line):
         counts[index] = _quoted_cells(lines[index], separator)
     widest = _heading_width(lines, separator, counts, width)
     fits = (counts >= width) & (counts <= widest)
     for index in np.flatnonzero(fits & (counts < widest)):
         lines[index] += separator * int(widest - counts[index])
-    empty = np.fromiter((not line.strip(' \t;,|"') for line in lines), bool, len(lines))
+    # Most lines begin with a digit or a letter.
+    empty = np.fromiter(
+        (line[:1] in _BLANKS and not line.strip(_BLANKS) for line in lines),
+        bool,
+        len(lines),
+    )
     loose = [
         Line(index + 1, cells_of(lines[index], separator), fits=False)
         for index in np.flatnonzero(~fits & ~empty).tolist()
@@ -54,6 +62,7 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
         loose=loose,
         separator=separator,
         text=[*compress(lines, kept.tolist())],
+        quoted=quoted,
     ), notes
 
 

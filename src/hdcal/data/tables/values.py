@@ -152,6 +152,6 @@ def read_labels(
 def _add(
     table: Table, faults: list[Fault], column: Column, findings: FileFindings
 ) -> None:
-    rows = table.rows.tolist()
-    each = ((rows[place], problem, remedy) for place, problem, remedy in faults)
+    rows = table.rows
+    each = ((int(rows[place]), words, remedy) for place, words, remedy in faults)
     findings.add_rows(each, column.header)
