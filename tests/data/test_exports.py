@@ -67,6 +67,18 @@ def test_units_stand_in_columns_beside_the_numbers(tmp_path):
     assert any("changes: 'N' and 'kN'" in one for one in refused(tmp_path, text))
 
 
+def test_units_stand_in_the_cells(tmp_path):
+    cells = [f"{x} um" for x in 1e3 * X], [f"{f}cN" for f in F]
+    case = read(tmp_path, "Travel,Load\n" + rows(*cells))
+    check(case, force=F / 100)
+    text = "Travel [mm];Load\n" + rows(X, cells[1], separator=";", decimal=",")
+    check(read(tmp_path, text), force=F / 100)
+    mixed = [f"{f} {'N' if f < 5 else 'kN'}" for f in F]
+    for header in ("Load", "Load [lbf]"):
+        found = refused(tmp_path, f"Travel [mm],{header}\n" + rows(X, mixed))
+        assert any("changes" in one and "'kN'" in one for one in found)
+
+
 def test_rows_of_ranges_and_factors_stand_between_names_and_readings(tmp_path):
     text = (
         'Logger,"A-1"\nRate (Hz),10\nName,"Extension","Load"\nRange,10,50\n'

@@ -6,7 +6,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from hdcal.data.units import UNITS
+
 NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
+_UNITS = "|".join(map(re.escape, sorted(UNITS, key=len, reverse=True)))
+_WITH_UNIT = re.compile(rf"(?P<number>[+-]?[\d.,eE+-]+)\s*(?P<unit>{_UNITS})")
 _POINT = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 # Whole numbers, their thousands marked by points.
 _IN_THOUSANDS = re.compile(r"[+-]?[1-9]?\d{1,2}(\.\d{3})*", re.ASCII)
@@ -25,7 +29,14 @@ class CellError(ValueError):
 
 def is_number(cell: str) -> bool:
     """Tell whether a cell holds a number, its decimal mark a point or a comma."""
-    return NUMBER.fullmatch(cell) is not None
+    return NUMBER.fullmatch(cell) is not None or bool(unit_in(cell))
+
+
+def unit_in(cell: str) -> str:
+    """Return the unit behind the number in a cell, as in '12.5 N'; empty without."""
+    found = _WITH_UNIT.fullmatch(cell)
+    known = found is not None and NUMBER.fullmatch(found["number"])
+    return found["unit"] if found is not None and known else ""
 
 
 def read_number(cell: str, comma: bool) -> float:
@@ -40,6 +51,7 @@ def read_number(cell: str, comma: bool) -> float:
     """
     if not cell:
         raise CellError("the cell is empty", "Fill it in or leave out the row")
+    cell = cell.removesuffix(unit_in(cell)).rstrip()
     if _ENDLESS.fullmatch(cell):
         words = f"'{cell}' is not a finite number"
         raise CellError(words, "Leave out the row if nothing was read")

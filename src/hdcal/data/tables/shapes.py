@@ -6,16 +6,22 @@ import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import Table, find_table
+from hdcal.data.tables.cells import unit_in
 from hdcal.data.tables.grid import ArrayGrid, Grid
+from hdcal.data.tables.headers import parse_header
 from hdcal.data.tables.headings import UNIT_LABELS
 from hdcal.data.units import find_unit
 from hdcal.errors import quoted
+
+# Rows that show whether cells hold units.
+_SHOWN = 50
 
 
 def table_of(grid: Grid, findings: FileFindings) -> Table:
     """Return the table in a grid, whatever its shape."""
     table, titles = find_table(grid, findings)
-    return stacked(with_unit_columns(table, findings), titles)
+    table = with_unit_cells(with_unit_columns(table, findings), findings)
+    return stacked(table, titles)
 
 
 def with_unit_columns(table: Table, findings: FileFindings) -> Table:
@@ -40,6 +46,33 @@ def with_unit_columns(table: Table, findings: FileFindings) -> Table:
             words = f"the unit of {quoted(name)} changes: {several}"
             findings.add(words, "Convert the readings to one unit", table.header_row)
     return replace(table, headers=tuple(headers), notes=tuple(notes))
+
+
+def with_unit_cells(table: Table, findings: FileFindings) -> Table:
+    """Return a table whose headers have the units that stand in their cells.
+
+    Args:
+        table: the readings.
+        findings: of the source; gets one where a unit changes from row to row, or is
+            another one than that of the header.
+    """
+    first = np.arange(len(table.rows)) < _SHOWN
+    headers, sample = [*table.headers], table.grid.take(first)
+    for place, name in enumerate(headers):
+        if sample.is_numeric(place) or not any(map(unit_in, sample.texts(place))):
+            continue
+        units = [*dict.fromkeys(map(unit_in, table.grid.texts(place)))]
+        header = parse_header(name)
+        known = header.unit.name if header.unit and header.quantity else ""
+        units = [unit for unit in units if unit and find_unit(unit) != header.unit]
+        if len(units) == 1 and not known:
+            headers[place] = f"{name} [{units[0]}]"
+        elif units and header.quantity:
+            said = [known] if known else []
+            several = " and ".join(map(quoted, [*said, *units[:3]]))
+            words = f"the unit of {quoted(name)} changes: {several}"
+            findings.add(words, "Convert the readings to one unit", table.header_row)
+    return replace(table, headers=tuple(headers))
 
 
 def stacked(table: Table, titles: tuple[str, ...]) -> Table:
