@@ -18,7 +18,7 @@ import os, pkgutil, sys, warnings
 from importlib import import_module
 
 import arviz_base, arviz_stats, diffrax, distributed, equinox, h5netcdf, jax
-import matplotlib, numpy, numpyro.contrib.hsgp.laplacian, optimistix, pandas, pint
+import matplotlib, numpy, numpyro.contrib.hsgp.laplacian, optimistix, pandas
 import pydantic, rich, scipy.optimize, scipy.stats, threadpoolctl, xarray
 
 def state():

@@ -15,10 +15,12 @@ import hdcal
 from hdcal.__main__ import hdcal as program
 from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
+from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
-from hdcal.data.measurements import read_measurements
+from hdcal.data.measurements import read_columns, read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
-from hdcal.data.units import COLUMN_UNITS
+from hdcal.data.tables.headers import DIMENSIONS
+from hdcal.data.units import unit_names
 from hdcal.errors import InputError
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"
@@ -40,13 +42,26 @@ def posterior():
     return still_posterior(K=0.02)
 
 
+def own_header(quantity: str) -> str:
+    return f"{quantity}_{unit_names(DIMENSIONS[quantity])[0]}"
+
+
 def column(quantity: str, value, folder: Path) -> None:
     """Read a table with one such cell."""
-    header = f"{quantity}_{COLUMN_UNITS[quantity][0]}"
-    rest = [f"{n}_{COLUMN_UNITS[n][0]}" for n in ("deformation", "force")]
+    header = own_header(quantity)
+    rest = [own_header(name) for name in ("deformation", "force")]
     others = [name for name in rest if name != header]
     rows = [f"{value!r},{','.join(['0'] * len(others))}\n" for _ in range(6)]
     (folder / "data.csv").write_text(",".join([header, *others]) + "\n" + "".join(rows))
+    if quantity == "torque":
+        with FileFindings("data.csv") as findings:
+            read_columns(
+                folder / "data.csv",
+                None,
+                findings,
+                quantities=("torque",),
+                required=("torque",),
+            )
     read_measurements(folder / "data.csv")
 
 
@@ -79,8 +94,8 @@ def material(name: str, value, folder: Path) -> None:
 
 def read_entries() -> Iterator[tuple[str, str, Callable]]:
     """Yield the quantity, how a finding names it, and what reads it from a file."""
-    for name in COLUMN_UNITS:
-        yield name, f"{name}_{COLUMN_UNITS[name][0]}", partial(column, name)
+    for name in DIMENSIONS:
+        yield name, own_header(name), partial(column, name)
     sizes = ("wall_thickness", "radius", "length", "load_height", "nominal_deformation")
     for key in [
         *(f"gear.{name}_mm" for name in sizes),

@@ -81,7 +81,9 @@ class Shown:
         """
         if (result := self._result) is not None:
             return result.to_frame()
-        return import_module("hdcal.data.frames").frame_of(self._columns)
+        import pandas as pd
+
+        return pd.DataFrame({name: [*each] for name, each in self._columns.items()})
 
     def to_datatree(self) -> Any:
         """Return its main table as xarray's DataTree; draws are in ArviZ' groups."""

@@ -68,7 +68,7 @@ def test_what_is_not_read_of_a_mat_file_is_told(tmp_path):
 
 def test_arrays_have_no_encoding(tmp_path):
     FRAME.to_parquet(tmp_path / "a.parquet")
-    with pytest.raises(InputError, match="without `encoding`"):
+    with pytest.raises(InputError, match="has no `encoding`"):
         hdcal.read_case(tmp_path / "a.parquet", encoding="utf-8")
 
 

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.text_file import LONGEST_LINE
+from hdcal.data.tables.text_file import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"
@@ -260,24 +260,14 @@ def test_a_column_that_is_missing_is_told_with_those_that_are_there(folder):
         assert "HEADER one of: 'here', 'there'" in found.remedy
 
 
-def test_many_bad_cells_are_counted_after_twenty(folder):
+def test_one_fault_of_many_rows_is_one_finding_with_their_number(folder):
     cells = "".join(f"1,x{k}\n" for k in range(1000))
     (folder / "data.csv").write_text(H + "0,0\n" + cells + "1\n0\n\n" * 30)
-    findings = findings_of(folder)
-    assert sum(f.problem.startswith("'x") for f in findings) == 20
-    assert [f.problem for f in findings if f.row is None] == [
-        "and 20 more rows like these",
-        "and 980 more cells that are no numbers",
-    ]
-
-
-def test_many_rows_that_lack_the_same_are_told_as_one(folder):
-    (folder / "data.csv").write_text(H + "0,0\n" + "1,x\n" * 1000 + "1\n" * 30)
     check(
         findings_of(folder),
         [
-            (1003, None, "has 2; the same in all rows down to 1032"),
-            (3, "force_N", "'x' is not a number; the same in all rows down to 1002"),
+            (1003, None, "60 rows in all, also rows 1004, 1006"),
+            (3, "force_N", "1000 rows in all, also rows 4, 5, 6, 7, 8, 9 and 993 more"),
         ],
     )
 
@@ -343,7 +333,10 @@ def test_every_torn_reading_at_the_top_is_told(folder, above):
     columns = {} if above else {"deformation": "1[mm]", "force": "2[N]"}
     found = findings_of(folder, columns=columns)
     first = above.count("\n") + 1
-    check(found, [(first + k, None, f"has {n}") for k, n in enumerate((1, 3, 1))])
+    words = "has 1 cells where the header row has 2; the same in 2 rows in all, also"
+    check(
+        found, [(first, None, f"{words} row {first + 2}"), (first + 1, None, "has 3")]
+    )
     assert all("or remove the line" in finding.remedy for finding in found)
 
 

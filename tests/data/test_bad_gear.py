@@ -125,7 +125,7 @@ CASES = {
     ),
     "effect unit": (
         GEAR + "[priors.slack]\nc = { family = 'half_normal', sd = 1, unit = 'mA' }\n",
-        [(6, "priors.slack.c.unit", "mechanical")],
+        [(6, "priors.slack.c.unit", "is not a unit")],
     ),
     "effect no table": (
         GEAR + "[priors.slack]\nclearance = 3\n",

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdcal.data.cells import NOT_STATED
 from hdcal.data.dates import dates_of
+from hdcal.data.tables.cells import NOT_STATED
 
 
 @pytest.mark.parametrize(

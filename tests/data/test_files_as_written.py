@@ -183,7 +183,7 @@ FILES = {
     "a title on every column of a spreadsheet": Written(
         "Test 12;;\n;;\nWeg [mm];Kraft [N];Temperatur [°C]\n"
         + lines(";", ",", more=TEMPERATURE),
-        ("lines above", "'Weg [mm]'"),
+        ("1 line above", "'Weg [mm]'"),
         also=WARM,
     ),
     "a setpoint beside what was reached": Written(
@@ -272,7 +272,7 @@ FILES = {
         "Channels\t2\t\t\nX_Dimension\tTime\tTime\t\n***End_of_Header***\t\t\t\n"
         "X_Value\tWeg (mm)\tKraft (N)\tComment\n"
         + "".join(f"\t{row}\t\n" for row in lines("\t").strip().split("\n")),
-        ("lines above the table", "'X_Value'"),
+        ("lines above the table", "'X_Value"),
     ),
     "a mean and a remark below the readings, in cells of the table": Written(
         "Prüfling,Weg [mm],Kraft [N]\n"
@@ -377,7 +377,7 @@ REFUSED = {
     ),
     "a mass for a force": (
         "Displacement (mm),Load (g)\n" + BODY,
-        "no column holds the force",
+        "g is a mass; its weight is gf",
     ),
     "thousands marked by points beside decimal commas": (
         "Weg [mm];Kraft [N]\n" + "".join(f"0,{k}00;1.70{k}\n" for k in range(6)),

@@ -4,9 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdcal.data.cells import NOT_STATED
 from hdcal.data.mountings import run_labels
 from hdcal.data.reading import read_case
+from hdcal.data.tables.cells import NOT_STATED
 
 X = np.linspace(0.1, 0.5, 5)
 # Gear, date, rig, operator of each mounting.

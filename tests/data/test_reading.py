@@ -6,8 +6,8 @@ import hashlib
 import numpy as np
 import pytest
 
-from hdcal.data.header_words import guess_header
 from hdcal.data.reading import read_case
+from hdcal.data.tables.headers import parse_header
 
 ROWS = [(0.0, 1.5), (0.1, 20.0), (0.2, 41.25), (0.3, 60.5), (0.4, 82.0), (0.5, 101.0)]
 
@@ -283,7 +283,8 @@ def test_rigs_are_those_of_mountings(folder):
     case = read(folder, mixed)
     assert case.rigs == ()
     assert "rigs are not used: run 'A/2' has several" in case.notes
-    assert guess_header("Rig temperature [C]") == ("temperature", "C", False)
+    header = parse_header("Rig temperature [C]")
+    assert (header.quantity, header.unit_text) == ("temperature", "C")
 
 
 def test_who_tested_may_stand_above_the_table_too(folder):

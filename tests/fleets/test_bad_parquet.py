@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdcal.data import parquet, parquet_head
+from hdcal.data import parquet
 from hdcal.errors import InputError
 from hdcal.fleets.read_fleet import read_fleet
 
@@ -37,7 +37,7 @@ def told(*args, **kwargs) -> list[str]:
 @pytest.mark.parametrize("batch", [30, 1 << 18])
 def test_no_row_lies_beyond_the_radius(tmp_path, monkeypatch, batch):
     """As in a table, of which the farthest row of each gear is told."""
-    monkeypatch.setattr(parquet_head, "_SHOWN", 40)
+    monkeypatch.setattr(parquet, "_SHOWN", 40)
     monkeypatch.setattr(parquet, "_BATCH", batch)
     given = measured()
     given.loc[[204, 207, 330], "deformation_um"] = [41_000.0, -45_000.0, 40_000.0]
@@ -77,7 +77,7 @@ def test_all_first_rows_of_parquet_may_be_of_a_bad_gear(
     (folder := tmp_path / "line").mkdir()
     frame[:30].to_parquet(folder / "a.parquet", index=False)
     frame[30:].to_parquet(folder / "b.parquet", index=False)
-    monkeypatch.setattr(parquet_head, "_SHOWN", 20)
+    monkeypatch.setattr(parquet, "_SHOWN", 20)
     monkeypatch.setattr(parquet, "_BATCH", batch)
     (first, *_) = told(folder)
     assert problem in first and "a.parquet, row 2" in first

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 import hdcal as api
-from hdcal.data import parquet, parquet_head
+from hdcal.data import parquet
 from hdcal.fleets.read_fleet import read_fleet
 
 GEARS, ROWS = 8, 8
@@ -66,7 +66,7 @@ def test_batches_of_parquet_tell_the_same(frame, tmp_path, monkeypatch, batch):
 
 
 def test_the_first_rows_of_parquet_have_their_runs(frame, tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet_head, "_SHOWN", 3 * ROWS)
+    monkeypatch.setattr(parquet, "_SHOWN", 3 * ROWS)
     bad = frame.copy()
     bad.loc[bad["specimen"] == "G1", "force_N"] = np.nan
     bad.to_parquet(tmp_path / "line.parquet", index=False)

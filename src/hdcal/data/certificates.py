@@ -7,12 +7,11 @@ the error of finding that point a displacement gauge adds its own.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
-from hdcal.data.plausible import range_of
 from hdcal.data.prior import Prior
 from hdcal.data.priors import MODEL_UNITS
 from hdcal.data.typed_json import within
@@ -94,15 +93,6 @@ _SOURCE = "certificate: "
 def is_stated(prior: Prior) -> bool:
     """Tell whether a prior is one that a certificate states."""
     return prior.family == "normal" and prior.source.startswith(_SOURCE)
-
-
-def can_state(site: str, family: str, numbers: Sequence[float]) -> bool:
-    """Tell whether a certificate can state a prior of a site, in code units."""
-    most = range_of("expanded_K").high
-    if site in GAINS:
-        most = 0.01 * range_of("expanded_percent").high
-    centred = family == "normal" and numbers[0] == 0.0
-    return site in GAUGE_UNITS and centred and 0.0 < numbers[1] <= most
 
 
 def certificate_faults(

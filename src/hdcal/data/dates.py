@@ -4,9 +4,8 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 
-from hdcal.data.cells import NOT_STATED
+from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
 # How days are written; behind points the month stands second, behind slashes anywhere.
@@ -34,7 +33,7 @@ def dates_of(
     """
     if not len(labels):
         return (), ""
-    place, texts = pd.factorize(np.array(labels, object))
+    texts, place = _distinct(labels)
     told = np.array([text != NOT_STATED for text in texts])
     times = np.full(len(texts), np.datetime64("NaT", "s"))
     note = ""
@@ -65,9 +64,9 @@ def days_of(labels: np.ndarray) -> np.ndarray:
         Days as ISO 8601 has them, as they are written where that can be read in two
         ways, and as not stated where they cannot be read.
     """
-    place, stamps = pd.factorize(labels)
+    stamps, place = _distinct(labels)
     # Few days have many times.
-    day, texts = pd.factorize(np.array([day_text(text) for text in stamps], object))
+    texts, day = _distinct([day_text(text) for text in stamps])
     days = np.full(len(texts), NOT_STATED, object)
     told = np.flatnonzero(texts != NOT_STATED)
     readings = _readings(texts[told]) if len(told) else []
@@ -79,6 +78,11 @@ def days_of(labels: np.ndarray) -> np.ndarray:
     return days[day][place]
 
 
+def _distinct(labels: Sequence[str] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return labels without repetition, and the index of each among them, (n,)."""
+    return np.unique(np.array(labels, object), return_inverse=True)
+
+
 def day_text(text: str) -> str:
     """Return a date as it is written, without its time."""
     return _CLOCK.sub("", text)
@@ -86,6 +90,8 @@ def day_text(text: str) -> str:
 
 def _readings(texts: Sequence[str] | np.ndarray) -> list[np.ndarray]:
     """Return in how many ways texts can be read, most of them at least, as times."""
+    import pandas as pd
+
     found: list[np.ndarray] = []
     # What clocks there showed counts, not what they showed elsewhere; and what is said
     # without a number is another day whenever it is read.

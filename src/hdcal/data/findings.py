@@ -1,30 +1,22 @@
-"""What is wrong with one file, collected while it is read."""
+"""Findings on one file, collected while it is read."""
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import NoReturn
 
 from hdcal.errors import Finding, Findings, InputError, quoted
 
-LISTED = 20  # findings of one kind that are spelled out before "and N more"
+LISTED = 20  # findings that are spelled out before "and N more"
+_FIRST_FEW = 6  # rows that one sentence lists
+_CELL = re.compile(r"'[^']*'")
 
 
-# Row, problem and remedy.
-_Found = tuple[int, str, str]
-
-
-def _blocks(
-    found: Sequence[_Found], places: Sequence[tuple[str, int]]
-) -> list[list[_Found]]:
-    """Return findings with those of the row above that say the same beside them."""
-    blocks: list[list[_Found]] = []
-    for one in found:
-        above = blocks[-1][-1] if blocks else (-1, "", "")
-        below = above[0] == one[0] - 1 and above[1:] == one[1:]
-        if below and (not places or places[above[0] - 1][0] == places[one[0] - 1][0]):
-            blocks[-1].append(one)
-        else:
-            blocks.append([one])
-    return blocks
+def row_list(rows: Sequence[int]) -> str:
+    """Return a text such as 'rows 3, 5, 9 and 12 more'."""
+    few = ", ".join(map(str, rows[:_FIRST_FEW]))
+    more = len(rows) - _FIRST_FEW
+    few += f" and {more} more" if more > 0 else ""
+    return f"row {few}" if len(rows) == 1 else f"rows {few}"
 
 
 class FileFindings(Findings):
@@ -37,7 +29,7 @@ class FileFindings(Findings):
         places: sheet and row of each row of a table that was joined from several
             sheets; empty of any other.
         rows: problem, remedy and column of the first thing that is wrong with each row,
-            those that are not spelled out among them.
+            also of rows that no sentence lists.
     """
 
     def __init__(self, file: str):
@@ -47,7 +39,7 @@ class FileFindings(Findings):
         self.rows: dict[int, tuple[str, str, str | None]] = {}
 
     def row_of_file(self, row: int) -> int:
-        """Return where a row of the text stands in the file, or in its sheet."""
+        """Return where a row of the table stands in the file, or in its sheet."""
         return self.places[row - 1][1] if self.places else row
 
     def add(
@@ -63,7 +55,7 @@ class FileFindings(Findings):
         self.append(self._finding(problem, remedy, row, column))
 
     def of_row(self, row: int) -> Finding:
-        """Return the first thing that is wrong with a row of the text."""
+        """Return the first thing that is wrong with a row of the table."""
         problem, remedy, column = self.rows[row]
         return self._finding(problem, remedy, row, column)
 
@@ -77,34 +69,26 @@ class FileFindings(Findings):
         return Finding(file, problem, remedy, row, column)
 
     def add_rows(
-        self,
-        found: Iterable[tuple[int, str, str]],
-        column: str | None = None,
-        kind: str = "rows like these",
+        self, found: Iterable[tuple[int, str, str]], column: str | None = None
     ) -> None:
-        """Add findings of one kind: the first 20, then how many more there are.
-
-        Where there are more, rows below each other that lack the same are told as one.
+        """Add one finding for all rows of which the same is wrong.
 
         Args:
-            found: row, problem and remedy of each.
+            found: row, problem and remedy of each; problems that differ in a cell that
+                they quote are the same.
             column: header.
-            kind: what they are, in the plural.
         """
-        every = [*found]
-        for row, problem, remedy in every:
+        alike: dict[str, list[tuple[int, str, str]]] = {}
+        for row, problem, remedy in found:
             self.rows.setdefault(row, (problem, remedy, column))
-        blocks = [[one] for one in every]
-        if len(every) > LISTED:
-            blocks = _blocks(every, self.places)
-        for block in blocks[:LISTED]:
-            row, problem, remedy = block[0]
-            if len(block) > 1:
-                last = self.row_of_file(block[-1][0])
-                problem = f"{problem}; the same in all rows down to {last}"
+            kind = _CELL.sub("''", problem)
+            alike.setdefault(kind, []).append((row, problem, remedy))
+        for (row, problem, remedy), *others in alike.values():
+            if others:
+                rows = row_list([self.row_of_file(one) for one, *_ in others])
+                count = len(others) + 1
+                problem = f"{problem}; the same in {count} rows in all, also {rows}"
             self.add(problem, remedy, row, column)
-        if more := sum(map(len, blocks[LISTED:])):
-            self.add(f"and {more} more {kind}", "Mend all of them", None, column)
 
     def refuse(self, problem: str, remedy: str, row: int | None = None) -> NoReturn:
         """Add one finding, after which nothing more can be read.

@@ -3,11 +3,10 @@
 from collections.abc import Mapping
 
 import numpy as np
-import pandas as pd
 
-from hdcal.data.cells import NOT_STATED
 from hdcal.data.dates import dates_of
 from hdcal.data.measurements import Labels
+from hdcal.data.tables.cells import NOT_STATED
 from hdcal.errors import quoted
 
 
@@ -46,9 +45,9 @@ def _one_each(labels, of: Labels, quantity: str) -> tuple[tuple[str, ...], str]:
     """
     if labels is None:
         return (), ""
-    pairs = pd.DataFrame({"of": of.index, "label": labels}).drop_duplicates()
+    pairs = dict.fromkeys(zip(of.index.tolist(), labels, strict=True))
     told: dict[int, list[str]] = {}
-    for one, label in zip(pairs["of"].tolist(), pairs["label"].tolist(), strict=True):
+    for one, label in pairs:
         told.setdefault(one, []).append(label)
     for one, several in told.items():
         # A cell that was left empty is filled by the others of its gear or mounting.

@@ -12,14 +12,11 @@ import numpy as np
 
 from hdcal.data.bad_gears import offer
 from hdcal.data.case import Case, Gear
-from hdcal.data.cells import NOT_STATED
-from hdcal.data.columns import Columns
-from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
 from hdcal.data.gear_files import gear_files, gear_labels, not_read
-from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import (
+    Columns,
     Measurements,
     labels_of,
     read_measurements,
@@ -28,6 +25,10 @@ from hdcal.data.measurements import (
 from hdcal.data.mountings import run_labels
 from hdcal.data.reading import GEAR_NAME, asked_columns, case_of, gear_of
 from hdcal.data.reading_notes import mountings_note, unused_columns
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.grid import ArrayGrid
+from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings
@@ -250,7 +251,8 @@ def _joined(parts: Sequence[_Part], warm: float) -> Measurements:
         for columns in [part.measured.columns]
         for note in (*columns.notes, *unused_columns(columns))
     )
-    table = CsvTable((), 0, _places(parts), ",", b"", rows, 0)
+    grid = ArrayGrid(_places(parts), 0, [], values.__getitem__)
+    table = Table((), 0, grid, rows)
     columns = Columns(
         values,
         {},

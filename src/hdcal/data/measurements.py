@@ -1,36 +1,74 @@
-"""From a CSV file to checked columns, runs and gears."""
+"""From a source to checked columns, runs and gears."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from hdcal.data.bad_gears import among, bad_gears, offer
-from hdcal.data.cells import read_cells
-from hdcal.data.columns import (
-    LABELS,
-    QUANTITIES,
-    REQUIRED,
-    Column,
-    Columns,
-    match_columns,
-)
-from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
-from hdcal.data.frames import NAME, frame_text, is_frame
 from hdcal.data.mountings import run_labels
-from hdcal.data.text_file import read_text
-from hdcal.data.units import column_to_code
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.columns import REQUIRED, Column, choose_columns
+from hdcal.data.tables.grid import factorize
+from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header
+from hdcal.data.tables.sources import read_source, source_name
+from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
 from hdcal.errors import Finding, InputError, quoted
 
+# Quantities of a spring under a force.
+_READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
 # How a note begins that says what was guessed.
 ASSUMED = "ASSUMED: "
 # Labels that one finding names.
 _LISTED = 20
+
+
+@dataclass(frozen=True)
+class Columns:
+    """The columns that are used, in code units, whether they make sense or not.
+
+    Attributes:
+        values: by quantity, floats (NaN where a cell is wrong) or label strings,
+            each of shape (n,).
+        used: where each quantity stands.
+        table: the readings.
+        sha256: hash of the source.
+        findings: what is wrong with it.
+        notes: what was assumed of it.
+    """
+
+    values: dict[str, np.ndarray]
+    used: dict[str, Column]
+    table: Table
+    sha256: str
+    findings: FileFindings
+    notes: tuple[str, ...] = ()
+
+    def as_named(self) -> dict[str, str]:
+        """Return how a user would name each: its header or number, with its unit.
+
+        Those that hdcal's own headers name need no other name.
+        """
+        named = {}
+        for quantity, column in self.used.items():
+            header = parse_header(column.header)
+            if header.exact and header.quantity == quantity and not column.against:
+                continue
+            alone = self.table.headers.count(column.header) == 1
+            name = column.header if alone else str(column.position + 1)
+            said = alone and header.unit == column.unit
+            unit = "" if column.unit is None else column.unit.name
+            named[quantity] = name if said or not unit else f"{name}[{unit}]"
+        return named
+
+    def find(self, mask: np.ndarray, quantity: str, problem: str, remedy: str) -> None:
+        """Add one finding for the rows where the mask, shape (n,), is true."""
+        rows = self.table.rows[mask].tolist()
+        header = self.used[quantity].header
+        self.findings.add_rows(((row, problem, remedy) for row in rows), header)
 
 
 @dataclass(frozen=True)
@@ -70,7 +108,7 @@ class Measurements:
 
 
 def read_measurements(
-    path: Any,
+    data: Any,
     mapping: Mapping[str, str] | None = None,
     encoding: str | None = None,
     sheet: str | None = None,
@@ -78,10 +116,10 @@ def read_measurements(
     check: Callable[[Columns, Labels], None] | None = None,
     skip_bad: bool | None = None,
 ) -> Measurements:
-    """Read a file of measurements.
+    """Read a source of measurements.
 
     Args:
-        path: the file, or a table in memory (see `frame_text`).
+        data: the file, or a table in memory (see `read_source`).
         mapping: quantity -> header, the unit in brackets, as in
             `{"force": "Load[kgf]"}`; for headers that do not name themselves.
         encoding: of the text; by default what it looks like.
@@ -94,8 +132,8 @@ def read_measurements(
         InputError: holds everything that is wrong with the file.
     """
     left_out: dict[str, Finding] = {}
-    with FileFindings(NAME if is_frame(path) else str(path)) as findings:
-        found = _find_columns(path, mapping, findings, encoding=encoding, sheet=sheet)
+    with FileFindings(source_name(data)) as findings:
+        found = find_columns(data, mapping, findings, encoding=encoding, sheet=sheet)
         while True:
             measured = _measured(found)
             columns, gears = measured.columns, measured.specimen
@@ -118,7 +156,7 @@ def read_measurements(
 
 def _measured(found: Columns) -> Measurements:
     """Return what stands in columns, right or wrong: their findings say."""
-    columns = _with_values(found, FEWEST_ROWS)
+    columns = with_values(found, FEWEST_ROWS)
     rows = len(columns.table.rows)
     specimen = labels_of(columns.values.get("specimen"), rows)
     run = runs_of(run_labels(columns.values, specimen.index), specimen, rows)
@@ -147,12 +185,12 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
     columns = replace(
         measured.columns,
         values={name: v[here] for name, v in measured.columns.values.items()},
-        table=replace(measured.columns.table, rows=measured.columns.table.rows[here]),
+        table=measured.columns.table.take(here),
     )
     check_values(columns, 0)
     if findings:
         raise InputError(findings)
-    index, kept = pd.factorize(measured.run.index[here])
+    index, kept = factorize(measured.run.index[here].tolist())
     return Measurements(
         columns,
         Labels(index, tuple(measured.run.names[run] for run in kept)),
@@ -161,114 +199,96 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
 
 
 def read_columns(
-    path: Any,
+    data: Any,
     mapping: Mapping[str, str] | None,
     findings: FileFindings,
     *,
-    quantities: Sequence[str] = QUANTITIES,
-    required: Sequence[str] = REQUIRED,
+    quantities: Sequence[str] = _READ,
+    required: tuple[str, ...] = REQUIRED,
     fewest: int = FEWEST_ROWS,
-    encoding: str | None = None,
-    sheet: str | None = None,
 ) -> Columns:
-    """Read the columns of a CSV file that hold known quantities, right or wrong.
+    """Read the columns of a source that hold known quantities, right or wrong.
 
     Args:
-        path: the file, or a table in memory.
+        data: the file, or a table in memory.
         mapping: quantity -> header with its unit in brackets, or None.
-        findings: of the file; gets one for everything that is wrong.
+        findings: of the source; gets one for everything that is wrong.
         quantities: what to look for.
         required: which of them must be there.
         fewest: rows that are needed.
-        encoding: of the text; by default what it looks like.
-        sheet: of a workbook; by default the one with readings.
 
     Raises:
-        InputError: no table can be found in the file.
+        InputError: no table can be found.
     """
-    found = _find_columns(
-        path,
-        mapping,
-        findings,
-        quantities=quantities,
-        required=required,
-        encoding=encoding,
-        sheet=sheet,
-    )
-    columns = _with_values(found, fewest)
+    how = {"quantities": quantities, "required": required}
+    columns = with_values(find_columns(data, mapping, findings, **how), fewest)
     findings += columns.findings
     return replace(columns, findings=findings)
 
 
-def _find_columns(
-    path: Any,
+def find_columns(
+    data: Any,
     mapping: Mapping[str, str] | None,
     findings: FileFindings,
     *,
-    quantities: Sequence[str] = QUANTITIES,
-    required: Sequence[str] = REQUIRED,
+    quantities: Sequence[str] = _READ,
+    required: tuple[str, ...] = REQUIRED,
     encoding: str | None = None,
     sheet: str | None = None,
 ) -> Columns:
     """Return where the columns stand, without their values, as `read_columns` does."""
-    if is_frame(path):
-        utf8, sha256, guessed = frame_text(path, findings)
-    else:
-        utf8, sha256, guessed = read_text(Path(path), findings, encoding, sheet)
-    mapping = mapping or {}
-    numbered = any(wanted[:1].isdigit() for wanted in mapping.values())
-    named = {"numbered": numbered, "labelled": "run" in mapping}
-    table = split_table(utf8, findings, **named)
-    used = match_columns(table, mapping, quantities, required, findings)
-    notes = tuple(_assumed(guessed, table, used))
-    return Columns({}, used, table, sha256, findings, notes)
+    source = read_source(data, findings, encoding, sheet)
+    table = source.table
+    used = choose_columns(table, mapping or {}, quantities, required, findings)
+    table, used, left_out = without_slow_channels(table, used, required)
+    notes = (*_assumed(table, used), *table.left_out, *left_out)
+    return Columns({}, used, table, source.sha256, findings, notes)
 
 
-def _with_values(found: Columns, fewest: int) -> Columns:
+def with_values(found: Columns, fewest: int) -> Columns:
     """Return columns with what stands in them, and findings of that alone."""
     findings = FileFindings(found.findings.file)
     findings.places = found.findings.places
-    values, told = read_cells(found.table, found.used, findings)
-    for quantity, column in found.used.items():
-        if quantity not in LABELS:
-            # a wild number may overflow here; the limits below report it
-            with np.errstate(over="ignore"):
-                converted = column_to_code(values[quantity], quantity, column.unit)
-            values[quantity] = converted
-    notes = (*found.notes, *(f"{ASSUMED}{note}" for note in told))
+    values, notes = read_values(found.table, found.used, findings)
+    runs = found.table.runs
+    if runs is not None and "run" not in found.used:
+        values["run"] = np.char.mod("%d", runs + 1).astype(object)
+        notes.append("the readings below each row of headers are a run")
+    notes = (*found.notes, *(f"{ASSUMED}{note}" for note in notes))
+    notes = tuple(sorted(notes, key=lambda note: not note.startswith(ASSUMED)))
     columns = replace(found, values=values, findings=findings, notes=notes)
     check_values(columns, fewest)
     return columns
 
 
-def _assumed(
-    guessed: str, table: CsvTable, used: Mapping[str, Column]
-) -> Iterator[str]:
-    """Yield what was guessed of a file, each with how to say otherwise."""
-    for note in (*([guessed] if guessed else []), *table.notes):
+def _assumed(table: Table, used: Mapping[str, Column]) -> Iterator[str]:
+    """Yield what was assumed of a source, each with how to say otherwise."""
+    for note in table.notes:
         yield f"{ASSUMED}{note}"
     for column in used.values():
-        if column.against:
+        if column.against and column.unit is not None:
             yield (
-                f"{ASSUMED}{quoted(column.header)} is in {column.unit}, as was said, "
-                f"though it names {column.against}"
+                f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as was "
+                f"said, though it names {column.against}"
             )
     guesses = [column for column in used.values() if column.guessed]
     if guesses:
         said = ", ".join(
-            f"{quoted(c.header)} is the {c.quantity}{f' in {c.unit}' * bool(c.unit)}"
-            for c in guesses
+            f"{quoted(column.header)} is the {column.quantity}"
+            + ("" if column.unit is None else f" in {column.unit.name}")
+            for column in guesses
         )
-        one = guesses[0].quantity
-        form = "HEADER" if one in LABELS else "HEADER[UNIT]"
-        yield f"{ASSUMED}{said}. If not, name the column: --column '{one}={form}'"
+        first = guesses[0]
+        form = "HEADER" if first.unit is None else "HEADER[UNIT]"
+        option = f"--column '{first.quantity}={form}'"
+        yield f"{ASSUMED}{said}. If not, name the column: {option}"
 
 
 def labels_of(labels: np.ndarray | None, rows: int) -> Labels:
     """Return which gear each row is of; one where no labels, shape (n,), tell."""
     if labels is None:
         return Labels(np.zeros(rows, int), ("1",))
-    index, names = pd.factorize(labels)
+    index, names = factorize(labels.tolist())
     return Labels(index, tuple(names))
 
 
@@ -277,9 +297,9 @@ def runs_of(labels: np.ndarray | None, specimen: Labels, rows: int) -> Labels:
     if labels is None:
         return specimen if specimen.index.any() else labels_of(None, rows)
     run, gears = labels_of(labels, rows), len(specimen.names)
-    index, pairs = pd.factorize(run.index * gears + specimen.index)
+    index, pairs = factorize((run.index * gears + specimen.index).tolist())
     if len(pairs) == len(run.names):
         return run
-    both = (divmod(int(pair), gears) for pair in pairs)
+    both = (divmod(pair, gears) for pair in pairs)
     names = (f"{specimen.names[gear]}/{run.names[one]}" for one, gear in both)
     return Labels(index, tuple(names))

@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from itertools import compress
 
 import numpy as np
-import pandas as pd
 
-from hdcal.data.cells import NOT_STATED
 from hdcal.data.dates import days_of
+from hdcal.data.tables.cells import NOT_STATED
 
 # What is the same all through a mounting.
 TELLING = ("date", "rig", "operator")
@@ -30,6 +29,8 @@ def run_labels(values: Mapping[str, np.ndarray], gear: np.ndarray) -> np.ndarray
         return None
     if "date" in told:
         told["date"] = days_of(told["date"])
+    import pandas as pd
+
     table = pd.DataFrame({"gear": gear} | told)
     index = table.groupby([*table], sort=False).ngroup()
     mountings: dict[int, tuple[list, list]] = {}

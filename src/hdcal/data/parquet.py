@@ -1,34 +1,36 @@
 """Parquet, a file or a folder of them: read in batches, whatever the number of rows."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from hdcal.data.bad_gears import bad_gears, offer
 from hdcal.data.case import Case, Gear
-from hdcal.data.cells import NOT_STATED
-from hdcal.data.columns import LABELS, Column
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import GROUPINGS
-from hdcal.data.measurements import read_measurements
-from hdcal.data.parquet_cells import label_cells, number_cells
-from hdcal.data.parquet_head import (
-    first_rows,
-    placed,
-    quantity_of,
-    rows_of_others,
-    runs_told,
-)
-from hdcal.data.parquet_table import parquet_files, parquet_table
-from hdcal.data.reading import GEAR_NAME, read_case
-from hdcal.data.too_far import beyond_radius
+from hdcal.data.measurements import Measurements, read_measurements
+from hdcal.data.reading import GEAR_NAME, case_of, gear_of
+from hdcal.data.tables.arrow_grid import arrow_grid
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.columns import Column
+from hdcal.data.tables.headers import GROUPINGS, LABELS, parse_header
+from hdcal.data.tables.parquet_files import parquet_files, parquet_table
+from hdcal.data.tables.values import read_labels, read_values
+from hdcal.data.too_far import beyond_radius, too_far
+from hdcal.data.value_checks import wild_rows
 from hdcal.errors import Finding, InputError
 
+if TYPE_CHECKING:
+    from pyarrow.dataset import Dataset
+
+# Rows that are looked at one by one.
+_SHOWN = 50_000
+_REMEDY = "Save it anew"
 # Rows of a batch.
 _BATCH = 1 << 18
 _USED = ("deformation", "force", "temperature", "specimen", "run", *GROUPINGS)
@@ -104,34 +106,38 @@ def read_parquet(
     path = Path(data)
     files = parquet_files(path)
     root = str(path) if path.is_dir() else ""
+    beside = (path if root else path.parent) / GEAR_NAME
+    gear = beside if gear is None and beside.exists() else gear
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        beside = (path if root else path.parent) / GEAR_NAME
-        gear = beside if gear is None and beside.exists() else gear
-        how: dict = {"columns": columns, "theory": theory, "reading": reading}
-        how |= {"skip_bad": skip_bad}
-        frame = first_rows(dataset, findings)
-        # Lots, operators, rigs and dates are told of all rows.
-        further = [
-            name for name in frame if quantity_of(str(name), columns) in GROUPINGS
-        ]
+        found, told = gear_of(gear, None, False, (theory, None, reading))
+        named = dict(found.source.get("columns", {})) | dict(columns or {})
+        frame = _first_rows(dataset, findings)
 
-        def read(rows: pd.DataFrame) -> Case:
-            runs = runs_told(rows, gear, columns, (theory, None, reading))
-            return read_case(rows.drop(columns=further).assign(**runs), gear, **how)
+        def read(rows: pd.DataFrame) -> Measurements:
+            check = partial(too_far, gear=found)
+            return read_measurements(rows, named, check=check, skip_bad=skip_bad)
 
         try:
-            case = placed(dataset, frame, read)
+            measured = _placed(dataset, frame, read)
         except InputError:
-            if not skip_bad:
+            others = _rows_of_others(dataset, frame, named)
+            if not skip_bad or others.empty:
                 raise
-            others = rows_of_others(dataset, frame, columns)
-            if others.empty:
-                raise
-            frame = pd.concat([frame, others])
-            case = placed(dataset, frame, read)
-        used = _columns(frame, case, columns, findings)
+            measured = _placed(dataset, pd.concat([frame, others]), read)
+        used = measured.columns.used
+        if "specimen" not in used:
+            remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
+            findings.refuse("no column says which gear a row is of", remedy)
+    # Lots, operators, rigs and dates are told of all rows.
+    columns_of_case = measured.columns.values.items()
+    values = {name: v for name, v in columns_of_case if name not in GROUPINGS}
+    if measured.mounted:
+        values["run"] = np.array(measured.run.names, object)[measured.run.index]
+    measured = replace(measured, columns=replace(measured.columns, values=values))
     name = path.resolve().name if root else path.stem
+    case = replace(case_of(measured, found, told, name), left_out=measured.left_out)
+    used = {quantity: used[quantity] for quantity in _USED if quantity in used}
     return Parquet(name, case, _sha256(files), files, root, used)
 
 
@@ -158,22 +164,33 @@ def read_batches(
     with FileFindings(file) as findings:
         dataset = parquet_table([file], root, findings)
     row, headers = 1, [column.header for column in used.values()]
+    placed = {
+        quantity: replace(column, position=place)
+        for place, (quantity, column) in enumerate(used.items())
+    }
+    numeric = {q: column for q, column in placed.items() if q not in LABELS}
     for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
-        values, labels = {}, {}
         with FileFindings(file) as findings:
-            for quantity, column in used.items():
-                if quantity in LABELS:
-                    labels[quantity] = label_cells(batch, column, row, findings)
-                else:
-                    values[quantity] = number_cells(batch, column, row, findings)
-            rows = np.arange(row, row + batch.num_rows)
+            size = batch.num_rows
+            grid = arrow_grid(batch.schema, batch.column, size, row, days=True)
+            table = Table(tuple(headers), row, grid, size)
+            values, _ = read_values(table, numeric, findings)
+            labels = {
+                quantity: read_labels(table, column, findings, [])
+                for quantity, column in placed.items()
+                if quantity in LABELS
+            }
+            for quantity, column in numeric.items():
+                wild = wild_rows(values[quantity], quantity, table.rows)
+                findings.add_rows(wild, column.header)
+            rows = table.rows
             fine = ~np.isin(rows, [*findings.rows])
             read, of = values["deformation"][fine], labels["specimen"][0][fine]
             beyond = beyond_radius(read, of, rows[fine], gear)
             findings.add_rows(beyond, used["deformation"].header)
             found = _batch(values, labels, rows, findings, skip_bad=skip_bad)
-        row += batch.num_rows
-        if batch.num_rows:
+        row += size
+        if size:
             yield found
 
 
@@ -182,26 +199,88 @@ def _batch(
 ) -> Batch:
     """Return what was read; where bad gears may be left out, they are no findings."""
     gear, gears = labels["specimen"]
-    # Rows of a gear that is not named are nobody's.
-    names = ["" if name == NOT_STATED else name for name in gears]
-    bad = bad_gears(findings, rows, gear, names)
+    bad = bad_gears(findings, rows, gear, gears)
     wrong = np.isin(rows, [*findings.rows])
-    if skip_bad and not np.any(wrong & (gears[gear] == NOT_STATED)):
+    # Rows of a gear that is not named are nobody's, and stop all.
+    if skip_bad and not np.any(wrong & (gears[gear] == "")):
         findings.clear()
     elif skip_bad is False and bad:
         findings.append(offer(bad))
     return Batch(values, labels, bad).where(~wrong)
 
 
-def _columns(frame, case: Case, columns, findings: FileFindings) -> dict[str, Column]:
-    """Return the columns that are used, by quantity."""
-    named = dict(case.gear.source.get("columns", {})) | dict(columns or {})
-    # What is wrong with rows was told, or is left out.
-    used = read_measurements(frame, named, skip_bad=True).columns.used
-    if "specimen" not in used:
-        remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
-        findings.refuse("no column says which gear a row is of", remedy)
-    return {quantity: used[quantity] for quantity in _USED if quantity in used}
+def _first_rows(dataset: "Dataset", findings: FileFindings) -> pd.DataFrame:
+    """Return the first rows of all files, without columns that hold no plain cells."""
+    from pyarrow import types
+
+    plain = [f.name for f in dataset.schema if not types.is_nested(f.type)]
+    try:
+        return dataset.head(_SHOWN, columns=plain).to_pandas()
+    except Exception as error:  # whatever a parser makes of a broken file
+        findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
+
+
+def _rows_of_others(
+    dataset: "Dataset", frame: pd.DataFrame, columns: Mapping[str, str]
+) -> pd.DataFrame:
+    """Return the first rows of other gears where all of a frame are of one.
+
+    Args:
+        dataset: of which the frame is the first rows.
+        frame: indexed by their places there.
+        columns: quantity -> header, as the user or the gear file names them.
+    """
+    said = columns.get("specimen")
+    headers = [str(name) for name in frame]
+    whose = [said] if said in headers else []
+    whose = whose or [h for h in headers if parse_header(h).quantity == "specimen"]
+    gears = frame[whose[0]].unique() if len(whose) == 1 else ()
+    if len(gears) != 1:
+        return frame.iloc[:0]
+    found, at = [frame.iloc[:0]], 0
+    for batch in dataset.to_batches(columns=[*frame]):
+        rows = batch.to_pandas()
+        rows.index += at
+        at += len(rows)
+        found.append(rows[rows[whose[0]] != gears[0]])
+        if sum(map(len, found)) >= _SHOWN:
+            break
+    return pd.concat(found).iloc[:_SHOWN]
+
+
+def _placed(
+    dataset: "Dataset",
+    frame: pd.DataFrame,
+    read: Callable[[pd.DataFrame], Measurements],
+) -> Measurements:
+    """Return what is read of the first rows; what is wrong is told by file and row.
+
+    Args:
+        dataset: the files.
+        frame: some of their rows, indexed by their places there.
+        read: reads it.
+
+    Raises:
+        InputError: holds what is wrong.
+    """
+    ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
+    names = [str(one.path) for one in dataset.get_fragments()]
+
+    def told(wrong: Finding) -> Finding:
+        if wrong.row is None:
+            return wrong
+        # Below a line of headers.
+        at = frame.index[wrong.row - 2]
+        place = int(np.searchsorted(ends, at, side="right"))
+        row = at + 1 - (int(ends[place - 1]) if place else 0)
+        return replace(wrong, file=names[place], row=row)
+
+    try:
+        measured = read(frame)
+    except InputError as error:
+        raise InputError(map(told, error.findings)) from None
+    left_out = {gear: told(wrong) for gear, wrong in measured.left_out.items()}
+    return replace(measured, left_out=left_out)
 
 
 def _sha256(files: Sequence[str]) -> str:

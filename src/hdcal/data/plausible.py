@@ -59,6 +59,7 @@ RANGES = {
     "temperature": Range(-273.15, 3e3, "°C", "absolute zero, and where steel boils"),
     "time": Range(-1e12, 1e12, "s", "thirty thousand years"),
     "angle": Range(-1e9, 1e9, "rad", "a hundred million turns"),
+    "torque": Range(-1e9, 1e9, "N·m", "no rig twists with a ship on a metre's arm"),
     "force_sd": Range(0.0, 1e9, "N", _SCATTER),
     # what a calibration certificate of a gauge states
     "expanded_percent": Range(1e-6, 20.0, "%", "no gauge with a certificate is worse"),

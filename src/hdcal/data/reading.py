@@ -13,7 +13,6 @@ import numpy as np
 from hdcal.data.case import Case, Gear
 from hdcal.data.correlation_prior import with_correlation_prior
 from hdcal.data.deformation_scatter import without_scatter
-from hdcal.data.frames import NAME, is_frame
 from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
 from hdcal.data.gear import at_full_scale, read_gear, unsized
@@ -26,6 +25,8 @@ from hdcal.data.measurements import (
 )
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
+from hdcal.data.tables.arrays import NAME
+from hdcal.data.tables.sources import is_frame
 from hdcal.data.theory_names import SPRING
 from hdcal.data.too_far import too_far
 from hdcal.errors import Finding, Findings, InputError

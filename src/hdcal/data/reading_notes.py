@@ -5,12 +5,11 @@ from collections.abc import Container, Iterator
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.data.cells import NOT_STATED
-from hdcal.data.columns import LABELS, Columns
-from hdcal.data.header_words import guess_header
 from hdcal.data.loading import Motion
-from hdcal.data.measurements import ASSUMED, Measurements
+from hdcal.data.measurements import ASSUMED, Columns, Measurements
 from hdcal.data.mountings import TELLING
+from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.headers import LABELS, parse_header
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import quoted
 
@@ -82,17 +81,18 @@ def _unusual_temperature(measured: Measurements) -> Iterator[str]:
 def unused_columns(columns: Columns) -> Iterator[str]:
     """Yield what of a file was not read."""
     positions = {column.position for column in columns.used.values()}
-    headers = enumerate(columns.table.headers)
-    extra = [header for place, header in headers if place not in positions]
+    headers = [*enumerate(columns.table.headers)]
+    extra = [header for place, header in headers if place not in positions and header]
     for header in extra:
-        guess = guess_header(header)
-        if guess is not None and not guess.unit and guess.quantity not in columns.used:
-            label = guess.quantity in LABELS
+        found = parse_header(header)
+        named = found.quantity and found.quantity not in columns.used
+        if named and (found.quantity in LABELS or found.unit is None):
+            label = found.quantity in LABELS
             why = "differs from row to row" if label else "names no unit"
-            example = f"--column '{guess.quantity}={header}{'' if label else '[UNIT]'}'"
+            option = f"'{found.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (
-                f"{ASSUMED}{quoted(header)}, which may be the {guess.quantity}, is not "
-                f"used, as it {why}. Name the column to use it: {example}"
+                f"{ASSUMED}{quoted(header)}, which may be the {found.quantity}, is not "
+                f"used, as it {why}. Name the column to use it: --column {option}"
             )
     if extra:
         yield f"columns not used: {', '.join(map(quoted, extra))}"

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.data.columns import Columns
-from hdcal.data.measurements import Labels
+from hdcal.data.measurements import Columns, Labels
 
 _REMEDY = "Check the unit of the column and the radius in the gear file"
 

@@ -1,86 +1,149 @@
-"""The one place where units are read and converted: at the edge, by Pint.
+"""The one table of units, and the conversion of columns and priors by it.
 
-Inside hdcal everything is in mm, N, s, K (a temperature in °C) and rad.
+Inside hdcal everything is in mm, N, s, K (a temperature in °C) and rad; a torque is in
+N*m.
 """
 
 import math
 import re
+import unicodedata
 from collections.abc import Iterable
-from fractions import Fraction
 from functools import cache
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-# quantity of a column -> the units a header may name, code unit first
-COLUMN_UNITS: dict[str, tuple[str, ...]] = {
-    "deformation": ("mm", "um", "m", "in"),
-    "force": ("N", "kN", "kgf", "lbf"),
-    "temperature": ("C", "K", "F"),
-    "time": ("s", "ms", "min"),
-    "angle": ("rad", "deg"),
-    "force_sd": ("N", "kN", "kgf", "lbf"),
+_GRAVITY = 9.80665  # standard gravity [m/s²]
+_POUND = 4.4482216152605  # pound-force [N]
+_INCH = 25.4  # [mm]
+_DEGREE = math.pi / 180.0  # [rad]
+# Size of each unit in the first one of its dimension; other spellings stand behind the
+# usual one.
+SIZES: dict[str, dict[str, float]] = {
+    "length": {
+        "mm": 1.0,
+        "um µm μm": 1e-3,
+        "m": 1e3,
+        "in inch": _INCH,
+        "cm": 10.0,
+        "nm": 1e-6,
+        "mil thou": 1e-3 * _INCH,
+    },
+    "force": {
+        "N": 1.0,
+        "kN": 1e3,
+        "kgf kp": _GRAVITY,
+        "lbf": _POUND,
+        "mN": 1e-3,
+        "cN": 1e-2,
+        "daN": 10.0,
+        "MN": 1e6,
+        "gf": 1e-3 * _GRAVITY,
+        "ozf": _POUND / 16.0,
+        "kip kipf kips": 1e3 * _POUND,
+    },
+    "torque": {
+        "Nm": 1.0,
+        "mNm": 1e-3,
+        "kNm": 1e3,
+        "Nmm": 1e-3,
+        "Ncm": 1e-2,
+        "kgfm": _GRAVITY,
+        "kgfcm": 1e-2 * _GRAVITY,
+        "lbfin inlbf": 1e-3 * _INCH * _POUND,
+        "lbfft ftlbf": 12e-3 * _INCH * _POUND,
+        "ozfin inozf": 1e-3 * _INCH * _POUND / 16.0,
+    },
+    "angle": {
+        "rad": 1.0,
+        "deg °": _DEGREE,
+        "mrad": 1e-3,
+        "arcmin ′": _DEGREE / 60.0,
+        "arcsec ″": _DEGREE / 3600.0,
+    },
+    "time": {
+        "s sec secs second seconds": 1.0,
+        "ms msec": 1e-3,
+        "min minutes": 60.0,
+        "us µs μs": 1e-6,
+        "h hr hour hours": 3600.0,
+    },
+    "temperature": {"C °C degC celsius": 1.0, "K": 1.0, "F °F degF": 5.0 / 9.0},
 }
-
-# Spellings of the same units that instruments write.
-_ALIASES = {
-    "µm": "um",  # micro sign
-    "μm": "um",  # Greek mu
-    "°C": "C",
-    "°F": "F",
-    "degC": "C",
-    "degF": "F",
-    "°": "deg",
+# Reading in a unit at the zero of °C.
+_ZEROS = {"K": 273.15, "F": 32.0}
+# What priors are written in beside these: sizes in N, mm, s and K, and their powers.
+_OF_PRIORS = {
+    "MPa": (1.0, (1, -2, 0, 0)),
+    "Pa": (1e-6, (1, -2, 0, 0)),
+    "kPa": (1e-3, (1, -2, 0, 0)),
+    "GPa": (1e3, (1, -2, 0, 0)),
+    "bar": (0.1, (1, -2, 0, 0)),
+    "psi": (_POUND / _INCH**2, (1, -2, 0, 0)),
+    "kg": (1e-3, (1, -1, 2, 0)),
+    "g": (1e-6, (1, -1, 2, 0)),
+    "J": (1e3, (1, 1, 0, 0)),
+    "W": (1e3, (1, 1, -1, 0)),
+    "Hz": (1.0, (0, 0, -1, 0)),
+    "%": (1e-2, (0, 0, 0, 0)),
 }
-_PINT_NAMES = {"C": "degC", "F": "degF"}  # coulomb and farad to Pint
-
 _CODE_UNITS = ("N", "mm", "s", "K")
-# Scale and powers of what shipped priors are written in: Pint's definitions take longer
-# to read than a posterior.
-_ATOMS = {
-    **{u: (1.0, [u == one for one in _CODE_UNITS]) for u in _CODE_UNITS},
-    "m": (1e3, [0, 1, 0, 0]),
-    "kg": (1e-3, [1, -1, 2, 0]),
-    "MPa": (1.0, [1, -2, 0, 0]),
-    "GPa": (1e3, [1, -2, 0, 0]),
+_POWERS = {
+    "force": (1, 0, 0, 0),
+    "length": (0, 1, 0, 0),
+    "time": (0, 0, 1, 0),
+    "temperature": (0, 0, 0, 1),
+    "angle": (0, 0, 0, 0),
 }
-_DIMENSIONS = ("[mass]", "[length]", "[time]", "[temperature]")
 _NUMBER = re.compile(r"\d+(\.\d*)?([eE][+-]?\d{1,2})?", re.ASCII)
-_FACTOR = re.compile(r"(?P<name>[^\W\d]+|°C|%)((\^|\*\*)(?P<power>-?[1-9]))?")
+_FACTOR = re.compile(r"(?P<name>[^\W\d]+|°[CF]?|[%′″])((\^|\*\*)(?P<power>-?[1-9]))?")
+_LONGEST = 60
+
+
+class Unit(NamedTuple):
+    """Unit of a column.
+
+    Attributes:
+        name: its usual spelling.
+        dimension: a key of `SIZES`.
+        size: in the first unit of that dimension.
+        zero: reading in this unit at the zero of that one.
+    """
+
+    name: str
+    dimension: str
+    size: float
+    zero: float = 0.0
+
+    def convert(self, values: np.ndarray) -> np.ndarray:
+        """Convert values, shape (n,), into mm, N, N*m, rad, s or °C."""
+        if self.zero:
+            values = values - self.zero
+        return values if self.size == 1.0 else values * self.size
+
+
+UNITS = {
+    spelling: Unit(name := names.split()[0], dimension, size, _ZEROS.get(name, 0.0))
+    for dimension, sizes in SIZES.items()
+    for names, size in sizes.items()
+    for spelling in names.split()
+}
 
 
 class UnitError(ValueError):
     """A unit that cannot be read; the message says why, in words for the user."""
 
 
-def known_unit(quantity: str, unit: str) -> str | None:
-    """Canonical spelling of a column's unit, or None when it is not one.
-
-    A quantity without units, such as a label, has the empty one.
-    """
-    unit = _ALIASES.get(unit, unit)
-    return unit if unit in COLUMN_UNITS.get(quantity, ("",)) else None
+def find_unit(text: str) -> Unit | None:
+    """Return the unit of a text such as '(N·m)'; None of any other text."""
+    bare = unicodedata.normalize("NFC", text.strip().strip("()[]").strip())
+    # Factors of a torque are joined in many ways.
+    return UNITS.get(bare) or UNITS.get(re.sub(r"[\s·⋅*.-]", "", bare))
 
 
-def column_to_code(values: np.ndarray, quantity: str, unit: str) -> np.ndarray:
-    """Convert a column into code units.
-
-    Args:
-        values: as read, shape (n,).
-        quantity: a key of COLUMN_UNITS.
-        unit: one of COLUMN_UNITS[quantity].
-
-    Returns:
-        Values in mm, N, °C, s or rad, shape (n,).
-    """
-    code = COLUMN_UNITS[quantity][0]
-    if unit == code:
-        return values
-    here, there = (_PINT_NAMES.get(name, name) for name in (unit, code))
-    quantity_of = _registry().Quantity
-    zero = quantity_of(Fraction(0), there).to(here).magnitude
-    scale = quantity_of(zero + 1, here).to(there).magnitude
-    return (values - float(zero)) * float(scale)
+def unit_names(dimension: str) -> list[str]:
+    """Return the usual spellings of the units of a dimension."""
+    return [names.split()[0] for names in SIZES[dimension]]
 
 
 def to_code(unit: str) -> tuple[float, str]:
@@ -111,7 +174,7 @@ def unit_powers(unit: str) -> tuple[int, ...]:
 @cache
 def _product(unit: str) -> tuple[float, np.ndarray]:
     """Scale of a product of units, and its powers of the code units."""
-    if len(unit) > 60:
+    if len(unit) > _LONGEST:
         raise UnitError("the unit is longer than any unit can be")
     factor, powers = 1.0, np.zeros(len(_CODE_UNITS), int)
     sign = 1
@@ -121,19 +184,16 @@ def _product(unit: str) -> tuple[float, np.ndarray]:
         if part in ("*", "/"):
             sign = 1 if part == "*" else -1
             continue
-        scale, own = _factor(part, unit)
+        scale, its_powers = _factor(part, unit)
         factor *= scale**sign
-        powers += sign * own
+        powers += sign * its_powers
     if not (0.0 < factor < math.inf):
         raise UnitError(f"'{unit}' is not a usable scale")
     return factor, powers
 
 
 def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
-    """Scale of one factor, and its powers of the code units.
-
-    The grammar is that of a product and no more: Pint would evaluate any sum.
-    """
+    """Scale of one factor, and its powers of the code units."""
     if _NUMBER.fullmatch(part):
         scale = float(part)
         if not scale > 0.0:
@@ -142,35 +202,15 @@ def _factor(part: str, unit: str) -> tuple[float, np.ndarray]:
     match = _FACTOR.fullmatch(part)
     if match is None:
         raise UnitError(f"'{unit}' is not a unit")
-    scale, powers = _atom(match["name"])
-    power = int(match["power"] or 1)
-    return scale**power, powers * power
-
-
-@cache
-def _atom(name: str) -> tuple[float, np.ndarray]:
-    if name in _ATOMS:
-        scale, powers = _ATOMS[name]
-        return scale, np.array(powers, int)
-    return _of_pint(name)
-
-
-def _of_pint(name: str) -> tuple[float, np.ndarray]:
-    import pint
-
-    quantity = _registry().Quantity
-    try:
-        # from zero to one of the unit: for degrees the zero is not the absolute one
-        zero, one = (quantity(Fraction(n), name).to_root_units() for n in (0, 1))
-        step, dimensions = one - zero, dict(one.dimensionality)
-    except (pint.PintError, AttributeError, ValueError, TypeError, KeyError) as error:
-        raise UnitError(f"'{name}' is not a unit") from error
-    mass, length, time, kelvin = (dimensions.pop(key, 0) for key in _DIMENSIONS)
-    powers = [mass, length - mass, time + 2 * mass, kelvin]
-    if dimensions or any(power % 1 for power in powers):
-        raise UnitError(f"'{name}' is not a mechanical unit")
-    # exact until this last step, which rounds once
-    return float(step.to(_name(powers)).magnitude), np.array(powers, int)
+    name, power = match["name"], int(match["power"] or 1)
+    known = UNITS.get(name)
+    if name in _OF_PRIORS:
+        scale, powers = _OF_PRIORS[name]
+    elif known is not None and known.dimension in _POWERS:
+        scale, powers = known.size, _POWERS[known.dimension]
+    else:
+        raise UnitError(f"'{name}' is not a unit")
+    return scale**power, np.array(powers) * power
 
 
 def _name(powers: Iterable[int]) -> str:
@@ -183,11 +223,3 @@ def _name(powers: Iterable[int]) -> str:
         if power:
             (above if power > 0 else below).append(name + size)
     return "/".join(["*".join(above) or "1", *below])
-
-
-@cache
-def _registry() -> Any:
-    import pint
-
-    exact: Any = Fraction  # Pint's own hint says float
-    return pint.UnitRegistry(non_int_type=exact)

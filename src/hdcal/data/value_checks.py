@@ -1,17 +1,22 @@
 """What readings can be, whatever the rig: checks of whole columns."""
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from hdcal.data.columns import Columns
 from hdcal.data.plausible import RANGES
-from hdcal.data.units import COLUMN_UNITS
+from hdcal.data.tables.headers import DIMENSIONS
+
+if TYPE_CHECKING:
+    from hdcal.data.measurements import Columns
 
 FEWEST_ROWS = 5
 # Kelvin become degrees Celsius with an error of rounding.
 _ROUNDED = 1e-9
 
 
-def check_values(columns: Columns, fewest: int) -> None:
+def check_values(columns: "Columns", fewest: int) -> None:
     """Find what single columns cannot be, whatever the rig.
 
     Args:
@@ -22,12 +27,9 @@ def check_values(columns: Columns, fewest: int) -> None:
     if count < fewest:
         words = f"holds {count} rows of readings"
         columns.findings.add(words, f"At least {fewest} are needed")
-    for quantity in filter(values.__contains__, COLUMN_UNITS):
-        number, known = values[quantity], RANGES[quantity]
-        slack = _ROUNDED if quantity == "temperature" else 0.0
-        # a NaN was reported where it stands
-        wild = (number < known.low - slack) | (number > known.high)
-        columns.find(wild, quantity, known.problem(), "Check the number and its unit")
+    for quantity in filter(values.__contains__, DIMENSIONS):
+        wild = wild_rows(values[quantity], quantity, columns.table.rows)
+        columns.findings.add_rows(wild, columns.used[quantity].header)
     if "deformation" in values:
         known = values["deformation"][np.isfinite(values["deformation"])]
         if known.size > 1 and known.min() == known.max():
@@ -36,7 +38,24 @@ def check_values(columns: Columns, fewest: int) -> None:
             columns.findings.add(words, "Measure at several", None, header)
 
 
-def check_time(columns: Columns, run: np.ndarray) -> None:
+def wild_rows(
+    values: np.ndarray, quantity: str, rows: np.ndarray
+) -> Iterator[tuple[int, str, str]]:
+    """Yield row, problem and remedy of numbers that no rig reads.
+
+    Args:
+        values: in code units, shape (n,); NaN where something else is wrong.
+        quantity: one with numbers.
+        rows: of the source, shape (n,).
+    """
+    known = RANGES[quantity]
+    slack = _ROUNDED if quantity == "temperature" else 0.0
+    wild = (values < known.low - slack) | (values > known.high)
+    for row in rows[wild].tolist():
+        yield row, known.problem(), "Check the number and its unit"
+
+
+def check_time(columns: "Columns", run: np.ndarray) -> None:
     """Find each row whose time is before that of its run's last row.
 
     Args:

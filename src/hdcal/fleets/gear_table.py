@@ -9,15 +9,14 @@ import numpy as np
 
 from hdcal.data.bad_gears import among, bad_gears
 from hdcal.data.case import Case, Gear
-from hdcal.data.cells import CellError, read_number
-from hdcal.data.csv_table import CsvTable, split_table
 from hdcal.data.findings import FileFindings
-from hdcal.data.frames import frame_text, is_frame
 from hdcal.data.gear_schema import size_faults
-from hdcal.data.header_words import guess_header
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Geometry
-from hdcal.data.text_file import read_text
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.cells import has_comma, read_numbers
+from hdcal.data.tables.headers import parse_header
+from hdcal.data.tables.sources import is_frame, read_source
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.physics.theory import THEORIES
@@ -66,12 +65,7 @@ def gear_sizes(source: Any, case: Case) -> GearSizes:
         if case.gear.theory == SPRING:
             words = "its sizes say nothing of the stiffness, as no gear file has sizes"
             findings.refuse(words, "Name one, as `gear` FILE.toml")
-        text = (
-            frame_text(source, findings)
-            if in_memory
-            else read_text(Path(source), findings)
-        )
-        table = split_table(text[0], findings)
+        table = read_source(source, findings).table
     sizes, labels = _read(table, case, findings)
     bad = bad_gears(findings, table.rows, np.arange(len(labels)), labels)
     if findings:
@@ -89,12 +83,12 @@ def gear_sizes(source: Any, case: Case) -> GearSizes:
 
 
 def _read(
-    table: CsvTable, case: Case, findings: FileFindings
+    table: Table, case: Case, findings: FileFindings
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return sizes and gear of each row."""
     sizes = _sizes(table, findings)
     at_odds = _at_odds(table, sizes, case.gear.geometry)
-    findings.add_rows(at_odds, kind="rows of such sizes")
+    findings.add_rows(at_odds)
     return sizes, _labels(table, case, findings)
 
 
@@ -109,7 +103,7 @@ def _ratio(stated: dict[str, np.ndarray], gear: Gear) -> np.ndarray:
     return np.broadcast_to(own / one, len(next(iter(stated.values())))).copy()
 
 
-def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
+def _sizes(table: Table, findings: FileFindings) -> dict[str, np.ndarray]:
     """Return the sizes of each row [mm], by their names in a geometry."""
     places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
     for header in table.headers:
@@ -123,24 +117,20 @@ def _sizes(table: CsvTable, findings: FileFindings) -> dict[str, np.ndarray]:
         findings.refuse(words, f"Name its columns {', '.join(SIZES)}")
     found = {}
     for header, place in places.items():
-        cells = table.texts([place])[place]
-        comma = table.separator != "," and any("," in cell for cell in cells)
-        column = np.full(len(cells), np.nan)
-        for index, cell in enumerate(cells):
-            row = int(table.rows[index])
-            try:
-                column[index] = read_number(cell, comma)
-            except CellError as error:
-                findings.add(error.args[0], "State the size", row, header)
-                continue
+        cells = table.grid.read([place])[place].astype(object)
+        column, bad = read_numbers(cells, has_comma([cells]))
+        for index, words, _ in bad:
+            findings.add(words, "State the size", int(table.rows[index]), header)
+        for index in np.flatnonzero(np.isfinite(column)):
             for wrong in implausible(header, column[index], "size"):
+                row = int(table.rows[index])
                 findings.add(wrong.problem, wrong.remedy, row, header)
         found[header.removesuffix("_mm")] = column
     return found
 
 
 def _at_odds(
-    table: CsvTable, sizes: Mapping[str, np.ndarray], base: Geometry
+    table: Table, sizes: Mapping[str, np.ndarray], base: Geometry
 ) -> Iterator[tuple[int, str, str]]:
     """Yield rows whose sizes cannot be beside each other, or those of the gear file."""
     other = {name: float(size) for name, size in vars(base).items() if name in _NAMES}
@@ -153,21 +143,18 @@ def _at_odds(
             yield int(row), f"{name}_mm: {words}", remedy
 
 
-def _labels(table: CsvTable, case: Case, findings: FileFindings) -> list[str]:
+def _labels(table: Table, case: Case, findings: FileFindings) -> list[str]:
     """Return the gear of each row."""
     known = case.columns.get("specimen")
     places = [
         place
         for place, header in enumerate(table.headers)
-        if header == known
-        or (
-            (guess := guess_header(header)) is not None and guess.quantity == "specimen"
-        )
+        if header == known or parse_header(header).quantity == "specimen"
     ]
     if len(places) != 1:
         words = "it does not say which gear a row is of"
         findings.refuse(words, f"Name one column {known or 'specimen'}")
-    labels = table.texts(places)[places[0]]
+    labels = table.grid.texts(places[0])
     seen: set[str] = set()
     for row, label in zip(table.rows, labels, strict=True):
         if label in seen:

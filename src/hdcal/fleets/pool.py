@@ -7,13 +7,13 @@ import numpy as np
 
 from hdcal.data.bad_gears import among
 from hdcal.data.case import Gear
-from hdcal.data.columns import Column
 from hdcal.data.further_labels import further_labels
-from hdcal.data.header_words import GROUPINGS
 from hdcal.data.measurements import Labels
 from hdcal.data.mountings import TELLING, run_labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.data.reading_notes import mountings_note
+from hdcal.data.tables.columns import Column
+from hdcal.data.tables.headers import GROUPINGS
 from hdcal.errors import Finding
 from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.groups import read_by

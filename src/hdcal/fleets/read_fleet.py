@@ -9,8 +9,8 @@ from hdcal.data.case import Case
 from hdcal.data.gear_files import gear_files
 from hdcal.data.gear_folder import read_gear_folder
 from hdcal.data.parquet import read_parquet
-from hdcal.data.parquet_table import is_parquet
 from hdcal.data.reading import read_case
+from hdcal.data.tables.parquet_files import is_parquet
 from hdcal.errors import Finding, InputError
 from hdcal.fleets.pool import pool_of
 from hdcal.fleets.readings import FleetReadings, fleet_readings

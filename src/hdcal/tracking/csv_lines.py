@@ -4,12 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.cells import CellError, read_number
-from hdcal.data.columns import LABELS, Column, match_columns
-from hdcal.data.csv_table import CsvTable
 from hdcal.data.findings import FileFindings
-from hdcal.data.table_start import header_cells, split_line
-from hdcal.data.units import column_to_code
+from hdcal.data.tables.cells import CellError, read_number
+from hdcal.data.tables.columns import Column, choose_columns
+from hdcal.data.tables.grid import split_line
+from hdcal.data.tables.headers import LABELS
+from hdcal.data.tables.shapes import table_of
+from hdcal.data.tables.text_grid import text_grid
 from hdcal.errors import InputError
 
 # What a tracker takes of a reading.
@@ -27,14 +28,13 @@ class CsvLines:
     """
 
     def __init__(self, header: str):
-        marks = max(";\t,", key=header.count)
-        headers = tuple(header_cells(header, marks))
-        table = CsvTable(headers, 1, np.zeros(0, int), marks, b"", 0, 0)
+        grid, _ = text_grid(header)
         with FileFindings("standard input") as wrong:
-            self._columns: dict[str, Column] = match_columns(
+            table = table_of(grid, wrong)
+            self._columns: dict[str, Column] = choose_columns(
                 table, {}, _TAKEN, _TAKEN[:2], wrong
             )
-        self._separator, self._width = marks, len(headers)
+        self._separator, self._width = grid.separator, grid.width
         # One decimal sign serves a whole stream, once a comma was one.
         self._comma = False
 
@@ -58,7 +58,8 @@ class CsvLines:
                 number = np.array([read_number(cell, self._comma)])
             except CellError as error:
                 raise ValueError(f"{quantity}: {error.args[0]}") from None
-            found[quantity] = float(column_to_code(number, quantity, column.unit)[0])
+            assert column.unit is not None
+            found[quantity] = float(column.unit.convert(number)[0])
         return found
 
 

@@ -84,7 +84,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
     from hdcal.data.gear import read_gear
     from hdcal.data.gear_text import gear_text
     from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
-    from hdcal.data.text_file import text_of
+    from hdcal.data.tables.sources import text_of
 
     tables = {"name": Path(folder).resolve().name, **stated}
     if str(tables["material"]).endswith(".toml"):

@@ -4,10 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hdcal.data.array_files import PARQUET
-from hdcal.data.columns import QUANTITIES
 from hdcal.data.findings import FileFindings
-from hdcal.data.header_words import guess_header
+from hdcal.data.tables.arrow_grid import PARQUET
+from hdcal.data.tables.headers import parse_header
 from hdcal.errors import InputError, quoted
 
 if TYPE_CHECKING:
@@ -102,7 +101,7 @@ def _joined(schemas, files: Sequence[str], findings: FileFindings) -> "Schema":
             words = (
                 f"{quoted(name)} is {other.type} in {files[at]}, {first.type} before"
             )
-            if guess_header(name) is not None or name in QUANTITIES:
+            if parse_header(name).quantity:
                 findings.add(words, _REMEDY)
     if findings:
         raise InputError(findings)

@@ -1,0 +1,1 @@
+"""Tables of any source: one grid of cells, its headers, its columns and numbers."""

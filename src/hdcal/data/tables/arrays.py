@@ -1,0 +1,146 @@
+"""Grids of arrays: DataFrames, and MATLAB's .mat up to version 7."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.tables.grid import ArrayGrid, Line, stored_text
+from hdcal.errors import quoted
+
+# What findings call a table in memory.
+NAME = "DataFrame"
+_FEWEST = 5
+
+
+def array_grid(names: Sequence[str], columns: Sequence[np.ndarray]) -> ArrayGrid:
+    """Return a grid of columns, shape (n,) each, below a row of their names.
+
+    Columns that are only counted have no headers: they are asked for by number.
+    """
+    rows = len(columns[0]) if columns else 0
+    counted = all(name.isdigit() for name in names)
+    header = [] if counted else [Line(1, [*names], fits=True)]
+    numeric = [i for i, one in enumerate(columns) if one.dtype.kind in "iuf"]
+    return ArrayGrid(
+        rows=np.arange(rows) + (1 if counted else 2),
+        width=len(columns),
+        loose=header,
+        load=columns.__getitem__,
+        numeric=frozenset(numeric),
+    )
+
+
+def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
+    """Return the grid of a table in memory, and the hash of its cells.
+
+    Args:
+        data: a pandas DataFrame, another library's that can become one, or a mapping of
+            names to arrays of one length.
+        findings: of the table.
+
+    Raises:
+        InputError: arrays of several lengths, or of more than one dimension; headers
+            of several levels.
+    """
+    import pandas as pd
+
+    if hasattr(data, "to_pandas"):
+        data = data.to_pandas()
+    try:
+        frame = pd.DataFrame(data)
+    except (ValueError, TypeError) as error:
+        remedy = "Give arrays of one length and one dimension, by name"
+        findings.refuse(f"is no table ({error})", remedy)
+    if frame.columns.nlevels > 1:
+        remedy = "Name each by one text, as in frame.columns.map('_'.join)"
+        findings.refuse("has columns of several levels", remedy)
+    if any(name is not None for name in frame.index.names):
+        frame = frame.reset_index()
+    names = [str(name) for name in frame.columns]
+    columns = [plain_column(frame.iloc[:, i]) for i in range(len(names))]
+    digest = hashlib.sha256("\t".join(names).encode())
+    for column in columns:
+        text = column.dtype == object
+        digest.update(
+            "\n".join(map(stored_text, column.tolist())).encode()
+            if text
+            else column.tobytes()
+        )
+    return array_grid(names, columns), digest.hexdigest()
+
+
+def plain_column(column: Any) -> np.ndarray:
+    """Return a column of a DataFrame as numbers, or as objects: texts and numbers."""
+    import pandas as pd
+
+    types = pd.api.types
+    if types.is_numeric_dtype(column) and not types.is_bool_dtype(column):
+        return column.to_numpy(float, na_value=np.nan)
+    objects = column.astype(object).where(column.notna(), "").to_numpy()
+    kinds = str, int, float
+    return np.array(
+        [c if isinstance(c, kinds) and c is not True else str(c) for c in objects],
+        object,
+    )
+
+
+def mat_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[str]]:
+    """Return the vectors of one length in a .mat file, or the columns of a matrix."""
+    from scipy.io import loadmat
+
+    try:
+        held = loadmat(path, simplify_cells=True)
+    except Exception as error:  # whatever a parser makes of a broken file
+        words = f"is no .mat file that can be read ({error})"
+        findings.refuse(words, "Save it anew")
+    found = [*_arrays(held)]
+    twice = [name for name, many in Counter(n for n, _ in found).items() if many > 1]
+    if twice:
+        words = f"holds {', '.join(map(quoted, twice))} more than once"
+        findings.refuse(words, "Save one run in a file, or give each a name")
+    arrays = dict(found)
+    vectors = {name: array for name, array in arrays.items() if array.ndim == 1}
+    lengths = Counter(map(len, vectors.values()))
+    usual = [size for size, many in lengths.items() if many > 1]
+    matrices = {name: array for name, array in arrays.items() if array.ndim == 2}
+    if len(usual) == 1:
+        taken = {n: a for n, a in vectors.items() if len(a) == usual[0]}
+        left = [*_not_taken(held, taken)]
+        note = f"not read of the file: {', '.join(map(quoted, left))}"
+        return array_grid([*taken], [*taken.values()]), [note] if left else []
+    if not usual and len(matrices) == 1:
+        ((name, matrix),) = matrices.items()
+        names = [str(k + 1) for k in range(matrix.shape[1])]
+        note = f"the matrix {quoted(name)} holds the readings"
+        return array_grid(names, [*matrix.T]), [note]
+    names = ", ".join(map(quoted, arrays))
+    words = f"holds no one table of readings: {names or 'no arrays'}"
+    findings.refuse(words, "Save vectors of one length, and nothing else")
+
+
+def _not_taken(held: Mapping[str, Any], taken: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the variables of a .mat file that are not among the readings."""
+    for name, value in held.items():
+        inside = isinstance(value, dict) and {*value} <= {*taken}
+        if name not in taken and not name.startswith("__") and not inside:
+            yield name
+
+
+def _arrays(held: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the arrays of numbers in variables and structures, by their own names."""
+    if isinstance(held, dict):
+        for key, value in held.items():
+            if not key.startswith("__"):
+                yield from _arrays(value, key)
+    elif (
+        isinstance(held, np.ndarray)
+        and held.dtype.kind in "iuf"
+        and held.ndim in (1, 2)
+        and len(held) >= _FEWEST
+    ):
+        yield name, held

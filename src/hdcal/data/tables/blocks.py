@@ -1,0 +1,258 @@
+"""Blocks of readings in a grid.
+
+Rows with numbers in every counted column are readings. All other rows stand above,
+between and below them: names and units, titles, remarks, summaries, and spoilt
+readings, which are kept so that what is wrong with them is said.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.tables.cells import is_number
+from hdcal.data.tables.grid import ArrayGrid, Grid, Line
+from hdcal.data.tables.headings import Heading, find_heading
+from hdcal.data.tables.other_lines import OtherLines, is_summary
+
+# Rows at the top, and spread over the rest, that show which columns hold numbers.
+_SAMPLE = 400
+
+
+@dataclass(frozen=True)
+class Table:
+    """Readings of a source.
+
+    Attributes:
+        headers: with their units, shape (c,).
+        header_row: row of the headers in the source, or of the first reading.
+        grid: the readings.
+        filled: number of lines with any cell in them, whether they fit or not.
+        named: whether there is a row of headers.
+        conflicts: unit that a row of units states against a header, by position.
+        unit_row: that row.
+        empty: positions of columns without any cell.
+        skipped: number of empty lines between the readings.
+        notes: what was assumed.
+        left_out: what was not read.
+        runs: number of the run of each row by repeated headers, shape (n,); None
+            without these.
+    """
+
+    headers: tuple[str, ...]
+    header_row: int
+    grid: Grid
+    filled: int
+    named: bool = True
+    conflicts: Mapping[int, str] = field(default_factory=dict)
+    unit_row: int | None = None
+    empty: frozenset[int] = frozenset()
+    skipped: int = 0
+    notes: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    runs: np.ndarray | None = None
+
+    @property
+    def rows(self) -> np.ndarray:
+        """Return the row of the source of each reading, shape (n,)."""
+        return self.grid.rows
+
+    def take(self, kept: np.ndarray) -> "Table":
+        """Return the rows that are true in a mask, shape (n,)."""
+        return replace(
+            self,
+            grid=self.grid.take(kept),
+            filled=self.filled - int(np.sum(~kept)),
+            runs=None if self.runs is None else self.runs[kept],
+        )
+
+
+def find_table(grid: Grid, findings: FileFindings) -> tuple[Table, tuple[str, ...]]:
+    """Return the readings of a grid under their headers, and the titles above these.
+
+    Args:
+        grid: of a source.
+        findings: of the source; gets one for each line that is neither a reading nor
+            anything else.
+    """
+    sample = _sample(grid)
+    counted, empty = _kinds(sample)
+    known = _are_readings(sample, counted)
+    # The sample begins with all rows at the top.
+    first = sample.rows[int(np.argmax(known))] if known.any() else np.inf
+    top, body = grid.take(grid.rows < first), grid.take(grid.rows >= first)
+    clean = _are_readings(body, counted)
+    above, groups = _groups(
+        body.rows[clean], [*top.lines(), *body.take(~clean).lines(), *grid.loose]
+    )
+    heading = find_heading(above, grid.width)
+    _check_width(heading, grid.width, empty, findings)
+    others = OtherLines(grid.width, counted, findings)
+    headings = others.sort_above(above, heading)
+    total = int(clean.sum())
+    for readings, lines in groups.items():
+        later = find_heading(lines, grid.width, heading) if heading else None
+        if later is None or readings == total:
+            others.sort(lines, below=readings == total)
+        else:
+            headings.append(later)
+            others.sort([one for one in lines if one.row < later.row], titled=True)
+            others.sort([one for one in lines if one.row > later.last])
+    if others.spoilt and min(others.spoilt) < first:
+        body, clean = grid, grid.rows >= first
+        clean[clean] = _are_readings(grid.take(clean), counted)
+    readings = body.take(clean | np.isin(body.rows, others.spoilt))
+    table = _joined(readings, headings, empty, others)
+    table = replace(
+        table,
+        filled=len(readings.rows) + others.add_findings(),
+        skipped=_skipped(readings.rows, grid),
+    )
+    return table, headings[0].titles
+
+
+def _check_width(
+    heading: Heading | None, width: int, empty: frozenset[int], findings: FileFindings
+) -> None:
+    """Refuse readings with more cells than their headers."""
+    unnamed = range(width if heading is None else heading.cells, width)
+    if heading is not None and not empty.issuperset(unnamed):
+        words = f"names {heading.cells} columns, and the readings below have {width}"
+        findings.refuse(words, "Name every column", heading.row)
+
+
+def _skipped(readings: np.ndarray, grid: Grid) -> int:
+    """Return how many lines between the first and the last reading are empty."""
+    if not len(readings):
+        return 0
+    first, last = readings[0], readings[-1]
+    filled = np.sum((grid.rows >= first) & (grid.rows <= last))
+    filled += sum(first < line.row < last for line in grid.loose)
+    return int(last - first + 1 - filled)
+
+
+def _sample(grid: Grid) -> Grid:
+    """Return the first rows of a grid, and some of the rest."""
+    count = len(grid.rows)
+    chosen = np.zeros(count, bool)
+    chosen[:_SAMPLE] = True
+    chosen[_SAMPLE :: max(1, count // _SAMPLE)] = True
+    return grid.take(chosen)
+
+
+def _kinds(sample: Grid) -> tuple[list[int], frozenset[int]]:
+    """Return the columns that hold numbers in most rows, and those without a cell."""
+    places, count = range(sample.width), len(sample.rows)
+    # What the source itself says to be numbers is not looked at.
+    texts = [
+        ["0"] * count if sample.is_numeric(place) else sample.texts(place)
+        for place in places
+    ]
+    numbers = np.array([[*map(is_number, cells)] for cells in texts], bool)
+    filled = np.array([[bool(cell) for cell in cells] for cells in texts], bool)
+    rows = numbers.sum(axis=0) >= min(2, sample.width)
+    if not rows.any():
+        rows = numbers.any(axis=0)
+    share = 2 * numbers[:, rows].sum(axis=1) > filled[:, rows].sum(axis=1)
+    counted = [i for i in places if share[i] or sample.is_numeric(i)]
+    bare = filled[:, rows].sum(axis=1) == 0
+    return counted, frozenset(i for i in places if bare[i] and rows.any())
+
+
+def _are_readings(grid: Grid, counted: list[int]) -> np.ndarray:
+    """Tell which rows have numbers in all counted columns, two at least, (n,)."""
+    unsure = [place for place in counted if not grid.is_numeric(place)]
+    numbers = np.full(len(grid.rows), len(counted))
+    fits = np.ones(len(grid.rows), bool)
+    for cells in grid.read(unsure).values():
+        if cells.dtype != object:
+            continue
+        each = cells.tolist()
+        held = np.array([not isinstance(c, str) or is_number(c) for c in each], bool)
+        numbers -= ~held
+        fits &= held | np.array([cell == "" for cell in each], bool)
+    fits &= numbers >= min(2, len(counted))
+    if 0 not in counted and unsure:
+        fits &= ~_summaries(grid.texts(0))
+    return fits & (len(counted) > 0)
+
+
+def _summaries(words: list[str]) -> np.ndarray:
+    """Tell which rows begin with a word such as Mean, shape (n,).
+
+    One that stands in several rows below each other is a label.
+    """
+    known = {word for word in {*words} if is_summary(word)}
+    found = np.zeros(len(words), bool)
+    for place in (i for i, word in enumerate(words) if known and word in known):
+        beside = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
+        found[place] = words[place] not in beside
+    return found
+
+
+def _groups(
+    rows: np.ndarray, lines: list[Line]
+) -> tuple[list[Line], dict[int, list[Line]]]:
+    """Return the lines above all readings, and others by the readings above them.
+
+    Args:
+        rows: of the readings, shape (n,).
+        lines: all others.
+    """
+    above, groups = [], {}
+    for line in sorted(lines):
+        readings = int(np.searchsorted(rows, line.row))
+        (groups.setdefault(readings, []) if readings else above).append(line)
+    return above, groups
+
+
+def _joined(
+    grid: Grid, headings: list[Heading], empty: frozenset[int], others: OtherLines
+) -> Table:
+    """Return the readings of all blocks under the headings of the first one."""
+    main = headings[0]
+    block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
+    for place, heading in enumerate(headings):
+        order = _order(heading, main)
+        if order is None:
+            others.refuse_block(heading.row)
+        elif order != [*range(grid.width)]:
+            grid = _reordered(grid, block == place, order)
+            others.notes.append(f"other order of columns below row {heading.row}")
+    runs = np.unique(block, return_inverse=True)[1]
+    return Table(
+        headers=main.names,
+        header_row=main.row or (int(grid.rows[0]) if len(grid.rows) else 1),
+        grid=grid,
+        filled=0,
+        named=main.row > 0,
+        conflicts=main.conflicts,
+        unit_row=main.unit_row,
+        empty=empty,
+        notes=(*others.assumed(main, len(headings)),),
+        left_out=tuple(others.notes),
+        runs=runs if runs.any() else None,
+    )
+
+
+def _order(heading: Heading, main: Heading) -> list[int] | None:
+    """Return where the first block's columns stand in another block, or None."""
+    if heading.names == main.names:
+        return [*range(len(main.names))]
+    alike = sorted(heading.names) == sorted(main.names)
+    if not alike or len({*main.names}) < len(main.names):
+        return None
+    return [heading.names.index(name) for name in main.names]
+
+
+def _reordered(grid: Grid, rows: np.ndarray, order: list[int]) -> Grid:
+    """Return a grid with columns of some rows, a mask of shape (n,), in other order."""
+    found = grid.read(range(grid.width))
+
+    def load(place: int) -> np.ndarray:
+        column = found[place].astype(object)
+        column[rows] = found[order[place]][rows]
+        return column
+
+    return ArrayGrid(grid.rows, grid.width, [], load)

@@ -1,0 +1,241 @@
+"""Choice of columns: which one is read as which quantity, in which unit.
+
+A column is read where its header, or the user, names it. Where several may be meant, or
+a unit is missing, that is asked; nothing is guessed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.headers import (
+    LABELS,
+    QUANTITIES,
+    parse_header,
+    unit_advice,
+    weight_unit,
+)
+from hdcal.data.tables.label_columns import label_columns
+from hdcal.data.tables.named_columns import named_column
+from hdcal.data.units import Unit
+from hdcal.errors import quoted
+
+REQUIRED = ("deformation", "force")
+# Beside other columns these are asked for where the user has to choose.
+_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column that is used.
+
+    Attributes:
+        quantity: one of QUANTITIES.
+        header: as written in the file.
+        position: 0 = first column.
+        unit: of its numbers; None for labels.
+        guessed: its header says so in other words than hdcal's own.
+        against: another unit, which its header names itself.
+    """
+
+    quantity: str
+    header: str
+    position: int
+    unit: Unit | None = None
+    guessed: bool = False
+    against: str = ""
+
+
+def choose_columns(
+    table: Table,
+    mapping: Mapping[str, str],
+    quantities: Sequence[str],
+    required: Sequence[str],
+    findings: FileFindings,
+) -> dict[str, Column]:
+    """Find each quantity's column by its name, or by what the user said.
+
+    Args:
+        table: whose headers are read.
+        mapping: quantity -> header with the unit in square brackets.
+        quantities: what to look for.
+        required: which of them must be there.
+        findings: of the file; gets one for each header that is wrong or missing.
+
+    Returns:
+        The columns by quantity.
+
+    Raises:
+        InputError: there are no headers, and the user names no column by its number.
+    """
+    if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
+        words = f"no row of headers names the {len(table.headers)} columns: the first "
+        words += "row holds numbers where the headers should be"
+        remedy = "Say which column is which by its number, as in `columns` "
+        remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
+        findings.refuse(words, remedy, table.header_row)
+    for quantity in mapping:
+        if quantity not in QUANTITIES:
+            near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
+            hint = f"Did you mean {near[0]}? " if near else ""
+            words = f"`columns` {quantity}=… names no quantity that hdcal knows"
+            findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
+    chooser = _Chooser(table, findings)
+    columns: dict[str, Column] = {}
+    if "force" in required and "force" not in mapping and chooser.is_torsion():
+        words = "holds torques and no forces: a torsional spring is not calibrated yet"
+        remedy = "Convert with a lever arm: a force is torque / arm, a deformation "
+        findings.add(words, f"{remedy}angle * arm", table.header_row)
+        required = ()
+    for quantity in quantities:
+        if quantity in mapping:
+            found = named_column(quantity, mapping[quantity], table, findings)
+            column = None if found is None else Column(quantity, *found)
+        elif quantity in LABELS:
+            column = chooser.label(quantity)
+        else:
+            column = chooser.measured(quantity, needed=quantity in required)
+        if column is not None:
+            columns[quantity] = column
+    _refuse_conflicts(columns, table, findings)
+    return columns
+
+
+class _Chooser:
+    """Choice by headers.
+
+    Args:
+        table: whose headers are read.
+        findings: of the file.
+    """
+
+    def __init__(self, table: Table, findings: FileFindings):
+        self._table, self._findings = table, findings
+        self._headers = [*map(parse_header, table.headers)]
+        self._filled = [
+            place for place in range(len(self._headers)) if place not in table.empty
+        ]
+
+    def measured(self, quantity: str, *, needed: bool) -> Column | None:
+        """Return the only column of a quantity; more than one is asked about."""
+        exact = self._where(lambda h: h.exact and h.quantity == quantity)
+        good = [p for p in exact if self._headers[p].measures(quantity)]
+        if len(good) == 1:
+            return self._column(quantity, good[0])
+        if len(good) > 1:
+            names = " and ".join(quoted(self._table.headers[place]) for place in good)
+            words = f"two columns hold the {quantity}: {names}"
+            self._add(words, "Keep one of them", good[1])
+            return None
+        if exact:
+            self._ask_unit(quantity, exact[0])
+            return None
+        named = self._where(lambda h: h.quantity == quantity)
+        fitting = [p for p in named if self._headers[p].measures(quantity)]
+        if not needed:
+            # One that names nothing else is meant rather than one that says more.
+            whole = [p for p in fitting if self._headers[p].whole]
+            chosen = whole or fitting
+            return self._column(quantity, chosen[0]) if len(chosen) == 1 else None
+        # A gauge may be called by its serial number.
+        nameless = self._where(
+            lambda h: not h.quantity and not h.excluded and h.measures(quantity)
+        )
+        several = sorted([*fitting, *nameless])
+        if len(several) == 1 and fitting:
+            return self._column(quantity, fitting[0])
+        if several:
+            self._ask_which(quantity, several)
+        elif named:
+            self._ask_unit(quantity, named[0])
+        else:
+            self._refuse_missing(quantity)
+        return None
+
+    def is_torsion(self) -> bool:
+        """Tell whether a column holds a torque, and none a force."""
+        named = {
+            quantity
+            for quantity in ("force", "torque")
+            if self._where(lambda h, q=quantity: h.quantity == q and h.measures(q))
+        }
+        return named == {"torque"}
+
+    def label(self, quantity: str) -> Column | None:
+        """Return the only column of labels; which run or specimen is meant is asked."""
+        found = label_columns(self._table, self._headers, quantity)
+        if len(found) > 1 and quantity in ("run", "specimen"):
+            self._ask_which(quantity, found)
+        return self._column(quantity, found[0]) if len(found) == 1 else None
+
+    def _where(self, fits) -> list[int]:
+        """Return the columns whose header fits, without those that have no cells."""
+        return [place for place in self._filled if fits(self._headers[place])]
+
+    def _column(self, quantity: str, place: int) -> Column:
+        header = self._headers[place]
+        unit = None if quantity in LABELS else header.unit
+        text = self._table.headers[place]
+        return Column(quantity, text, place, unit, guessed=not header.exact)
+
+    def _add(self, problem: str, remedy: str, place: int) -> None:
+        header = self._table.headers[place]
+        self._findings.add(problem, remedy, self._table.header_row, header)
+
+    def _ask_which(self, quantity: str, places: Sequence[int]) -> None:
+        names = [quoted(self._table.headers[place]) for place in places]
+        if len(places) == 1:
+            words = f"no header names the {quantity}, which {names[0]} may hold"
+            remedy = f"If so, say `columns` '{quantity}={places[0] + 1}'"
+        else:
+            words = f"the {quantity} may be {', '.join(names[:-1])} or {names[-1]}"
+            numbers = ", ".join(str(place + 1) for place in places)
+            remedy = f"Say which, by its number: `columns` '{quantity}={places[0] + 1}'"
+            remedy += f"; the numbers are {numbers}" if len(places) > 2 else ""
+        self._add(words, remedy, places[min(1, len(places) - 1)])
+
+    def _ask_unit(self, quantity: str, place: int) -> None:
+        header, text = self._headers[place], self._table.headers[place]
+        words = f"may be the {quantity}, but the header names no unit"
+        if header.unit_text:
+            words = f"unknown unit {quoted(header.unit_text)} of the {quantity}"
+        name = text.removesuffix(f"[{header.unit_text}]").rstrip()
+        advice = unit_advice(header.unit_text, quantity)
+        self._add(words, f"Say `columns` '{quantity}={name}[UNIT]'; {advice}", place)
+
+    def _refuse_missing(self, quantity: str) -> None:
+        """Add that no column holds a quantity, with what might."""
+        words, option = f"no column holds the {quantity}", f"`columns` '{quantity}="
+        headers = self._table.headers
+        shown = ", ".join(quoted(header) for header in headers[:_SHOWN] if header)
+        remedy = f"Say {option}HEADER[UNIT]', HEADER one of: {shown}"
+        for place, header in enumerate(self._headers):
+            unit = header.unit_text if header.measures(quantity) else ""
+            if quantity == "force" and (weight := weight_unit(header.unit_text)):
+                words += f"; {headers[place]} is a mass"
+                unit = weight
+            if unit:
+                remedy = f"If {quoted(headers[place])} does, say {option}"
+                remedy += f"{place + 1}[{unit}]'"
+                break
+        self._findings.add(words, remedy, self._table.header_row, quantity)
+
+
+def _refuse_conflicts(
+    columns: Mapping[str, Column], table: Table, findings: FileFindings
+) -> None:
+    """Add columns of two quantities, and units that differ from those of headers."""
+    owners: dict[int, str] = {}
+    for quantity, column in columns.items():
+        other = owners.setdefault(column.position, quantity)
+        if other != quantity:
+            words = f"is used both as {other} and as {quantity}"
+            remedy = "Give each quantity a column of its own"
+            findings.add(words, remedy, table.header_row, column.header)
+        unit = table.conflicts.get(column.position)
+        if unit and column.unit is not None and not column.against:
+            words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
+            remedy = "Leave one of them out"
+            findings.add(f"{words}units {unit}", remedy, table.unit_row)

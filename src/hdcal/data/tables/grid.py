@@ -1,0 +1,255 @@
+"""Grids of cells: what every source becomes before anything is looked for in it."""
+
+import csv
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import compress
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from hdcal.data.tables.cells import is_number
+
+SEPARATORS = "\t;|,"
+T = TypeVar("T")
+
+
+class Line(NamedTuple):
+    """A row of a source that is no reading, or none yet.
+
+    Attributes:
+        row: of the source, 1 = first.
+        cells: texts without blanks around them.
+        fits: whether it is a row of the grid, as readings are.
+    """
+
+    row: int
+    cells: list[str]
+    fits: bool
+
+    @property
+    def first(self) -> str:
+        """Return the first cell that is not empty."""
+        return next(filter(None, self.cells), "")
+
+    @property
+    def numbers(self) -> int:
+        """Return how many cells are numbers."""
+        return sum(map(is_number, self.cells))
+
+    @property
+    def counts(self) -> bool:
+        """Tell whether it begins as a number or a time does."""
+        return self.first.lstrip("+-.,")[:1].isdigit()
+
+
+class Grid(ABC):
+    """Rows of cells.
+
+    Attributes:
+        rows: row of the source of each, shape (n,), 1 = first.
+        width: cells of a row.
+        loose: rows of the source with another number of cells.
+    """
+
+    rows: np.ndarray
+    width: int
+    loose: list[Line]
+
+    @abstractmethod
+    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
+        """Return columns by position, shape (n,) each.
+
+        Floats where every cell is a finite number, else objects: texts without blanks
+        around them, or numbers where the source stores numbers.
+        """
+
+    @abstractmethod
+    def texts(self, column: int) -> list[str]:
+        """Return the cells of a column as texts without blanks around them."""
+
+    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+        """Return the index of each cell, shape (n,), and the texts in a column."""
+        return factorize(self.texts(column))
+
+    @abstractmethod
+    def take(self, chosen: np.ndarray) -> "Grid":
+        """Return the rows where a mask, shape (n,), is true; none of them is loose."""
+
+    def is_numeric(self, column: int) -> bool:
+        """Tell whether the source itself says that a column holds numbers only."""
+        return False
+
+    def has_commas(self) -> bool:
+        """Tell whether texts may have decimal commas that `read` takes for such."""
+        return False
+
+    def lines(self) -> list[Line]:
+        """Return the rows."""
+        if not len(self.rows):
+            return []
+        cells = zip(*(self.texts(column) for column in range(self.width)), strict=True)
+        rows = zip(self.rows.tolist(), cells, strict=True)
+        return [Line(row, [*texts], fits=True) for row, texts in rows]
+
+
+@dataclass(frozen=True)
+class TextGrid(Grid):
+    """Lines of a text with as many cells each.
+
+    Attributes:
+        rows: as in `Grid`.
+        width: likewise.
+        loose: likewise.
+        separator: of the cells.
+        text: the lines.
+        quoted: some cells stand in quotation marks.
+    """
+
+    rows: np.ndarray
+    width: int
+    loose: list[Line]
+    separator: str
+    text: list[str]
+    quoted: bool
+
+    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
+        """As in `Grid`."""
+        wanted = [*columns]
+        missing = [place for place in wanted if place not in self._read]
+        floats = self._floats(missing)
+        for place in missing:
+            found = self._floats([place]) if floats is None else floats
+            if found is None:
+                found = {place: np.array(self.texts(place), object)}
+            self._read[place] = found[place]
+        return {place: self._read[place] for place in wanted}
+
+    def texts(self, column: int) -> list[str]:
+        """As in `Grid`."""
+        mark = self.separator
+        if self.quoted:
+            return [split_line(line, mark)[column] for line in self.text]
+        return [line.split(mark, column + 1)[column].strip() for line in self.text]
+
+    def take(self, chosen: np.ndarray) -> "TextGrid":
+        """As in `Grid`."""
+        if chosen.all() and not self.loose:
+            return self
+        lines = [*compress(self.text, chosen.tolist())]
+        return replace(self, rows=self.rows[chosen], text=lines, loose=[])
+
+    def _floats(self, columns: list[int]) -> dict[int, np.ndarray] | None:
+        """Return columns where all of them are finite numbers."""
+        if not self.text or not columns:
+            return {place: np.array([], object) for place in columns}
+        lines = self.text
+        if self.has_commas():
+            # Beside decimal commas a point is no part of a number.
+            text = "\n".join(lines).replace(".", "?").replace(",", ".")
+            lines = text.split("\n")
+        try:
+            found = np.loadtxt(
+                lines,
+                delimiter=self.separator,
+                usecols=columns,
+                comments=None,
+                quotechar='"' if self.quoted else None,
+                ndmin=2,
+            )
+        except ValueError:
+            return None
+        finite = len(found) == len(lines) and np.isfinite(found).all()
+        return dict(zip(columns, found.T.copy(), strict=True)) if finite else None
+
+    @cached_property
+    def _read(self) -> dict[int, np.ndarray]:
+        """Columns that were read already."""
+        return {}
+
+    def has_commas(self) -> bool:
+        """As in `Grid`."""
+        return self.separator != "," and any("," in line for line in self.text)
+
+
+@dataclass(frozen=True)
+class ArrayGrid(Grid):
+    """Columns of arrays, each loaded when it is needed.
+
+    Attributes:
+        rows: as in `Grid`.
+        width: likewise.
+        loose: likewise.
+        load: returns a column, numbers or objects.
+        numeric: positions of the columns that are stored as numbers.
+        index: which of the loaded rows these are, shape (n,).
+    """
+
+    rows: np.ndarray
+    width: int
+    loose: list[Line]
+    load: Callable[[int], np.ndarray]
+    numeric: frozenset[int] = frozenset()
+    index: np.ndarray | None = None
+
+    def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
+        """As in `Grid`."""
+        return {place: self._column(place) for place in columns}
+
+    def texts(self, column: int) -> list[str]:
+        """As in `Grid`."""
+        return [stored_text(cell) for cell in self._column(column).tolist()]
+
+    def take(self, chosen: np.ndarray) -> "ArrayGrid":
+        """As in `Grid`."""
+        index = np.flatnonzero(chosen)
+        index = index if self.index is None else self.index[index]
+        return replace(self, rows=self.rows[chosen], index=index, loose=[])
+
+    def is_numeric(self, column: int) -> bool:
+        """As in `Grid`."""
+        return column in self.numeric
+
+    def _column(self, place: int) -> np.ndarray:
+        found = self.load(place)
+        found = found if self.index is None else found[self.index]
+        if found.dtype != object:
+            floats = found.astype(float)
+            known = np.isfinite(floats)
+            if known.all():
+                return floats
+            found = floats.astype(object)
+            found[np.isnan(floats)] = ""
+            return found
+        if all(isinstance(cell, float | int) for cell in found.tolist()):
+            floats = found.astype(float)
+            return floats if np.isfinite(floats).all() else found
+        return found
+
+
+def factorize(labels: Sequence[T]) -> tuple[np.ndarray, list[T]]:
+    """Return the index of each label, shape (n,), and labels in order of appearance."""
+    names = {label: index for index, label in enumerate(dict.fromkeys(labels))}
+    return np.fromiter((names[one] for one in labels), int, len(labels)), [*names]
+
+
+def stored_text(cell: Any) -> str:
+    """Return a cell as text: a number in full, nothing that would end a line."""
+    if cell is None or cell != cell:
+        return ""
+    if isinstance(cell, float):
+        return str(int(cell)) if cell.is_integer() and abs(cell) < 1e15 else repr(cell)
+    return " ".join(str(cell).split())
+
+
+def split_line(line: str, separator: str) -> list[str]:
+    """Return the cells of a line without blanks around them."""
+    if '"' not in line:
+        return [cell.strip() for cell in line.split(separator)]
+    try:
+        cells = next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:  # a cell longer than the csv module will hold
+        cells = line.split(separator)
+    return [cell.strip() for cell in cells]

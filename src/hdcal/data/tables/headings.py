@@ -1,0 +1,155 @@
+"""Headings of blocks: the lines of names and units above their readings."""
+
+import re
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+from hdcal.data.tables.grid import Line
+from hdcal.data.tables.headers import (
+    DIMENSIONS,
+    LABELS,
+    is_unit_text,
+    parse_header,
+)
+from hdcal.data.units import find_unit
+
+# Lines above the readings among which the names stand.
+_NEAR = 20
+# Words before a row of units, and names of columns of them.
+UNIT_LABELS = "unit units einheit einheiten unité 単位 单位 y_unit_label"
+_MARK = re.compile(r"\A\s*[#%*/]+\s*")
+
+
+class Heading(NamedTuple):
+    """Names and units of a block.
+
+    Attributes:
+        names: with their units in brackets, shape (c,).
+        bare: the names as written, shape (c,).
+        titles: cells of the line above the names, shape (c,).
+        row: of the names in the source; 0 where there are none.
+        last: row of the last of names and units.
+        unit_row: of the units; None without one.
+        cells: number of names.
+        conflicts: other unit that the row of units states, by position.
+    """
+
+    names: tuple[str, ...]
+    bare: tuple[str, ...] = ()
+    titles: tuple[str, ...] = ()
+    row: int = 0
+    last: int = 0
+    unit_row: int | None = None
+    cells: int = 0
+    conflicts: Mapping[int, str] = MappingProxyType({})
+
+
+def find_heading(
+    lines: list[Line], width: int, first: Heading | None = None
+) -> Heading | None:
+    """Return names and units among the lines above a block.
+
+    The names are the line with the most quantities, else the line right above the
+    readings or their units.
+
+    Args:
+        lines: above the block, below the one before.
+        width: cells of a reading.
+        first: heading of the first block, for those of later ones.
+    """
+    near = lines[-_NEAR:]
+    units = next((one for one in reversed(lines) if _is_unit_line(one, near)), None)
+    texts = _units_of(units, width)
+    named = [(_quantities(one, texts), one.row, one) for one in near if one != units]
+    named = [one for one in named if _may_name(one[2], one[0], width)]
+    if not named and units is not None and units in near:
+        # Names of columns may be letters, as N and s are.
+        named, units, texts = [(0, units.row, units)], None, [""] * width
+    if not named:
+        return None
+    # One quantity may stand in a title too.
+    quantities, _, best = max(named, key=lambda one: (one[0] > 1 and one[0], one[1]))
+    bare = tuple(_bare_names(best, lines, width))
+    last = max(best.row, units.row if units is not None else 0)
+    if first is not None and bare == first.bare:
+        return first._replace(row=best.row, last=last)
+    below = [one for one in lines if one != units and one.row > best.row]
+    if not quantities and (first or not all(one.counts for one in below)):
+        return None
+    above = [line.cells for line in lines if line.row == best.row - 1]
+    return Heading(
+        tuple(map(_with_unit, bare, texts)),
+        bare,
+        tuple(_padded(above[0] if above else [], width)),
+        best.row,
+        last,
+        None if units is None else units.row,
+        len(best.cells),
+        _conflicts(bare, texts),
+    )
+
+
+def _may_name(line: Line, quantities: int, width: int) -> bool:
+    """Tell whether a line may hold names: not more than a reading has cells."""
+    filled = max((i + 1 for i, cell in enumerate(line.cells) if cell), default=0)
+    several = filled >= 2 or line.fits
+    words = not line.counts or (quantities > 0 and line.numbers < filled)
+    return several and filled <= width and words
+
+
+def _quantities(line: Line, units: list[str]) -> int:
+    """Return how many cells of a line name a quantity of a spring, or a run."""
+    pairs = zip(line.cells, [*units, *[""] * len(line.cells)], strict=False)
+    found = [parse_header(_with_unit(_MARK.sub("", n), unit)) for n, unit in pairs]
+    return sum(h.quantity in (*DIMENSIONS, *LABELS[:2]) for h in found)
+
+
+def _is_unit_line(line: Line, near: list[Line]) -> bool:
+    """Tell whether a line holds units, behind a label such as 'Unit' or near names."""
+    filled = [cell for cell in line.cells if cell]
+    if not filled or line.numbers:
+        return False
+    if filled[0].strip(" :").casefold() in UNIT_LABELS.split():
+        return any(map(is_unit_text, filled[1:]))
+    units = [cell for cell in filled if is_unit_text(cell)]
+    return line in near and any(map(find_unit, filled)) and 2 * len(units) > len(filled)
+
+
+def _units_of(line: Line | None, width: int) -> list[str]:
+    """Return the units of a line, without its label, shape (c,)."""
+    cells = _padded(line.cells if line is not None else [], width)
+    return [cell.strip("()[] ") if is_unit_text(cell) else "" for cell in cells]
+
+
+def _bare_names(line: Line, lines: list[Line], width: int) -> list[str]:
+    """Return headers as written; LabVIEW's first one where it is the time."""
+    names = _padded(line.cells, width)
+    names[0] = _MARK.sub("", names[0])
+    timed = any(each.cells[:2] == ["X_Dimension", "Time"] for each in lines)
+    if names[0] == "X_Value" and names.count("X_Value") == 1 and timed:
+        names[0] = "X_Value (Time) [s]"
+    return names
+
+
+def _with_unit(name: str, unit: str) -> str:
+    """Return a header with its unit, where it names none itself."""
+    header = parse_header(name)
+    said = header.unit is not None and bool(header.quantity)
+    return f"{name} [{unit}]".strip() if unit and not said else name
+
+
+def _conflicts(names: Sequence[str], units: Sequence[str]) -> dict[int, str]:
+    """Return the units beside headers that name other ones, by position."""
+    found = {}
+    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+        header, other = parse_header(name), find_unit(unit)
+        said = header.unit if header.quantity else None
+        if said is not None and unit and other != said:
+            found[place] = unit
+    return found
+
+
+def _padded(cells: list[str], width: int) -> list[str]:
+    """Return cells with empty ones behind them, shape (c,)."""
+    return [*cells, *[""] * width][:width]

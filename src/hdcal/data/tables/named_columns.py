@@ -1,0 +1,83 @@
+"""Columns that the user named, as 'Load [kN]', 'Load[kN]' or '2[kN]'."""
+
+from difflib import get_close_matches
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header, unit_advice
+from hdcal.data.units import Unit, find_unit
+
+_SHOWN = 20
+# Header, position, unit, whether it is guessed, and the unit that the header names.
+_Named = tuple[str, int, Unit | None, bool, str]
+
+
+def named_column(
+    quantity: str, wanted: str, table: Table, findings: FileFindings
+) -> _Named | None:
+    """Return the column that a user named, or None after a finding.
+
+    Args:
+        quantity: that it holds.
+        wanted: header or number, with the unit in brackets where it names none.
+        table: whose headers are read.
+        findings: of the file.
+    """
+    name, unit_text = split_brackets(wanted)
+    places, option = _places(wanted, name, table), f"`columns` {quantity}="
+    if len(places) != 1:
+        words = f"{option}{wanted} names a column that is not there"
+        near = get_close_matches(name, table.headers, 1, 0.4)
+        remedy = f"Use a header of the file, such as '{near[0]}'" if near else ""
+        remedy = remedy or "Use one of: " + ", ".join(table.headers[:_SHOWN])
+        if places:
+            words = f"{option}{wanted} fits {len(places)} columns"
+            numbers = " or ".join(str(place + 1) for place in places)
+            remedy = f"Name it by its number, {numbers}"
+        findings.add(words, remedy, table.header_row, name)
+        return None
+    (place,) = places
+    header = table.headers[place]
+    if quantity in LABELS:
+        return header, place, None, False, ""
+    parsed = parse_header(header)
+    own = parsed.unit or find_unit(header.rpartition("_")[2])
+    unit = own if unit_text is None else find_unit(unit_text)
+    if unit is None or unit.dimension != DIMENSIONS[quantity]:
+        text = parsed.unit_text if unit_text is None else unit_text
+        words = f"has no unit that is known for {quantity}"
+        if text:
+            words = f"unknown unit '{text}' for {quantity}"
+        advice = unit_advice(text, quantity)
+        remedy = f"Write {option}'{name}[UNIT]'; {advice}"
+        findings.add(words, remedy, table.header_row, header)
+        return None
+    conflict = own is not None and own.dimension == unit.dimension and own != unit
+    return header, place, unit, False, own.name if conflict and own else ""
+
+
+def _places(wanted: str, name: str, table: Table) -> list[int]:
+    """Return where the columns stand that a text may name."""
+    # A header may itself end in brackets, so the whole text is tried as well.
+    wholes = {_squeezed(wanted), _squeezed(name)}
+    headers = table.headers
+    found = [i for i, header in enumerate(headers) if _squeezed(header) in wholes]
+    if not found:
+        bare = [_squeezed(split_brackets(header)[0]) for header in headers]
+        found = [i for i, header in enumerate(bare) if header == _squeezed(name)]
+    if not found and name.isdigit() and 0 < int(name) <= len(headers):
+        found = [int(name) - 1]
+    return found
+
+
+def split_brackets(text: str) -> tuple[str, str | None]:
+    """`Load [kgf]` -> (`Load`, `kgf`); no unit where the text ends in no brackets."""
+    text = text.strip()
+    name, opening, unit = text.removesuffix("]").rpartition("[")
+    if not (opening and text.endswith("]")) or "]" in unit:
+        return text, None
+    return name.rstrip(), unit.strip()
+
+
+def _squeezed(text: str) -> str:
+    return "".join(text.split())

@@ -1,0 +1,162 @@
+"""Sources of tables: files of any kind, and tables in memory."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.regular_file import why_not_readable
+from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
+from hdcal.data.tables.arrow_grid import PARQUET, parquet_grid
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.joined_sheets import joined_sheets
+from hdcal.data.tables.shapes import table_of
+from hdcal.data.tables.text_file import LARGEST_FILE, decode, read_bytes
+from hdcal.data.tables.text_grid import text_grid
+from hdcal.data.tables.workbook import refuse_formulas, sheet_grids
+
+_WORKBOOK, _OLD_WORKBOOK = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"
+_MATLAB, _HDF5 = b"MATLAB 5.0", b"\x89HDF"
+_KINDS = {_WORKBOOK: "a workbook", _OLD_WORKBOOK: "an old workbook (.xls)"}
+_KINDS |= {PARQUET: "a Parquet file", _MATLAB: "a .mat file", _HDF5: "an HDF5 file"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A table with the hash of what it was read from.
+
+    Attributes:
+        table: the readings.
+        sha256: of the bytes of the file, or of the cells of a table in memory.
+    """
+
+    table: Table
+    sha256: str
+
+
+def is_frame(data: Any) -> bool:
+    """Tell whether this is a table in memory: a data frame, or arrays by name."""
+    return isinstance(data, Mapping) or any(
+        hasattr(data, name) for name in ("to_csv", "to_pandas")
+    )
+
+
+def source_name(data: Any) -> str:
+    """Return how findings call a source."""
+    return NAME if is_frame(data) else str(data)
+
+
+def read_source(
+    data: Any,
+    findings: FileFindings,
+    encoding: str | None = None,
+    sheet: str | None = None,
+) -> Source:
+    """Return the table of a file, or of a table in memory.
+
+    Args:
+        data: a path, a DataFrame, or arrays by name.
+        findings: of the source.
+        encoding: of a text; by default what it looks like.
+        sheet: of a workbook; by default the only one with readings. With an asterisk it
+            stands for several, each of them a specimen.
+
+    Raises:
+        InputError: it holds no table, or it is not clear which one is meant.
+    """
+    if is_frame(data):
+        grid, sha256 = frame_grid(data, findings)
+        return Source(table_of(grid, findings), sha256)
+    path = Path(data)
+    if (why := why_not_readable(path, LARGEST_FILE)) is not None:
+        findings.refuse(*why)
+    try:
+        table, sha256 = _file_table(path, findings, encoding, sheet)
+    except FileNotFoundError:
+        findings.refuse("does not exist", "Check the name and the folder")
+    except PermissionError:
+        findings.refuse("may not be read", "Give yourself the permission to read it")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        findings.refuse(f"cannot be read ({reason})", "Check the name and the disk")
+    return Source(table, sha256)
+
+
+def text_of(path: Path, sheet: str | None = None) -> bytes:
+    """Return the bytes of a text file as they are, of any other the table as text.
+
+    Args:
+        path: of a file that `read_source` reads.
+        sheet: of a workbook, as there.
+    """
+    if not _kind(path):
+        return path.read_bytes()
+    with FileFindings(str(path)) as findings:
+        table = read_source(path, findings, sheet=sheet).table
+    columns = [table.grid.texts(place) for place in range(len(table.headers))]
+    headers = [*table.headers] if table.named else None
+    if table.runs is not None and "run" not in table.headers:
+        columns.append([str(run + 1) for run in table.runs])
+        headers = None if headers is None else [*headers, "run"]
+    rows = [*([headers] if headers else []), *zip(*columns, strict=True)]
+    return "".join("\t".join(row) + "\n" for row in rows).encode()
+
+
+def _kind(path: Path) -> bytes:
+    """Return what a file begins with, if it is no text."""
+    with open(path, "rb") as stream:
+        begins = stream.read(max(map(len, _KINDS)))
+    return next((mark for mark in _KINDS if begins.startswith(mark)), b"")
+
+
+def _file_table(
+    path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
+) -> tuple[Table, str]:
+    """Return the table of a file, and the hash of its bytes."""
+    kind = _kind(path)
+    _refuse_kind(kind, findings, encoding, sheet)
+    if not kind:
+        raw = read_bytes(path, findings, wide=encoding is not None)
+        text, guessed = decode(raw, findings, encoding)
+        if not text.strip():
+            remedy = "Write a header row and at least 5 rows of readings"
+            findings.refuse("the file is empty", remedy)
+        grid, notes = text_grid(text)
+        table, notes = table_of(grid, findings), [*guessed, *notes]
+        sha256 = hashlib.sha256(raw).hexdigest()
+        return replace(table, notes=(*notes, *table.notes)), sha256
+    if kind == _WORKBOOK:
+        grids, notes = sheet_grids(path, findings, sheet)
+        several = sheet is not None and "*" in sheet
+        table = (
+            joined_sheets(grids, findings)
+            if several
+            else table_of(next(iter(grids.values())), findings)
+        )
+        if any(table.headers[place] for place in table.empty):
+            refuse_formulas(path, findings)
+    else:
+        read = parquet_grid if kind == PARQUET else mat_grid
+        grid, notes = read(path, findings)
+        table = table_of(grid, findings)
+    with open(path, "rb") as stream:
+        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+    return replace(table, notes=(*notes, *table.notes)), sha256
+
+
+def _refuse_kind(
+    kind: bytes, findings: FileFindings, encoding: str | None, sheet: str | None
+) -> None:
+    """Refuse kinds of files that are not read, and options that a kind has not."""
+    if kind and encoding is not None:
+        words = f"is {_KINDS[kind]}, which has no `encoding`"
+        findings.refuse(words, "Leave it out")
+    if kind != _WORKBOOK and sheet is not None:
+        findings.refuse("is no workbook, and has no `sheet`", "Leave it out")
+    if kind == _OLD_WORKBOOK:
+        findings.refuse(f"is {_KINDS[kind]}", "Open it and save it as .xlsx or CSV")
+    if kind == _HDF5:
+        words = "is an HDF5 file, as MATLAB writes it since version 7.3"
+        findings.refuse(words, "Save it with -v7, or as CSV")

@@ -1,0 +1,143 @@
+"""From lines of text to a grid: the separator, and lines with as many cells each."""
+
+import re
+from collections import Counter
+from itertools import compress
+
+import numpy as np
+
+from hdcal.data.tables.cells import is_number
+from hdcal.data.tables.grid import SEPARATORS, Line, TextGrid, split_line
+
+# Lines at the top, and spread over the rest, by which the separator is judged.
+_SAMPLE = 300
+# Cells by which a line of headers may be longer than the readings below it: remarks.
+_MOST_REMARKS = 2
+# Lines of numbers between blanks that make a table.
+_FEWEST = 5
+# What an empty line may hold.
+_BLANKS = ' \t;,|"'
+_MARK = re.compile(r"\s*[#%*/]+\s*")
+_GAP = re.compile(r"\s{2,}")
+
+
+def text_grid(text: str) -> tuple[TextGrid, list[str]]:
+    """Return the grid of a text, and what was assumed of it.
+
+    Its cells are separated as most lines of numbers are; without such lines as the
+    first line is.
+
+    Args:
+        text: with plain newlines.
+    """
+    lines, notes = text.split("\n"), []
+    separator, width = _dialect(lines)
+    if separator == " ":
+        notes.append("the columns are separated by blanks")
+        lines, separator = [_tabbed(line, width) for line in lines], "\t"
+    if not separator:
+        separator, width = _first_line(lines)
+    counts = np.fromiter((line.count(separator) for line in lines), int, len(lines)) + 1
+    quoted = '"' in text
+    for index in (i for i, line in enumerate(lines) if quoted and '"' in line):
+        counts[index] = _quoted_cells(lines[index], separator)
+    widest = _heading_width(lines, separator, counts, width)
+    fits = (counts >= width) & (counts <= widest)
+    for index in np.flatnonzero(fits & (counts < widest)):
+        lines[index] += separator * int(widest - counts[index])
+    # Most lines begin with a digit or a letter.
+    empty = np.fromiter(
+        (line[:1] in _BLANKS and not line.strip(_BLANKS) for line in lines),
+        bool,
+        len(lines),
+    )
+    loose = [
+        Line(index + 1, cells_of(lines[index], separator), fits=False)
+        for index in np.flatnonzero(~fits & ~empty).tolist()
+    ]
+    kept = fits & ~empty
+    return TextGrid(
+        rows=np.flatnonzero(kept) + 1,
+        width=widest,
+        loose=loose,
+        separator=separator,
+        text=[*compress(lines, kept.tolist())],
+        quoted=quoted,
+    ), notes
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Return the cells of a line, or the line where a quotation mark stays open."""
+    return [line] if line.count('"') % 2 else split_line(line, separator)
+
+
+def _dialect(lines: list[str]) -> tuple[str, int]:
+    """Return the separator with which most lines hold numbers, and their cells.
+
+    The separator is empty where no line holds two numbers, a blank for any blanks. A
+    tab or a semicolon is never part of a number; a comma may be one.
+    """
+    step = max(1, len(lines) // _SAMPLE)
+    sample = [
+        line for line in (*lines[:_SAMPLE], *lines[_SAMPLE::step]) if line.strip()
+    ]
+    tabs = any("\t" in line.strip() for line in sample)
+    most, found = 0, ("", 0)
+    for separator in SEPARATORS if tabs else SEPARATORS + " ":
+        shares = [*filter(None, (_numbers(line, separator) for line in sample))]
+        if not shares or (separator == " " and len(shares) < _FEWEST):
+            continue
+        width, lines = Counter(cells for cells, _ in shares).most_common(1)[0]
+        if lines > most:
+            most, found = lines, (separator, width)
+    return found
+
+
+def _numbers(line: str, separator: str) -> tuple[int, float] | None:
+    """Return how many cells a line has, and the share of numbers among filled ones."""
+    if separator == " ":
+        cells = line.split()
+        # A comma at the end of a number separates it from the next.
+        if not all(is_number(cell) and cell == cell.strip(",") for cell in cells):
+            return None
+    else:
+        cells = split_line(line, separator)
+    numbers = sum(map(is_number, cells))
+    return (len(cells), numbers / sum(map(bool, cells))) if numbers >= 2 else None
+
+
+def _first_line(lines: list[str]) -> tuple[str, int]:
+    """Return the separator and the cells of the first line that is not empty."""
+    first = next((line for line in lines if line.strip()), "")
+    # A semicolon or a tab is never part of a number; a comma may be one.
+    separator = max(";\t", key=first.count)
+    separator = separator if separator in first else ","
+    return separator, len(split_line(first, separator))
+
+
+def _heading_width(
+    lines: list[str], separator: str, counts: np.ndarray, width: int
+) -> int:
+    """Return the cells of a line of headers, some of which may name remarks."""
+    likely = np.flatnonzero(counts == width).tolist()
+    found = ((i, _numbers(lines[i], separator)) for i in likely)
+    # Names of gauges may be numbers too, but not most of them.
+    first = next((i for i, one in found if one is not None and one[1] > 0.5), 0)
+    begins = ((i, split_line(lines[i], separator)[0]) for i in range(first))
+    above = [i for i, cell in begins if lines[i].strip() and not is_number(cell)]
+    header = int(counts[above[-1]]) if above else width
+    return header if width < header <= width + _MOST_REMARKS else width
+
+
+def _quoted_cells(line: str, separator: str) -> int:
+    """Return the number of cells; 0 of a line with an open quotation mark."""
+    return 0 if line.count('"') % 2 else len(split_line(line, separator))
+
+
+def _tabbed(line: str, width: int) -> str:
+    """Return a line with tabs for the blanks between its cells, if it has so many."""
+    bare = _MARK.sub("", line, 1).strip() if _MARK.match(line) else line.strip()
+    for cells in (bare.split(), _GAP.split(bare)):
+        if len(cells) == width:
+            return "\t".join(cells)
+    return line

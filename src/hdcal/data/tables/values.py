@@ -1,0 +1,157 @@
+"""Values of the columns that are used: numbers in code units, and labels."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.formula_cells import with_formula
+from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.cells import (
+    NOT_STATED,
+    Fault,
+    has_comma,
+    may_hold_thousands,
+    read_numbers,
+    thousands,
+)
+from hdcal.data.tables.columns import Column
+from hdcal.data.tables.headers import GROUPINGS, LABELS
+from hdcal.errors import quoted
+
+# Share of cells from which on a column is no slow channel.
+_SLOW = 0.5
+_FEWEST = 5
+
+
+def read_values(
+    table: Table, used: Mapping[str, Column], findings: FileFindings
+) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Read the used columns.
+
+    Args:
+        table: the readings.
+        used: columns by quantity.
+        findings: of the source; gets what is wrong with cells.
+
+    Returns:
+        Floats in code units (NaN where a cell is wrong) or label strings, by quantity,
+        each of shape (n,); and what was assumed of them.
+    """
+    notes: list[str] = []
+    values = _numbers(table, used, findings)
+    for quantity, column in used.items():
+        if quantity in LABELS:
+            index, labels = read_labels(table, column, findings, notes)
+            values[quantity] = labels[index]
+        else:
+            assert column.unit is not None
+            # A wild number may overflow here; the limits of readings report it.
+            with np.errstate(over="ignore"):
+                values[quantity] = column.unit.convert(values[quantity])
+    return values, notes
+
+
+def without_slow_channels(
+    table: Table, used: Mapping[str, Column], required: tuple[str, ...]
+) -> tuple[Table, dict[str, Column], list[str]]:
+    """Return the rows in which slow channels were read as well.
+
+    A channel that is read more seldom than others leaves most of its cells empty. Where
+    it is no required one, it is not used.
+
+    Args:
+        table: the readings.
+        used: columns by quantity.
+        required: quantities without which a row is no reading.
+
+    Returns:
+        The rows, the columns that are used, and notes on what is left out.
+    """
+    kept, left, notes = np.ones(len(table.rows), bool), dict(used), []
+    numeric = [c.position for q, c in used.items() if q not in LABELS]
+    cells = table.grid.read(numeric)
+    for quantity, column in used.items():
+        if quantity in LABELS or cells[column.position].dtype != object:
+            continue
+        filled = np.array([cell != "" for cell in cells[column.position].tolist()])
+        if not len(filled) or filled.mean() > _SLOW:
+            continue
+        if quantity in required and not _is_regular(filled):
+            continue
+        name, many = quoted(column.header), f"{(~filled).sum()} of {len(filled)} rows"
+        if quantity in required:
+            kept &= filled
+            notes.append(f"{name} is empty in {many}: these are left out")
+        else:
+            del left[quantity]
+            notes.append(f"{name} is not used, as it is empty in {many}")
+    return table if kept.all() else table.take(kept), left, notes
+
+
+def _is_regular(filled: np.ndarray) -> bool:
+    """Tell whether cells, a mask of shape (n,), are filled at about equal distances."""
+    places = np.concatenate([[-1], np.flatnonzero(filled), [len(filled)]])
+    gaps = np.diff(places)
+    return bool(filled.sum() >= _FEWEST and gaps.max() <= 2 * np.median(gaps))
+
+
+def _numbers(
+    table: Table, used: Mapping[str, Column], findings: FileFindings
+) -> dict[str, np.ndarray]:
+    """Return the columns of numbers in the units of the file."""
+    numeric = [column for quantity, column in used.items() if quantity not in LABELS]
+    cells = table.grid.read(column.position for column in numeric)
+    odd = {p: column for p, column in cells.items() if column.dtype == object}
+    if odd and table.grid.has_commas():
+        # One decimal mark serves all columns: some may have been read by another.
+        odd = {p: np.array(table.grid.texts(p), object) for p in cells}
+        cells = odd
+    comma = has_comma(odd.values())
+    found = {}
+    for column in numeric:
+        numbers, wrong = cells[column.position], []
+        if column.position in odd:
+            numbers, wrong = read_numbers(numbers, comma)
+        # Beside decimal commas a point was refused.
+        if not comma and not wrong and may_hold_thousands(numbers):
+            wrong = thousands(table.grid.texts(column.position))
+        _add(table, wrong, column, findings)
+        found[column.quantity] = numbers
+    return found
+
+
+def read_labels(
+    table: Table, column: Column, findings: FileFindings, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index of each row's label, and the labels, as objects.
+
+    Args:
+        table: the readings.
+        column: of the labels.
+        findings: of the source; gets rows without a label that need one.
+        notes: gets what was assumed.
+    """
+    index, texts = table.grid.labels(column.position)
+    empty = np.array([text == "" for text in texts], bool)[index]
+    # As merged cells do; where most rows have a label, an empty one was forgotten.
+    if len(index) and not empty[0] and 2 * empty.sum() > len(index):
+        words = "stands in the first row of each: the rows below it are taken for"
+        notes.append(f"the label of {quoted(column.header)} {words} the same")
+        last = np.maximum.accumulate(np.where(empty, 0, np.arange(len(index))))
+        index, empty = index[last], np.zeros(len(index), bool)
+    if column.quantity not in GROUPINGS:
+        words = f"the {column.quantity} label is empty"
+        places = np.flatnonzero(empty).tolist()
+        _add(table, [(place, words, "Name it") for place in places], column, findings)
+    stated = NOT_STATED if column.quantity in GROUPINGS else ""
+    names = [with_formula(text) or stated for text in texts]
+    return index, np.fromiter(names, object, len(names))
+
+
+def _add(
+    table: Table, faults: list[Fault], column: Column, findings: FileFindings
+) -> None:
+    rows = table.rows
+    each = ((int(rows[place]), words, remedy) for place, words, remedy in faults)
+    findings.add_rows(each, column.header)

@@ -1,0 +1,252 @@
+"""Exports of machines and loggers are read by name and unit; what is open is asked."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hdcal.data.findings import FileFindings
+from hdcal.data.measurements import read_columns
+from hdcal.data.reading import read_case
+from hdcal.errors import InputError
+
+STIFFNESS = 12.0
+X = np.round(np.linspace(0.0, 1.1, 12), 3)
+F = np.round(STIFFNESS * X + 0.3, 4)
+
+
+def rows(*columns, separator=",", decimal=".") -> str:
+    lines = (separator.join(map(str, cells)) for cells in zip(*columns, strict=True))
+    text = "\n".join(lines) + "\n"
+    return text if decimal == "." else text.replace(".", decimal)
+
+
+def read(folder, text: str, **asked):
+    (folder / "log.txt").write_text(text, "utf-8")
+    return read_case(folder / "log.txt", **asked)
+
+
+def check(case, x=X, force=F) -> None:
+    np.testing.assert_allclose(case.records.deformation, x, atol=1e-12)
+    np.testing.assert_allclose(case.records.force, force, rtol=1e-9)
+
+
+def refused(folder, text: str, **asked) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        read(folder, text, **asked)
+    return [str(finding) for finding in caught.value.findings]
+
+
+@pytest.mark.parametrize(
+    ("unit", "newtons"),
+    [("gf", 9.80665e-3), ("mN", 1e-3), ("kip", 4448.2216), ("ozf", 0.27801385)],
+)
+def test_units_of_forces(tmp_path, unit, newtons):
+    case = read(tmp_path, f"Travel (mm),Load ({unit})\n" + rows(X, F))
+    np.testing.assert_allclose(case.records.force, newtons * F, rtol=1e-7)
+
+
+def test_what_is_named_a_mass_is_asked(tmp_path):
+    (found,) = refused(tmp_path, "Travel (in),Load (lb)\n" + rows(X, F))
+    assert "lbf" in found
+    first, second = refused(tmp_path, "mass (kg),position (m)\n" + rows(F, X))
+    assert "'deformation=2[m]'" in first and "'force=1[kgf]'" in second
+
+
+def test_units_stand_in_columns_beside_the_numbers(tmp_path):
+    text = "Maximum,9.1,@\nNo.,Force,Unit,Displacement,Unit,Judge,\n"
+    count, unit = range(len(X)), ["um"] * len(X)
+    case = read(
+        tmp_path,
+        text
+        + rows(
+            count, F, ["cN"] * len(X), 1e3 * X, unit, ["OK"] * len(X), [""] * len(X)
+        ),
+    )
+    check(case, force=F / 100)
+    text = "Force,Unit,Travel [mm]\n" + rows(F, ["N"] * 6 + ["kN"] * 6, X)
+    assert any("changes: 'N' and 'kN'" in one for one in refused(tmp_path, text))
+
+
+def test_units_stand_in_the_cells(tmp_path):
+    cells = [f"{x} um" for x in 1e3 * X], [f"{f}cN" for f in F]
+    case = read(tmp_path, "Travel,Load\n" + rows(*cells))
+    check(case, force=F / 100)
+    text = "Travel [mm];Load\n" + rows(X, cells[1], separator=";", decimal=",")
+    check(read(tmp_path, text), force=F / 100)
+    mixed = [f"{f} {'N' if f < 5 else 'kN'}" for f in F]
+    for header in ("Load", "Load [lbf]"):
+        found = refused(tmp_path, f"Travel [mm],{header}\n" + rows(X, mixed))
+        assert any("changes" in one and "'kN'" in one for one in found)
+
+
+def test_rows_of_ranges_and_factors_stand_between_names_and_readings(tmp_path):
+    text = (
+        'Logger,"A-1"\nRate (Hz),10\nName,"Extension","Load"\nRange,10,50\n'
+        'Factor,5,10\nUnit,"mm","N"\n'
+    )
+    case = read(tmp_path, text + rows(np.arange(12) / 10, X, F))
+    check(case)
+    volts = text.replace('"mm","N"', '"V","V"')
+    found = refused(tmp_path, volts + rows(np.arange(12) / 10, X, F))
+    assert len(found) == 2 and all("calibration" in one for one in found)
+
+
+def test_gauges_are_called_by_serial_numbers(tmp_path):
+    text = "Zeit\tKraft Sollwert\tKraft\tWeg\t2011 C\t3390412\nsec\tN\tN\tmm\tmm\tmm\n"
+    cells = rows(np.arange(12), F + 1, F, 8 * X, X, 2 * X, separator="\t", decimal=",")
+    (found,) = refused(tmp_path, text + cells)
+    for name in ("'Weg [mm]'", "'2011 C [mm]'", "'3390412 [mm]'", "4, 5, 6"):
+        assert name in found
+    check(read(tmp_path, text + cells, columns={"deformation": "5"}))
+
+
+def test_of_raw_and_corrected_travel_one_is_named(tmp_path):
+    text = "Displacement (mm),Compensated displacement (mm),Force (N)\n"
+    text += rows(1.1 * X, X, F)
+    (found,) = refused(tmp_path, text)
+    assert "'deformation=1'" in found
+    check(read(tmp_path, text, columns={"deformation": "2"}))
+
+
+def test_of_volts_and_newtons_the_unit_decides(tmp_path):
+    text = "Travel (in V),Force (in V),Travel (in mm),Force (in N)\n"
+    check(read(tmp_path, text + rows(X / 3, F / 50, X, F)))
+
+
+@pytest.mark.parametrize("blank", [4, 9])
+def test_of_a_slow_channel_whole_rows_are_read(tmp_path, blank):
+    x, force = np.repeat(X, blank + 1), np.repeat(F, blank + 1)
+    cells = [str(v) if i % (blank + 1) == 0 else "" for i, v in enumerate(x)]
+    case = read(tmp_path, "force_N,deformation_mm\n" + rows(force, cells))
+    check(case)
+    (note,) = (note for note in case.notes if "is empty in" in note)
+    assert f"{12 * blank} of {12 * (blank + 1)} rows" in note
+
+
+def test_a_slow_channel_that_is_not_needed_is_left_out(tmp_path):
+    warm = ["20.5" if i % 4 == 0 else "" for i in range(12)]
+    case = read(tmp_path, "force_N,deformation_mm,temperature_C\n" + rows(F, X, warm))
+    check(case)
+    assert "temperature" not in case.records.known
+    cells = [str(x) if i < 5 else "" for i, x in enumerate(X)]
+    (found,) = refused(tmp_path, "force_N,deformation_mm\n" + rows(F, cells))
+    assert "7 rows in all" in found
+
+
+def test_blocks_have_headers_of_their_own(tmp_path):
+    """The second one has its columns in other order, below a title with numbers."""
+    text = "Run 1\nTime\tTravel\tLoad\ns\tmm\tN\n" + rows(
+        np.arange(6), X[:6], F[:6], separator="\t"
+    )
+    text += "\nRun 2\t8.0\ts\nTime\tLoad\tTravel\ns\tN\tmm\n" + rows(
+        np.arange(6), F[6:], X[6:], separator="\t"
+    )
+    case = read(tmp_path, text)
+    check(case)
+    assert case.records.run.tolist() == [0] * 6 + [1] * 6
+
+
+def test_a_block_of_other_columns_is_left_out_or_refused(tmp_path):
+    text = "Travel [mm]\tLoad [N]\tTime [s]\n" + rows(X, F, range(12), separator="\t")
+    few = text + "\nExtremes\nTravel [mm]\tLoad [N]\n0.1\t0.2\n1.1\t13.5\n"
+    case = read(tmp_path, few)
+    check(case)
+    assert any("rows 17, 18" in note for note in case.notes)
+    many = text + "Travel [mm]\tGap [um]\n" + rows(X, F, separator="\t")
+    assert any("Split the file" in one for one in refused(tmp_path, many))
+
+
+def test_a_column_that_is_not_used_stops_nothing(tmp_path):
+    other = ["1.5"] * 5 + ["OVL", "-", "nan", "1,5", "x", "", "1e999"]
+    check(
+        read(
+            tmp_path,
+            "deformation_mm;gauge;force_N\n" + rows(X, other, F, separator=";"),
+        )
+    )
+
+
+def test_specimens_stand_side_by_side(tmp_path):
+    ends = [*rows(X, F, X, 2 * F).split()[:8], *rows(X, F).split()[8:]]
+    text = "A,,B,\nTravel,Load,Travel,Load\nmm,N,mm,N\n"
+    case = read(
+        tmp_path, text + "\n".join(f"{e},," if e.count(",") < 3 else e for e in ends)
+    )
+    assert case.specimen_labels == ("A", "B")
+    check(case, np.concatenate([X, X[:8]]), np.concatenate([F, 2 * F[:8]]))
+
+
+def test_columns_of_a_file_without_headers_are_named_by_number(tmp_path):
+    text = "# group: g7\n# name: Time   name: Travel   name: Force\n"
+    text += rows(range(12), X, F, separator=" , ")
+    (found,) = refused(tmp_path, text)
+    assert "3 columns" in found and "'deformation=1[mm]'" in found
+    check(read(tmp_path, text, columns={"deformation": "2[mm]", "force": "3[N]"}))
+
+
+def test_a_torque_over_an_angle_is_called_so(tmp_path):
+    text = "Drehmoment [Nm];Verdrehwinkel [arcmin]\n" + rows(F, X, separator=";")
+    (found,) = refused(tmp_path, text)
+    assert "torsion" in found
+
+
+@pytest.mark.parametrize(
+    ("headers", "newton_metres", "radians"),
+    [
+        ("Torque (mNm),Twist (arcmin)", 1e-3, np.pi / 10800),
+        ("load [lbf*in],travel [deg]", 0.112984829, np.pi / 180),
+        ("torque_Nm,angle_rad", 1.0, 1.0),
+    ],
+)
+def test_torques_and_angles_are_converted(tmp_path, headers, newton_metres, radians):
+    (tmp_path / "log.csv").write_text(f"{headers}\n" + rows(F, X))
+    with FileFindings("log.csv") as findings:
+        spring = ("torque", "angle")
+        how = {"quantities": spring, "required": spring}
+        found = read_columns(tmp_path / "log.csv", None, findings, **how)
+    np.testing.assert_allclose(found.values["torque"], newton_metres * F, rtol=1e-8)
+    np.testing.assert_allclose(found.values["angle"], radians * X, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("raw", "word"),
+    [
+        (b"<html><body><table><tr><td>1</td></tr></table></body></html>", "HTML"),
+        (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600), ".xls"),
+    ],
+)
+def test_a_file_that_is_no_table_is_called_what_it_is(tmp_path, raw, word):
+    (tmp_path / "data.xls").write_bytes(raw)
+    with pytest.raises(InputError) as caught:
+        read_case(tmp_path / "data.xls")
+    (found,) = caught.value.findings
+    assert word in found.problem and ".xlsx" in found.remedy
+
+
+def test_formulas_without_values_are_called_so(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["deformation_mm", "other", "force_N"])
+    for place, x in enumerate(X.tolist()):
+        book.active.append([x, 1.0, f"=A{place + 2}*12"])
+    book.save(tmp_path / "book.xlsx")
+    with pytest.raises(InputError) as caught:
+        read_case(tmp_path / "book.xlsx")
+    assert any(
+        "formulas without values" in one.problem for one in caught.value.findings
+    )
+
+
+def test_a_large_parquet_file_is_read_by_its_used_columns(tmp_path):
+    frame = pd.DataFrame({"deformation_mm": X, "force_N": F, "note": ["x"] * 12})
+    frame["trace"] = [[1.0, 2.0]] * 12
+    frame.to_parquet(tmp_path / "log.parquet")
+    check(read_case(tmp_path / "log.parquet"))
+
+
+def test_commas_in_quotes_may_be_decimal(tmp_path):
+    text = '"Weg [mm]","Kraft [N]"\n'
+    text += "".join(
+        f'"{x}","{f}"\n'.replace(".", ",") for x, f in zip(X, F, strict=True)
+    )
+    check(read(tmp_path, text))
