@@ -7,6 +7,7 @@ from hdcal.screening.local_fit import (
     Usual,
     looked_at,
     median,
+    quantile,
     resolution,
     slopes,
     spread,
@@ -15,6 +16,8 @@ from hdcal.screening.local_fit import (
 
 # Share of the tested range within which the deformation counts as at rest.
 _REST = 0.01
+# A gauge is zeroed by a step this many times as large as those of the test.
+_ZEROED = 10.0
 # A tare lies in this share of the first rows at most.
 _EARLY = 0.25
 # A smaller step of the force, as a share of its range, is left in the record.
@@ -33,11 +36,11 @@ _BACK, _ADVANCE = 0.1, 0.25
 _FEWEST = 5
 
 
-def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float]:
-    """Return how many first rows were read before the tare, and its step.
+def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
+    """Return how many first rows were read before the tare, its step and the unit.
 
-    Before a tare nothing moves, and the force steps to another level while the
-    deformation stays.
+    Before a tare nothing moves; then the force steps to another level while the
+    deformation stays, or the deformation while the force stays.
 
     Args:
         x: deformation, shape (n,).
@@ -45,7 +48,7 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float]:
     """
     last = int(_EARLY * x.size)
     if last < 2:
-        return 0, 0.0
+        return 0, 0.0, ""
     rows = looked_at(x, y)
     rows = rows[rows > 0]
     typical = float(median(slopes(*_sample(x, y))[None].reshape(1, -1), 0.0)[0])
@@ -54,13 +57,17 @@ def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float]:
     usual = Usual.of(step, resolution(y))
     found = usual.surprised(step, x.size) & (rows >= 2) & (rows <= last)
     found &= np.abs(step) > _LEAST * spread(y)
-    found &= np.abs(run) <= _REST * spread(x)
+    # at rest, or a gauge that is zeroed, by far more than it ever moves
+    far = _ZEROED * float(quantile(np.abs(run), 0.95))
+    found &= (np.abs(run) <= _REST * spread(x)) | (np.abs(run) > far)
     for place in np.flatnonzero(found)[::-1]:
         row = rows[place]
         rests = np.ptp(x[:row]) <= _REST * spread(x)
         if rests and np.ptp(y[:row]) <= 0.2 * abs(step[place]):
-            return int(row), float(step[place])
-    return 0, 0.0
+            zeroed = abs(run[place]) > far
+            size = run[place] if zeroed else step[place]
+            return int(row), float(size), "mm" if zeroed else "N"
+    return 0, 0.0, ""
 
 
 def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

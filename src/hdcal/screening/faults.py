@@ -69,12 +69,11 @@ def _clock(one: Run) -> None:
 
 
 def _tare(one: Run) -> None:
-    rows = one.distinct()
-    first, step = rows_before_tare(one.x[rows], one.y[rows])
+    first, step, unit = rows_before_tare(one.x, one.y)
     if first:
-        before = np.arange(rows[first])
+        before = np.arange(first)
         one.cut(before, TARE)
-        one.observe("before the tare", before, step, "N", "cut")
+        one.observe("before the tare", before, step, unit, "cut")
 
 
 def _saturation(one: Run) -> None:

@@ -19,7 +19,7 @@ from hdcal.report.chart_spec import Chart
 from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
 from hdcal.report.sentences import rendered
 from hdcal.report.units import UNITS
-from hdcal.screening.result import SEGMENTS, Screening
+from hdcal.screening.result import HOLDING, LOADING, SEGMENTS, Screening
 
 # Prior standard deviations of log K that contain 99.7 % of it.
 _FAR = 3.0
@@ -161,6 +161,20 @@ class Check(Result):
     def notes(self) -> tuple[Words, ...]:
         """Doubts, assumptions and remarks."""
         return self.lines("notes")
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Number of rows of each segment that was left out."""
+        kept = SEGMENTS[LOADING : HOLDING + 1]
+        found = self.screening.segments if self.screening else {}
+        return {name: rows for name, rows in found.items() if name not in kept}
+
+    @property
+    def straight_part(self) -> StraightRange | None:
+        """The longest straight part; of several specimens none is told."""
+        if self.screening is None or len(self.data.specimens) > 1:
+            return None
+        return self.screening.straight_part
 
     @property
     def stiffness_range(self) -> float:
