@@ -1,6 +1,7 @@
 """Calibrate simulated springs by a command, and grade its answers.
 
-Least squares over all rows of each file are the reference.
+References: least squares over all rows of each file, over the rows that this version's
+screening keeps, and over the longest straight part that it finds.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import numpy as np
 
 from benchmarks.springs.record import ALL, faulty_spring, write_csv
 from benchmarks.springs.spring import Spring
+from hdcal.screening.screen import screen
 
 # An answer that is off by more is wrong.
 WRONG = 0.10
@@ -49,6 +51,28 @@ def least_squares(spring: Spring) -> Answer:
     """Return the straight line through all rows."""
     (slope, _), cov = np.polyfit(spring.deformation, spring.force, 1, cov=True)
     half = NORMAL * float(np.sqrt(cov[0, 0]))
+    return graded(spring, slope, slope - half, slope + half)
+
+
+def least_squares_of_kept(spring: Spring) -> Answer:
+    """Return the straight line through the rows that the screening keeps."""
+    found = screen(spring.deformation, spring.force)
+    if found.asked:
+        return Answer("asked")
+    x, y = found.deformation[found.kept], found.force[found.kept]
+    (slope, _), cov = np.polyfit(x, y, 1, cov=True)
+    half = NORMAL * float(np.sqrt(cov[0, 0]))
+    return graded(spring, slope, slope - half, slope + half)
+
+
+def straight_part(spring: Spring) -> Answer:
+    """Return the slope of the longest straight part."""
+    found = screen(spring.deformation, spring.force)
+    if found.asked:
+        return Answer("asked")
+    if found.straight is None:
+        return Answer("failed")
+    slope, half = found.straight.slope, NORMAL * found.straight.slope_sd
     return graded(spring, slope, slope - half, slope + half)
 
 
@@ -99,6 +123,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=300, help="springs")
     parser.add_argument("--seed", type=int, default=1, help="fresh springs for each")
     parser.add_argument("--hdcal", metavar="PATH", help="another version's command")
+    parser.add_argument("--no-hdcal", action="store_true", help="references only")
     parser.add_argument("--keep", metavar="DIR", help="keep the files there")
     given = parser.parse_args()
     command = [given.hdcal] if given.hdcal else [sys.executable, "-m", "hdcal"]
@@ -112,7 +137,10 @@ def main() -> None:
         for place, spring in enumerate(springs):
             file = folder / f"spring{place}.csv"
             write_csv(spring, file, bool(clocks[place]))
-            answers.append(calibrated(spring, file, command))
+            if given.no_hdcal:
+                answers.append(Answer("failed"))
+            else:
+                answers.append(calibrated(spring, file, command))
             lines.append(least_squares(spring))
             truth = "none" if spring.truth is None else f"{spring.truth:.4g}"
             faults = {name: round(size, 3) for name, size in spring.faults.items()}
@@ -126,6 +154,9 @@ def main() -> None:
             )
     table("hdcal", springs, answers)
     table("least squares over all rows", springs, lines)
+    kept = [least_squares_of_kept(spring) for spring in springs]
+    table("least squares over the rows that the screening keeps", springs, kept)
+    table("longest straight part", springs, [straight_part(s) for s in springs])
 
 
 if __name__ == "__main__":

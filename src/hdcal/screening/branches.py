@@ -7,8 +7,9 @@ from hdcal.screening.run import Run
 from hdcal.screening.straight import longest_straight
 from hdcal.screening.trembling import HIDDEN
 from hdcal.screening.turning_points import turning_points
-from hdcal.screening.wild import FEWEST
 
+# Rows from which on a line has a slope and scatter.
+_FEWEST = 5
 # A movement over this share of the range is a branch.
 _BRANCH = 0.1
 
@@ -31,15 +32,13 @@ def name_segments(one: Run) -> None:
 def straight_part(one: Run, n: int) -> StraightPart | None:
     """Return the longest straight part of a run's largest movement."""
     rows = np.flatnonzero(one.kept)
-    if rows.size < FEWEST:
+    if rows.size < _FEWEST or not np.ptp(one.x[rows]):
         return None
     turns, _ = _branches(one, rows)
     ends = [0, *turns.tolist(), rows.size - 1]
     first = int(np.argmax(np.abs(np.diff(one.y[rows[ends]]))))
     loading = rows[ends[first] : ends[first + 1] + 1]
     found = longest_straight(one.x[loading], one.y[loading], one.scatter)
-    if found is None:
-        return None
     part = loading[found[0]]
     low, high = float(one.x[part].min()), float(one.x[part].max())
     inside = np.zeros(n, bool)

@@ -8,7 +8,7 @@ from hdcal.screening.jumps import Jump, find_jump
 from hdcal.screening.result import DROPPED, SATURATED, TARE, WILD, Kind
 from hdcal.screening.run import Run
 from hdcal.screening.saturation import saturated_rows
-from hdcal.screening.trembling import scatter_of_deformation
+from hdcal.screening.trembling import matters, scatter_of_deformation
 from hdcal.screening.wild import FEWEST, wild_readings
 
 # More jumps than this are no faults of a zero but what the part does.
@@ -38,10 +38,11 @@ def look_at(one: Run) -> None:
     _wild(one)
     if _jumps(one):
         _wild(one)
-    if one.scatter:
-        one.scatter = _scatter(one)
-    if one.scatter:
-        rows = np.flatnonzero(one.kept)
+    rows = np.flatnonzero(one.kept)
+    one.scatter = _scatter(one) if one.scatter else 0.0
+    if not matters(one.scatter, one.x[rows]):
+        one.scatter = 0.0
+    else:
         one.observe("scatter of the deformation", rows, one.scatter, "mm", "kept")
 
 

@@ -17,7 +17,7 @@ _PARAMETERS = 3.0
 
 def longest_straight(
     x: np.ndarray, y: np.ndarray, scatter: float = 0.0
-) -> tuple[slice, bool] | None:
+) -> tuple[slice, bool]:
     """Return the rows of the longest straight part, and whether it is the whole curve.
 
     The curve is cut into straight pieces, as many as the Bayesian information
@@ -30,8 +30,6 @@ def longest_straight(
         y: force, shape (n,).
         scatter: sd of the deformation's reading, which means of rows make small.
     """
-    if x.size < 2 * _FEWEST:
-        return None
     points = min(_POINTS, x.size)
     if scatter:
         fine = _FINE * float(np.ptp(x)) * np.sqrt(x.size) / scatter
@@ -45,7 +43,7 @@ def longest_straight(
     cuts = _pieces(cost, px.size)
     span_x, span_y = np.ptp(px), np.ptp(py)
     if not span_x or not span_y:
-        return None
+        return slice(0, x.size), True
     areas = [
         abs((px[b - 1] - px[a]) / span_x) * abs((py[b - 1] - py[a]) / span_y)
         for a, b in pairwise(cuts)

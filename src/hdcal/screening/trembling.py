@@ -18,7 +18,7 @@ HIDDEN = 0.2
 
 
 def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return the sd of the deformation's reading; 0 where none shows or matters.
+    """Return the sd of the deformation's reading; 0 where none shows.
 
     A movement that is really uneven has the force follow it; scatter of the gauge
     does not. Of the second differences the part that the force does not follow is
@@ -42,11 +42,20 @@ def scatter_of_deformation(x: np.ndarray, y: np.ndarray) -> float:
     variance = float(parts.mean())
     # neighbouring second differences share readings: half of them are independent
     error = float(parts.std()) / np.sqrt(parts.size / 2.0)
-    material = variance > _MATTERS * float(np.var(x))
     clear = variance > norm.isf(_LEVEL) * error
     # of scatter they alternate (-2/3), of a smooth movement they do not
     alternates = np.mean(bend_x[1:] * bend_x[:-1]) < -_ALTERNATES * np.mean(bend_x**2)
-    return float(np.sqrt(variance)) if material and clear and alternates else 0.0
+    return float(np.sqrt(variance)) if clear and alternates else 0.0
+
+
+def matters(scatter: float, x: np.ndarray) -> bool:
+    """Tell whether scatter makes a straight line too flat.
+
+    Args:
+        scatter: sd of the deformation's reading.
+        x: deformation, shape (n,).
+    """
+    return scatter**2 > _MATTERS * float(np.var(x))
 
 
 def _slope(x: np.ndarray, y: np.ndarray) -> float:
