@@ -110,9 +110,9 @@ def _wild(one: Run) -> None:
 
 def _jumps(one: Run) -> bool:
     """Give the rows after each jump a zero of their own, and tell whether any did."""
-    found: list[Jump] = []
-    kept = one.x.copy(), one.y.copy(), one.zero.copy()
-    while len(found) <= _MOST_JUMPS:
+    found: dict[int, Jump] = {}
+    as_read = one.x.copy(), one.y.copy()
+    for _ in range(2 * _MOST_JUMPS):
         rows = one.distinct()
         jump = find_jump(one.x[rows], one.y[rows], one.scatter)
         if jump is None:
@@ -121,22 +121,26 @@ def _jumps(one: Run) -> bool:
         if _rested(one, row):
             before = np.flatnonzero(one.kept[:row])
             one.cut(before, TARE)
-            _, unit = _JUMPS[jump.channel]
-            step = jump.deformation if unit == "mm" else jump.force
-            one.observe("before the tare", before, step, unit, "cut")
+            size, _, unit = _size(jump)
+            one.observe("before the tare", before, size, unit, "cut")
             continue
         one.x[row:] -= jump.deformation
         one.y[row:] -= jump.force
-        one.zero[row:] += 1
-        found.append(Jump(row, jump.channel, jump.deformation, jump.force))
+        # what is left of one that was found before
+        found[row] = jump + found[row] if row in found else jump
     if len(found) > _MOST_JUMPS:
-        one.x, one.y, one.zero = kept
+        one.x, one.y = as_read
         return False
-    for jump in found:
-        kind, unit = _JUMPS[jump.channel]
-        size = jump.deformation if unit == "mm" else jump.force
-        one.observe(kind, np.array([jump.row]), size, unit, "new zero")
+    for row, jump in sorted(found.items()):
+        one.zero[row:] += 1
+        size, kind, unit = _size(jump)
+        one.observe(kind, np.array([row]), size, unit, "new zero")
     return bool(found)
+
+
+def _size(jump: Jump) -> tuple[float, Kind, str]:
+    kind, unit = _JUMPS[jump.channel]
+    return jump.deformation if unit == "mm" else jump.force, kind, unit
 
 
 def _rested(one: Run, row: int) -> bool:

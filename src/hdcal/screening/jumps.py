@@ -20,6 +20,8 @@ _STILL = 0.02
 _BOTH, _FAR = 0.2, 10.0
 # Standard errors from which on a slope is known.
 _KNOWN = 5.0
+# Share of the movement that must be more than scatter.
+_REAL = 0.2
 # Movements over this share of the range make a cycle, in so many of which a zero shows.
 _CYCLE, _CYCLES = 0.1, 3
 
@@ -40,6 +42,12 @@ class Jump:
     deformation: float
     force: float
 
+    def __add__(self, other: "Jump") -> "Jump":
+        """Return both jumps before the same row as one."""
+        channel = self.channel if self.channel == other.channel else "both"
+        deformation = self.deformation + other.deformation
+        return Jump(self.row, channel, deformation, self.force + other.force)
+
 
 def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
     """Return the clearest jump of a zero, or None.
@@ -52,16 +60,17 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
         scatter: sd of the deformation's reading.
     """
     for row in possible_jumps(x, y, scatter)[:_TRIED]:
-        if (jump := _jump(x, y, int(row), REACH)) is not None:
+        if (jump := _jump(x, y, int(row), REACH, scatter)) is not None:
             return jump
     block = max(_block(x), _block(y))
     for first in (0, block // 2) if block > 1 else ():
         edges = np.arange(first, x.size, block)
-        means = [np.add.reduceat(v, edges)[:-1] / block for v in (x, y)]
-        for place in possible_jumps(*means, scatter / np.sqrt(block))[:_TRIED]:
-            near = np.arange(edges[place] - block, edges[place] + block + 1)
+        mean_x, mean_y = (np.add.reduceat(v, edges)[:-1] / block for v in (x, y))
+        places = possible_jumps(mean_x, mean_y, scatter / np.sqrt(block))
+        for edge in edges[places[:_TRIED]].tolist():
+            near = np.arange(edge - block, edge + block + 1)
             row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
-            if (jump := _jump(x, y, row, REACH * block)) is not None:
+            if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
                 return jump
     return None
 
@@ -85,7 +94,9 @@ def _sharpest(x: np.ndarray, y: np.ndarray, near: np.ndarray) -> int:
     return int(near[np.argmax(off)])
 
 
-def _jump(x: np.ndarray, y: np.ndarray, row: int, reach: int) -> Jump | None:
+def _jump(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> Jump | None:
     """Return the jump before a row, None where the curve does not go on after it.
 
     Args:
@@ -93,15 +104,18 @@ def _jump(x: np.ndarray, y: np.ndarray, row: int, reach: int) -> Jump | None:
         y: force, shape (n,).
         row: the first one after it.
         reach: rows on each side that tell its size.
+        scatter: sd of the deformation's reading.
     """
-    jump = _measured(x, y, row, reach)
+    jump = _measured(x, y, row, reach, scatter)
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
     real = _goes_on(*level, row) and _stays(*level, after, jump)
     return jump if real else None
 
 
-def _measured(x: np.ndarray, y: np.ndarray, row: int, reach: int) -> Jump:
+def _measured(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> Jump:
     """Return a jump with its size, in the channel that leaves its own sequence."""
     sides = slice(max(row - reach, 0), row), slice(row, row + reach)
     dx, dy = (
@@ -109,7 +123,8 @@ def _measured(x: np.ndarray, y: np.ndarray, row: int, reach: int) -> Jump:
         for values in (x, y)
     )
     square = float(dx @ dx)
-    slope = float(dx @ dy) / square if square else 0.0
+    real = square - dx.size * scatter**2
+    slope = float(dx @ dy) / real if real > _REAL * square else 0.0
     left = dy - slope * dx
     known = slope * np.sqrt(square) > _KNOWN * np.sqrt(left @ left / dx.size)
     run, rise = (float(v[sides[1]].mean() - v[sides[0]].mean()) for v in (x, y))

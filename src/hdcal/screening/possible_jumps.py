@@ -42,6 +42,7 @@ class Sides:
 
     @classmethod
     def at(cls, x: np.ndarray, y: np.ndarray, rows: np.ndarray) -> "Sides":
+        """Return the windows about some boundaries, each before a row."""
         offsets = np.arange(-REACH, 0), np.arange(REACH)
         middle = 0.5 * (x[rows - 1] + x[rows])[:, None]
         before, after = offsets
