@@ -109,7 +109,10 @@ def _jump(
     jump = _measured(x, y, row, reach, scatter)
     after = np.arange(x.size) >= row
     level = x - jump.deformation * after, y - jump.force * after
-    real = _goes_on(*level, row) and _stays(*level, after, jump)
+    # through the scatter of the deformation
+    least = max(_CYCLE * float(np.ptp(level[0])), 10.0 * scatter)
+    turns = turning_points(level[0], least)
+    real = _goes_on(*level, row, turns[0]) and _stays(*level, after, jump, turns)
     return jump if real else None
 
 
@@ -142,7 +145,7 @@ def _measured(
     return Jump(row, "deformation", run - rise / slope if known else off[0], 0.0)
 
 
-def _goes_on(x: np.ndarray, y: np.ndarray, row: int) -> bool:
+def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
     """Tell whether the curve goes on with the same slope, over many rows.
 
     A part that broke has another one, or none.
@@ -151,8 +154,8 @@ def _goes_on(x: np.ndarray, y: np.ndarray, row: int) -> bool:
         x: deformation, the jump taken out, shape (n,).
         y: force, likewise.
         row: the first one after it.
+        turns: rows at which the movement turns.
     """
-    turns, _ = turning_points(x, _CYCLE * float(np.ptp(x)))
     edges = np.r_[0, turns, x.size]
     left = edges[edges <= row - SIDE].max(initial=0)
     right = edges[edges >= row + SIDE].min(initial=x.size)
@@ -171,14 +174,26 @@ def _goes_on(x: np.ndarray, y: np.ndarray, row: int) -> bool:
     return abs(first - second) <= _ALIKE * max(abs(first), abs(second)) + blur
 
 
-def _stays(x: np.ndarray, y: np.ndarray, after: np.ndarray, jump: Jump) -> bool:
+def _stays(
+    x: np.ndarray,
+    y: np.ndarray,
+    after: np.ndarray,
+    jump: Jump,
+    turning: tuple[np.ndarray, int],
+) -> bool:
     """Tell whether all that comes after a jump is moved by it.
 
     A part that gives way in one cycle has another loop in the next one, but about the
     same centre; a zero that jumped moves the centre. Only cycles can tell.
+
+    Args:
+        x: deformation, the jump taken out, shape (n,).
+        y: force, likewise.
+        after: which rows come after it.
+        jump: that was taken out.
+        turning: rows at which the movement turns, and its first sign.
     """
-    span = float(np.ptp(x))
-    turns, sign = turning_points(x, _CYCLE * span)
+    turns, sign = turning
     if turns.size < _CYCLES:
         return True
     way = sign * (-1.0) ** np.searchsorted(turns, np.arange(x.size), "left")
