@@ -1,5 +1,7 @@
 """A working range leaves only the rows between its ends."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -46,3 +48,14 @@ def test_the_gear_file_may_state_it_and_the_caller_overrides_it():
 def test_too_few_rows_are_refused_with_what_was_read():
     with pytest.raises(InputError, match=r"2 of 101 rows.*from 0 to 1 mm"):
         hdcal.read_case(TABLE, range="0.10:0.115")
+
+
+def test_a_command_takes_it(tmp_path, here):
+    TABLE.to_csv(tmp_path / "data.csv", index=False)
+    done = here("check", str(tmp_path / "data.csv"), "--range", "0.105:0.405", "--json")
+    answer = json.loads(done.stdout)
+    assert answer["data"]["rows"] == 30
+    assert answer["screening"]["segments"]["outside the range"] == 71
+    refused = here("check", str(tmp_path / "data.csv"), "--range", "2:1")
+    assert refused.returncode == 2
+    assert "--range" in refused.stderr
