@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hdcal.data.loading import derive_motion, loading, movement_words
-from hdcal.data.turning_points import resting, turning_points
+from hdcal.screening.turning_points import resting, turning_points
 
 # A way that takes longer at one time than at another: by resting or by speed.
 EITHER = "holds or rates"

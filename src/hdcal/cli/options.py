@@ -92,6 +92,12 @@ reading_options = combined(
     sheet_option,
     column_option,
     click.option(
+        "--range",
+        metavar="LOW:HIGH",
+        help="Working range: 0.1:0.6 of the deformation [mm], or 10%:40% of the "
+        "largest force [default: until the force drops for good].",
+    ),
+    click.option(
         "--theory",
         type=click.Choice(get_args(Theory)),
         help="Stiffness formula that K multiplies; overrides the gear file.",
@@ -104,6 +110,7 @@ case_options = combined(reading_options, click.argument("data", metavar="DATA"))
 def take_reading(settings: dict) -> dict:
     """Take the values of `reading_options` out of a command's settings."""
     names = "gear", "columns", "theory", "encoding", "sheet", "reading", "specimen"
+    names += ("range",)
     return {name: settings.pop(name) for name in names}
 
 

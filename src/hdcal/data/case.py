@@ -12,6 +12,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
+from hdcal.screening.result import Screening
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -100,6 +101,8 @@ class Case:
             empty where none is stated.
         left_out: specimens left out because of a faulty row, each with the finding;
             empty unless `skip_bad` was given.
+        screening: of the whole record before rows were cut; None where the rows are
+            not those of a file.
     """
 
     name: str
@@ -115,6 +118,7 @@ class Case:
     rigs: tuple[str, ...] = ()
     dates: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
+    screening: Screening | None = None
 
     def __repr__(self) -> str:
         rows = len(self.records.force)

@@ -73,6 +73,7 @@ def read_gear_folder(
     reading: str | None = None,
     encoding: str | None = None,
     skip_bad: bool | None = None,
+    range: str | None = None,
 ) -> tuple[Case, dict[str, list] | None]:
     """Read a folder with a file for each gear, or with a folder for each.
 
@@ -86,6 +87,7 @@ def read_gear_folder(
         columns: as in `read_case`.
         theory: likewise.
         reading: likewise.
+        range: likewise.
         encoding: likewise.
         skip_bad: likewise. A file that cannot be read is a gear that is bad.
 
@@ -135,7 +137,7 @@ def read_gear_folder(
         many = len(whole.run.names), len(whole.specimen.names)
         notes.append(mountings_note(whole.columns.values, *many))
     whole = replace(whole, left_out=bad)
-    case = case_of(whole, found, (*notes, *told), folder.resolve().name)
+    case = case_of(whole, found, (*notes, *told), folder.resolve().name, range)
     return case, _sizes(parts) if own and found.theory != SPRING else None
 
 

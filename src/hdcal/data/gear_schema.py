@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from hdcal.data.certificates import (
     DeformationCertificate,
@@ -21,6 +21,7 @@ from hdcal.data.theory_names import READINGS, SPRING, Theory
 from hdcal.data.toml_file import TomlFile, did_you_mean
 from hdcal.data.typed_json import within
 from hdcal.errors import Finding, Findings, InputError
+from hdcal.screening.working_range import FORM, read_range
 
 _STRICT = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
@@ -44,6 +45,11 @@ class GearTable(BaseModel):
     theory: Theory = "ring"
 
 
+def _checked_range(text: str) -> str:
+    read_range(text)
+    return text
+
+
 class MeasurementTable(BaseModel):
     """The table [measurement]."""
 
@@ -54,6 +60,7 @@ class MeasurementTable(BaseModel):
     force_calibration: ForceCertificate | None = None
     deformation_calibration: DeformationCertificate | None = None
     temperature_calibration: TemperatureCertificate | None = None
+    range: Annotated[str, AfterValidator(_checked_range)] | None = None
 
     @property
     def certificates(self) -> dict[str, GaugeCertificate]:
@@ -135,6 +142,8 @@ def _translate(error: dict, toml: TomlFile) -> Finding:
         quantity = name if name in (*RANGES, *NAMES) else name.rpartition("_")[0]
         (found,) = implausible(key, value, quantity)
         return toml.finding(found.problem, found.remedy, key)
+    if kind == "value_error" and key == "measurement.range":
+        return toml.finding(str(error["ctx"]["error"]), FORM, key)
     words = error["msg"][:1].lower() + error["msg"][1:]
     return toml.finding(words, f"Write it like {_example(key)}", key)
 
@@ -161,6 +170,7 @@ def _example(key: str) -> str:
         "deformation": 'deformation = "radial"',
         "force_calibration": "force_calibration = { expanded_percent = 0.5, k = 2 }",
         "deformation_calibration": "deformation_calibration = { expanded_mm = 0.002 }",
+        "range": 'range = "10%:40%"',
         "temperature_calibration": "temperature_calibration = { expanded_K = 1.0 }",
     }
     return examples.get(name, f"{name} = … (a number)")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.data.turning_points import (
+from hdcal.screening.turning_points import (
     HOLD_MOST,
     HOLD_SHARE,
     TURN_MOST,
@@ -102,7 +102,11 @@ def movement_words(deformation: np.ndarray) -> dict[int, str]:
 
 
 def derive_motion(
-    deformation: np.ndarray, run: np.ndarray, time: np.ndarray | None = None
+    deformation: np.ndarray,
+    run: np.ndarray,
+    time: np.ndarray | None = None,
+    *,
+    hidden: bool = False,
 ) -> Motion:
     """Derive the motion inside each run.
 
@@ -110,9 +114,13 @@ def derive_motion(
         deformation: in the order it was taken [mm], shape (n,).
         run: index of the mounting, shape (n,).
         time: not decreasing within a run [s], shape (n,); None when not measured.
+        hidden: whether scatter of the deformation hides how it moved; every row then
+            counts as loading, and the loading shows nothing.
     """
     size = len(deformation)
     direction, rate, sense = np.zeros(size), np.zeros(size), np.ones(size)
+    if hidden:
+        return Motion(sense, sense, rate, frozenset())
     order = np.argsort(run, kind="stable")
     cuts = np.flatnonzero(np.diff(run[order])) + 1
     span = float(np.ptp(deformation)) if size else 0.0

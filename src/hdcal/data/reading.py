@@ -25,6 +25,7 @@ from hdcal.data.measurements import (
 )
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
+from hdcal.data.screened import asked_range, screened, screening_notes, with_zeros
 from hdcal.data.tables.arrays import NAME
 from hdcal.data.tables.sources import is_frame
 from hdcal.data.theory_names import SPRING
@@ -55,6 +56,7 @@ def read_case(
     reading: str | None = None,
     specimen: str | None = None,
     skip_bad: bool | None = None,
+    range: str | None = None,
 ) -> Case:
     """Read a case from a CSV file, a workbook, a folder or a table in memory.
 
@@ -79,11 +81,16 @@ def read_case(
         specimen: label of the one whose rows are wanted; by default all of them.
         skip_bad: leave out specimens of which a row is wrong, whole; `left_out` of the
             case names them. False: refuse, and say that this can be asked for.
+        range: working range, outside of which rows are left out: `0.1:0.6` of the
+            deformation as read [mm], or `10%:40%` of the largest force of each run; by
+            default that of the gear file, or all that was read until the force drops
+            for good.
 
     Raises:
         InputError: holds everything that is wrong with either file.
     """
     columns, in_memory = asked_columns(data, columns)
+    asked_range(range)
     table, data = data, Path(NAME if in_memory else data)
     # Of a folder with a file for each gear, the one that is called after it.
     own = data if in_memory else _own_file(data, specimen)
@@ -115,7 +122,7 @@ def read_case(
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
     label = None if alone else specimen
-    return case_of(measured, found, told, _name(data, folder, sheet, label))
+    return case_of(measured, found, told, _name(data, folder, sheet, label), range)
 
 
 def _own_file(data: Path, specimen: str | None) -> Path:
@@ -126,7 +133,11 @@ def _own_file(data: Path, specimen: str | None) -> Path:
 
 
 def case_of(
-    measured: Measurements, found: Gear, told: Sequence[str], name: str
+    measured: Measurements,
+    found: Gear,
+    told: Sequence[str],
+    name: str,
+    range: str | None = None,
 ) -> Case:
     """Return what was measured on a gear, or several of its kind, as a case.
 
@@ -135,9 +146,22 @@ def case_of(
         found: as its file has it.
         told: notes on how that was found.
         name: of the case.
+        range: working range; by default that of the gear file.
+
+    Raises:
+        InputError: as `screened`.
     """
-    measured, smoothed = _steadied(measured)
-    motion = _motion(measured)
+    wanted = asked_range(range or found.source.get("measurement", {}).get("range"))
+    measured, screening = screened(measured, wanted)
+    motion = _motion(measured, hidden=screening.trembling)
+    of_reading = [*reading_notes(measured, found, motion)]
+    of_reading += screening_notes(screening)
+    run = with_zeros(measured.run, screening)
+    if run is not measured.run:
+        measured = replace(measured, run=run)
+        motion = _motion(measured, hidden=screening.trembling)
+    if screening.deformation_sd > 0.0:
+        measured = _without_scatter(measured)
     further, of_further = further_labels(
         measured.columns.values, measured.specimen, measured.run
     )
@@ -156,34 +180,24 @@ def case_of(
         notes=(
             *measured.columns.notes,
             *told,
-            *reading_notes(measured, found, motion),
+            *of_reading,
             *of_further,
-            *smoothed,
         ),
         columns=measured.columns.as_named(),
         left_out=measured.left_out,
+        screening=screening,
         **further,
     )
 
 
-def _steadied(measured: Measurements) -> tuple[Measurements, list[str]]:
-    """Return measurements without the scatter of the displacement gauge, and a note."""
+def _without_scatter(measured: Measurements) -> Measurements:
+    """Return measurements without the scatter of the displacement gauge."""
     values = measured.columns.values
-    steady, force, scatter = without_scatter(
+    steady, force = without_scatter(
         values["deformation"], values["force"], measured.run.index
     )
-    if scatter == 0.0:
-        return measured, []
-    columns = replace(
-        measured.columns, values=values | {"deformation": steady, "force": force}
-    )
-    words = (
-        f"the displacement gauge scatters by {scatter:.2g} mm (sd), which would make "
-        "the stiffness too small: each reading is moved along its line to the "
-        "deformation smoothed over the rows"
-    )
-    columns = replace(measured.columns, values=moved)
-    return replace(measured, columns=columns), [words]
+    moved = values | {"deformation": steady, "force": force}
+    return replace(measured, columns=replace(measured.columns, values=moved))
 
 
 def asked_columns(
@@ -208,9 +222,10 @@ def _name(data: Path, folder: bool, *parts: str | None) -> str:
     return "-".join([name, *named])
 
 
-def _motion(measured: Measurements) -> Motion:
-    values = measured.columns.values
-    return derive_motion(values["deformation"], measured.run.index, values.get("time"))
+def _motion(measured: Measurements, *, hidden: bool) -> Motion:
+    values, run = measured.columns.values, measured.run.index
+    time = values.get("time")
+    return derive_motion(values["deformation"], run, time, hidden=hidden)
 
 
 def _records(measured: Measurements, gear: Gear, motion: Motion) -> Records:

@@ -119,6 +119,7 @@ def read_gears(console: Console, scheduler: str | None, given: dict):
     several = bool(gear_files(given["data"]))
     if (several or is_parquet(given["data"])) and given["columns"] is not None:
         names = "data", "gear", "columns", "theory", "reading", "encoding", "skip_bad"
+        names += ("range",)
         console.wrong += without_meaning(["sheet", "specimen"], "a folder of gears")
         how: dict = {name: given[name] for name in names}
         return console.wrong.attempt(read_fleet, **how, scheduler=scheduler)

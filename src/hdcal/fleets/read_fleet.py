@@ -26,6 +26,7 @@ def read_fleet(
     encoding: str | None = None,
     scheduler: str | None = None,
     skip_bad: bool = False,
+    range: str | None = None,
 ) -> FleetReadings:
     """Return what was measured on a fleet.
 
@@ -41,6 +42,7 @@ def read_fleet(
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
         skip_bad: leave out gears of which a row is wrong, whole.
+        range: working range, as in `read_case`; not of Parquet, which is not screened.
 
     Raises:
         InputError: holds everything that is wrong with the data.
@@ -49,6 +51,9 @@ def read_fleet(
         return data
     how: dict = {"columns": columns, "theory": theory, "reading": reading}
     how |= {"skip_bad": skip_bad}
+    if is_parquet(data) and range is not None:
+        words = "is not known of Parquet, which is read in batches"
+        raise InputError([Finding("range", words, "Save the rows that are meant")])
     if is_parquet(data):
         source = read_parquet(data, gear, **how)
         return pool_of(source, scheduler, skip_bad=skip_bad).readings(source)
@@ -58,7 +63,7 @@ def read_fleet(
         raise InputError([Finding("scheduler", f"the data {words}", remedy)])
     if isinstance(data, Case):
         return fleet_readings(data)
-    how |= {"encoding": encoding}
+    how |= {"encoding": encoding, "range": range}
     if gear_files(data):
         case, sizes = read_gear_folder(data, gear, **how)
         # A gear that is bad in one file may stand in others.

@@ -1,13 +1,55 @@
-"""Chart of the readings of a case."""
+"""Chart of the readings of a case, with the segments of the record in colour."""
+
+from collections.abc import Iterator
 
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.report.chart_spec import CYCLE, Chart, Panel, Points, drawn_rows
+from hdcal.report.chart_spec import (
+    CYCLE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    RED,
+    SKY,
+    YELLOW,
+    Chart,
+    Panel,
+    Points,
+    drawn_rows,
+)
+from hdcal.screening.result import SEGMENTS, Screening
+
+# Of the segments of a record; runs and specimens have the colours of the cycle.
+_COLOURS = dict(
+    zip(
+        SEGMENTS,
+        (CYCLE[0], ORANGE, GREEN, PURPLE, RED, YELLOW, SKY, GREY),
+        strict=True,
+    )
+)
 
 
 def readings_chart(case: Case) -> Chart:
-    """Return force over deformation, each specimen in a colour, or else each run."""
+    """Return force over deformation, with rows that were left out as crosses.
+
+    Each specimen has a colour, or else each run; of one run each segment.
+    """
+    found = case.screening
+    several = max(len(case.specimen_labels), len(case.run_labels)) > 1
+    marks = [*(_members(case) if several or found is None else _kept(found))]
+    panel = Panel(
+        x=f"deformation as read ({case.gear.reading}) [mm]",
+        y="force as read [N]",
+        marks=[*marks, *([] if found is None else _left_out(found))],
+        title=f"{case.name}: readings",
+    )
+    return Chart(panels=[panel])
+
+
+def _members(case: Case) -> Iterator[Points]:
+    """Yield the rows of each specimen, or of each run."""
     records = case.records
     several = len(case.specimen_labels) > 1
     names = case.specimen_labels if several else case.run_labels
@@ -18,19 +60,36 @@ def readings_chart(case: Case) -> Chart:
         np.asarray(values)[drawn]
         for values in (records.deformation, records.force, index)
     )
-    marks = [
-        Points(
+    for place in np.unique(group):
+        yield Points(
             label=f"{kind}{names[place]}" if len(names) > 1 else "",
             x=x[group == place],
             y=y[group == place],
             colour=CYCLE[place % len(CYCLE)],
         )
-        for place in np.unique(group)
-    ]
-    panel = Panel(
-        x=f"deformation as read ({case.gear.reading}) [mm]",
-        y="force as read [N]",
-        marks=marks,
-        title=f"{case.name}: readings",
-    )
-    return Chart(panels=[panel])
+
+
+def _kept(found: Screening) -> Iterator[Points]:
+    yield from _segments(found, found.kept, "o", "")
+
+
+def _left_out(found: Screening) -> Iterator[Points]:
+    yield from _segments(found, ~found.kept, "X", "left out: ")
+
+
+def _segments(
+    found: Screening, rows: np.ndarray, marker: str, words: str
+) -> Iterator[Points]:
+    """Yield some rows, those of each segment in its colour."""
+    some = np.flatnonzero(rows)
+    some = some[drawn_rows(found.force[some])]
+    for segment in np.unique(found.segment[some]):
+        these = some[found.segment[some] == segment]
+        name = SEGMENTS[segment]
+        yield Points(
+            label=f"{words}{name}",
+            x=found.deformation[these],
+            y=found.force[these],
+            colour=_COLOURS[name],
+            marker=marker,
+        )

@@ -19,6 +19,7 @@ from hdcal.report.chart_spec import Chart
 from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
 from hdcal.report.sentences import rendered
 from hdcal.report.units import UNITS
+from hdcal.screening.result import HOLDING, LOADING, SEGMENTS, Screening
 
 # Prior standard deviations of log K that contain 99.7 % of it.
 _FAR = 3.0
@@ -70,6 +71,43 @@ class CheckedData(Item):
     sha256: Digest
 
 
+class ScreenedFinding(Item):
+    """A finding of the screening: what it is, where, how large, and what was done."""
+
+    kind: str
+    rows: str
+    row_count: Count
+    size: float
+    unit: str
+    action: str
+    words: Words
+
+
+class StraightRange(Item):
+    """The longest straight part of the curve.
+
+    Attributes:
+        deformation_mm: its ends, as read.
+        stiffness_N_per_mm: slope of a straight line there.
+        standard_error_N_per_mm: of that slope.
+        whole: whether the whole curve is straight.
+    """
+
+    deformation_mm: Ends
+    stiffness_N_per_mm: float
+    standard_error_N_per_mm: float
+    whole: bool
+
+
+class Screened(Item):
+    """What the screening found, with the number of rows of each segment."""
+
+    findings: tuple[ScreenedFinding, ...]
+    segments: dict[str, Count]
+    working_range: str
+    straight_part: StraightRange | None
+
+
 class TestableEffects(Item):
     """Effects that the data can show, and what the data lack for the others."""
 
@@ -96,6 +134,7 @@ class Check(Result):
 
     Attributes:
         specimens: empty unless there are several.
+        screening: None where the rows are not those of a file.
         case: what was read.
         implausible_K: slope of the readings as K, with the ends of its prior, if it
             lies outside.
@@ -112,6 +151,7 @@ class Check(Result):
     data: CheckedData
     specimens: tuple[Specimen, ...]
     effects: TestableEffects
+    screening: Screened | None
     case: Annotated[InstanceOf[Case], Field(exclude=True)]
     implausible_K: tuple[float, float, float] | None = Field(exclude=True)
     each_effect: bool = Field(exclude=True)
@@ -121,6 +161,20 @@ class Check(Result):
     def notes(self) -> tuple[Words, ...]:
         """Doubts, assumptions and remarks."""
         return self.lines("notes")
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Number of rows of each segment that was left out."""
+        kept = SEGMENTS[LOADING : HOLDING + 1]
+        found = self.screening.segments if self.screening else {}
+        return {name: rows for name, rows in found.items() if name not in kept}
+
+    @property
+    def straight_part(self) -> StraightRange | None:
+        """The longest straight part; of several specimens none is told."""
+        if self.screening is None or len(self.data.specimens) > 1:
+            return None
+        return self.screening.straight_part
 
     @property
     def stiffness_range(self) -> float:
@@ -162,10 +216,43 @@ def check(case: Case, *, each_effect: bool = False) -> Check:
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
         ),
+        screening=_screened(case.screening),
         case=case,
         implausible_K=_implausible_K(case),
         each_effect=each_effect,
         part="part" if gear.theory == SPRING else "gear",
+    )
+
+
+def _screened(found: Screening | None) -> Screened | None:
+    if found is None:
+        return None
+    part, rows = found.straight, np.bincount(found.segment, minlength=len(SEGMENTS))
+    straight = None
+    if part is not None:
+        ends = part.low, part.high
+        straight = StraightRange(
+            deformation_mm=ends,
+            stiffness_N_per_mm=part.slope,
+            standard_error_N_per_mm=part.slope_sd,
+            whole=part.whole,
+        )
+    return Screened(
+        findings=tuple(
+            ScreenedFinding(
+                kind=one.kind,
+                rows=one.where,
+                row_count=one.count,
+                size=one.size,
+                unit=one.unit,
+                action=one.action,
+                words=one.words,
+            )
+            for one in found.observations
+        ),
+        segments={n: int(k) for n, k in zip(SEGMENTS, rows, strict=True) if k},
+        working_range=found.working_range,
+        straight_part=straight,
     )
 
 

@@ -1,0 +1,1 @@
+"""Simulated springs of all scales with the faults of real records."""

@@ -1,0 +1,1 @@
+"""The record before a model is fitted: segments, jumps, wild readings, range."""

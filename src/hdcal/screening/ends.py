@@ -1,0 +1,127 @@
+"""Beginning and end of a record: rows before the tare, and after the force dropped."""
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from hdcal.screening.local_fit import (
+    Usual,
+    looked_at,
+    median,
+    quantile,
+    resolution,
+    slopes,
+    spread,
+    windows,
+)
+
+# Share of the tested range within which the deformation counts as at rest.
+_REST = 0.01
+# A gauge is zeroed by a step this many times as large as those of the test.
+_ZEROED = 10.0
+# A tare lies in this share of the first rows at most.
+_EARLY = 0.25
+# A smaller step of the force, as a share of its range, is left in the record.
+_LEAST = 0.02
+# The part has given way when the force has fallen by this share of its range; less
+# is a serrated yield or the wear of a loop.
+_DROP = 0.05
+# Rows on each side that are averaged at most.
+_SMOOTH = 50
+# Seen in one row only, by so much.
+_GONE = 0.5
+# Share of the range that counts as a movement back, and share of a usual step that
+# counts as a step on.
+_BACK, _ADVANCE = 0.1, 0.25
+# Rows from which on a curve before the drop can be calibrated.
+_FEWEST = 5
+
+
+def rows_before_tare(x: np.ndarray, y: np.ndarray) -> tuple[int, float, str]:
+    """Return how many first rows were read before the tare, its step and the unit.
+
+    Before a tare nothing moves; then the force steps to another level while the
+    deformation stays, or the deformation while the force stays.
+
+    Args:
+        x: deformation, shape (n,).
+        y: force, shape (n,).
+    """
+    last = int(_EARLY * x.size)
+    if last < 2:
+        return 0, 0.0, ""
+    rows = looked_at(x, y)
+    rows = rows[rows > 0]
+    typical = float(median(slopes(*_sample(x, y))[None].reshape(1, -1), 0.0)[0])
+    rise, run = (values[rows] - values[rows - 1] for values in (y, x))
+    step = rise - typical * run
+    usual = Usual.of(step, resolution(y))
+    found = usual.surprised(step, x.size) & (rows >= 2) & (rows <= last)
+    found &= np.abs(step) > _LEAST * spread(y)
+    # at rest, or a gauge that is zeroed, by far more than it ever moves
+    far = _ZEROED * float(quantile(np.abs(run), 0.95))
+    found &= (np.abs(run) <= _REST * spread(x)) | (np.abs(run) > far)
+    for place in np.flatnonzero(found)[::-1]:
+        row = rows[place]
+        rests = np.ptp(x[:row]) <= _REST * spread(x)
+        if rests and np.ptp(y[:row]) <= 0.2 * abs(step[place]):
+            zeroed = abs(run[place]) > far
+            size = run[place] if zeroed else step[place]
+            return int(row), float(size), "mm" if zeroed else "N"
+    return 0, 0.0, ""
+
+
+def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return windows of ten rows over the whole record."""
+    rows = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
+    offsets = np.arange(-5, 5)
+    return windows(x, rows, offsets), windows(y, rows, offsets)
+
+
+def noise_of(y: np.ndarray) -> float:
+    """Return a robust sd of the noise, from second differences."""
+    return float(median(np.abs(np.diff(y, 2)))) / (0.6745 * 6**0.5)
+
+
+def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
+    """Return the first row after the largest force has dropped for good, and the drop.
+
+    The deformation goes on beyond that of the largest force, and the force does not
+    come back. None for a record that never does that, and for one whose deformation
+    had gone back and forth before: there the curve is a loop.
+
+    Args:
+        x: deformation, growing with the load in the mean, shape (n,).
+        y: force, likewise.
+    """
+    start = float(np.median(x[:3]))
+    way = 1.0 if x.max() - start >= start - x.min() else -1.0
+    x, y = way * (x - start), way * y
+    # a peak of noise is no largest force: of means over a few per cent of the record
+    half = min(max(1, y.size // 50), _SMOOTH)
+    smooth = median_filter(y, 2 * half + 1, mode="nearest")
+    peak = int(np.argmax(smooth))
+    top = peak + int(np.argmax(y[peak : peak + half + 1]))
+    span, whole = float(np.ptp(x)), float(np.ptp(y))
+    before = x[: top + 1]
+    if top < _FEWEST - 1 or np.ptp(before) < 2.0 * _BACK * span:
+        return None
+    # moved back and forth before, or not at its farthest at the largest force
+    back = np.maximum.accumulate(before) - before
+    if back.max() > _BACK * span or back[-1] > 0.5 * _BACK * span:
+        return None
+    # rows to which the deformation moved on, not those of a hold
+    farthest = np.maximum.accumulate(x)
+    step = np.median(np.abs(np.diff(before)))
+    moved_on = np.diff(farthest, prepend=farthest[0]) > _ADVANCE * step
+    fallen = moved_on & (np.arange(x.size) > top)
+    # or at rest, where no part lets so much go from one row to the next
+    rests = np.abs(np.diff(x[top : top + 2])) <= 0.5 * _BACK * span
+    if np.any(rests & (-np.diff(y[top : top + 2]) > _GONE * whole)):
+        fallen[top + 1] = True
+    if not fallen.any():
+        return None
+    drop = float(smooth[peak] - np.median(y[fallen]))
+    least = _DROP if fallen.sum() > 1 else _GONE
+    if drop < max(least * whole, 6.0 * noise_of(y)):
+        return None
+    return top + 1, way * drop

@@ -1,0 +1,149 @@
+"""Faults of the readings of one run, each looked for and dealt with."""
+
+import numpy as np
+
+from hdcal.screening import clock
+from hdcal.screening.ends import rows_before_tare
+from hdcal.screening.jumps import Jump, find_jump
+from hdcal.screening.result import DROPPED, SATURATED, TARE, WILD, Kind
+from hdcal.screening.run import Run
+from hdcal.screening.saturation import saturated_rows
+from hdcal.screening.trembling import matters, scatter_of_deformation
+from hdcal.screening.wild import FEWEST, wild_readings
+
+# More jumps than this are no faults of a zero but what the part does.
+_MOST_JUMPS = 4
+# A larger share of wild readings is noise with heavy tails.
+_MOST_WILD = 0.1
+# Fewer rows after a reset of the clock are no new test, but its end.
+_FEWEST_AFTER = 5
+# Share of the range within which nothing moves.
+_REST = 0.02
+_JUMPS: dict[str, tuple[Kind, str]] = {
+    "force": ("jump of the force", "N"),
+    "deformation": ("jump of the deformation", "mm"),
+    "both": ("jump of both", "N"),
+}
+
+
+def look_at(one: Run) -> None:
+    """Find what is wrong with the readings of a run."""
+    if one.time is not None:
+        _clock(one)
+    if one.plain or one.x.size < FEWEST or not np.ptp(one.x) or not np.ptp(one.y):
+        return
+    _tare(one)
+    _saturation(one)
+    one.scatter = _scatter(one)
+    _wild(one)
+    if _jumps(one):
+        _wild(one)
+    rows = np.flatnonzero(one.kept)
+    one.scatter = _scatter(one) if one.scatter else 0.0
+    if not matters(one.scatter, one.x[rows]):
+        one.scatter = 0.0
+    else:
+        one.observe("scatter of the deformation", rows, one.scatter, "mm", "smoothed")
+
+
+def _clock(one: Run) -> None:
+    """Count the time on where the clock was reset while the test went on."""
+    assert one.time is not None
+    back = clock.steps_back(one.time)
+    if not back.size:
+        return
+    size = float(np.min(np.diff(one.time)))
+    steps = np.abs(np.diff(one.x))
+    usual = max(4.0 * float(np.median(steps)), 0.02 * float(np.ptp(one.x)))
+    new_test = np.any(steps[back - 1] > usual)
+    if back[0] > one.x.size - _FEWEST_AFTER and back[0] > FEWEST:
+        after = np.arange(back[0], one.x.size)
+        one.cut(after, DROPPED)
+        one.observe("clock", after, size, "s", "cut")
+        one.time[after] = one.time[back[0] - 1]
+        return
+    if clock.out_of_order(back) or new_test:
+        one.observe("clock", back, size, "s", "asked")
+        return
+    one.time = clock.counted_on(one.time, back)
+    one.observe("clock", back, size, "s", "new zero")
+
+
+def _tare(one: Run) -> None:
+    first, step, unit = rows_before_tare(one.x, one.y)
+    if first:
+        before = np.arange(first)
+        one.cut(before, TARE)
+        one.observe("before the tare", before, step, unit, "cut")
+
+
+def _saturation(one: Run) -> None:
+    rows = np.flatnonzero(one.kept)
+    x, y = one.x[rows], one.y[rows]
+    channels: tuple[tuple[Kind, str, np.ndarray, np.ndarray], ...] = (
+        ("saturation of the force", "N", y, x),
+        ("saturation of the deformation", "mm", x, y),
+    )
+    for kind, unit, held, moving in channels:
+        found = saturated_rows(held, moving)
+        if found.size:
+            one.cut(rows[found], SATURATED)
+            size = float(held[found[0]])
+            one.observe(kind, rows[found], size, unit, "cut")
+
+
+def _scatter(one: Run) -> float:
+    rows = one.distinct()
+    return scatter_of_deformation(one.x[rows], one.y[rows])
+
+
+def _wild(one: Run) -> None:
+    rows = one.distinct()
+    found, off = wild_readings(one.x[rows], one.y[rows])
+    if not found.size or found.size > _MOST_WILD * rows.size:
+        return
+    wild = one.with_repeats(rows[found])
+    one.cut(wild, WILD)
+    size = float(off[np.argmax(np.abs(off))])
+    one.observe("wild reading", wild, size, "N", "cut")
+
+
+def _jumps(one: Run) -> bool:
+    """Give the rows after each jump a zero of their own, and tell whether any did."""
+    found: dict[int, Jump] = {}
+    as_read = one.x.copy(), one.y.copy()
+    for _ in range(2 * _MOST_JUMPS):
+        rows = one.distinct()
+        jump = find_jump(one.x[rows], one.y[rows], one.scatter)
+        if jump is None:
+            break
+        row = int(rows[jump.row])
+        if _rested(one, row):
+            before = np.flatnonzero(one.kept[:row])
+            one.cut(before, TARE)
+            size, _, unit = _size(jump)
+            one.observe("before the tare", before, size, unit, "cut")
+            continue
+        one.x[row:] -= jump.deformation
+        one.y[row:] -= jump.force
+        # what is left of one that was found before
+        found[row] = jump + found[row] if row in found else jump
+    if len(found) > _MOST_JUMPS:
+        one.x, one.y = as_read
+        return False
+    for row, jump in sorted(found.items()):
+        one.zero[row:] += 1
+        size, kind, unit = _size(jump)
+        one.observe(kind, np.array([row]), size, unit, "new zero")
+    return bool(found)
+
+
+def _size(jump: Jump) -> tuple[float, Kind, str]:
+    kind, unit = _JUMPS[jump.channel]
+    return jump.deformation if unit == "mm" else jump.force, kind, unit
+
+
+def _rested(one: Run, row: int) -> bool:
+    """Tell whether nothing moved before a row."""
+    before = np.ptp(one.x[:row][one.kept[:row]])
+    return bool(before < _REST * np.ptp(one.x[row:][one.kept[row:]]))

@@ -1,0 +1,208 @@
+"""Jumps of a zero: from one row on, the same curve with another origin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hdcal.screening.ends import noise_of
+from hdcal.screening.local_fit import REACH, resolution
+from hdcal.screening.possible_jumps import SIDE, possible_jumps
+from hdcal.screening.turning_points import turning_points
+
+# Places that are tried.
+_TRIED = 5
+# Slopes on both sides agree when they differ by less than this share.
+_ALIKE = 0.5
+# Share of the range within which nothing moves.
+_STILL = 0.02
+# Both channels jumped when one leaves its sequence at least this share as far, and by
+# this many usual steps.
+_BOTH, _FAR = 0.2, 10.0
+# Standard errors from which on a slope is known.
+_KNOWN = 5.0
+# Share of the movement that must be more than scatter.
+_REAL = 0.2
+# Movements over this share of the range make a cycle, in so many of which a zero shows.
+_CYCLE, _CYCLES = 0.1, 3
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A change of a zero before a row.
+
+    Attributes:
+        row: the first one after it.
+        channel: `force`, `deformation` or `both`.
+        deformation: by which it jumped; 0 where it did not.
+        force: likewise.
+    """
+
+    row: int
+    channel: str
+    deformation: float
+    force: float
+
+    def __add__(self, other: "Jump") -> "Jump":
+        """Return both jumps before the same row as one."""
+        channel = self.channel if self.channel == other.channel else "both"
+        deformation = self.deformation + other.deformation
+        return Jump(self.row, channel, deformation, self.force + other.force)
+
+
+def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
+    """Return the clearest jump of a zero, or None.
+
+    Where noise is larger than the steps between rows, means of rows tell more.
+
+    Args:
+        x: deformation, without wild readings, shape (n,).
+        y: force, shape (n,).
+        scatter: sd of the deformation's reading.
+    """
+    for row in possible_jumps(x, y, scatter)[:_TRIED]:
+        if (jump := _jump(x, y, int(row), REACH, scatter)) is not None:
+            return jump
+    block = max(_block(x), _block(y))
+    for first in (0, block // 2) if block > 1 else ():
+        edges = np.arange(first, x.size, block)
+        mean_x, mean_y = (np.add.reduceat(v, edges)[:-1] / block for v in (x, y))
+        places = possible_jumps(mean_x, mean_y, scatter / np.sqrt(block))
+        for edge in edges[places[:_TRIED]].tolist():
+            near = np.arange(edge - block, edge + block + 1)
+            row = _sharpest(x, y, near[(near > 0) & (near < x.size)])
+            if (jump := _jump(x, y, row, REACH * block, scatter)) is not None:
+                return jump
+    return None
+
+
+def _block(values: np.ndarray) -> int:
+    """Return how many rows make noise smaller than the steps of their means."""
+    noise = noise_of(values)
+    lag = max(values.size // 20, 1)
+    step = float(np.median(np.abs(values[lag:] - values[:-lag]))) / lag
+    if step == 0.0:
+        return 1
+    return int(np.clip((2.0 * noise / step) ** (2.0 / 3.0), 1, values.size // 40 + 1))
+
+
+def _sharpest(x: np.ndarray, y: np.ndarray, near: np.ndarray) -> int:
+    """Return the row at which one channel leaves its sequence by the largest step."""
+    off = np.zeros(near.size)
+    for values in (x, y):
+        step = np.abs(values[near] - values[near - 1])
+        off = np.maximum(off, step / (np.median(step) + resolution(values)))
+    return int(near[np.argmax(off)])
+
+
+def _jump(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> Jump | None:
+    """Return the jump before a row, None where the curve does not go on after it.
+
+    Args:
+        x: deformation, shape (n,).
+        y: force, shape (n,).
+        row: the first one after it.
+        reach: rows on each side that tell its size.
+        scatter: sd of the deformation's reading.
+    """
+    jump = _measured(x, y, row, reach, scatter)
+    after = np.arange(x.size) >= row
+    level = x - jump.deformation * after, y - jump.force * after
+    # through the scatter of the deformation
+    least = max(_CYCLE * float(np.ptp(level[0])), 10.0 * scatter)
+    turns = turning_points(level[0], least)
+    real = _goes_on(*level, row, turns[0]) and _stays(*level, after, jump, turns)
+    return jump if real else None
+
+
+def _measured(
+    x: np.ndarray, y: np.ndarray, row: int, reach: int, scatter: float
+) -> Jump:
+    """Return a jump with its size, in the channel that leaves its own sequence."""
+    sides = slice(max(row - reach, 0), row), slice(row, row + reach)
+    dx, dy = (
+        np.concatenate([values[side] - values[side].mean() for side in sides])
+        for values in (x, y)
+    )
+    square = float(dx @ dx)
+    real = square - dx.size * scatter**2
+    slope = float(dx @ dy) / real if real > _REAL * square else 0.0
+    left = dy - slope * dx
+    known = slope * np.sqrt(square) > _KNOWN * np.sqrt(left @ left / dx.size)
+    run, rise = (float(v[sides[1]].mean() - v[sides[0]].mean()) for v in (x, y))
+    off, ratio = [], []
+    for values in (x, y):
+        steps = np.diff(values[max(row - REACH, 0) : row + REACH])
+        usual = float(np.median(steps))
+        off.append(float(values[row] - values[row - 1]) - usual)
+        typical = float(np.median(np.abs(steps - usual))) + 0.5 * abs(usual)
+        ratio.append(abs(off[-1]) / (typical + resolution(values)))
+    if min(ratio) > max(_BOTH * max(ratio), _FAR):
+        return Jump(row, "both", off[0], off[1])
+    if ratio[1] >= ratio[0]:
+        return Jump(row, "force", 0.0, rise - slope * run if known else off[1])
+    return Jump(row, "deformation", run - rise / slope if known else off[0], 0.0)
+
+
+def _goes_on(x: np.ndarray, y: np.ndarray, row: int, turns: np.ndarray) -> bool:
+    """Tell whether the curve goes on with the same slope, over many rows.
+
+    A part that broke has another one, or none.
+
+    Args:
+        x: deformation, the jump taken out, shape (n,).
+        y: force, likewise.
+        row: the first one after it.
+        turns: rows at which the movement turns.
+    """
+    edges = np.r_[0, turns, x.size]
+    left = edges[edges <= row - SIDE].max(initial=0)
+    right = edges[edges >= row + SIDE].min(initial=x.size)
+    most = max(x.size // 4, REACH)
+    lines = []
+    for part in (slice(max(left, row - most), row), slice(row, min(right, row + most))):
+        dx, dy = x[part] - x[part].mean(), y[part] - y[part].mean()
+        square = float(dx @ dx)
+        if np.ptp(dx) < _STILL * np.ptp(x):
+            return True
+        slope = float(dx @ dy) / square
+        left_over = dy - slope * dx
+        lines.append((slope, float(left_over @ left_over) / dx.size / square))
+    (first, var_1), (second, var_2) = lines
+    blur = 3.0 * np.sqrt(var_1 + var_2)
+    return abs(first - second) <= _ALIKE * max(abs(first), abs(second)) + blur
+
+
+def _stays(
+    x: np.ndarray,
+    y: np.ndarray,
+    after: np.ndarray,
+    jump: Jump,
+    turning: tuple[np.ndarray, int],
+) -> bool:
+    """Tell whether all that comes after a jump is moved by it.
+
+    A part that gives way in one cycle has another loop in the next one, but about the
+    same centre; a zero that jumped moves the centre. Only cycles can tell.
+
+    Args:
+        x: deformation, the jump taken out, shape (n,).
+        y: force, likewise.
+        after: which rows come after it.
+        jump: that was taken out.
+        turning: rows at which the movement turns, and its first sign.
+    """
+    turns, sign = turning
+    if turns.size < _CYCLES:
+        return True
+    way = sign * (-1.0) ** np.searchsorted(turns, np.arange(x.size), "left")
+    # of the cycles next to it
+    first, last = np.searchsorted(turns, np.argmax(after)) + np.array(
+        [-_CYCLES, _CYCLES]
+    )
+    ends = np.r_[0, turns, x.size]
+    part = slice(ends[max(first + 1, 0)], ends[min(last + 1, ends.size - 1)])
+    columns = np.column_stack([np.ones_like(x), x, way, after])[part]
+    _, slope, _, step = np.linalg.lstsq(columns, y[part], rcond=None)[0]
+    return bool(abs(step) < 0.5 * (abs(jump.force) + abs(slope * jump.deformation)))

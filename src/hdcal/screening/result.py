@@ -1,0 +1,139 @@
+"""The result of a screening: what was found in a record, and what was done."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+Kind = Literal[
+    "before the tare",
+    "jump of the force",
+    "jump of the deformation",
+    "jump of both",
+    "wild reading",
+    "opposite sign",
+    "negative slope",
+    "clock",
+    "saturation of the force",
+    "saturation of the deformation",
+    "scatter of the deformation",
+    "after the largest force",
+    "outside the range",
+]
+Action = Literal["cut", "new zero", "turned", "asked", "smoothed"]
+# What a row belongs to; the order is that of `Screening.segment`.
+SEGMENTS = (
+    "loading",
+    "unloading",
+    "holding",
+    "before the tare",
+    "after the largest force",
+    "wild reading",
+    "saturated",
+    "outside the range",
+)
+LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE = range(8)
+# First and last row of each stretch of rows.
+Stretches = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One finding in the record.
+
+    Attributes:
+        kind: what it is.
+        rows: first and last row of each stretch that it concerns, from 0.
+        size: how large it is, in `unit`.
+        unit: of the size.
+        action: what was done about it.
+        run: index of the run.
+        where: the rows as their file names them.
+        words: the finding in a sentence without a full stop.
+    """
+
+    kind: Kind
+    rows: Stretches
+    size: float
+    unit: str
+    action: Action
+    run: int = 0
+    where: str = ""
+    words: str = ""
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return sum(last - first + 1 for first, last in self.rows)
+
+
+@dataclass(frozen=True)
+class StraightPart:
+    """The longest straight part of the first loading.
+
+    Attributes:
+        low: smallest deformation of it, as read [mm].
+        high: largest deformation of it, as read [mm].
+        rows: whether a row lies in this range of the deformation, shape (n,).
+        slope: of the force over the deformation there, by least squares [N/mm].
+        slope_sd: its standard error [N/mm].
+        whole: whether the whole curve is straight.
+    """
+
+    low: float
+    high: float
+    rows: np.ndarray
+    slope: float
+    slope_sd: float
+    whole: bool
+
+
+@dataclass(frozen=True)
+class Screening:
+    """A record after it was looked at.
+
+    Attributes:
+        observations: in the order of the record.
+        segment: index into `SEGMENTS` of each row, shape (n,).
+        kept: which rows stay in the record, shape (n,).
+        deformation: with each jump of its zero taken out [mm], shape (n,).
+        force: likewise, turned where its sign was opposite [N], shape (n,).
+        time: counted on where the clock was reset [s], shape (n,), or None.
+        zero: counts the jumps of a zero before each row in its run, shape (n,).
+        deformation_sd: scatter of the deformation's gauge [mm]; 0 where none shows.
+        trembling: whether that scatter hides the direction of the movement.
+        straight: the longest straight part of the first run, None where too few rows.
+        working_range: in words; empty where none is stated.
+    """
+
+    observations: tuple[Observation, ...]
+    segment: np.ndarray
+    kept: np.ndarray
+    deformation: np.ndarray
+    force: np.ndarray
+    time: np.ndarray | None
+    zero: np.ndarray
+    deformation_sd: float = 0.0
+    trembling: bool = False
+    straight: StraightPart | None = None
+    working_range: str = ""
+
+    @property
+    def asked(self) -> tuple[Observation, ...]:
+        """Findings that only the user can decide about."""
+        return tuple(one for one in self.observations if one.action == "asked")
+
+
+def stretches(rows: np.ndarray | Sequence[int]) -> Stretches:
+    """Return first and last row of each stretch of rows without a gap.
+
+    Args:
+        rows: increasing.
+    """
+    rows = np.asarray(rows, int)
+    if not rows.size:
+        return ()
+    cuts = np.flatnonzero(np.diff(rows) > 1)
+    firsts, lasts = rows[np.r_[0, cuts + 1]], rows[np.r_[cuts, rows.size - 1]]
+    return tuple(zip(firsts.tolist(), lasts.tolist(), strict=True))

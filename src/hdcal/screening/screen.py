@@ -1,0 +1,133 @@
+"""Screening of a record, run by run, before any model is fitted."""
+
+import numpy as np
+
+from hdcal.screening.branches import name_segments, straight_part
+from hdcal.screening.ends import rows_after_drop
+from hdcal.screening.faults import look_at
+from hdcal.screening.plain import plain_runs
+from hdcal.screening.result import DROPPED, Screening
+from hdcal.screening.run import Run
+from hdcal.screening.sign import Sign, sign_of_slope
+from hdcal.screening.trembling import HIDDEN
+from hdcal.screening.wild import FEWEST
+
+# Rows from which the sign of a slope can be told.
+_FEWEST_FOR_SIGN = 5
+
+
+def screen(
+    deformation: np.ndarray,
+    force: np.ndarray,
+    time: np.ndarray | None = None,
+    run: np.ndarray | None = None,
+) -> Screening:
+    """Look at a record: what of it is no curve of a part, and what was done about it.
+
+    Args:
+        deformation: as read [mm], in the order it was taken, shape (n,).
+        force: as read [N], shape (n,).
+        time: as read [s], shape (n,); None when not measured.
+        run: index of the mounting, shape (n,); by default one.
+    """
+    x, y = np.array(deformation, float), np.array(force, float)
+    n = x.size
+    clock_read = None if time is None else np.array(time, float)
+    index = np.zeros(n, int) if run is None else np.asarray(run)
+    order = np.argsort(index, kind="stable")
+    cuts = np.flatnonzero(np.diff(index[order])) + 1
+    runs = []
+    plain = plain_runs(x, y, index)
+    for rows in np.split(order, cuts):
+        t = None if clock_read is None else clock_read[rows]
+        empty = np.zeros(rows.size, int)
+        one = Run(
+            int(index[rows[0]]),
+            rows,
+            x[rows],
+            y[rows],
+            t,
+            empty.copy(),
+            np.ones(rows.size, bool),
+            empty.copy(),
+        )
+        one.plain = bool(plain[one.index])
+        look_at(one)
+        runs.append(one)
+    _signs(runs)
+    for one in runs:
+        name_segments(one)
+    return _gathered(runs, n, clock_read)
+
+
+def _gathered(runs: list[Run], n: int, time: np.ndarray | None) -> Screening:
+    """Return the screened runs as one record."""
+    columns = {name: np.zeros(n) for name in ("x", "y", "segment", "kept", "zero")}
+    time = None if time is None else time.copy()
+    for one in runs:
+        for name, values in columns.items():
+            values[one.rows] = getattr(one, name)
+        if time is not None and one.time is not None:
+            time[one.rows] = one.time
+    scatter = max((one.scatter for one in runs), default=0.0)
+    span = max((float(np.ptp(one.x)) for one in runs), default=0.0)
+    return Screening(
+        tuple(found for one in runs for found in one.observations),
+        columns["segment"].astype(int),
+        columns["kept"].astype(bool),
+        columns["x"],
+        columns["y"],
+        time,
+        columns["zero"].astype(int),
+        scatter,
+        10.0 * scatter > HIDDEN * span,
+        straight_part(runs[0], n) if runs else None,
+    )
+
+
+def _signs(runs: list[Run]) -> None:
+    """Turn the force where it is counted the other way in every run.
+
+    What comes after the largest force is cut first: there the force falls.
+    """
+    signs = [_sign(one) for one in runs]
+    turned = {*signs} - {"unknown"} == {"opposite"}
+    for one, sign in zip(runs, signs, strict=True):
+        if sign == "same" or (sign == "unknown" and not turned):
+            continue
+        rows = np.flatnonzero(one.kept)
+        slope = _rough_slope(one.x[rows], one.y[rows])
+        if turned:
+            one.y = -one.y
+            one.observe("opposite sign", rows, slope, "N/mm", "turned")
+        else:
+            one.observe("negative slope", rows, slope, "N/mm", "asked")
+
+
+def _sign(one: Run) -> Sign:
+    """Tell how force and deformation go together until the force has dropped."""
+    rows = one.distinct()
+    if rows.size < _FEWEST_FOR_SIGN:
+        return "unknown"
+    if one.plain:
+        return "same"
+    x, y = one.x[rows], one.y[rows]
+    sign = sign_of_slope(x, y)
+    if rows.size < FEWEST:
+        return sign
+    for way, expected in ((1.0, "same"), (-1.0, "opposite")):
+        found = rows_after_drop(x, way * y)
+        if found is None:
+            continue
+        first, drop = found
+        before = sign_of_slope(x[:first], y[:first])
+        if before == expected:
+            after = np.flatnonzero(one.kept & (np.arange(one.x.size) >= rows[first]))
+            one.cut(after, DROPPED)
+            one.observe("after the largest force", after, way * drop, "N", "cut")
+            return before
+    return sign
+
+
+def _rough_slope(x: np.ndarray, y: np.ndarray) -> float:
+    return float(np.polyfit(x - x.mean(), y - y.mean(), 1)[0])

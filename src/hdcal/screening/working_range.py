@@ -1,0 +1,102 @@
+"""The working range: between which deformations or forces a stiffness is asked."""
+
+import math
+import re
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
+
+_ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
+FORM = "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force"
+
+
+@dataclass(frozen=True)
+class WorkingRange:
+    """Ends of the working range.
+
+    Attributes:
+        low: lower end.
+        high: upper end.
+        unit: mm of the deformation as read, or % of the largest force of a run.
+    """
+
+    low: float
+    high: float
+    unit: Literal["mm", "%"]
+
+    def __str__(self) -> str:
+        if self.unit == "mm":
+            return f"{self.low:g} to {self.high:g} mm"
+        return f"{self.low:g} to {self.high:g} % of the largest force"
+
+    def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Tell which rows of a run lie in the range.
+
+        Args:
+            deformation: as read [mm], shape (n,).
+            force: as read [N], shape (n,).
+        """
+        if self.unit == "mm":
+            return (deformation >= self.low) & (deformation <= self.high)
+        size = np.abs(force)
+        share = 100.0 * size / size.max(initial=math.ulp(0.0))
+        return (share >= self.low) & (share <= self.high)
+
+
+def read_range(text: str) -> WorkingRange:
+    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force.
+
+    Raises:
+        ValueError: it is neither; the words say why.
+    """
+    found = _ENDS.fullmatch(text)
+    try:
+        assert found is not None
+        low, high = float(found[1]), float(found[3])
+        assert math.isfinite(low) and math.isfinite(high)
+    except (AssertionError, ValueError):
+        raise ValueError(f"'{text}' is no range") from None
+    if bool(found[2]) != bool(found[4]):
+        raise ValueError(f"'{text}' is in % at one end only")
+    unit = "%" if found[2] else "mm"
+    if not low < high:
+        raise ValueError(f"the lower end of '{text}' is not below the upper one")
+    if unit == "%" and not 0.0 <= low < high <= 100.0:
+        raise ValueError(f"'{text}' is not between 0 and 100 %")
+    return WorkingRange(low, high, unit)
+
+
+def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Screening:
+    """Return a screening in which the rows outside the range are cut.
+
+    Args:
+        screening: of the whole record.
+        wanted: the range.
+        run: index of each row's run, shape (n,).
+    """
+    inside = np.zeros(run.size, bool)
+    for index in np.unique(run):
+        rows = np.flatnonzero((run == index) & screening.kept)
+        inside[rows] = wanted.inside(screening.deformation[rows], screening.force[rows])
+    outside = np.flatnonzero(screening.kept & ~inside)
+    if not outside.size:
+        return replace(screening, working_range=str(wanted))
+    segment = screening.segment.copy()
+    segment[outside] = OUTSIDE
+    observed = Observation(
+        "outside the range",
+        stretches(outside),
+        wanted.high - wanted.low,
+        wanted.unit,
+        "cut",
+    )
+    return replace(
+        screening,
+        observations=(*screening.observations, observed),
+        segment=segment,
+        kept=inside,
+        working_range=str(wanted),
+    )

@@ -1,0 +1,178 @@
+"""Each fault of a record is found, at its rows and with its size."""
+
+import numpy as np
+import pytest
+
+from hdcal.screening.result import SEGMENTS
+from hdcal.screening.screen import screen
+
+RNG = np.random.default_rng(8)
+STIFFNESS = 20.0
+
+
+def ramp(rows=200, back=False):
+    """Loading to 1 mm, with noise of 0.02 N on 20 N."""
+    x = np.linspace(0.0, 1.0, rows)
+    x = np.r_[x, x[-2::-1]] if back else x
+    return x, STIFFNESS * x + RNG.normal(0.0, 0.02, x.size)
+
+
+def only(found):
+    (one,) = found.observations
+    return one
+
+
+def slope(found):
+    kept = found.kept
+    return np.polyfit(found.deformation[kept], found.force[kept], 1)[0]
+
+
+def test_rows_before_the_tare_are_cut():
+    x, y = ramp()
+    x, y = np.r_[0.0, 0.0, 0.0, x], np.r_[12.0, 12.01, 11.99, y]
+    found = screen(x, y)
+    one = only(found)
+    assert (one.kind, one.rows, one.action) == ("before the tare", ((0, 2),), "cut")
+    assert one.size == pytest.approx(-12.0, abs=0.1)
+    assert found.kept.sum() == x.size - 3
+
+
+@pytest.mark.parametrize("size", [-8.0, 1.5, 30.0])
+@pytest.mark.parametrize("back", [False, True])
+def test_a_jump_of_the_force_is_a_new_zero(size, back):
+    x, y = ramp(back=back)
+    y[90:] += size
+    found = screen(x, y)
+    one = only(found)
+    assert (one.kind, one.rows) == ("jump of the force", ((90, 90),))
+    assert one.size == pytest.approx(size, abs=0.1)
+    assert slope(found) == pytest.approx(STIFFNESS, rel=0.01)
+    np.testing.assert_array_equal(found.zero, np.arange(x.size) >= 90)
+
+
+@pytest.mark.parametrize("size", [-0.7, 0.1, 5.0])
+def test_a_jump_of_the_deformation_is_a_new_zero(size):
+    x, y = ramp(back=True)
+    x[120:] += size
+    one = only(found := screen(x, y))
+    assert (one.kind, one.rows, one.unit) == (
+        "jump of the deformation",
+        ((120, 120),),
+        "mm",
+    )
+    assert one.size == pytest.approx(size, abs=0.01)
+    assert slope(found) == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_a_gauge_zeroed_at_rest_begins_the_record():
+    x, y = ramp()
+    x, y = np.r_[np.full(30, -3.0), x], np.r_[np.zeros(30), y]
+    one = only(screen(x, y))
+    assert (one.kind, one.rows) == ("before the tare", ((0, 29),))
+
+
+def test_several_wild_readings_do_not_hide_each_other():
+    x, y = ramp()
+    wild = [40, 41, 42, 52, 100, 150, 151]
+    y[wild] += [60.0, 55.0, 58.0, 61.0, -30.0, 4.0, 4.0]
+    one = only(screen(x, y))
+    assert one.kind == "wild reading"
+    assert one.rows == ((40, 42), (52, 52), (100, 100), (150, 151))
+
+
+def test_a_wild_reading_of_the_deformation_is_cut():
+    x, y = ramp()
+    x[77] = 9.9
+    one = only(screen(x, y))
+    assert (one.kind, one.rows) == ("wild reading", ((77, 77),))
+
+
+def test_the_record_ends_where_the_part_breaks():
+    x, y = ramp()
+    y[140:] = np.linspace(4.0, 3.0, 60)
+    found = screen(x, y)
+    one = only(found)
+    assert (one.kind, one.rows) == ("after the largest force", ((140, 199),))
+    assert one.size == pytest.approx(10.4, abs=0.6)
+    assert SEGMENTS[found.segment[150]] == "after the largest force"
+
+
+def test_a_negative_slope_in_places_is_asked_about():
+    x = np.linspace(0.0, 1.0, 100)
+    one = only(screen(x, -STIFFNESS * x + 12.0 * np.sin(25.0 * x)))
+    assert (one.kind, one.action) == ("negative slope", "asked")
+
+
+def test_a_clock_that_wraps_is_counted_on():
+    x, y = ramp()
+    time = np.r_[np.arange(100.0, 200.0), np.arange(100.0)]
+    found = screen(x, y, time)
+    assert only(found).action == "new zero"
+    np.testing.assert_allclose(np.diff(found.time), 1.0)
+
+
+def test_a_clock_reset_with_a_new_test_is_asked_about():
+    x, y = ramp(100)
+    time = np.tile(np.arange(100.0), 2)
+    found = screen(np.tile(x, 2), np.tile(y, 2), time)
+    assert [one.kind for one in found.asked] == ["clock"]
+
+
+def test_a_saturated_force_is_cut():
+    x, y = ramp(back=True)
+    y = np.round(np.minimum(y, 15.0), 3)
+    found = screen(x, y)
+    one = only(found)
+    assert (one.kind, one.size) == ("saturation of the force", 15.0)
+    assert one.count == pytest.approx(100, abs=4)
+    assert slope(found) == pytest.approx(STIFFNESS, rel=0.01)
+
+
+@pytest.mark.parametrize("sd", [0.02, 0.1])
+def test_scatter_of_the_deformation_is_measured(sd):
+    x, y = ramp(400, back=True)
+    found = screen(x + RNG.normal(0.0, sd, x.size), y)
+    one = only(found)
+    assert (one.kind, one.action) == ("scatter of the deformation", "smoothed")
+    assert found.deformation_sd == pytest.approx(sd, rel=0.15)
+    assert found.trembling == (sd > 0.05)
+    assert found.straight.slope == pytest.approx(STIFFNESS, rel=0.06)
+
+
+def test_an_uneven_movement_is_no_scatter():
+    x = np.cumsum(np.abs(RNG.normal(0.0, 1.0, 400))) * 0.01
+    x = x + RNG.normal(0.0, 0.05, 400)
+    assert screen(x, STIFFNESS * x + RNG.normal(0.0, 0.02, 400)).observations == ()
+
+
+@pytest.mark.parametrize(
+    ("curve", "low", "high"),
+    [
+        (lambda x: 20.0 * np.maximum(x - 0.3, 0.0), 0.3, 1.0),
+        (
+            lambda x: 20.0 * np.minimum(x, 0.6) + 0.8 * np.maximum(x - 0.6, 0.0),
+            0.0,
+            0.6,
+        ),
+        (lambda x: np.where(x < 0.02, 400.0 * x, 8.0 + 20.0 * (x - 0.02)), 0.02, 1.0),
+    ],
+    ids=["approach", "yield", "preload"],
+)
+def test_the_longest_straight_part(curve, low, high):
+    x = np.linspace(0.0, 1.0, 300)
+    part = screen(x, curve(x) + RNG.normal(0.0, 0.02, 300)).straight
+    assert not part.whole
+    assert (part.low, part.high) == (
+        pytest.approx(low, abs=0.02),
+        pytest.approx(high, abs=0.02),
+    )
+    assert part.slope == pytest.approx(20.0, rel=0.01)
+
+
+def test_runs_are_screened_by_themselves():
+    x, y = ramp(50)
+    wild = y.copy()
+    wild[20] += 50.0
+    found = screen(np.tile(x, 3), np.r_[y, wild, y], run=np.repeat([0, 1, 2], 50))
+    one = only(found)
+    assert (one.run, one.rows) == (1, ((70, 70),))

@@ -1,0 +1,67 @@
+"""A case is screened when it is read, and every command says what was done."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import hdcal
+from hdcal.calibration.check.check import check
+from hdcal.errors import InputError
+
+RNG = np.random.default_rng(4)
+ROWS = 120
+
+
+def table(**columns):
+    x = np.linspace(0.0, 1.0, ROWS)
+    force = 20.0 * x + RNG.normal(0.0, 0.02, ROWS)
+    return pd.DataFrame({"deformation_mm": x, "force_N": force} | columns)
+
+
+def test_cut_rows_leave_the_records():
+    frame = table()
+    frame.loc[[30, 70], "force_N"] += 90.0
+    case = hdcal.read_case(frame)
+    assert len(case.records.force) == ROWS - 2
+    assert case.screening.kept.sum() == ROWS - 2
+    assert any("wild" in note and "rows 32, 72" in note for note in case.notes)
+
+
+def test_rows_after_a_jump_are_a_run_of_their_own():
+    frame = table()
+    frame.loc[60:, "force_N"] += 11.0
+    case = hdcal.read_case(frame)
+    assert case.run_labels == ("1", "1 (zero 2)")
+    np.testing.assert_array_equal(case.records.run, np.arange(ROWS) >= 60)
+    assert np.ptp(case.records.force) == pytest.approx(20.0, abs=0.2)
+
+
+def test_direction_is_not_derived_from_a_trembling_gauge():
+    frame = table()
+    frame["deformation_mm"] += RNG.normal(0.0, 0.1, ROWS)
+    case = hdcal.read_case(frame)
+    assert case.screening.trembling
+    assert (case.records.direction == 1.0).all()
+    assert "unloading" not in case.records.known
+
+
+def test_a_negative_slope_is_refused():
+    frame = table()
+    frame["force_N"] = -frame["force_N"] + 12.0 * np.sin(25.0 * frame["deformation_mm"])
+    with pytest.raises(InputError, match="falls as the deformation grows"):
+        hdcal.read_case(frame)
+
+
+def test_check_shows_findings_segments_and_the_straight_part():
+    frame = table()
+    frame.loc[80:, "force_N"] = 2.0
+    found = check(hdcal.read_case(frame))
+    answer = json.loads(found.to_json())["screening"]
+    (one,) = answer["findings"]
+    assert (one["kind"], one["row_count"]) == ("after the largest force", 40)
+    assert answer["segments"] == {"loading": 80, "after the largest force": 40}
+    assert answer["straight_part"]["whole"]
+    labels = [mark.label for mark in found.charts()["readings"].panels[0].marks]
+    assert labels == ["loading", "left out: after the largest force"]

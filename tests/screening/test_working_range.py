@@ -1,0 +1,61 @@
+"""A working range leaves only the rows between its ends."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import hdcal
+from hdcal.errors import InputError
+from hdcal.screening.working_range import WorkingRange, read_range
+
+X = np.linspace(0.0, 1.0, 101)
+TABLE = pd.DataFrame({"deformation_mm": X, "force_N": 20.0 * X})
+SIZES = {"wall_thickness_mm": 0.7, "radius_mm": 40.0, "length_mm": 70.0}
+
+
+def test_both_forms_are_read():
+    assert read_range("0.1:0.6") == WorkingRange(0.1, 0.6, "mm")
+    assert read_range(" -2 : -1.5 ") == WorkingRange(-2.0, -1.5, "mm")
+    assert read_range("10%:40%") == WorkingRange(10.0, 40.0, "%")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1", "a:b", "1:2:3", "10%:40", "2:1", "10%:140%", "nan:1", "1:inf"]
+)
+def test_what_is_no_range_is_refused(text):
+    with pytest.raises(InputError, match="range"):
+        hdcal.read_case(TABLE, range=text)
+
+
+@pytest.mark.parametrize("text", ["0.105:0.405", "10.5%:40.5%"])
+def test_rows_outside_leave_the_records(text):
+    case = hdcal.read_case(TABLE, range=text)
+    np.testing.assert_allclose(case.records.deformation, X[11:41])
+    assert case.screening.working_range
+    assert (~case.screening.kept).sum() == 71
+
+
+def test_the_gear_file_may_state_it_and_the_caller_overrides_it():
+    gear = {**SIZES, "range": "10.5%:40.5%"}
+    assert len(hdcal.read_case(TABLE, gear).records.force) == 30
+    assert len(hdcal.read_case(TABLE, gear, range="0:0.5").records.force) == 51
+    with pytest.raises(InputError, match="is no range"):
+        hdcal.read_case(TABLE, {**SIZES, "range": "from 1 to 2"})
+
+
+def test_too_few_rows_are_refused_with_what_was_read():
+    with pytest.raises(InputError, match=r"2 of 101 rows.*from 0 to 1 mm"):
+        hdcal.read_case(TABLE, range="0.10:0.115")
+
+
+def test_a_command_takes_it(tmp_path, here):
+    TABLE.to_csv(tmp_path / "data.csv", index=False)
+    done = here("check", str(tmp_path / "data.csv"), "--range", "0.105:0.405", "--json")
+    answer = json.loads(done.stdout)
+    assert answer["data"]["rows"] == 30
+    assert answer["screening"]["segments"]["outside the range"] == 71
+    refused = here("check", str(tmp_path / "data.csv"), "--range", "2:1")
+    assert refused.returncode == 2
+    assert "--range" in refused.stderr
