@@ -101,7 +101,7 @@ def test_the_spring_for_a_window_is_mirrored(kind: str):
     assert other.stress.stress_MPa.lo > 0.0
     first, last = other.adjusted.preload_N
     assert first < last < 0.0
-    assert " pull " in other.answer[0] and "inside the undeformed" in other.next_step
+    assert " pull " in other.answer[0]
 
 
 @pytest.mark.parametrize("kind", GEARS)
