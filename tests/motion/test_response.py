@@ -222,6 +222,7 @@ def test_gears_that_run_away_are_told_at_once(monkeypatch):
         respond(posterior, "step", amplitude=40.0, **KNOWN, **SMALL)
 
 
+@pytest.mark.thorough
 def test_a_motion_of_too_many_steps_is_told(monkeypatch):
     monkeypatch.setattr(dynamics, "MOST_STEPS", 3)
     asked_for = {**SMALL, "points": 102}
