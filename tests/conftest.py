@@ -9,12 +9,19 @@ import zlib
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 pytest_plugins = ["commands", "clusters"]
 
 _OWN = pytest.StashKey[str]()
+# Code that no trace holds: it reads, decides, writes or keeps the traces.
+_NEVER_TRACED = (
+    *("hdcal.cli", "hdcal.data", "hdcal.diagnosis", "hdcal.exported", "hdcal.report"),
+    *("hdcal.design.inverse_design.inverse_design", "hdcal.design.wave_generator"),
+    *("hdcal.evidence.bursts", "hdcal.motion.loss"),
+)
 _COMPILED_PLAINLY = (
     "--xla_backend_optimization_level=1 --xla_cpu_parallel_codegen_split_count=1 "
     "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
@@ -86,6 +93,18 @@ def few_executables() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def own_traces(request: pytest.FixtureRequest) -> None:
     """Keep no trace of code that a test has changed, and load none in its place."""
-    if "monkeypatch" in request.fixturenames and "hdcal.exported" in sys.modules:
-        patch = request.getfixturevalue("monkeypatch")
-        patch.setattr("hdcal.exported._needs_plain_jit", lambda leaves: True)
+    if "monkeypatch" not in request.fixturenames:
+        return
+    patch = request.getfixturevalue("monkeypatch")
+    change = patch.setattr
+
+    def change_untraced(target: object, *given: Any, **named: Any) -> None:
+        change(target, *given, **named)
+        if isinstance(target, str):
+            changed = target
+        else:
+            changed = getattr(target, "__module__", getattr(target, "__name__", ""))
+        if changed.startswith("hdcal.") and not changed.startswith(_NEVER_TRACED):
+            change("hdcal.exported._needs_plain_jit", lambda leaves: True)
+
+    patch.setattr = change_untraced

@@ -21,7 +21,7 @@ LAST_LINES = {
     "own_effect.py": "the truth lies inside the interval",
 }
 
-QUICK = ("calibrate_a_csv.py", "gradient_of_force.py")
+QUICK = ("calibrate_a_csv.py",)
 
 
 # In this process, where what one example compiles serves the others.

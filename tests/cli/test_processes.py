@@ -8,6 +8,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from slices import slice_of
 
 WORK = (
     "import time; from hdcal.cli.processes import run_all\n"
@@ -71,7 +72,9 @@ def test_work_that_fails_ends_its_workers_and_nobody_else(tmp_path: Path):
     assert done.stdout == "True 1\n", done.stderr
 
 
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "by", slice_of([signal.SIGINT, signal.SIGTERM], [signal.SIGTERM])
+)
 def test_a_second_interruption_does_not_disturb_the_first(by, tmp_path: Path):
     with subprocess.Popen(
         [sys.executable, "-c", SLOW],

@@ -84,8 +84,6 @@ def test_one_case_fills_the_folder_itself(diagnose, cases, tmp_path: Path):
     obeys(found, VerdictAnswer)
     assert json.loads(done.stdout) == found
     assert found["seed"] == 3 and not found["quick"]
-    assert "Most likely cause: hysteresis (96 %)" in done.stderr
-    assert "What this cannot say" in done.stderr and "report.html" in done.stderr
 
 
 def test_the_folder_is_named_after_the_case(diagnose, cases, tmp_path: Path):
@@ -119,16 +117,12 @@ def test_many_cases_get_a_folder_each(diagnose, cases, tmp_path: Path):
 def test_a_failed_case_is_written_and_told_by_the_exit_code(
     diagnose, cases, tmp_path: Path
 ):
-    done = diagnose(cases["failed"], cases["none"], "--out", "all")
+    done = diagnose(cases["failed"], "--out", "alone")
+    assert done.returncode == 1 and "FAILED" in done.stdout
+    for file in ("report.html", "where.svg"):
+        assert "FAILED — do not use" in (tmp_path / "alone" / file).read_text("utf-8")
+    done = diagnose(cases["failed"], cases["none"], "--out", "all", "--no-report")
     assert done.returncode == 1
-    assert "FAILED" in done.stdout
-    page = (tmp_path / "all" / "failed" / "report.html").read_text("utf-8")
-    assert "FAILED — do not use this result" in page
-    assert "FAILED — do not use" in (tmp_path / "all/failed/where.svg").read_text()
-    alone = diagnose(cases["failed"], "--out", "alone", "--no-report")
-    assert alone.returncode == 1
-    assert "FAILED: this result must not be used." in alone.stdout
-    assert "Most likely" not in alone.stdout
 
 
 def test_everything_wrong_with_any_case_is_said_at_once(
@@ -212,7 +206,6 @@ def test_a_defect_leaves_nothing(diagnose, cases, tmp_path: Path):
     assert names(tmp_path) == {"cases"}
 
 
-@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("where", ["diagnosis", "report", "reader"])
 def test_a_defect_in_one_case_does_not_stop_the_others(
     diagnose, monkeypatch, cases, tmp_path: Path, where: str
@@ -224,7 +217,8 @@ def test_a_defect_in_one_case_does_not_stop_the_others(
     if where == "reader":
         broken = cases["unknown"]
         monkeypatch.setattr("hdcal.diagnosis.many_cases.read_case", unreadable)
-    done = diagnose(cases["none"], broken, cases["named"], "--out", "all", "--json")
+    asked = cases["none"], broken, cases["named"], "--out", "all", "--json"
+    done = diagnose(*asked, *([] if where == "report" else ["--no-report"]))
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert names(tmp_path / "all") == {"none", "named", "refused.json", MARKER}
     said = json.loads(done.stdout)
@@ -263,8 +257,7 @@ def test_with_many_cases_reports_have_to_be_asked_for(
 ):
     monkeypatch.setattr(sys.modules["hdcal.diagnosis.command"], "MANY", 1)
     given = [cases["named"], cases["none"], "--out"]
-    done = diagnose(*given, "plain")
-    assert "no reports without --report" in done.stderr
+    assert diagnose(*given, "plain").returncode == 0
     assert names(tmp_path / "plain" / "none") == {"verdict.json"}
     assert diagnose(*given, "full", "--report").returncode == 0
     assert names(tmp_path / "full" / "none") == FILES

@@ -7,8 +7,6 @@ import pytest
 from diagnosis_cases import judged, rich, simulated
 from rigs import ramp
 
-from hdcal.physics.registry import EFFECTS
-
 SATURATES = {"force_saturation": {"curvature": 3e-6}}
 
 
@@ -53,10 +51,8 @@ def test_behind_a_coarse_display_the_unknown_stays_unknown():
     case = replace(
         case, records=replace(case.records, force=case.records.force + swing)
     )
-    names = ("coulomb_friction", "quantisation", "thermal_zero_drift", "hysteresis")
-    library = {name: EFFECTS[name] for name in names}
-    assert judged(case, library=library).which.verdict == "unknown"
-    assert judged(rounded(case, 0.98), library=library).which.verdict == "unknown"
+    assert judged(case).which.verdict == "unknown"
+    assert judged(rounded(case, 0.98)).which.verdict == "unknown"
 
 
 @pytest.mark.thorough

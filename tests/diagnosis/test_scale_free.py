@@ -96,7 +96,7 @@ def first(program, tmp_path_factory):
     return judged_once
 
 
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", slice_of(CHANGES, [*CHANGES][:3]))
 @pytest.mark.parametrize("name", slice_of(EFFECTS, ["coulomb_friction"]))
 def test_the_verdict_stays(first, program, name, change, tmp_path):
     as_it_is = first(name)

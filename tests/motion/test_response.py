@@ -1,6 +1,5 @@
 """The response of a calibrated gear: right for every draw, honest about its priors."""
 
-from dataclasses import replace
 from inspect import signature
 
 import numpy as np
@@ -62,7 +61,6 @@ def test_without_them_priors_are_the_answer_and_it_says_so():
     drivers = {name: entry["driven_by"] for name, entry in found.estimates.items()}
     assert drivers.pop("stiffness_N_per_mm") == "data"
     assert set(drivers.values()) == {"prior"}
-    assert "mass and damping: there the prior is the answer" in found.remarks[0]
     frequency = found.estimates["natural_frequency_Hz"]
     # A mass known to a factor of two either way (sd) leaves √2 of the frequency.
     assert np.log(frequency["hi"] / frequency["lo"]) == pytest.approx(
@@ -167,16 +165,6 @@ def test_what_swings_faster_than_the_points_is_told():
     assert any("more points" in words for words in found.remarks)
 
 
-def test_a_notebook_shows_the_answer_and_harmless_names():
-    posterior = still_posterior()
-    gear = replace(posterior.case.gear, name="<script>alert(1)</script>")
-    posterior = replace(posterior, case=replace(posterior.case, gear=gear))
-    cell = respond(posterior, "step", **SMALL)._repr_html_()
-    assert "The deformation reaches" in cell and "decided by" in cell
-    assert "there the prior is the answer" in cell
-    assert "&lt;script&gt;" in cell and "<script" not in cell
-
-
 def test_nothing_follows_from_a_failed_calibration():
     with pytest.raises(NotUsable, match="by hand"):
         respond(still_posterior(usable=False), "step", **KNOWN, **SMALL)
@@ -234,6 +222,7 @@ def test_gears_that_run_away_are_told_at_once(monkeypatch):
         respond(posterior, "step", amplitude=40.0, **KNOWN, **SMALL)
 
 
+@pytest.mark.thorough
 def test_a_motion_of_too_many_steps_is_told(monkeypatch):
     monkeypatch.setattr(dynamics, "MOST_STEPS", 3)
     asked_for = {**SMALL, "points": 102}

@@ -7,6 +7,7 @@ import pytest
 from effect_bench import BEYOND_RECORDS, noisy, typical
 from jax.flatten_util import ravel_pytree
 from scipy import optimize
+from slices import slice_of
 
 from hdcal import EFFECTS
 from hdcal.inference.likelihood import log_probability
@@ -20,7 +21,14 @@ TESTABLE = sorted(n for n in EFFECTS if not EFFECTS[n].needs & BEYOND_RECORDS)
 SIGMA_KNOWN = {"quantisation"}
 
 
-@pytest.mark.parametrize("name", TESTABLE)
+# One of each kind; the others beside them.
+KINDS = (
+    *("coulomb_friction", "outliers", "progressive_stiffening", "quantisation"),
+    *("relaxation", "seating_slack", "thermal_zero_drift", "viscous_damping"),
+)
+
+
+@pytest.mark.parametrize("name", slice_of(TESTABLE, KINDS))
 def test_recovered_from_its_own_data(name, loading, base, reading):
     """Maximum likelihood finds a typical effect within four standard errors.
 

@@ -23,6 +23,7 @@ from effect_bench import (
     typical,
 )
 from jax.flatten_util import ravel_pytree
+from slices import slice_of
 
 from hdcal import EFFECTS
 from hdcal.inference.padding import repeat_last_row
@@ -32,7 +33,7 @@ from hdcal.physics.effects.scatter import Scatter
 
 
 @everyone
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", slice_of(range(3), [0]))
 def test_null_changes_nothing(name, seed, scattered, base, reading):
     found = contribution([null(name)], (), base, scattered(seed), reading)
     assert np.max(np.abs(found)) <= 1e-12
@@ -61,7 +62,7 @@ def test_gradients_are_finite(name, size, moved, scattered, base, reading):
 
 
 @everyone
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", slice_of(range(2), [0]))
 def test_gradients_are_right(name, seed, scattered, base, reading, differences):
     records = scattered(seed)
     mean = compiled_chain(base, (), records, reading)[0]
@@ -159,6 +160,7 @@ def test_symmetry_is_as_declared(name, scattered, base, reading):
     assert np.max(np.abs(moved)) > 1e-3
 
 
+@pytest.mark.thorough
 @everyone
 def test_any_two_compose(name, scattered, base, reading):
     """Each effect before each of the library."""

@@ -1,14 +1,9 @@
 """Bands over several models are those of their pooled draws."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from posteriors import single, stiffer
-from rigs import make_case, ramp
-from short import SHORT
 
-from hdcal.calibration.calibrate import calibrate
 from hdcal.prediction.bands.bands import default_bands, predict
 
 TAILS = np.array([0.025, 0.5, 0.975])
@@ -16,11 +11,7 @@ TAILS = np.array([0.025, 0.5, 0.975])
 
 @pytest.fixture(scope="module")
 def posterior():
-    records = ramp(14)
-    noise = np.random.default_rng(3).normal(0.0, 0.8, 14)
-    force = 200.0 * records.deformation + noise
-    case = make_case(replace(records, force=force))
-    return calibrate(case, **SHORT)
+    return single()
 
 
 def test_one_model_keeps_its_bands(posterior):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from inspect import signature
 
+import jax
 import numpy as np
 import pytest
 from posteriors import batch, plain_draws, ramp_case, written_posterior
@@ -29,9 +30,12 @@ def reading(records, seed=0):
 
 @pytest.fixture(scope="module")
 def rubbing():
+    """Draws about the truth of the readings, friction of 2 N among them."""
     records = cycles(96)
     case = make_case(replace(records, force=reading(records)))
-    return calibrate(case, effects=["coulomb_friction"], **SHORT)
+    draws = plain_draws(case, 400) | {"sigma": np.full(400, 0.4)}
+    draws["coulomb_friction.force"] = np.full(400, 2.0)
+    return written_posterior(case, draws, effects=["coulomb_friction"])
 
 
 def test_bands_follow_deformation_temperature_and_direction(rubbing):
@@ -82,6 +86,7 @@ def test_blocks_do_not_show(rubbing, monkeypatch):
     assert pieces.physics_lo_N == pytest.approx(whole.physics_lo_N, abs=1e-12)
 
 
+FORCE_OF = jax.jit(force_of)
 LOOPS = {
     "hysteresis": {"force": 6.0, "reach": 0.1},
     "plastic_yield": {"softening": 0.2, "yield_deformation": 0.3},
@@ -109,7 +114,7 @@ def test_what_remembers_came_its_own_way(name: str, monkeypatch):
             one_gear = np.zeros(len(along), dtype=int)
             path = grid_records(along, np.full(len(along), 20.0), sense, 0.0, one_gear)
             value = {site: v[0] for site, v in known.draws.items()}
-            expected = float(force_of(known.problem, value, path)[0][-1])
+            expected = float(FORCE_OF(known.problem, value, path)[0][-1])
             median = found[way].physics_median_N[row]
             assert median == pytest.approx(expected, abs=1e-6), (way, place)
     loop = found["up"].physics_median_N - found["down"].physics_median_N

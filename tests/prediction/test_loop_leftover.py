@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from posteriors import plain_draws, ramp_case, written_posterior
 from rigs import cycles, make_case
 
 import hdcal
@@ -14,6 +15,7 @@ from hdcal.prediction.bands.bands import default_bands
 from hdcal.tracking.tracker import Tracker
 
 STIFFNESS, OPENING, NOISE = 195.0, 0.06, 0.3
+WAYS = (1.0, -1.0)
 PLACES = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
 
 
@@ -53,13 +55,33 @@ def bands(posterior, direction):
     return found.with_gap_lo_N, found.with_gap_hi_N
 
 
-@pytest.mark.parametrize(("direction", "sense"), [("up", 1.0), ("down", -1.0)])
-def test_the_mean_of_each_direction_lies_in_its_own_band(direction, sense):
-    low, high = bands(looped(), direction)
-    true = truth(PLACES, sense)
-    assert np.all((low < true) & (true < high))
-    # The loop is a multiple of what is left open.
-    assert np.all(high - low < 0.4 * np.abs(true - truth(PLACES, -sense)) + 0.5)
+def test_bands_of_each_direction_have_their_own_leftover():
+    """Draws are made by hand: what the directions differ by is known."""
+    case = ramp_case(known={"unloading"}, sense=np.tile([1.0, -1.0], 15))
+    draws = plain_draws(case, 200)
+    draws |= {"gap_sd": np.full(200, 1.5), "gap_length": np.full(200, 0.3)}
+    gap = written_posterior(case, draws, with_gap=True).problem.discrepancy
+    up, down = (np.asarray(gap.columns(PLACES, sense + 0.0 * PLACES)) for sense in WAYS)
+    weights = np.ones(up.shape[1]) / (1.0 + np.arange(up.shape[1]))
+    draws["gap_weights"] = np.tile(weights, (200, 1))
+    known = written_posterior(case, draws, with_gap=True)
+    median = [
+        hdcal.predict(known, PLACES, [20.0], way).with_gap_median_N
+        for way in ("up", "down")
+    ]
+    expected = (up - down) @ weights
+    assert np.max(np.abs(expected)) > 0.1
+    np.testing.assert_allclose(median[0] - median[1], expected, atol=1e-6)
+
+
+@pytest.mark.thorough
+def test_the_mean_of_each_direction_lies_in_its_own_band():
+    for direction, sense in (("up", 1.0), ("down", -1.0)):
+        low, high = bands(looped(), direction)
+        true = truth(PLACES, sense)
+        assert np.all((low < true) & (true < high))
+        # The loop is a multiple of what is left open.
+        assert np.all(high - low < 0.4 * np.abs(true - truth(PLACES, -sense)) + 0.5)
 
 
 @pytest.mark.thorough
@@ -96,6 +118,7 @@ def test_beside_friction_the_leftover_has_no_loop():
     assert np.mean(size) == pytest.approx(3.0, abs=4.0 * NOISE / np.sqrt(96))
 
 
+@pytest.mark.thorough
 def test_readings_lie_about_the_bands_of_their_own_direction():
     """In the figure: what the leftover adds to the physics goes with the direction."""
     found = looped()
@@ -110,6 +133,7 @@ def test_readings_lie_about_the_bands_of_their_own_direction():
         np.testing.assert_allclose(away[way], expected[way], atol=0.6)
 
 
+@pytest.mark.thorough
 def test_a_stream_counts_half_the_loop_as_noise():
     """It does not say which way it moves: of 600 readings 95 % and more lie inside."""
     rng = np.random.default_rng(3)

@@ -11,7 +11,6 @@ from hdcal.prediction.margin.temperatures import nodes_of
 QUICK = {"limit_force": 95.0, "sensitivities": False}
 
 
-@pytest.mark.usefixtures("counted")
 @pytest.mark.thorough
 @pytest.mark.parametrize("make", [single, batch])
 def test_each_is_what_it_is_alone(make):

@@ -28,7 +28,6 @@ from hdcal.prediction.engine.mixture import Mixture
 from hdcal.prediction.engine.population import widest
 from hdcal.prediction.engine.population_force import SCORES, population_force
 from hdcal.prediction.engine.sizes import shifted, stiffness_ratio, tolerance_strata
-from hdcal.prediction.margin.sentences import answer
 
 QUICK = {"sensitivities": False}
 QUANTILE = jax.jit(Mixture.quantile)
@@ -83,7 +82,6 @@ def test_the_numbers_are_those_of_brute_force(gears):
     assert level.capacity_median_N == pytest.approx(middle, rel=5e-3)
 
 
-@pytest.mark.usefixtures("counted")
 def test_a_capacity_meets_what_it_was_asked_to(gears):
     asked = hdcal.margin(gears, 0.4, required_probability=0.999, **QUICK).worst
     expected, sure = asked.capacity_predictive_N, asked.capacity_N
@@ -112,7 +110,6 @@ def test_the_population_is_the_widest_that_was_tested(gears, one):
     assert bounds == sorted(bounds)
     assert [each.basis for each in found] == ["", "", "A-basis"]
     alone = hdcal.margin(one, 0.4, **QUICK)
-    assert "this one gear in the tested mounting" in alone.population_words
     assert alone.basis == ""
 
 
@@ -133,7 +130,6 @@ def test_the_load_has_no_zero_and_no_noise(one):
     assert found.worst.upper_bound_N == pytest.approx(np.quantile(load, 0.95), rel=1e-4)
     # Nothing scatters: what any share needs is what all need.
     assert found.worst.force_N.hi == pytest.approx(found.worst.member_N.hi, rel=1e-3)
-    assert any("without the gauge's zero" in words for words in found.remarks)
 
 
 def test_the_worst_temperature_counts():
@@ -148,9 +144,6 @@ def test_the_worst_temperature_counts():
     drop = bounds[0] - bounds[2]
     assert drop == pytest.approx(205.0 * 0.4 * 3e-4 * 100.0, abs=0.8)
     assert [level.tested for level in found.levels] == [False, True, False]
-    assert "Young's modulus" in found.extrapolated[0]
-    assert "prior" in found.extrapolated[0]
-    assert "drift" not in found.extrapolated[0]
 
 
 def test_tolerances_widen_as_brute_force_says(one):
@@ -234,9 +227,9 @@ def test_a_force_that_nothing_reaches_is_said(gears):
     found = hdcal.margin(gears, 0.4, given_force=600.0, **QUICK)
     assert found.reached.median_mm is found.reached.lower_bound_mm is None
     assert not found.reached.tested
-    assert " mm needs 600 N." in " ".join(answer(found))
 
 
+@pytest.mark.thorough
 def test_towards_the_other_sense_no_spread_grows():
     """Of a gear pushed and pulled, 60 N are reached as if it had only been pushed."""
     rng = np.random.default_rng(0)
@@ -248,18 +241,11 @@ def test_towards_the_other_sense_no_spread_grows():
     assert 0.3 < reached.lower_bound_mm < reached.upper_bound_mm < 0.5
 
 
-def test_a_bend_that_is_seen_goes_on():
-    place, rng = np.linspace(0.0, 0.5, 60), np.random.default_rng(4)
-    bent = 150.0 * place + 60.0 * place**2 + rng.normal(0.0, 0.3, 60)
-    told = hdcal.margin(regressed(place, bent, rng), 0.6, **QUICK).extrapolated[0]
-    assert "The bend that these rows leave over goes on there: +" in told
-
-
 def test_beyond_the_tested_deformation_a_bend_widens(one):
     inside = hdcal.margin(one, 0.5, **QUICK)
     beyond = hdcal.margin(one, 0.7, **QUICK)
     assert inside.extrapolated == ()
-    assert "A bend that these rows need not show may" in beyond.extrapolated[0]
+    assert len(beyond.extrapolated) == 1
 
     def width(found):
         return found.worst.force_N.hi - found.worst.force_N.lo
@@ -308,6 +294,7 @@ def test_the_same_seed_gives_the_same_margin(gears):
     assert first == second != third
 
 
+@pytest.mark.thorough
 def test_the_load_height_matters_to_the_cup():
     cup = single(make_gear(theory="cup"), 200)
     plain = hdcal.margin(cup, 0.4, **QUICK)
@@ -315,6 +302,7 @@ def test_the_load_height_matters_to_the_cup():
     assert wide.worst.upper_bound_N > plain.worst.upper_bound_N + 2.0
 
 
+@pytest.mark.thorough
 def test_unloading_begins_at_the_top():
     case = ramp_case()
     draws = plain_draws(case, 200) | {
@@ -329,6 +317,3 @@ def test_unloading_begins_at_the_top():
     )
     gap = up.worst.force_N.median - down.worst.force_N.median
     assert gap == pytest.approx(8.0, abs=0.1)
-    begins = "Unloading is taken to begin at 0.54 mm, the largest tested."
-    assert begins in down.remarks
-    assert begins not in up.remarks

@@ -148,7 +148,6 @@ def test_what_the_data_say_nothing_of_has_its_row_with_all_that_hangs_on_it():
     assert (line.type, line.unit) == ("B", "%")
     assert line.standard_uncertainty == pytest.approx(0.25, rel=0.05)
     assert line.sensitivity_N_per_unit == pytest.approx(0.82, rel=0.1)
-    assert line.halved_by == "a load cell certified to ± 0.25 % (k = 2)"
 
 
 @pytest.mark.thorough
@@ -282,7 +281,6 @@ def test_a_straight_budget_is_valid_and_given():
     assert ends == pytest.approx(
         (found.estimate_N - 2.94, found.estimate_N + 2.94), abs=0.003
     )
-    assert found.linear_check.words.endswith("The linear budget stands.")
 
 
 @pytest.mark.thorough
@@ -294,31 +292,15 @@ def test_a_budget_that_does_not_stand_gives_way_to_monte_carlo():
     assert (found.coverage_lo_N, found.coverage_hi_N) == (member.lo, member.hi)
     check = found.linear_check
     assert abs(check.hi_N - member.hi) > check.tolerance_N
-    assert "Monte Carlo is given" in check.words
     assert found.budget and sum(s.share for s in found.budget) == pytest.approx(1.0)
 
 
 def test_too_few_draws_are_said():
     found = hdcal.margin(single(size=200), 0.4, quantity="load")
     assert found.linear_budget_valid is False
-    assert "the draws are too few to tell" in found.linear_check.words
 
 
 def test_without_sensitivities_monte_carlo_speaks_alone():
     found = hdcal.margin(single(size=200), 0.4, sensitivities=False)
     assert found.budget == () and found.linear_budget_valid is None
     assert found.coverage_hi_N == found.worst.member_N.hi
-
-
-@pytest.mark.parametrize(
-    ("count", "words"),
-    # Student's t of 2 and of 8 degrees of freedom; of many their scatter is left.
-    [(3, "9 mountings instead of 3"), (6, "half the scatter between mountings")],
-)
-def test_what_would_halve_a_row_is_said_where_it_can_be(count: int, words: str):
-    found = hdcal.margin(batch(count, 400), 0.4, population="mountings")
-    rows = {line.component: line for line in found.budget}
-    assert rows["mounting to mounting"].halved_by.startswith(words)
-    assert rows["reading noise"].halved_by == (
-        "the mean of 4 readings, independent of each other"
-    )

@@ -152,6 +152,7 @@ def test_every_source_has_its_share():
     assert {"gear", "wall_thickness"} <= large and "noise" not in large
 
 
+@pytest.mark.thorough
 def test_a_drift_that_one_cause_holds_is_open_for_the_others():
     """Whichever of them comes first."""
     plain = single(size=400)

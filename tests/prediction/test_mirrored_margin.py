@@ -20,7 +20,7 @@ from slices import slice_of
 import hdcal
 from hdcal.errors import InputError
 from hdcal.prediction.margin.result import Level, Margin
-from hdcal.prediction.margin.sentences import answer, headline, next_steps
+from hdcal.prediction.margin.sentences import headline
 from hdcal.prediction.margin.stated import BudgetCheck, BudgetLine
 
 QUICK = {"sensitivities": False}
@@ -176,10 +176,9 @@ ASKED = {
         AT | {"sensitivities": True, "deformation": 0.6, "limit_force": 130.0},
     ),
 }
-QUICK_ASKED = ("rounded", "load", "mountings", "averaged", "leftover", "drifting zero")
+QUICK_ASKED = ("rounded", "averaged", "leftover")
 
 
-@pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("name", slice_of(ASKED, QUICK_ASKED))
 def test_the_answer_is_mirrored(name: str):
     make, asked = ASKED[name]
@@ -198,18 +197,6 @@ def test_the_answer_is_mirrored(name: str):
         assert other.reached.lower_bound_mm < other.reached.upper_bound_mm < 0.0
 
 
-def test_what_was_not_tested_is_named():
-    pressed = single(size=SIZE)
-    for known, at, words in (
-        (pressed, -0.1, "loading in tension"),
-        (mirrored(pressed), 0.1, "loading in compression"),
-    ):
-        found = hdcal.margin(known, at, **QUICK)
-        assert any(f"{words} was not tested" in said for said in found.extrapolated)
-    found = hdcal.margin(pressed, 0.4, direction="down", **QUICK)
-    assert found.extrapolated[0].startswith("Extrapolated: unloading was not tested")
-
-
 @pytest.fixture(scope="module")
 def both_senses():
     """One gear that was pressed, and its mirror image that was pulled."""
@@ -217,11 +204,10 @@ def both_senses():
     return {1: pressed, -1: mirrored(pressed)}
 
 
-@pytest.mark.usefixtures("counted")
 @pytest.mark.parametrize("sense", [1, -1])
 def test_the_larger_the_capacity_the_rarer_it_is_exceeded(both_senses, sense: int):
     names = ("probability", "lo", "hi", "at_confidence")
-    ladder = np.arange(60.0, 110.0, 2.5)
+    ladder = np.arange(60.0, 110.0, 5.0)
     risks = [
         hdcal.margin(both_senses[sense], sense * 0.4, limit_force=limit, **QUICK)
         for limit in ladder
@@ -251,23 +237,6 @@ def test_a_capacity_is_a_size_or_has_the_sign_of_the_force(both_senses):
     assert [finding.file for finding in refused.value.findings] == ["limit_force"]
 
 
-def test_the_words_of_a_gear_that_is_pulled_are_those_of_sizes(both_senses):
-    asked = {"limit_force": 70.0, "given_force": -80.0, **QUICK}
-    found = hdcal.margin(both_senses[-1], -0.4, **asked)
-    said = " ".join(answer(found))
-    size = found.worst.capacity_N
-    assert headline(found).startswith("A capacity of 70 N in tension is NOT enough")
-    assert f"99 % of readings need at most {size:.1f} N in tension" in said
-    assert "the mean force that the gauge shows is −8" in said.replace("-", "−")
-    assert "needs more than 70 N in tension with a probability of " in said
-    assert next(next_steps(found)).startswith(f"Provide {size:.1f} N in tension")
-    got = found.reached
-    least, most = f"{got.upper_bound_mm:.4g}", f"{got.lower_bound_mm:.4g}"
-    assert f"get at least to {least} mm" in said and f"at most to {most} mm" in said
-    pressed = hdcal.margin(both_senses[1], 0.4, limit_force=70.0, **QUICK)
-    assert "in tension" not in " ".join(answer(pressed))
-
-
 def test_a_force_is_reached_in_its_own_sense_whatever_else_is_asked(both_senses):
     """On data of both senses, each force is found where its own question finds it."""
     case = ramp_case()
@@ -285,20 +254,6 @@ def test_a_force_is_reached_in_its_own_sense_whatever_else_is_asked(both_senses)
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-def test_a_force_that_may_have_either_sign_is_said(both_senses, sense: int):
-    found = hdcal.margin(both_senses[sense], sense * 0.008, **QUICK)
-    member = found.worst.member_N
-    assert member.lo < 0.0 < member.hi and found.loading_sense == sense
-    sign = {1: "positive", -1: "negative"}[sense]
-    assert any(
-        "may have either sign" in words and f"count the {sign} ones only" in words
-        for words in found.remarks
-    )
-    settled = hdcal.margin(both_senses[sense], sense * 0.4, **QUICK)
-    assert not any("either sign" in words for words in settled.remarks)
-
-
-@pytest.mark.parametrize("sense", [1, -1])
 def test_a_capacity_is_refused_where_the_zero_is_larger_than_the_load(sense: int):
     posterior = single(size=SIZE)
     tree = posterior.tree.copy(deep=True)
@@ -308,8 +263,6 @@ def test_a_capacity_is_refused_where_the_zero_is_larger_than_the_load(sense: int
     with pytest.raises(InputError, match="Ask for the quantity load") as refused:
         hdcal.margin(posterior, sense * 0.4, limit_force=70.0, **QUICK)
     assert [finding.file for finding in refused.value.findings] == ["limit_force"]
-    bare = hdcal.margin(posterior, sense * 0.4, **QUICK)
-    assert any("no capacity can be compared" in words for words in bare.remarks)
     load = hdcal.margin(
         posterior, sense * 0.4, limit_force=70.0, quantity="load", **QUICK
     )

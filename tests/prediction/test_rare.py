@@ -20,7 +20,6 @@ from hdcal.prediction.engine.population_force import population_force
 from hdcal.prediction.engine.untested import PLACES
 from hdcal.prediction.margin import rare as module
 from hdcal.prediction.margin.rare import Rare, pooled_rare, rare
-from hdcal.prediction.margin.refined import rests_on as refined_words
 from hdcal.prediction.margin.sampling_laws import SamplingLaws
 
 AT = 0.4
@@ -68,6 +67,10 @@ def test_tails_are_exact_however_far(law):
         assert error < max(5.0 * found.relative_error, 0.01) * true
         assert abs(np.log(found.probability / true)) < 0.05 * abs(np.log(true))
         assert found.relative_error < 0.1
+    asked = {"limit_force": limit, "population": "readings", "sensitivities": False}
+    risk = hdcal.margin(posterior, AT, **asked).worst.exceedance
+    assert risk.probability == pytest.approx(found.probability, rel=0.2)
+    assert "importance sampling" in risk.rests_on
     # A gear that is pulled exceeds it in tension.
     other = rare(population_force(pulled, -AT, "readings"), limit).probability
     assert other == pytest.approx(true, rel=5.0 * found.relative_error + 0.01)
@@ -212,19 +215,6 @@ def test_each_model_alone_is_refined_too():
     risk = found.worst.exceedance
     assert "importance sampling" in risk.rests_on
     assert np.dot(shares, chances) == pytest.approx(risk.probability, rel=1e-6)
-
-
-def test_it_says_what_it_rests_on():
-    one = Rare(1e-6, 0.03, 1.0, 1.2)
-    words = refined_words(one)
-    assert words == "Its Monte Carlo error is 3 %, by importance sampling."
-    words = refined_words(replace(one, heavy_tailed=40.0, without_prior=0.2))
-    assert "rests on the normal law of the scatter (by Student's t" in words
-    assert "and on the prior of the noise (without one it were 0.2 times" in words
-    words = refined_words(replace(one, relative_error=0.6, without_prior=np.nan))
-    assert words.endswith(
-        "60 %, by importance sampling: no more than its order of magnitude is known."
-    )
 
 
 @pytest.mark.thorough

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from posteriors import regressed, single, with_leftover, written_posterior
 from pulled_further import all_pulled_further
+from slices import slice_of
 
 import hdcal
 from hdcal.design.design_draws import DesignDraws, design_draws
 from hdcal.design.study.force_quantiles import force_quantiles, general_quantiles
-from hdcal.design.study.study import study
 from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.posterior import Posterior
 
@@ -45,7 +45,7 @@ def held(times: float, count: int, seed: int) -> tuple[float, float, int]:
     return right / cases, alone / cases, cases
 
 
-@pytest.mark.parametrize("times", [1.5, 2.0])
+@pytest.mark.parametrize("times", slice_of([1.5, 2.0], [2.0]))
 def test_a_slice_of_stiffening_gears_stays_inside(times: float):
     right, alone, cases = held(times, 6, seed=21)
     assert cases >= 10
@@ -75,7 +75,7 @@ def test_nothing_grows_between_rest_and_the_tested_ends(make):
     np.testing.assert_allclose(spans(design_draws(single()), [-1e-6]), near, atol=1e-3)
 
 
-@pytest.mark.parametrize("make", [single, with_leftover])
+@pytest.mark.parametrize("make", slice_of([single, with_leftover], [with_leftover]))
 def test_quick_quantiles_are_those_of_every_draw(make):
     draws = design_draws(make(size=300))
     factor = np.linspace(0.5, 2.0, len(PLACES))
@@ -100,15 +100,6 @@ def test_a_product_has_no_rig_that_drifts():
     np.testing.assert_array_equal(
         force_quantiles(draws, *asked), force_quantiles(straight(draws), *asked)
     )
-
-
-def test_a_study_says_what_may_grow_and_how_much():
-    found = study(single(), {"deformation_mm": [0.4, 0.8]})
-    (words,) = found.warnings
-    assert "tested were 0.02 … 0.54 mm" in words
-    assert f"{design_draws(single()).bend_sd(0.8):.2g} N (sd) at 0.8 mm" in words
-    assert "test there before relying on it" in words
-    assert not study(single(), {"deformation_mm": [0.3, 0.4]}).warnings
 
 
 # A narrow range shows the slope there and no curvature, and the zero of the gauge is

@@ -41,7 +41,7 @@ def held(count: int, seed: int) -> tuple[float, float, float]:
 
 
 def test_a_slice_of_rigs_stays_inside():
-    mean, new, without = held(40, seed=4)
+    mean, new, without = held(24, seed=4)
     assert mean >= 0.85 and new >= 0.85, (mean, new)
     assert without <= 0.3, without
 
@@ -52,16 +52,12 @@ def test_two_hundred_rigs_stay_inside():
     assert 0.92 <= mean <= 0.98 and 0.92 <= new <= 0.98, (mean, new)
 
 
-def test_it_is_said_in_newtons_per_kelvin():
+def test_only_the_rig_drifts_and_only_outside():
     x, rng = np.linspace(0.02, 0.54, 30), np.random.default_rng(1)
     posterior = regressed(x, 200.0 * x + rng.normal(0.0, 0.5, 30), rng)
-    (words,) = hdcal.margin(posterior, 0.4, temperature=80.0, **QUICK).extrapolated
-    assert "0.1 N per kelvin by the zero of its gauge" in words
-    assert "0.2 N per kelvin by the length of its frame" in words
     # The gear knows nothing of the rig that it was tested on.
     load = {"temperature": 80.0, "quantity": "load", **QUICK}
     found = hdcal.margin(posterior, 0.4, **load)
-    assert "per kelvin by" not in found.extrapolated[0]
     cold = hdcal.margin(posterior, 0.4, quantity="load", **QUICK)
     widths = [one.worst.force_N.hi - one.worst.force_N.lo for one in (found, cold)]
     assert widths[0] < 1.5 * widths[1]

@@ -1,5 +1,6 @@
 """The command line as a user runs it, and one result that many tests look at."""
 
+import contextlib
 import fcntl
 import json
 import os
@@ -38,15 +39,10 @@ def hdcal() -> Hdcal:
 
 
 @pytest.fixture
-def here(
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> Iterator[Hdcal]:
+def here(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Iterator[Hdcal]:
     """Run hdcal in this process, which has compiled already what others need."""
     from hdcal.__main__ import main
 
-    monkeypatch.chdir(tmp_path)
     before = signal.getsignal(signal.SIGTERM)
 
     def run(*arguments: object) -> Done:
@@ -58,20 +54,23 @@ def here(
         assert isinstance(code, int)
         return subprocess.CompletedProcess(given, code, said.out, said.err)
 
-    yield run
+    with contextlib.chdir(tmp_path):
+        yield run
     signal.signal(signal.SIGTERM, before)
 
 
 @pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+def undrawn() -> Iterator[None]:
     """Leave out the drawing of figures, where a test looks at none of their files.
 
     They are made as ever; to draw one, as SVG and PNG, takes most of a report's time.
     """
     from hdcal.report import canvas, chart_drawing
 
-    for module in (canvas, chart_drawing):
-        monkeypatch.setattr(module, "render", lambda *_: b"<svg/>")
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (canvas, chart_drawing):
+            patch.setattr(module, "render", lambda *_: b"<svg/>")
+        yield
 
 
 @pytest.fixture(scope="session")

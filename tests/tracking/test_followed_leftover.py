@@ -94,9 +94,9 @@ def test_what_is_forgotten_of_a_long_wave_fades_to_the_prior_too():
     tree = posterior.tree.copy(deep=True)
     weights = tree["posterior"]["gap_weights"]
     tree["posterior"]["gap_weights"] = weights * 10.0 ** (-4.0 * np.arange(20))
-    tracker = Tracker(replace(posterior, tree=tree), forget=0.9)
+    tracker = Tracker(replace(posterior, tree=tree), forget=0.8)
     rng, found = np.random.default_rng(0), []
-    for at in np.resize(PLACES, 4000).tolist():
+    for at in np.resize(PLACES, 2000).tolist():
         answer = tracker.update(at, 205.0 * at + rng.normal(0.0, 0.5))
         found.append(answer["stiffness_N_per_mm"]["sd"])
     assert np.mean(found[-200:]) < 1.5 * np.mean(found[100:300])

@@ -69,9 +69,7 @@ def covariance_of(core: LinearCores) -> np.ndarray:
     return core.root @ core.root.mT
 
 
-@pytest.mark.parametrize(
-    ("count", "hard"), [(3, False), (2000, False), (100_000, True)]
-)
+@pytest.mark.parametrize(("count", "hard"), [(3, False), (2000, False), (20_000, True)])
 def test_it_equals_the_batch_answer(count, hard):
     prior, (design, force) = make_prior(), rows(count, hard=hard)
     core = follow(prior, design, force)

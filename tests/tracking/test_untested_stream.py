@@ -1,7 +1,5 @@
 """Readings at untested conditions: their bands are wide, and they teach little."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from posteriors import beside, regressed, single, with_leftover
@@ -10,7 +8,7 @@ from streams import follow
 
 import hdcal
 from hdcal.errors import InputError
-from hdcal.inference.model_average import LeftOut, ModelAverage
+from hdcal.inference.model_average import ModelAverage
 from hdcal.prediction.engine.pooled import pool
 from hdcal.prediction.engine.untested_reading import Addition, UntestedReading
 from hdcal.tracking.stream_prior import prior_from_posterior
@@ -166,40 +164,6 @@ def mixture(**shares: float):
     return ModelAverage({n: (share, made[n]) for n, share in shares.items()})
 
 
-def test_causes_that_can_be_followed_are_and_the_rest_is_said():
-    shares = {"none": 0.4, "contact_onset": 0.3, NOISE: 0.2, "unknown": 0.1}
-    words = Tracker(mixture(**shares)).describe()
-    assert (
-        "averages over the causes that are left: no gap (40 %), contact onset (30 %)"
-        in words
-    )
-    assert "something outside the library (10 %)" in words
-    assert "outliers cannot be followed row by row: 20 % of the probability" in words
-    # Forgetting goes with a line only.
-    words = Tracker(mixture(none=0.7, contact_onset=0.3), forget=0.99).describe()
-    assert "contact onset cannot be followed row by row: 30 %" in words
-    assert "averages" not in Tracker(single()).describe()
-
-
 def test_where_most_cannot_be_followed_nothing_is():
     with pytest.raises(InputError, match="'outliers' shapes the noise"):
         Tracker(mixture(none=0.4, **{NOISE: 0.6}))
-
-
-def test_what_was_left_out_is_said():
-    average = mixture(none=0.6, contact_onset=0.4)
-    words = Tracker(replace(average, left_out=LeftOut(0.02, "none"))).describe()
-    assert "2 % of the probability lies on hypotheses" in words
-
-
-def test_what_the_calibration_left_over_is_told_before_the_first_row():
-    deformation, rng = np.linspace(0.02, 0.54, 40), np.random.default_rng(3)
-    force = 205.0 * deformation + rng.normal(0.0, 0.3, 40)
-    plain, bent = (
-        Tracker(regressed(deformation, read, rng)).describe()
-        for read in (force, force + 30.0 * deformation**2)
-    )
-    assert "shape for right, but its residuals have one" in bent
-    # Which is then followed.
-    assert "An alarm may come of that" in bent and "calibrate with a gap" in bent
-    assert "alarm may come" not in plain

@@ -8,7 +8,7 @@ import numpy as np
 from hdcal.data.case import Gear
 from hdcal.data.prior import Prior
 from hdcal.data.priors import rig_priors
-from hdcal.data.turning_points import TURN_MOST, turning_points
+from hdcal.screening.turning_points import TURN_MOST, turning_points
 
 # Noise is what is faster than the loading: readings err alike over a fifth of a half
 # cycle at most, so that each holds five independent stretches. Slower is a bend.
