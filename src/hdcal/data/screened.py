@@ -98,7 +98,7 @@ def _kept(measured: Measurements, found: Screening) -> Measurements:
     if found.kept.all():
         return replace(measured, columns=replace(columns, values=values))
     kept = found.kept
-    table = replace(columns.table, rows=columns.table.rows[kept])
+    table = columns.table.take(kept)
     values = {name: column[kept] for name, column in values.items()}
     return Measurements(
         replace(columns, values=values, table=table),
