@@ -25,6 +25,7 @@ from hdcal.report.posterior_result import (
     posterior_fields,
 )
 from hdcal.report.result import Interval, Words
+from hdcal.screening.result import StraightPart
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]
@@ -73,6 +74,13 @@ class Calibration(PosteriorResult):
     def next_steps(self) -> tuple[Words, ...]:
         """What would make the answer better, most urgent first."""
         return self.lines("next_steps")
+
+    @property
+    def straight(self) -> StraightPart | None:
+        """The longest straight part of a curve that is no line; else None."""
+        screening = self.posterior.case.screening
+        part = None if screening is None else screening.straight
+        return None if part is None or part.whole or self.effects else part
 
     @property
     def known(self) -> frozenset[str]:
