@@ -39,9 +39,7 @@ def hdcal() -> Hdcal:
 
 
 @pytest.fixture
-def here(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Iterator[Hdcal]:
+def here(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Iterator[Hdcal]:
     """Run hdcal in this process, which has compiled already what others need."""
     from hdcal.__main__ import main
 
