@@ -68,8 +68,9 @@ def test_a_case_takes_them_from_its_largest_readings(tmp_path):
     (tmp_path / "gear.toml").write_text(GEAR)
     gear = read_case(tmp_path).gear
     # Radial: half of what is read.
-    assert gear.full_scale.deformation == pytest.approx(0.4, rel=0.02)
-    assert gear.full_scale.force == pytest.approx(40.0, rel=0.02)
+    # The wild reading is left out, and of the others one in a hundred may be wild.
+    assert gear.full_scale.deformation == pytest.approx(0.4 * 0.98, rel=0.02)
+    assert gear.full_scale.force == pytest.approx(40.0 * 0.98, rel=0.02)
     # What the gear file states stays as it is.
     assert gear.effect_priors["coulomb_friction.force"].numbers == (7.0,)
 
