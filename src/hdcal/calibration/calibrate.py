@@ -8,6 +8,7 @@ from difflib import get_close_matches
 import numpy as np
 import xarray as xr
 
+from hdcal.calibration.straight_part import straight_check
 from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
@@ -181,7 +182,9 @@ def calibrate(
     size = {"chains": chains, "warmup": warmup, "draws": draws}
     fitted = laplace.fit(problem)
     found = sample(problem, fitted, seed, progress=progress, **size)
-    own = _specifics(case, problem, form, found, asked=bool(asked), shown=shown)
+    # An effect, or a bend that was asked for, is a reason for another stiffness.
+    plain = not asked and with_gap is None
+    own = _specifics(case, problem, form, found, plain=plain, shown=shown)
     parts = assemble(case, priors, problem, found, own, seed)
     parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
@@ -233,7 +236,7 @@ def _specifics(
     form: Structure,
     found: Draws,
     *,
-    asked: bool,
+    plain: bool,
     shown: bool,
 ) -> Specifics:
     """Return what the model of the force adds to what every calibration has."""
@@ -243,6 +246,10 @@ def _specifics(
     near = linearise(problem, centre, case.records)
     members = near.members / near.sd[:, None]
     sigma, rows = found.values["sigma"], len(case.records.force)
+    line_checks = []
+    if plain:
+        line_checks += [line_check(case.records, found.values["stiffness"])]
+        line_checks += [straight_check(case)]
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={
@@ -254,8 +261,7 @@ def _specifics(
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(found.values, rows, form.why_independent),
             growth_check(found.values, unasked=shown),
-            # An effect is a reason for another stiffness.
-            *([] if asked else [line_check(case.records, found.values["stiffness"])]),
+            *line_checks,
         ],
     )
 

@@ -25,7 +25,6 @@ from hdcal.report.posterior_result import (
     posterior_fields,
 )
 from hdcal.report.result import Interval, Words
-from hdcal.screening.result import StraightPart
 
 _ALWAYS = ["K", "E0", "alpha", "force_offset", "deformation_offset", "sigma"]
 _SIZED = [name for name in get_args(Theory) if name != SPRING]
@@ -76,11 +75,13 @@ class Calibration(PosteriorResult):
         return self.lines("next_steps")
 
     @property
-    def straight(self) -> StraightPart | None:
-        """The longest straight part of a curve that is no line; else None."""
-        screening = self.posterior.case.screening
-        part = None if screening is None else screening.straight
-        return None if part is None or part.whole or self.effects else part
+    def part_of_curve(self) -> str:
+        """Working range over which a curve that is no line has its stiffness."""
+        found = self.posterior.case.screening
+        part = None if found is None else found.straight
+        if found is None or part is None or part.whole or self.effects:
+            return ""
+        return found.working_range
 
     @property
     def known(self) -> frozenset[str]:

@@ -74,6 +74,14 @@ def calibrate(console: Console, data, out, force, dynamic, **settings):
         reading = take_reading(settings)
         settings["theory"] = reading["theory"]
         case = read_given(console, data, **reading)
+        plain = (
+            not (dynamic or settings["effects"]) and settings.get("with_gap") is None
+        )
+        if plain and case is not None:
+            from hdcal.calibration.straight_part import straight_range
+
+            if wanted := straight_range(case):
+                case = read_given(console, data, **{**reading, "range": wanted})
         # Said now, not after minutes of sampling.
         if out is None and case is not None:
             out = f"{case.name}-calibration"

@@ -11,7 +11,7 @@ from hdcal.inference.checks import Check
 # So many rows decide a line; of more every second, third, … is taken.
 _MOST_ROWS = 20_000
 # A difference below this share matters to nobody, however well both slopes are known.
-_LEAST_DIFFERENCE = 0.1
+LEAST_DIFFERENCE = 0.1
 # Residuals of normal noise have their median size at so many sds.
 _MEDIAN_SIZE = 0.6745
 _NORMAL_95 = 1.96
@@ -84,7 +84,7 @@ def line_check(records: Records, stiffness: np.ndarray) -> Check:
     low, middle, high = np.quantile(stiffness, [0.025, 0.5, 0.975])
     apart = abs(middle - line.slope)
     near = apart <= (high - low) / 2.0 + line.half_width
-    near = near or apart <= _LEAST_DIFFERENCE * abs(line.slope)
+    near = near or apart <= LEAST_DIFFERENCE * abs(line.slope)
     words = (
         f"the model has {middle:.4g} N/mm ({low:.4g} to {high:.4g}), a robust straight "
         f"line through the same readings {line.slope:.4g} ± {line.half_width:.2g} N/mm"

@@ -10,7 +10,7 @@ import numpy as np
 from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
-FORM = "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force"
+FORM = "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force; or all"
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,8 @@ class WorkingRange:
     unit: Literal["mm", "%"]
 
     def __str__(self) -> str:
+        if math.isinf(self.high):
+            return "all of the curve"
         if self.unit == "mm":
             return f"{self.low:g} to {self.high:g} mm"
         return f"{self.low:g} to {self.high:g} % of the largest force"
@@ -47,11 +49,13 @@ class WorkingRange:
 
 
 def read_range(text: str) -> WorkingRange:
-    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force.
+    """Read LOW:HIGH in mm, or LOW%:HIGH% of the largest force, or `all`.
 
     Raises:
         ValueError: it is neither; the words say why.
     """
+    if text.strip() == "all":
+        return WorkingRange(-math.inf, math.inf, "mm")
     found = _ENDS.fullmatch(text)
     try:
         assert found is not None
