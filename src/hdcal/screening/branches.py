@@ -32,7 +32,7 @@ def name_segments(one: Run) -> None:
 def straight_part(one: Run, n: int) -> StraightPart | None:
     """Return the longest straight part of a run's largest movement."""
     rows = np.flatnonzero(one.kept)
-    if rows.size < _FEWEST or not np.ptp(one.x[rows]):
+    if rows.size < _FEWEST:
         return None
     turns, _ = _branches(one, rows)
     ends = [0, *turns.tolist(), rows.size - 1]
@@ -40,6 +40,8 @@ def straight_part(one: Run, n: int) -> StraightPart | None:
     loading = rows[ends[first] : ends[first + 1] + 1]
     found = longest_straight(one.x[loading], one.y[loading], one.scatter)
     part = loading[found[0]]
+    if not np.ptp(one.x[part]):
+        return None
     low, high = float(one.x[part].min()), float(one.x[part].max())
     inside = np.zeros(n, bool)
     inside[one.rows[one.kept & (one.x >= low) & (one.x <= high)]] = True
