@@ -112,7 +112,7 @@ def _sign(one: Run) -> Sign:
     if one.plain:
         return "same"
     x, y = one.x[rows], one.y[rows]
-    sign = sign_of_slope(x, y)
+    sign = sign_of_slope(x, y, one.scatter)
     if rows.size < FEWEST:
         return sign
     for way, expected in ((1.0, "same"), (-1.0, "opposite")):
@@ -120,7 +120,7 @@ def _sign(one: Run) -> Sign:
         if found is None:
             continue
         first, drop = found
-        before = sign_of_slope(x[:first], y[:first])
+        before = sign_of_slope(x[:first], y[:first], one.scatter)
         if before == expected:
             after = np.flatnonzero(one.kept & (np.arange(one.x.size) >= rows[first]))
             one.cut(after, DROPPED)
