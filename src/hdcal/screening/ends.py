@@ -113,6 +113,9 @@ def _later_cycle(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
     sharp = drop > max(_SHARP * whole, _STEPS * float(np.median(np.abs(fall))))
     if not sharp or row < 2 * _FEWEST or y.size - row < _FEWEST:
         return None
+    # no wild reading
+    if np.median(y[row - 3 : row]) - np.median(y[row : row + 3]) < 0.5 * drop:
+        return None
     place = np.digitize(x, np.linspace(x.min(), x.max(), _PLACES))
     lowest = np.full(_PLACES + 1, np.inf)
     np.minimum.at(lowest, place[:row], y[:row])
