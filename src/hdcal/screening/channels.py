@@ -81,7 +81,7 @@ def _plateau(held: np.ndarray, moving: np.ndarray) -> np.ndarray:
         goes_on = np.median(np.abs(np.diff(moving[first:stop]))) >= _PACE * pace > 0.0
         # in the way in which the held channel rose, so that it should rise on
         way = np.sign(np.polyfit(held[before], moving[before], 1)[0])
-        beyond = np.max(way * (moving[first:stop] - moving[first]))
+        beyond = np.quantile(way * (moving[first:stop] - moving[first]), 0.9)
         if goes_on and beyond >= _MOVES * np.ptp(moving):
             found[first:stop] = True
     return found

@@ -34,7 +34,7 @@ _GONE = 0.5
 _BACK, _ADVANCE = 0.1, 0.25
 # A part that gives way after cycles does so by a step of this share of the range and
 # of so many usual steps, and stays below what it was at most deformations.
-_SHARP, _STEPS, _MOSTLY = 0.2, 10.0, 0.9
+_SHARP, _STEPS, _MOSTLY = 0.3, 20.0, 0.9
 # Places along the deformation at which before and after are compared.
 _PLACES = 50
 # Rows from which on a curve before the drop can be calibrated.
