@@ -74,7 +74,6 @@ def test_check_says_what_was_read(here: Hdcal):
         (0.1, "radial", False),
         (0.05, "diametral", False),
         (10.0, "radial", False),
-        (-1.0, "radial", False),
     ],
 )
 def test_check_doubts_a_stiffness_of_another_unit(
@@ -88,7 +87,7 @@ def test_check_doubts_a_stiffness_of_another_unit(
     (case / "gear.toml").write_text(gear.replace('"radial"', f'"{reading}"'))
     found = json.loads(here("check", case, "--json").stdout)
     assert (found["headline"] == "The input is in order.") == plausible
-    assert any("wrong sign or unit" in note for note in found["notes"]) != plausible
+    assert any("wrong unit" in note for note in found["notes"]) != plausible
 
 
 def test_bad_input_gives_every_finding_and_no_traceback(here: Hdcal, case: Path):

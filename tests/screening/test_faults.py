@@ -176,3 +176,11 @@ def test_runs_are_screened_by_themselves():
     found = screen(np.tile(x, 3), np.r_[y, wild, y], run=np.repeat([0, 1, 2], 50))
     one = only(found)
     assert (one.run, one.rows) == (1, ((70, 70),))
+
+
+def test_a_part_that_gives_way_after_cycles_ends_the_record():
+    x = 1.0 - np.abs(np.linspace(0.0, 5.0, 500) % 2.0 - 1.0)
+    y = STIFFNESS * x + RNG.normal(0.0, 0.02, 500)
+    y[470:] = 3.0
+    one = only(screen(x, y))
+    assert (one.kind, one.rows) == ("after the largest force", ((470, 499),))

@@ -65,3 +65,15 @@ def test_check_shows_findings_segments_and_the_straight_part():
     assert answer["straight_part"]["whole"]
     labels = [mark.label for mark in found.charts()["readings"].panels[0].marks]
     assert labels == ["loading", "left out: after the largest force"]
+
+
+def test_a_gear_with_a_negative_slope_can_be_left_out():
+    good = table(specimen="A")
+    bad = table(specimen="B")
+    bad["force_N"] = 12.0 * np.sin(25.0 * bad["deformation_mm"]) - bad["force_N"]
+    both = pd.concat([good, bad])
+    with pytest.raises(InputError, match="falls as the deformation grows"):
+        hdcal.read_case(both)
+    case = hdcal.read_case(both, skip_bad=True)
+    assert case.specimen_labels == ("A",)
+    assert [*case.left_out] == ["B"]

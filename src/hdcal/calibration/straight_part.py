@@ -1,14 +1,16 @@
 """The straight part of a curve that is no line, over which its stiffness is asked."""
 
+import numpy as np
+
 from hdcal.data.case import Case
 from hdcal.inference.checks import Check
-from hdcal.inference.straight_line import LEAST_DIFFERENCE, robust_line
+from hdcal.inference.straight_line import LEAST_DIFFERENCE
 
 
 def straight_range(case: Case) -> str | None:
     """Return the working range of the longest straight part, where it is another one.
 
-    None where a straight line through all readings has that stiffness within a tenth,
+    None where least squares through all readings has that stiffness within a tenth,
     where a range was chosen, and of repeated cycles and several runs, whose stiffness is
     that of all their branches.
 
@@ -21,9 +23,8 @@ def straight_range(case: Case) -> str | None:
         return None
     if case.records.known & {"cycles", "run", "specimen"}:
         return None
-    line = robust_line(case.records)
-    apart = 0.0 if line is None else abs(line.slope - part.slope)
-    if apart <= LEAST_DIFFERENCE * abs(part.slope):
+    slope = np.polyfit(case.records.deformation, case.records.force, 1)[0]
+    if abs(slope - part.slope) <= LEAST_DIFFERENCE * abs(part.slope):
         return None
     return f"{part.low!r}:{part.high!r}"
 

@@ -137,7 +137,9 @@ def read_gear_folder(
         many = len(whole.run.names), len(whole.specimen.names)
         notes.append(mountings_note(whole.columns.values, *many))
     whole = replace(whole, left_out=bad)
-    case = case_of(whole, found, (*notes, *told), folder.resolve().name, range)
+    case = case_of(
+        whole, found, (*notes, *told), folder.resolve().name, range, skip_bad
+    )
     return case, _sizes(parts) if own and found.theory != SPRING else None
 
 

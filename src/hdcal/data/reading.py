@@ -122,7 +122,9 @@ def read_case(
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
     label = None if alone else specimen
-    return case_of(measured, found, told, _name(data, folder, sheet, label), range)
+    return case_of(
+        measured, found, told, _name(data, folder, sheet, label), range, skip_bad
+    )
 
 
 def _own_file(data: Path, specimen: str | None) -> Path:
@@ -138,6 +140,7 @@ def case_of(
     told: Sequence[str],
     name: str,
     range: str | None = None,
+    skip_bad: bool | None = None,
 ) -> Case:
     """Return what was measured on a gear, or several of its kind, as a case.
 
@@ -147,12 +150,13 @@ def case_of(
         told: notes on how that was found.
         name: of the case.
         range: working range; by default that of the gear file.
+        skip_bad: as in `read_case`.
 
     Raises:
         InputError: as `screened`.
     """
     wanted = asked_range(range or found.source.get("measurement", {}).get("range"))
-    measured, screening = screened(measured, wanted)
+    measured, screening = screened(measured, wanted, skip_bad)
     motion = _motion(measured, hidden=screening.trembling)
     of_reading = [*reading_notes(measured, found, motion)]
     of_reading += screening_notes(screening)

@@ -1,10 +1,12 @@
 """Measurements after their screening: rows cut, zeros counted anew."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
+from hdcal.data.bad_gears import among, offer
 from hdcal.data.measurements import Labels, Measurements
 from hdcal.data.value_checks import FEWEST_ROWS
 from hdcal.errors import Finding, InputError
@@ -29,13 +31,16 @@ def asked_range(wanted: str | None) -> WorkingRange | None:
 
 
 def screened(
-    measured: Measurements, wanted: WorkingRange | None = None
+    measured: Measurements,
+    wanted: WorkingRange | None = None,
+    skip_bad: bool | None = None,
 ) -> tuple[Measurements, Screening]:
     """Look at a record, and return what of it is a curve of the part.
 
     Args:
         measured: as read.
         wanted: working range; by default all of it.
+        skip_bad: as in `read_case`.
 
     Raises:
         InputError: holds what only the user can decide about; or hardly a row is left.
@@ -44,7 +49,17 @@ def screened(
     found = screen(values["deformation"], values["force"], values.get("time"), run)
     labels, file = measured.columns.table.rows, measured.columns.findings.file
     if found.asked:
-        raise InputError(Finding(file, *question(one, labels)) for one in found.asked)
+        bad = {
+            measured.specimen.names[measured.specimen.index[one.rows[0][0]]]: Finding(
+                file, *question(one, labels)
+            )
+            for one in found.asked
+        }
+        many = len(measured.specimen.names)
+        if skip_bad and len(bad) < many:
+            return screened(_without(measured, bad), wanted)
+        offered = skip_bad is False and len(bad) < many
+        raise InputError([*bad.values(), *([offer(bad, many)] if offered else [])])
     if wanted is not None:
         found = in_range(found, wanted, run)
     told = [in_words(one, labels, found.working_range) for one in found.observations]
@@ -97,7 +112,20 @@ def _kept(measured: Measurements, found: Screening) -> Measurements:
         values["time"] = found.time
     if found.kept.all():
         return replace(measured, columns=replace(columns, values=values))
-    kept = found.kept
+    return _of_rows(measured, values, found.kept)
+
+
+def _without(measured: Measurements, bad: Mapping[str, Finding]) -> Measurements:
+    """Return measurements without the gears that only the user can decide about."""
+    kept = ~among(measured.specimen.names, bad)[measured.specimen.index]
+    left = _of_rows(measured, measured.columns.values, kept)
+    return replace(left, left_out={**measured.left_out, **bad})
+
+
+def _of_rows(
+    measured: Measurements, values: Mapping[str, np.ndarray], kept: np.ndarray
+) -> Measurements:
+    columns = measured.columns
     table = columns.table.take(kept)
     values = {name: column[kept] for name, column in values.items()}
     return Measurements(

@@ -32,6 +32,11 @@ _GONE = 0.5
 # Share of the range that counts as a movement back, and share of a usual step that
 # counts as a step on.
 _BACK, _ADVANCE = 0.1, 0.25
+# A part that gives way after cycles does so by a step of this share of the range and
+# of so many usual steps, and stays below what it was at most deformations.
+_SHARP, _STEPS, _MOSTLY = 0.3, 20.0, 0.9
+# Places along the deformation at which before and after are compared.
+_PLACES = 50
 # Rows from which on a curve before the drop can be calibrated.
 _FEWEST = 5
 
@@ -85,10 +90,6 @@ def noise_of(y: np.ndarray) -> float:
 def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
     """Return the first row after the largest force has dropped for good, and the drop.
 
-    The deformation goes on beyond that of the largest force, and the force does not
-    come back. None for a record that never does that, and for one whose deformation
-    had gone back and forth before: there the curve is a loop.
-
     Args:
         x: deformation, growing with the load in the mean, shape (n,).
         y: force, likewise.
@@ -96,6 +97,43 @@ def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
     start = float(np.median(x[:3]))
     way = 1.0 if x.max() - start >= start - x.min() else -1.0
     x, y = way * (x - start), way * y
+    found = _first_loading(x, y) or _later_cycle(x, y)
+    return None if found is None else (found[0], way * found[1])
+
+
+def _later_cycle(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
+    """Return where a part gives way after cycles: at once, and everywhere for good.
+
+    The force falls by one step, and stays below all that was read before at the same
+    deformation.
+    """
+    fall = -np.diff(y)
+    row, whole = int(np.argmax(fall)) + 1, float(np.ptp(y))
+    drop = float(fall[row - 1])
+    sharp = drop > max(_SHARP * whole, _STEPS * float(np.median(np.abs(fall))))
+    if not sharp or row < 2 * _FEWEST or y.size - row < _FEWEST:
+        return None
+    # no wild reading
+    if np.median(y[row - 3 : row]) - np.median(y[row : row + 3]) < 0.5 * drop:
+        return None
+    place = np.digitize(x, np.linspace(x.min(), x.max(), _PLACES))
+    lowest = np.full(_PLACES + 1, np.inf)
+    np.minimum.at(lowest, place[:row], y[:row])
+    before = lowest[place[row:]]
+    known = np.isfinite(before)
+    below = y[row:] < before - 0.5 * _SHARP * whole
+    if known.sum() < _FEWEST or np.mean(below[known]) < _MOSTLY:
+        return None
+    return row, drop
+
+
+def _first_loading(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
+    """Return where the first loading ends in a drop of the force.
+
+    The deformation goes on beyond that of the largest force, and the force does not
+    come back. None for a record that never does that, and for one whose deformation
+    had gone back and forth before: there the curve is a loop.
+    """
     # a peak of noise is no largest force: of means over a few per cent of the record
     half = min(max(1, y.size // 50), _SMOOTH)
     smooth = median_filter(y, 2 * half + 1, mode="nearest")
@@ -124,4 +162,4 @@ def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
     least = _DROP if fallen.sum() > 1 else _GONE
     if drop < max(least * whole, 6.0 * noise_of(y)):
         return None
-    return top + 1, way * drop
+    return top + 1, drop

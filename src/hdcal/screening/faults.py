@@ -2,13 +2,18 @@
 
 import numpy as np
 
-from hdcal.screening import clock
+from hdcal.screening.channels import (
+    counted_on,
+    matters,
+    out_of_order,
+    saturated_rows,
+    scatter_of_deformation,
+    steps_back,
+)
 from hdcal.screening.ends import rows_before_tare
 from hdcal.screening.jumps import Jump, find_jump
 from hdcal.screening.result import DROPPED, SATURATED, TARE, WILD, Kind
 from hdcal.screening.run import Run
-from hdcal.screening.saturation import saturated_rows
-from hdcal.screening.trembling import matters, scatter_of_deformation
 from hdcal.screening.wild import FEWEST, wild_readings
 
 # More jumps than this are no faults of a zero but what the part does.
@@ -49,7 +54,7 @@ def look_at(one: Run) -> None:
 def _clock(one: Run) -> None:
     """Count the time on where the clock was reset while the test went on."""
     assert one.time is not None
-    back = clock.steps_back(one.time)
+    back = steps_back(one.time)
     if not back.size:
         return
     size = float(np.min(np.diff(one.time)))
@@ -62,10 +67,10 @@ def _clock(one: Run) -> None:
         one.observe("clock", after, size, "s", "cut")
         one.time[after] = one.time[back[0] - 1]
         return
-    if clock.out_of_order(back) or new_test:
+    if out_of_order(back) or new_test:
         one.observe("clock", back, size, "s", "asked")
         return
-    one.time = clock.counted_on(one.time, back)
+    one.time = counted_on(one.time, back)
     one.observe("clock", back, size, "s", "new zero")
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 
 from hdcal.screening.branches import name_segments, straight_part
+from hdcal.screening.channels import HIDDEN
 from hdcal.screening.ends import rows_after_drop
 from hdcal.screening.faults import look_at
 from hdcal.screening.plain import plain_runs
 from hdcal.screening.result import DROPPED, Screening
 from hdcal.screening.run import Run
 from hdcal.screening.sign import Sign, sign_of_slope
-from hdcal.screening.trembling import HIDDEN
 from hdcal.screening.wild import FEWEST
 
 # Rows from which the sign of a slope can be told.
@@ -112,7 +112,7 @@ def _sign(one: Run) -> Sign:
     if one.plain:
         return "same"
     x, y = one.x[rows], one.y[rows]
-    sign = sign_of_slope(x, y)
+    sign = sign_of_slope(x, y, one.scatter)
     if rows.size < FEWEST:
         return sign
     for way, expected in ((1.0, "same"), (-1.0, "opposite")):
@@ -120,7 +120,7 @@ def _sign(one: Run) -> Sign:
         if found is None:
             continue
         first, drop = found
-        before = sign_of_slope(x[:first], y[:first])
+        before = sign_of_slope(x[:first], y[:first], one.scatter)
         if before == expected:
             after = np.flatnonzero(one.kept & (np.arange(one.x.size) >= rows[first]))
             one.cut(after, DROPPED)

@@ -16,7 +16,7 @@ _CLEAR = 0.9
 _CHANCE = 3.5
 
 
-def sign_of_slope(x: np.ndarray, y: np.ndarray) -> Sign:
+def sign_of_slope(x: np.ndarray, y: np.ndarray, scatter: float = 0.0) -> Sign:
     """Tell whether force and deformation grow together.
 
     Opposite: the force falls with the deformation all along every branch, loading and
@@ -26,11 +26,12 @@ def sign_of_slope(x: np.ndarray, y: np.ndarray) -> Sign:
     Args:
         x: deformation, shape (n,).
         y: force, shape (n,).
+        scatter: sd of the deformation's reading, through which it turns.
     """
     together = _rank_correlation(x, y)
     if together >= 0.0:
         return "same"
-    turns, _ = turning_points(x, _BRANCH * float(np.ptp(x)))
+    turns, _ = turning_points(x, max(_BRANCH * float(np.ptp(x)), 10.0 * scatter))
     ends = [0, *turns.tolist(), x.size - 1]
     branches = [
         _rank_correlation(x[first : last + 1], y[first : last + 1])
