@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.bad_gears import among, bad_gears, offer
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.mountings import run_labels
 from hdcal.data.tables.blocks import Table
 from hdcal.data.tables.columns import REQUIRED, Column, choose_columns
@@ -15,7 +15,7 @@ from hdcal.data.tables.grid import factorize
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
-from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
+from hdcal.data.value_checks import FEWEST_ROWS, check_values, rows_back_in_time
 from hdcal.errors import Finding, InputError, quoted
 
 # Quantities of a spring under a force.
@@ -160,8 +160,33 @@ def _measured(found: Columns) -> Measurements:
     rows = len(columns.table.rows)
     specimen = labels_of(columns.values.get("specimen"), rows)
     run = runs_of(run_labels(columns.values, specimen.index), specimen, rows)
-    check_time(columns, run.index)
-    return Measurements(columns, run, specimen)
+    return Measurements(_with_time(columns, run), run, specimen)
+
+
+def _with_time(columns: Columns, run: Labels) -> Columns:
+    """Return columns with a time that never goes back within a run, or without one.
+
+    A time that goes back is refused where the user, or hdcal's own header, names it,
+    and not used where its header was guessed.
+    """
+    if "time" not in columns.values:
+        return columns
+    back = rows_back_in_time(columns.values["time"], run.index)
+    if not back.any():
+        return columns
+    label = quoted(run.names[run.index[int(np.argmax(back))]])
+    within = f"run {label}" if len(run.names) > 1 else "a run"
+    words = f"the time goes back within {within}"
+    if not columns.used["time"].guessed:
+        remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
+        columns.find(back, "time", words, remedy)
+        return columns
+    header, rows = columns.used["time"].header, row_list(columns.table.rows[back])
+    note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {rows}. If the rig was "
+    note += "reset there, label the runs in a column 'run'"
+    values = {name: v for name, v in columns.values.items() if name != "time"}
+    used = {name: column for name, column in columns.used.items() if name != "time"}
+    return replace(columns, values=values, used=used, notes=(note, *columns.notes))
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
