@@ -10,9 +10,10 @@ from hdcal.data.bad_gears import among, bad_gears, offer
 from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.mountings import run_labels
 from hdcal.data.tables.blocks import Table
-from hdcal.data.tables.columns import REQUIRED, Column, choose_columns
+from hdcal.data.tables.columns import REQUIRED, choose_columns
 from hdcal.data.tables.grid import factorize
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header
+from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.data.value_checks import FEWEST_ROWS, check_values, rows_back_in_time
@@ -181,7 +182,10 @@ def _with_time(columns: Columns, run: Labels) -> Columns:
         remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
         columns.find(back, "time", words, remedy)
         return columns
-    header, rows = columns.used["time"].header, row_list(columns.table.rows[back])
+    header, rows = (
+        columns.used["time"].header,
+        row_list(columns.table.rows[back].tolist()),
+    )
     note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {rows}. If the rig was "
     note += "reset there, label the runs in a column 'run'"
     values = {name: v for name, v in columns.values.items() if name != "time"}
@@ -262,12 +266,11 @@ def find_columns(
     sheet: str | None = None,
 ) -> Columns:
     """Return where the columns stand, without their values, as `read_columns` does."""
-    source = read_source(data, findings, encoding, sheet)
-    table = source.table
+    table, sha256 = read_source(data, findings, encoding, sheet)
     used = choose_columns(table, mapping or {}, quantities, required, findings)
     table, used, left_out = without_slow_channels(table, used, required)
     notes = (*_assumed(table, used), *table.left_out, *left_out)
-    return Columns({}, used, table, source.sha256, findings, notes)
+    return Columns({}, used, table, sha256, findings, notes)
 
 
 def with_values(found: Columns, fewest: int) -> Columns:

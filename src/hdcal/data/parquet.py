@@ -17,8 +17,8 @@ from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.reading import GEAR_NAME, case_of, gear_of
 from hdcal.data.tables.arrow_grid import arrow_grid
 from hdcal.data.tables.blocks import Table
-from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS, parse_header
+from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.parquet_files import parquet_files, parquet_table
 from hdcal.data.tables.values import read_labels, read_values
 from hdcal.data.too_far import beyond_radius, too_far

@@ -5,7 +5,6 @@ a unit is missing, that is asked; nothing is guessed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 from hdcal.data.findings import FileFindings
@@ -18,34 +17,12 @@ from hdcal.data.tables.headers import (
     weight_unit,
 )
 from hdcal.data.tables.label_columns import label_columns
-from hdcal.data.tables.named_columns import named_column
-from hdcal.data.units import Unit
+from hdcal.data.tables.named_columns import Column, named_column
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
 # Beside other columns these are asked for where the user has to choose.
 _SHOWN = 12
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column that is used.
-
-    Attributes:
-        quantity: one of QUANTITIES.
-        header: as written in the file.
-        position: 0 = first column.
-        unit: of its numbers; None for labels.
-        guessed: its header says so in other words than hdcal's own.
-        against: another unit, which its header names itself.
-    """
-
-    quantity: str
-    header: str
-    position: int
-    unit: Unit | None = None
-    guessed: bool = False
-    against: str = ""
 
 
 def choose_columns(
@@ -91,8 +68,7 @@ def choose_columns(
         required = ()
     for quantity in quantities:
         if quantity in mapping:
-            found = named_column(quantity, mapping[quantity], table, findings)
-            column = None if found is None else Column(quantity, *found)
+            column = named_column(quantity, mapping[quantity], table, findings)
         elif quantity in LABELS:
             column = chooser.label(quantity)
         else:
