@@ -60,9 +60,9 @@ class Columns:
                 continue
             alone = self.table.headers.count(column.header) == 1
             name = column.header if alone else str(column.position + 1)
-            said = alone and header.unit == column.unit
+            enough = alone and header.unit == column.unit
             unit = "" if column.unit is None else column.unit.name
-            named[quantity] = name if said or not unit else f"{name}[{unit}]"
+            named[quantity] = name if enough or not unit else f"{name}[{unit}]"
         return named
 
     def find(self, mask: np.ndarray, quantity: str, problem: str, remedy: str) -> None:
@@ -167,7 +167,7 @@ def _measured(found: Columns) -> Measurements:
 def _with_time(columns: Columns, run: Labels) -> Columns:
     """Return columns with a time that never goes back within a run, or without one.
 
-    A time that goes back is refused where the user, or hdcal's own header, names it,
+    A time that goes back is refused where the user names it, or a header `time_UNIT`,
     and not used where its header was guessed.
     """
     if "time" not in columns.values:
@@ -301,7 +301,7 @@ def _assumed(table: Table, used: Mapping[str, Column]) -> Iterator[str]:
             )
     guesses = [column for column in used.values() if column.guessed]
     if guesses:
-        said = ", ".join(
+        meanings = ", ".join(
             f"{quoted(column.header)} is the {column.quantity}"
             + ("" if column.unit is None else f" in {column.unit.name}")
             for column in guesses
@@ -309,7 +309,7 @@ def _assumed(table: Table, used: Mapping[str, Column]) -> Iterator[str]:
         first = guesses[0]
         form = "HEADER" if first.unit is None else "HEADER[UNIT]"
         option = f"--column '{first.quantity}={form}'"
-        yield f"{ASSUMED}{said}. If not, name the column: {option}"
+        yield f"{ASSUMED}{meanings}. If not, name the column: {option}"
 
 
 def labels_of(labels: np.ndarray | None, rows: int) -> Labels:

@@ -2,7 +2,7 @@
 
 Rows with numbers in every counted column are readings. All other rows stand above,
 between and below them: names and units, titles, remarks, summaries, and spoilt
-readings, which are kept so that what is wrong with them is said.
+readings, which are kept so that their bad cells become findings.
 """
 
 from collections.abc import Mapping
@@ -186,8 +186,8 @@ def _summaries(words: list[str]) -> np.ndarray:
     known = {word for word in {*words} if is_summary(word)}
     found = np.zeros(len(words), bool)
     for place in (i for i, word in enumerate(words) if known and word in known):
-        beside = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
-        found[place] = words[place] not in beside
+        neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
+        found[place] = words[place] not in neighbours
     return found
 
 

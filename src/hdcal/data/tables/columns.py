@@ -47,18 +47,7 @@ def choose_columns(
     Raises:
         InputError: there are no headers, and the user names no column by its number.
     """
-    if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
-        words = f"no row of headers names the {len(table.headers)} columns: the first "
-        words += "row holds numbers where the headers should be"
-        remedy = "Say which column is which by its number, as in `columns` "
-        remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
-        findings.refuse(words, remedy, table.header_row)
-    for quantity in mapping:
-        if quantity not in QUANTITIES:
-            near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
-            hint = f"Did you mean {near[0]}? " if near else ""
-            words = f"`columns` {quantity}=… names no quantity that hdcal knows"
-            findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
+    _check_names(table, mapping, findings)
     chooser = _Chooser(table, findings)
     columns: dict[str, Column] = {}
     if "force" in required and "force" not in mapping and chooser.is_torsion():
@@ -77,6 +66,24 @@ def choose_columns(
             columns[quantity] = column
     _refuse_conflicts(columns, table, findings)
     return columns
+
+
+def _check_names(
+    table: Table, mapping: Mapping[str, str], findings: FileFindings
+) -> None:
+    """Refuse a table without headers, and quantities that do not exist."""
+    if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
+        words = f"no row of headers names the {len(table.headers)} columns: the first "
+        words += "row holds numbers where the headers should be"
+        remedy = "Say which column is which by its number, as in `columns` "
+        remedy += "'deformation=1[mm]' and `columns` 'force=2[kN]'"
+        findings.refuse(words, remedy, table.header_row)
+    for quantity in mapping:
+        if quantity not in QUANTITIES:
+            near = get_close_matches(quantity, QUANTITIES, 1, 0.5)
+            hint = f"Did you mean {near[0]}? " if near else ""
+            words = f"`columns` {quantity}=… names no quantity that hdcal knows"
+            findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
 
 
 class _Chooser:

@@ -20,7 +20,7 @@ class Column:
         header: as written in the file.
         position: 0 = first column.
         unit: of its numbers; None for labels.
-        guessed: its header says so in other words than hdcal's own.
+        guessed: its header is not spelt `quantity_unit`.
         against: another unit, which its header names itself.
     """
 
@@ -61,8 +61,8 @@ def named_column(
     if quantity in LABELS:
         return Column(quantity, header, place)
     parsed = parse_header(header)
-    own = parsed.unit or find_unit(header.rpartition("_")[2])
-    unit = own if unit_text is None else find_unit(unit_text)
+    in_header = parsed.unit or find_unit(header.rpartition("_")[2])
+    unit = in_header if unit_text is None else find_unit(unit_text)
     if unit is None or unit.dimension != DIMENSIONS[quantity]:
         text = parsed.unit_text if unit_text is None else unit_text
         words = f"has no unit that is known for {quantity}"
@@ -73,8 +73,8 @@ def named_column(
         findings.add(words, remedy, table.header_row, header)
         return None
     against = ""
-    if own is not None and own.dimension == unit.dimension and own != unit:
-        against = own.name
+    if in_header not in (None, unit) and in_header.dimension == unit.dimension:
+        against = in_header.name
     return Column(quantity, header, place, unit, against=against)
 
 
