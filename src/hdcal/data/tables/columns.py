@@ -186,7 +186,9 @@ class _Chooser:
             words = f"unknown unit {quoted(header.unit_text)} of the {quantity}"
         name = text.removesuffix(f"[{header.unit_text}]").rstrip()
         advice = unit_advice(header.unit_text, quantity)
-        self._add(words, f"Say `columns` '{quantity}={name}[UNIT]'; {advice}", place)
+        weight = weight_unit(header.unit_text) if quantity == "force" else ""
+        option = f"`columns` '{quantity}={name}[{weight or 'UNIT'}]'"
+        self._add(words, f"Say {option}; {advice}", place)
 
     def _refuse_missing(self, quantity: str) -> None:
         """Add that no column holds a quantity, with what might."""
