@@ -152,7 +152,8 @@ class OtherLines:
             rows = row_list([line.row for line in self._remarks])
             yield f"no readings: {rows}, as {quoted(self._remarks[0].first)}"
         if self._other_tables:
-            yield f"a table of other columns is not read: {row_list(self._other_tables)}"
+            rows = row_list(self._other_tables)
+            yield f"a table of other columns is not read: {rows}"
 
     def assumed(self, heading: Heading, headings: int) -> Iterator[str]:
         """Yield what was assumed of the lines.
