@@ -166,6 +166,18 @@ def test_a_column_that_is_not_used_stops_nothing(tmp_path):
     )
 
 
+def test_a_clock_that_is_reset_is_not_used(tmp_path):
+    clock = [*range(9), 0, 1, 2]
+    case = read(tmp_path, "Time [s],Travel [mm],Load [N]\n" + rows(clock, X, F))
+    check(case)
+    assert "time" not in case.records.known and len(case.run_labels) == 1
+    assert "row 11" in case.notes[0]
+    text = "specimen,time_s,Travel [mm],Load [N]\n"
+    text += rows(["A"] * 6 + ["B"] * 6, clock, X, F)
+    (found,) = refused(tmp_path, text)
+    assert "row 11" in found and "'B'" in found
+
+
 def test_specimens_stand_side_by_side(tmp_path):
     ends = [*rows(X, F, X, 2 * F).split()[:8], *rows(X, F).split()[8:]]
     text = "A,,B,\nTravel,Load,Travel,Load\nmm,N,mm,N\n"

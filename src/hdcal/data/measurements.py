@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.bad_gears import among, bad_gears, offer
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.mountings import run_labels
 from hdcal.data.tables.blocks import Table
-from hdcal.data.tables.columns import REQUIRED, Column, choose_columns
+from hdcal.data.tables.columns import REQUIRED, choose_columns
 from hdcal.data.tables.grid import factorize
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header
+from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
-from hdcal.data.value_checks import FEWEST_ROWS, check_time, check_values
+from hdcal.data.value_checks import FEWEST_ROWS, check_values, rows_back_in_time
 from hdcal.errors import Finding, InputError, quoted
 
 # Quantities of a spring under a force.
@@ -59,9 +60,9 @@ class Columns:
                 continue
             alone = self.table.headers.count(column.header) == 1
             name = column.header if alone else str(column.position + 1)
-            said = alone and header.unit == column.unit
+            enough = alone and header.unit == column.unit
             unit = "" if column.unit is None else column.unit.name
-            named[quantity] = name if said or not unit else f"{name}[{unit}]"
+            named[quantity] = name if enough or not unit else f"{name}[{unit}]"
         return named
 
     def find(self, mask: np.ndarray, quantity: str, problem: str, remedy: str) -> None:
@@ -160,8 +161,36 @@ def _measured(found: Columns) -> Measurements:
     rows = len(columns.table.rows)
     specimen = labels_of(columns.values.get("specimen"), rows)
     run = runs_of(run_labels(columns.values, specimen.index), specimen, rows)
-    check_time(columns, run.index)
-    return Measurements(columns, run, specimen)
+    return Measurements(_with_time(columns, run), run, specimen)
+
+
+def _with_time(columns: Columns, run: Labels) -> Columns:
+    """Return columns with a time that never goes back within a run, or without one.
+
+    A time that goes back is refused where the user names it, or a header `time_UNIT`,
+    and not used where its header was guessed.
+    """
+    if "time" not in columns.values:
+        return columns
+    back = rows_back_in_time(columns.values["time"], run.index)
+    if not back.any():
+        return columns
+    label = quoted(run.names[run.index[int(np.argmax(back))]])
+    within = f"run {label}" if len(run.names) > 1 else "a run"
+    words = f"the time goes back within {within}"
+    if not columns.used["time"].guessed:
+        remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
+        columns.find(back, "time", words, remedy)
+        return columns
+    header, rows = (
+        columns.used["time"].header,
+        row_list(columns.table.rows[back].tolist()),
+    )
+    note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {rows}. If the rig was "
+    note += "reset there, label the runs in a column 'run'"
+    values = {name: v for name, v in columns.values.items() if name != "time"}
+    used = {name: column for name, column in columns.used.items() if name != "time"}
+    return replace(columns, values=values, used=used, notes=(note, *columns.notes))
 
 
 def of_specimen(measured: Measurements, label: str) -> Measurements:
@@ -237,12 +266,11 @@ def find_columns(
     sheet: str | None = None,
 ) -> Columns:
     """Return where the columns stand, without their values, as `read_columns` does."""
-    source = read_source(data, findings, encoding, sheet)
-    table = source.table
+    table, sha256 = read_source(data, findings, encoding, sheet)
     used = choose_columns(table, mapping or {}, quantities, required, findings)
     table, used, left_out = without_slow_channels(table, used, required)
     notes = (*_assumed(table, used), *table.left_out, *left_out)
-    return Columns({}, used, table, source.sha256, findings, notes)
+    return Columns({}, used, table, sha256, findings, notes)
 
 
 def with_values(found: Columns, fewest: int) -> Columns:
@@ -273,7 +301,7 @@ def _assumed(table: Table, used: Mapping[str, Column]) -> Iterator[str]:
             )
     guesses = [column for column in used.values() if column.guessed]
     if guesses:
-        said = ", ".join(
+        meanings = ", ".join(
             f"{quoted(column.header)} is the {column.quantity}"
             + ("" if column.unit is None else f" in {column.unit.name}")
             for column in guesses
@@ -281,7 +309,7 @@ def _assumed(table: Table, used: Mapping[str, Column]) -> Iterator[str]:
         first = guesses[0]
         form = "HEADER" if first.unit is None else "HEADER[UNIT]"
         option = f"--column '{first.quantity}={form}'"
-        yield f"{ASSUMED}{said}. If not, name the column: {option}"
+        yield f"{ASSUMED}{meanings}. If not, name the column: {option}"
 
 
 def labels_of(labels: np.ndarray | None, rows: int) -> Labels:

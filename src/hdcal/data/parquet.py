@@ -17,8 +17,8 @@ from hdcal.data.measurements import Measurements, read_measurements
 from hdcal.data.reading import GEAR_NAME, case_of, gear_of
 from hdcal.data.tables.arrow_grid import arrow_grid
 from hdcal.data.tables.blocks import Table
-from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS, parse_header
+from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.parquet_files import parquet_files, parquet_table
 from hdcal.data.tables.values import read_labels, read_values
 from hdcal.data.too_far import beyond_radius, too_far
@@ -110,7 +110,7 @@ def read_parquet(
     gear = beside if gear is None and beside.exists() else gear
     with FileFindings(str(path)) as findings:
         dataset = parquet_table(files, root, findings)
-        found, told = gear_of(gear, None, False, (theory, None, reading))
+        found, notes = gear_of(gear, None, False, (theory, None, reading))
         named = dict(found.source.get("columns", {})) | dict(columns or {})
         frame = _first_rows(dataset, findings)
 
@@ -129,14 +129,14 @@ def read_parquet(
         if "specimen" not in used:
             remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
             findings.refuse("no column says which gear a row is of", remedy)
-    # Lots, operators, rigs and dates are told of all rows.
+    # Lots, operators, rigs and dates come from all rows later.
     columns_of_case = measured.columns.values.items()
     values = {name: v for name, v in columns_of_case if name not in GROUPINGS}
     if measured.mounted:
         values["run"] = np.array(measured.run.names, object)[measured.run.index]
     measured = replace(measured, columns=replace(measured.columns, values=values))
     name = path.resolve().name if root else path.stem
-    case = replace(case_of(measured, found, told, name), left_out=measured.left_out)
+    case = replace(case_of(measured, found, notes, name), left_out=measured.left_out)
     used = {quantity: used[quantity] for quantity in _USED if quantity in used}
     return Parquet(name, case, _sha256(files), files, root, used)
 
@@ -230,11 +230,10 @@ def _rows_of_others(
         frame: indexed by their places there.
         columns: quantity -> header, as the user or the gear file names them.
     """
-    said = columns.get("specimen")
     headers = [str(name) for name in frame]
-    whose = [said] if said in headers else []
-    whose = whose or [h for h in headers if parse_header(h).quantity == "specimen"]
-    gears = frame[whose[0]].unique() if len(whose) == 1 else ()
+    labels = [name for name in headers if name == columns.get("specimen")]
+    labels = labels or [h for h in headers if parse_header(h).quantity == "specimen"]
+    gears = frame[labels[0]].unique() if len(labels) == 1 else ()
     if len(gears) != 1:
         return frame.iloc[:0]
     found, at = [frame.iloc[:0]], 0
@@ -242,7 +241,7 @@ def _rows_of_others(
         rows = batch.to_pandas()
         rows.index += at
         at += len(rows)
-        found.append(rows[rows[whose[0]] != gears[0]])
+        found.append(rows[rows[labels[0]] != gears[0]])
         if sum(map(len, found)) >= _SHOWN:
             break
     return pd.concat(found).iloc[:_SHOWN]
@@ -253,7 +252,7 @@ def _placed(
     frame: pd.DataFrame,
     read: Callable[[pd.DataFrame], Measurements],
 ) -> Measurements:
-    """Return what is read of the first rows; what is wrong is told by file and row.
+    """Return what is read of the first rows; findings name file and row.
 
     Args:
         dataset: the files.
@@ -266,7 +265,7 @@ def _placed(
     ends = np.cumsum([one.count_rows() for one in dataset.get_fragments()])
     names = [str(one.path) for one in dataset.get_fragments()]
 
-    def told(wrong: Finding) -> Finding:
+    def located(wrong: Finding) -> Finding:
         if wrong.row is None:
             return wrong
         # Below a line of headers.
@@ -278,8 +277,8 @@ def _placed(
     try:
         measured = read(frame)
     except InputError as error:
-        raise InputError(map(told, error.findings)) from None
-    left_out = {gear: told(wrong) for gear, wrong in measured.left_out.items()}
+        raise InputError(map(located, error.findings)) from None
+    left_out = {gear: located(wrong) for gear, wrong in measured.left_out.items()}
     return replace(measured, left_out=left_out)
 
 

@@ -55,23 +55,18 @@ def wild_rows(
         yield row, known.problem(), "Check the number and its unit"
 
 
-def check_time(columns: "Columns", run: np.ndarray) -> None:
-    """Find each row whose time is before that of its run's last row.
+def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Tell which rows have a time before that of their run's last row, shape (n,).
 
     Args:
-        columns: that are checked; each finding is added to theirs.
+        time: of each row, shape (n,); NaN where it is wrong.
         run: index of the mounting, shape (n,).
     """
-    if "time" not in columns.values:
-        return
-    time = columns.values["time"]
     order = np.flatnonzero(np.isfinite(time))
     order = order[np.argsort(run[order], kind="stable")]
     # A wild number may overflow here; it has a finding of its own.
     with np.errstate(over="ignore"):
         back = (np.diff(time[order]) < 0) & (np.diff(run[order]) == 0)
-    mask = np.zeros(len(time), bool)
-    mask[order[1:][back]] = True
-    words = "the time goes back within a run"
-    remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
-    columns.find(mask, "time", words, remedy)
+    found = np.zeros(len(time), bool)
+    found[order[1:][back]] = True
+    return found

@@ -65,7 +65,7 @@ def gear_sizes(source: Any, case: Case) -> GearSizes:
         if case.gear.theory == SPRING:
             words = "its sizes say nothing of the stiffness, as no gear file has sizes"
             findings.refuse(words, "Name one, as `gear` FILE.toml")
-        table = read_source(source, findings).table
+        table, _ = read_source(source, findings)
     sizes, labels = _read(table, case, findings)
     bad = bad_gears(findings, table.rows, np.arange(len(labels)), labels)
     if findings:

@@ -12,8 +12,8 @@ from hdcal.data.measurements import Labels
 from hdcal.data.mountings import TELLING, run_labels
 from hdcal.data.parquet import Batch, Parquet, read_batches
 from hdcal.data.reading_notes import mountings_note
-from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS
+from hdcal.data.tables.named_columns import Column
 from hdcal.errors import Finding
 from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.groups import read_by

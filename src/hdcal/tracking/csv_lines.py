@@ -6,9 +6,10 @@ import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.cells import CellError, read_number
-from hdcal.data.tables.columns import Column, choose_columns
+from hdcal.data.tables.columns import choose_columns
 from hdcal.data.tables.grid import split_line
 from hdcal.data.tables.headers import LABELS
+from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text_grid import text_grid
 from hdcal.errors import InputError

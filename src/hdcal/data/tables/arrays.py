@@ -132,7 +132,7 @@ def _not_taken(held: Mapping[str, Any], taken: Mapping[str, Any]) -> Iterator[st
 
 
 def _arrays(held: Any, name: str = "") -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the arrays of numbers in variables and structures, by their own names."""
+    """Yield the arrays of numbers in variables and structures, by name."""
     if isinstance(held, dict):
         for key, value in held.items():
             if not key.startswith("__"):

@@ -2,7 +2,7 @@
 
 Rows with numbers in every counted column are readings. All other rows stand above,
 between and below them: names and units, titles, remarks, summaries, and spoilt
-readings, which are kept so that what is wrong with them is said.
+readings, which are kept so that their bad cells become findings.
 """
 
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hdcal.data.findings import FileFindings
+from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.tables.cells import is_number
 from hdcal.data.tables.grid import ArrayGrid, Grid, Line
 from hdcal.data.tables.headings import Heading, find_heading
@@ -103,7 +103,7 @@ def find_table(grid: Grid, findings: FileFindings) -> tuple[Table, tuple[str, ..
         body, clean = grid, grid.rows >= first
         clean[clean] = _are_readings(grid.take(clean), counted)
     readings = body.take(clean | np.isin(body.rows, others.spoilt))
-    table = _joined(readings, headings, empty, others)
+    table = _joined(readings, headings, empty, others, findings)
     table = replace(
         table,
         filled=len(readings.rows) + others.add_findings(),
@@ -186,8 +186,8 @@ def _summaries(words: list[str]) -> np.ndarray:
     known = {word for word in {*words} if is_summary(word)}
     found = np.zeros(len(words), bool)
     for place in (i for i, word in enumerate(words) if known and word in known):
-        beside = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
-        found[place] = words[place] not in beside
+        neighbours = words[max(place - 1, 0) : place] + words[place + 1 : place + 2]
+        found[place] = words[place] not in neighbours
     return found
 
 
@@ -208,18 +208,32 @@ def _groups(
 
 
 def _joined(
-    grid: Grid, headings: list[Heading], empty: frozenset[int], others: OtherLines
+    grid: Grid,
+    headings: list[Heading],
+    empty: frozenset[int],
+    others: OtherLines,
+    findings: FileFindings,
 ) -> Table:
     """Return the readings of all blocks under the headings of the first one."""
     main = headings[0]
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
-    for place, heading in enumerate(headings):
-        order = _order(heading, main)
-        if order is None:
-            others.refuse_block(heading.row)
-        elif order != [*range(grid.width)]:
-            grid = _reordered(grid, block == place, order)
-            others.notes.append(f"other order of columns below row {heading.row}")
+    orders = [_order(heading, main) for heading in headings]
+    foreign = [h.row for h, order in zip(headings, orders, strict=True) if not order]
+    words = "the columns are others than those of the first block"
+    remedy = "Name them alike, or split the file"
+    findings.add_rows((row, words, remedy) for row in foreign)
+    moved = {
+        place: order
+        for place, order in enumerate(orders)
+        if order and order != [*range(grid.width)]
+    }
+    left_out = [*others.left_out()]
+    if moved:
+        grid = _reordered(grid, block, moved)
+        rows = row_list([headings[place].row for place in moved])
+        left_out.append(
+            f"the columns stand in another order below the headers of {rows}"
+        )
     runs = np.unique(block, return_inverse=True)[1]
     return Table(
         headers=main.names,
@@ -231,7 +245,7 @@ def _joined(
         unit_row=main.unit_row,
         empty=empty,
         notes=(*others.assumed(main, len(headings)),),
-        left_out=tuple(others.notes),
+        left_out=tuple(left_out),
         runs=runs if runs.any() else None,
     )
 
@@ -246,13 +260,21 @@ def _order(heading: Heading, main: Heading) -> list[int] | None:
     return [heading.names.index(name) for name in main.names]
 
 
-def _reordered(grid: Grid, rows: np.ndarray, order: list[int]) -> Grid:
-    """Return a grid with columns of some rows, a mask of shape (n,), in other order."""
+def _reordered(grid: Grid, block: np.ndarray, orders: dict[int, list[int]]) -> Grid:
+    """Return a grid with the columns of some blocks in other order.
+
+    Args:
+        grid: the readings of all blocks.
+        block: of each row, rising, shape (n,).
+        orders: where the columns stand in a block, by its number.
+    """
     found = grid.read(range(grid.width))
+    spans = {place: np.searchsorted(block, [place, place + 1]) for place in orders}
 
     def load(place: int) -> np.ndarray:
         column = found[place].astype(object)
-        column[rows] = found[order[place]][rows]
+        for number, (begin, end) in spans.items():
+            column[begin:end] = found[orders[number][place]][begin:end]
         return column
 
     return ArrayGrid(grid.rows, grid.width, [], load)

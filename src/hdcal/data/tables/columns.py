@@ -5,7 +5,6 @@ a unit is missing, that is asked; nothing is guessed.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 from hdcal.data.findings import FileFindings
@@ -18,34 +17,12 @@ from hdcal.data.tables.headers import (
     weight_unit,
 )
 from hdcal.data.tables.label_columns import label_columns
-from hdcal.data.tables.named_columns import named_column
-from hdcal.data.units import Unit
+from hdcal.data.tables.named_columns import Column, named_column
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
 # Beside other columns these are asked for where the user has to choose.
 _SHOWN = 12
-
-
-@dataclass(frozen=True)
-class Column:
-    """One column that is used.
-
-    Attributes:
-        quantity: one of QUANTITIES.
-        header: as written in the file.
-        position: 0 = first column.
-        unit: of its numbers; None for labels.
-        guessed: its header says so in other words than hdcal's own.
-        against: another unit, which its header names itself.
-    """
-
-    quantity: str
-    header: str
-    position: int
-    unit: Unit | None = None
-    guessed: bool = False
-    against: str = ""
 
 
 def choose_columns(
@@ -70,6 +47,31 @@ def choose_columns(
     Raises:
         InputError: there are no headers, and the user names no column by its number.
     """
+    _check_names(table, mapping, findings)
+    chooser = _Chooser(table, findings)
+    columns: dict[str, Column] = {}
+    if "force" in required and "force" not in mapping and chooser.is_torsion():
+        words = "holds torques and no forces: a torsional spring is not calibrated yet"
+        remedy = "Convert with a lever arm: a force is torque / arm, a deformation "
+        findings.add(words, f"{remedy}angle * arm", table.header_row)
+        required = ()
+    for quantity in quantities:
+        if quantity in mapping:
+            column = named_column(quantity, mapping[quantity], table, findings)
+        elif quantity in LABELS:
+            column = chooser.label(quantity)
+        else:
+            column = chooser.measured(quantity, needed=quantity in required)
+        if column is not None:
+            columns[quantity] = column
+    _refuse_conflicts(columns, table, findings)
+    return columns
+
+
+def _check_names(
+    table: Table, mapping: Mapping[str, str], findings: FileFindings
+) -> None:
+    """Refuse a table without headers, and quantities that do not exist."""
     if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
         words = f"no row of headers names the {len(table.headers)} columns: the first "
         words += "row holds numbers where the headers should be"
@@ -82,25 +84,6 @@ def choose_columns(
             hint = f"Did you mean {near[0]}? " if near else ""
             words = f"`columns` {quantity}=… names no quantity that hdcal knows"
             findings.add(words, f"{hint}Known are: {', '.join(QUANTITIES)}")
-    chooser = _Chooser(table, findings)
-    columns: dict[str, Column] = {}
-    if "force" in required and "force" not in mapping and chooser.is_torsion():
-        words = "holds torques and no forces: a torsional spring is not calibrated yet"
-        remedy = "Convert with a lever arm: a force is torque / arm, a deformation "
-        findings.add(words, f"{remedy}angle * arm", table.header_row)
-        required = ()
-    for quantity in quantities:
-        if quantity in mapping:
-            found = named_column(quantity, mapping[quantity], table, findings)
-            column = None if found is None else Column(quantity, *found)
-        elif quantity in LABELS:
-            column = chooser.label(quantity)
-        else:
-            column = chooser.measured(quantity, needed=quantity in required)
-        if column is not None:
-            columns[quantity] = column
-    _refuse_conflicts(columns, table, findings)
-    return columns
 
 
 class _Chooser:
@@ -203,7 +186,9 @@ class _Chooser:
             words = f"unknown unit {quoted(header.unit_text)} of the {quantity}"
         name = text.removesuffix(f"[{header.unit_text}]").rstrip()
         advice = unit_advice(header.unit_text, quantity)
-        self._add(words, f"Say `columns` '{quantity}={name}[UNIT]'; {advice}", place)
+        weight = weight_unit(header.unit_text) if quantity == "force" else ""
+        option = f"`columns` '{quantity}={name}[{weight or 'UNIT'}]'"
+        self._add(words, f"Say {option}; {advice}", place)
 
     def _refuse_missing(self, quantity: str) -> None:
         """Add that no column holds a quantity, with what might."""

@@ -135,17 +135,17 @@ def _bare_names(line: Line, lines: list[Line], width: int) -> list[str]:
 def _with_unit(name: str, unit: str) -> str:
     """Return a header with its unit, where it names none itself."""
     header = parse_header(name)
-    said = header.unit is not None and bool(header.quantity)
-    return f"{name} [{unit}]".strip() if unit and not said else name
+    known = header.unit is not None and bool(header.quantity)
+    return f"{name} [{unit}]".strip() if unit and not known else name
 
 
 def _conflicts(names: Sequence[str], units: Sequence[str]) -> dict[int, str]:
-    """Return the units beside headers that name other ones, by position."""
+    """Return the units of the row of units that differ from headers, by position."""
     found = {}
     for place, (name, unit) in enumerate(zip(names, units, strict=True)):
         header, other = parse_header(name), find_unit(unit)
-        said = header.unit if header.quantity else None
-        if said is not None and unit and other != said:
+        named = header.unit if header.quantity else None
+        if named is not None and unit and other != named:
             found[place] = unit
     return found
 

@@ -23,9 +23,9 @@ def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> Table:
     """
     first, tables = next(iter(grids)), {}
     for name, grid in grids.items():
-        own = FileFindings(f"{findings.file}, sheet {quoted(name)}")
-        table = table_of(grid, own)
-        findings += own
+        problems = FileFindings(f"{findings.file}, sheet {quoted(name)}")
+        table = table_of(grid, problems)
+        findings += problems
         if not table.named:
             findings.refuse(f"sheet {quoted(name)} has no row of headers", "Add one")
         if "specimen" in table.headers:

@@ -1,5 +1,6 @@
 """Columns that the user named, as 'Load [kN]', 'Load[kN]' or '2[kN]'."""
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 
 from hdcal.data.findings import FileFindings
@@ -8,13 +9,32 @@ from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header, unit_adv
 from hdcal.data.units import Unit, find_unit
 
 _SHOWN = 20
-# Header, position, unit, whether it is guessed, and the unit that the header names.
-_Named = tuple[str, int, Unit | None, bool, str]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column that is used.
+
+    Attributes:
+        quantity: one of QUANTITIES.
+        header: as written in the file.
+        position: 0 = first column.
+        unit: of its numbers; None for labels.
+        guessed: its header is not spelt `quantity_unit`.
+        against: another unit, which its header names itself.
+    """
+
+    quantity: str
+    header: str
+    position: int
+    unit: Unit | None = None
+    guessed: bool = False
+    against: str = ""
 
 
 def named_column(
     quantity: str, wanted: str, table: Table, findings: FileFindings
-) -> _Named | None:
+) -> Column | None:
     """Return the column that a user named, or None after a finding.
 
     Args:
@@ -39,10 +59,10 @@ def named_column(
     (place,) = places
     header = table.headers[place]
     if quantity in LABELS:
-        return header, place, None, False, ""
+        return Column(quantity, header, place)
     parsed = parse_header(header)
-    own = parsed.unit or find_unit(header.rpartition("_")[2])
-    unit = own if unit_text is None else find_unit(unit_text)
+    in_header = parsed.unit or find_unit(header.rpartition("_")[2])
+    unit = in_header if unit_text is None else find_unit(unit_text)
     if unit is None or unit.dimension != DIMENSIONS[quantity]:
         text = parsed.unit_text if unit_text is None else unit_text
         words = f"has no unit that is known for {quantity}"
@@ -52,8 +72,10 @@ def named_column(
         remedy = f"Write {option}'{name}[UNIT]'; {advice}"
         findings.add(words, remedy, table.header_row, header)
         return None
-    conflict = own is not None and own.dimension == unit.dimension and own != unit
-    return header, place, unit, False, own.name if conflict and own else ""
+    against = ""
+    if in_header not in (None, unit) and in_header.dimension == unit.dimension:
+        against = in_header.name
+    return Column(quantity, header, place, unit, against=against)
 
 
 def _places(wanted: str, name: str, table: Table) -> list[int]:

@@ -44,7 +44,6 @@ class OtherLines:
         above: number of lines above the headings.
         titles: number of lines above later headings.
         footers: number of lines below the readings.
-        notes: on other lines that are passed over.
     """
 
     def __init__(self, width: int, counted: list[int], findings: FileFindings):
@@ -52,7 +51,8 @@ class OtherLines:
         self.spoilt: list[int] = []
         self._wrong: list[tuple[int, str, str]] = []
         self.repeated = self.above = self.titles = self.footers = 0
-        self.notes: list[str] = []
+        self._remarks: list[Line] = []
+        self._other_tables: list[int] = []
 
     def sort_above(self, lines: list[Line], heading: Heading | None) -> list[Heading]:
         """Sort the lines above the first reading, and return the first heading.
@@ -102,11 +102,15 @@ class OtherLines:
                 self.titles += titled
                 self.footers += below
                 if not (titled or below):
-                    self.notes.append(f"row {line.row} is no reading: {line.first}")
+                    self._remarks.append(line)
             else:
                 self.refuse_line(line, top=top)
             words = words if line.counts else len(line.cells)
-        self._pass_over(others)
+        if len(others) >= _FEWEST:
+            words = "a second table with other columns begins here"
+            self._wrong.append((others[0].row, words, "Split the file: one table each"))
+        elif others:
+            self._other_tables += [line.row for line in others]
 
     def _is_spoilt(self, line: Line, *, titled: bool) -> bool:
         """Tell whether a line is a reading, though one with a bad cell."""
@@ -142,19 +146,14 @@ class OtherLines:
         self._findings.add_rows(self._wrong)
         return len(self._wrong)
 
-    def refuse_block(self, row: int) -> None:
-        """Add that a block has other columns than the first one."""
-        words = "the columns are others than those of the first block"
-        self._findings.add(words, "Name them alike, or split the file", row)
-
-    def _pass_over(self, lines: list[Line]) -> None:
-        """Note a few rows of another table; refuse many."""
-        rows = [line.row for line in lines]
-        if len(rows) >= _FEWEST:
-            words = "a second table with other columns begins here"
-            self._findings.add(words, "Split the file: one table each", rows[0])
-        elif rows:
-            self.notes.append(f"a table of other columns is not read: {row_list(rows)}")
+    def left_out(self) -> Iterator[str]:
+        """Yield what is passed over."""
+        if self._remarks:
+            rows = row_list([line.row for line in self._remarks])
+            yield f"no readings: {rows}, as {quoted(self._remarks[0].first)}"
+        if self._other_tables:
+            rows = row_list(self._other_tables)
+            yield f"a table of other columns is not read: {rows}"
 
     def assumed(self, heading: Heading, headings: int) -> Iterator[str]:
         """Yield what was assumed of the lines.

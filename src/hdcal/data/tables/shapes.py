@@ -1,4 +1,4 @@
-"""Tables in other shapes: units in columns of their own, specimens side by side."""
+"""Tables in other shapes: units in columns or cells, specimens side by side."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ def table_of(grid: Grid, findings: FileFindings) -> Table:
 
 
 def with_unit_columns(table: Table, findings: FileFindings) -> Table:
-    """Return a table whose headers have the units that stand in columns beside them.
+    """Return a table whose headers have the units from columns behind them.
 
     Args:
         table: the readings.
@@ -40,7 +40,9 @@ def with_unit_columns(table: Table, findings: FileFindings) -> Table:
         name = headers[place - 1]
         if len(units) == 1 and find_unit(units[0]):
             headers[place - 1] = f"{name} [{units[0]}]"
-            notes.append(f"the unit of {quoted(name)} stands beside it: {units[0]}")
+            notes.append(
+                f"the unit of {quoted(name)} stands in the column behind it: {units[0]}"
+            )
         elif len(units) > 1 and any(map(find_unit, units)):
             several = " and ".join(map(quoted, units[:3]))
             words = f"the unit of {quoted(name)} changes: {several}"
@@ -68,8 +70,8 @@ def with_unit_cells(table: Table, findings: FileFindings) -> Table:
         if len(units) == 1 and not known:
             headers[place] = f"{name} [{units[0]}]"
         elif units and header.quantity:
-            said = [known] if known else []
-            several = " and ".join(map(quoted, [*said, *units[:3]]))
+            several = [known, *units[:3]] if known else units[:3]
+            several = " and ".join(map(quoted, several))
             words = f"the unit of {quoted(name)} changes: {several}"
             findings.add(words, "Convert the readings to one unit", table.header_row)
     return replace(table, headers=tuple(headers))

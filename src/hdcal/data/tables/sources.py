@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,19 +23,6 @@ _KINDS = {_WORKBOOK: "a workbook", _OLD_WORKBOOK: "an old workbook (.xls)"}
 _KINDS |= {PARQUET: "a Parquet file", _MATLAB: "a .mat file", _HDF5: "an HDF5 file"}
 
 
-@dataclass(frozen=True)
-class Source:
-    """A table with the hash of what it was read from.
-
-    Attributes:
-        table: the readings.
-        sha256: of the bytes of the file, or of the cells of a table in memory.
-    """
-
-    table: Table
-    sha256: str
-
-
 def is_frame(data: Any) -> bool:
     """Tell whether this is a table in memory: a data frame, or arrays by name."""
     return isinstance(data, Mapping) or any(
@@ -53,8 +40,8 @@ def read_source(
     findings: FileFindings,
     encoding: str | None = None,
     sheet: str | None = None,
-) -> Source:
-    """Return the table of a file, or of a table in memory.
+) -> tuple[Table, str]:
+    """Return the table of a file, or of a table in memory, and the hash of its source.
 
     Args:
         data: a path, a DataFrame, or arrays by name.
@@ -68,12 +55,12 @@ def read_source(
     """
     if is_frame(data):
         grid, sha256 = frame_grid(data, findings)
-        return Source(table_of(grid, findings), sha256)
+        return table_of(grid, findings), sha256
     path = Path(data)
     if (why := why_not_readable(path, LARGEST_FILE)) is not None:
         findings.refuse(*why)
     try:
-        table, sha256 = _file_table(path, findings, encoding, sheet)
+        return _file_table(path, findings, encoding, sheet)
     except FileNotFoundError:
         findings.refuse("does not exist", "Check the name and the folder")
     except PermissionError:
@@ -81,7 +68,6 @@ def read_source(
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         findings.refuse(f"cannot be read ({reason})", "Check the name and the disk")
-    return Source(table, sha256)
 
 
 def text_of(path: Path, sheet: str | None = None) -> bytes:
@@ -94,7 +80,7 @@ def text_of(path: Path, sheet: str | None = None) -> bytes:
     if not _kind(path):
         return path.read_bytes()
     with FileFindings(str(path)) as findings:
-        table = read_source(path, findings, sheet=sheet).table
+        table, _ = read_source(path, findings, sheet=sheet)
     columns = [table.grid.texts(place) for place in range(len(table.headers))]
     headers = [*table.headers] if table.named else None
     if table.runs is not None and "run" not in table.headers:

@@ -87,9 +87,9 @@ def _dialect(lines: list[str]) -> tuple[str, int]:
         shares = [*filter(None, (_numbers(line, separator) for line in sample))]
         if not shares or (separator == " " and len(shares) < _FEWEST):
             continue
-        width, lines = Counter(cells for cells, _ in shares).most_common(1)[0]
-        if lines > most:
-            most, found = lines, (separator, width)
+        width, count = Counter(cells for cells, _ in shares).most_common(1)[0]
+        if count > most:
+            most, found = count, (separator, width)
     return found
 
 

@@ -15,8 +15,8 @@ from hdcal.data.tables.cells import (
     read_numbers,
     thousands,
 )
-from hdcal.data.tables.columns import Column
 from hdcal.data.tables.headers import GROUPINGS, LABELS
+from hdcal.data.tables.named_columns import Column
 from hdcal.errors import quoted
 
 # Share of cells from which on a column is no slow channel.
