@@ -11,8 +11,8 @@ def straight_range(case: Case) -> str | None:
     """Return the working range of the longest straight part, where it is another one.
 
     None where least squares through all readings has that stiffness within a tenth,
-    where a range was chosen, and of repeated cycles and several runs, whose stiffness is
-    that of all their branches.
+    where a range was chosen, and of repeated cycles and several runs, whose stiffness
+    is that of all their branches.
 
     Args:
         case: records with their screening.
