@@ -12,6 +12,7 @@ import pytest
 from rigs import cycles, draw_truth, make_case, make_gear, posterior_draws, simulate
 from scipy import stats
 from slices import slice_of
+from structures import form_of
 
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors
@@ -49,7 +50,8 @@ def _quantities(values: dict) -> dict:
 def run_sbc(model: str, count: int):
     """Return ranks by quantity, draws by quantity, and hits of the force bands."""
     case, effects = _setting(model)
-    template = build_problem(case, effect_priors(), effects)
+    form = form_of(case, effects)
+    template = build_problem(case, effect_priors(), effects, structure=form)
     ranks, hits = [], []
     for index in range(count):
         key = jax.random.key(1000 + index)
@@ -57,7 +59,7 @@ def run_sbc(model: str, count: int):
         truth = draw_truth(template, of_truth)
         data = simulate(template, case, truth, of_data)
         problem, draws = posterior_draws(
-            data, effects, index, chains=2, warmup=300, draws=400
+            data, effects, index, form, chains=2, warmup=300, draws=400
         )
         every = len(draws["K"]) // RANKED
         thin = {n: v[::every][:RANKED] for n, v in draws.items()}

@@ -19,6 +19,7 @@ from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
 from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.inference.structure import Structure
 from hdcal.inference.values import build_effects, member_base, with_rounding
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
@@ -163,8 +164,10 @@ def simulate(problem, case: Case, truth: dict, key) -> Case:
     return replace(case, records=replace(case.records, force=force))
 
 
-def posterior_draws(case: Case, effects, seed: int, **settings) -> tuple:
+def posterior_draws(
+    case: Case, effects, seed: int, structure: Structure | None = None, **settings
+) -> tuple:
     """Fit a case; return its problem and draws, chains joined."""
-    problem = build_problem(case, effect_priors(), effects)
+    problem = build_problem(case, effect_priors(), effects, structure=structure)
     draws = sample(problem, laplace.fit(problem), seed, **settings)
     return problem, {n: v.reshape(-1, *v.shape[2:]) for n, v in draws.values.items()}
