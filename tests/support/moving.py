@@ -1,16 +1,18 @@
 """Make-believe vibration tests: a gear that was released, and the truth about it."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from rigs import make_case, make_gear, make_records
+from structures import form_of
 
 from hdcal import EFFECTS, Posterior
 from hdcal.data.priors import dynamic_priors, effect_priors
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import Diagnosis
+from hdcal.inference.posterior import STRUCTURE
 from hdcal.inference.posterior_tree import data_groups, dataset
 from hdcal.inference.problem import problem_priors, unit_stiffness
 from hdcal.physics.frictional_response import frictional_response
@@ -129,6 +131,7 @@ def still_posterior(
     check = Check("chains agree (R-hat)", "passed" if usable else "failed", "by hand")
     settings = {
         "with_gap": gap is not None,
+        STRUCTURE: asdict(form_of(case, chosen, gap is not None)),
         "seed": 0,
         "chains": 2,
         "warmup": 1,

@@ -1,15 +1,18 @@
 """Effects are followed by weighted draws, or refused with the reason."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 import xarray as xr
 from rigs import BASE, make_case, program, ramp
 from scipy import stats
+from structures import form_of
 
 from hdcal.data.priors import effect_priors
 from hdcal.errors import InputError
 from hdcal.inference.distributions import frozen
-from hdcal.inference.posterior import Posterior
+from hdcal.inference.posterior import STRUCTURE, Posterior
 from hdcal.inference.posterior_tree import dataset
 from hdcal.inference.problem import build_problem, problem_priors
 from hdcal.physics.registry import EFFECTS
@@ -41,7 +44,7 @@ def handmade(names, **spread) -> Posterior:
         draws[name.replace("__", ".")] = middle + sd * rng.normal(size=DRAWS)
     draws["stiffness"] = draws["K"] * draws["E0"] * float(problem.unit_stiffness)
     drawn = dataset({name: values[None] for name, values in draws.items()})
-    settings = {"with_gap": False}
+    settings = {"with_gap": False, STRUCTURE: asdict(form_of(case, effects))}
     tree = xr.DataTree.from_dict({"posterior": drawn})
     return Posterior(case, "ring", effects, priors, tree, {}, (), settings)
 
