@@ -130,7 +130,7 @@ def _gibbs(target, columns, groups, noise_sd: float, floor: float, rng):
         # By QR: the sum of both squares would lose the smaller one where readings are
         # nearly interpolated.
         stacked = np.vstack([rows / np.sqrt(variance), np.diag(scale[groups] ** -0.5)])
-        upper = np.linalg.qr(stacked, mode="r")
+        upper = np.asarray(np.linalg.qr(stacked, mode="r"))
         upper *= np.sign(np.diag(upper))[:, None]
         centre = np.linalg.solve(upper.T, product / variance)
         weights = np.linalg.solve(upper, centre + rng.normal(size=len(centre)))

@@ -28,7 +28,7 @@ def distribution(prior: Prior, name: str = "") -> "dist.Distribution":
     """
     import numpyro.distributions as dist
 
-    first, second = (*prior.numbers, None)[:2]
+    first, second = (*prior.numbers, math.nan)[:2]
     match prior.family:
         case "normal" if name in POSITIVE:
             return dist.TruncatedNormal(first, second, low=0.0)
