@@ -13,6 +13,7 @@ from scipy.special import ndtri
 
 from hdcal.data.case import Case
 from hdcal.data.loading import loading_side
+from hdcal.data.prior import Prior
 from hdcal.data.records import Records
 from hdcal.diagnosis.contrasts import Contrast, contrasts
 from hdcal.diagnosis.gap import Seen
@@ -33,6 +34,9 @@ from hdcal.report.words import newton
 _MATERIAL = 1e-3
 # Prior sd of the loss of modulus [1/K] that no stated material has.
 _ANY_MATERIAL = 1e-3
+# Correlation of neighbouring readings where the gear file states none: most rigs read
+# independently, loggers with filters do not.
+_CORRELATION = Prior("beta", (0.5, 1.5))
 # Swing of a column, of sizes about one, that rounding alone gives.
 _NOTHING = 1e-9
 
@@ -53,7 +57,9 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     every = list(contrasts(turned, case, both=side == 0, own=own))
     tried = {str(i): c for i, c in enumerate(every) if c.swing > _NOTHING}
     sd = prepared.noise_sd / np.asarray(prepared.rows.weight)
-    noise = Correlated(prepared.rows.before, case.gear.scale_priors[CORRELATION])
+    stated = case.gear.scale_priors[CORRELATION]
+    expected = _CORRELATION if stated.family == "uniform" else stated
+    noise = Correlated(prepared.rows.before, expected)
     data = _whitened(prepared, tried, sd, sign, own=own)
     found = _found(data, sd, noise, np.asarray(turned.run))
     scale = float(np.max(np.abs(prepared.records.force)))

@@ -101,6 +101,21 @@ def _sample_contact(problem: Problem, values: Mapping):
     return numpyro.deterministic(CONTACT, corner - taken)
 
 
+def _sample_zero(problem: Problem, values: Mapping):
+    """Sample the force at the centre of readings far from the origin, and its zero.
+
+    Along the ridge of zero and stiffness the force at the centre stays. The ridge is
+    straight in it, and curved in the zero beside a logarithm of the stiffness.
+    """
+    prior = problem.priors["force_offset"]
+    if prior.family == "fixed":
+        return sample_site("force_offset", prior)
+    there = stiffness(problem, values) * problem.centre
+    law = _scaled_and_moved(distribution(prior), 1.0, there)
+    at_centre = numpyro.sample("_centre_force", law)
+    return numpyro.deterministic("force_offset", at_centre - there)
+
+
 def _sample_noise(problem: Problem, values: dict) -> None:
     """Sample what noise there is: its sd, how neighbours err alike, and its growth.
 
@@ -210,8 +225,12 @@ def declare(problem: Problem) -> None:
     values = sample_stiffness(priors)
     slack = any(effect.name == "seating_slack" for effect in problem.effects)
     for name in ("alpha", "force_offset", CONTACT):
-        if not (slack and name == CONTACT):
+        if not (
+            (slack and name == CONTACT) or (problem.far and name == "force_offset")
+        ):
             values[name] = sample_site(name, priors[name])
+    if problem.far:
+        values["force_offset"] = _sample_zero(problem, values)
     _sample_noise(problem, values)
     for effect in problem.effects:
         if effect.stage != "noise":

@@ -1,6 +1,7 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -32,6 +33,8 @@ from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
 _base_columns = jit(linear_columns)
+# Readings of a test that begins at the origin have their middle at half their range.
+_FAR = 1.0
 
 
 class Problem(Sampled):
@@ -53,6 +56,8 @@ class Problem(Sampled):
         specimens: number of specimens with a stiffness of their own, 0 = none.
         integrated: which of "run", "specimen", "discrepancy" are integrated out, as
             `integrated_kinds` orders them.
+        centre: middle of the deformations as read [mm].
+        far: whether they lie far from the origin, beside their range.
         count: measured rows; `records` and `columns` have padding after them.
         before: index of the row before each padded row in its run, −1 for none; or
             None where neighbours are not correlated or rows are compressed.
@@ -75,6 +80,8 @@ class Problem(Sampled):
     runs: int = eqx.field(static=True)
     specimens: int = eqx.field(static=True)
     integrated: tuple[str, ...] = eqx.field(static=True)
+    centre: Float[Array, ""] | float = 0.0
+    far: bool = eqx.field(static=True, default=False)
     count: int = 0
     before: Int[Array, " n"] | None = None
     correlated: bool = eqx.field(static=True, default=False)
@@ -252,8 +259,17 @@ def build_problem(
         specimens=members.get("specimen", 0),
         integrated=integrated,
         zero_stated=is_stated(case.gear.priors["force_offset"]),
+        **_place(records),
         **rows,
     )
+
+
+def _place(records: Records) -> dict[str, Any]:
+    """Return where the readings lie, as the fields of a problem hold it."""
+    deformation = np.asarray(records.deformation)
+    low, high = float(np.min(deformation)), float(np.max(deformation))
+    centre = (low + high) / 2.0
+    return {"centre": centre, "far": abs(centre) > _FAR * (high - low)}
 
 
 def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:
