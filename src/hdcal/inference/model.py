@@ -224,10 +224,9 @@ def declare(problem: Problem) -> None:
     priors = problem.priors
     values = sample_stiffness(priors)
     slack = any(effect.name == "seating_slack" for effect in problem.effects)
+    later = {CONTACT: slack, "force_offset": problem.far}
     for name in ("alpha", "force_offset", CONTACT):
-        if not (
-            (slack and name == CONTACT) or (problem.far and name == "force_offset")
-        ):
+        if not later.get(name):
             values[name] = sample_site(name, priors[name])
     if problem.far:
         values["force_offset"] = _sample_zero(problem, values)
