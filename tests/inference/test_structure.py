@@ -1,9 +1,12 @@
 """Correlation and bend are in the model where the readings show them, else not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import hdcal
+from hdcal.data.prior import Prior
 from hdcal.inference.structure import Structure, decide_structure
 from hdcal.physics.registry import EFFECTS
 
@@ -61,3 +64,12 @@ def test_a_posterior_keeps_its_structure():
     assert posterior.structure == decide_structure(posterior.case)
     assert isinstance(posterior.structure, Structure)
     assert posterior.structure.correlated and "noise_correlation" in posterior.draws
+
+
+def test_a_correlation_that_the_gear_file_states_is_in_the_model():
+    plain = case(0.0, 0.0, 0)
+    assert not decide_structure(plain).correlated
+    stated = Prior("beta", (20.0, 20.0))
+    priors = plain.gear.scale_priors | {"noise_correlation": stated}
+    gear = replace(plain.gear, scale_priors=priors)
+    assert decide_structure(replace(plain, gear=gear)).correlated

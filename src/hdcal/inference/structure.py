@@ -86,8 +86,11 @@ def decide_structure(
     weights = _Evidence(records, case.gear.scale_priors, generous=bool(effects))
     if with_gap is None and _line_suffices(case, weights.residual):
         with_gap = False
-    gaps = (False, True) if with_gap is None else (with_gap,)
-    forms = [(gap, tied) for gap in gaps for tied in ((False,) if reason else _EITHER)]
+    # What the gear file states of the correlation is in the model.
+    asked = case.gear.scale_priors[CORRELATION].family == "uniform"
+    ties = (False,) if reason else _EITHER if asked else (True,)
+    gaps = _EITHER if with_gap is None else (with_gap,)
+    forms = [(gap, tied) for gap in gaps for tied in ties]
     gap, tied = max(
         forms, key=lambda form: weights.log_evidence(*form) - sum(form) * _LOG_POSITIVE
     )
