@@ -210,9 +210,10 @@ def _base(records: Records, generous: bool) -> tuple[np.ndarray, np.ndarray]:
     rise = np.asarray(records.temperature) - np.mean(records.temperature)
     columns = [place * (specimen == i) for i in np.unique(specimen)[:_MOST_MEMBERS]]
     if np.ptp(rise) > 0.0:
-        columns += [rise, rise * place]
+        # The modulus falls with the temperature; a drift of the zero is no part of it.
+        columns += [rise * np.asarray(records.deformation)]
     if generous:
-        columns += [place**2, place**3, np.asarray(records.sense, float)]
+        columns += [place**2, place**3, np.asarray(records.sense, float), rise]
     runs = np.unique(run)
     if len(runs) <= _MOST_MEMBERS:
         columns += [(run == i).astype(float) for i in runs]
