@@ -5,8 +5,8 @@ import pandas as pd
 import pytest
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.measurements import read_columns
 from hdcal.data.reading import read_case
+from hdcal.data.used_columns import read_columns
 from hdcal.errors import InputError
 
 STIFFNESS = 12.0

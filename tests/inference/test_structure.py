@@ -7,7 +7,7 @@ import pytest
 
 import hdcal
 from hdcal.data.prior import Prior
-from hdcal.inference.structure import Structure, decide_structure
+from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.physics.registry import EFFECTS
 
 ROWS = 200
@@ -62,7 +62,7 @@ def test_a_bend_is_not_fitted_beside_effects_or_few_rows():
 def test_a_posterior_keeps_its_structure():
     posterior = hdcal.calibrate(case(0.0, 0.7, 0), warmup=200, draws=200)
     assert posterior.structure == decide_structure(posterior.case)
-    assert isinstance(posterior.structure, Structure)
+    assert isinstance(posterior.structure, ModelStructure)
     assert posterior.structure.correlated and "noise_correlation" in posterior.draws
 
 

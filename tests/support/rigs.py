@@ -19,7 +19,7 @@ from hdcal.inference.likelihood import draw_reading
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sample import sample
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.structure import Structure
+from hdcal.inference.structure import ModelStructure
 from hdcal.inference.values import build_effects, member_base, with_rounding
 from hdcal.physics.chain import predict_reading
 from hdcal.physics.effect import Noise
@@ -165,7 +165,7 @@ def simulate(problem, case: Case, truth: dict, key) -> Case:
 
 
 def posterior_draws(
-    case: Case, effects, seed: int, structure: Structure | None = None, **settings
+    case: Case, effects, seed: int, structure: ModelStructure | None = None, **settings
 ) -> tuple:
     """Fit a case; return its problem and draws, chains joined."""
     problem = build_problem(case, effect_priors(), effects, structure=structure)

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 from hdcal.data.case import Case
-from hdcal.inference.structure import NONE_SHOWN, Structure, decide_structure
+from hdcal.inference.structure import NONE_SHOWN, ModelStructure, decide_structure
 
 
-def form_of(case: Case, effects=(), with_gap: bool = False) -> Structure:
+def form_of(case: Case, effects=(), with_gap: bool = False) -> ModelStructure:
     """Return a structure with correlated noise wherever its likelihood is known."""
     found = decide_structure(case, effects, with_gap)
     if found.why_independent != NONE_SHOWN:

@@ -25,7 +25,7 @@ from hdcal.inference.posterior_tree import force_log_likelihood
 from hdcal.inference.problem import Problem, build_problem, problem_priors
 from hdcal.inference.sample import Draws, Progress, check_settings, sample
 from hdcal.inference.straight_line import line_check
-from hdcal.inference.structure import Structure, decide_structure
+from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.inference.values import MEMBER_SD, MEMBERS
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.noise import HeteroscedasticNoise
@@ -169,11 +169,13 @@ def calibrate(
     began = time.perf_counter()
     require_case(case)
     check_settings(chains, warmup, draws, seed)
-    case, chosen = _chosen(case, effects, registry, adapt_noise)
-    asked = choose_effects(effects, registry)
-    form = decide_structure(case, asked, with_gap)
-    # Readings showed that noise grows, and nobody asked for it.
-    shown = HeteroscedasticNoise in chosen and HeteroscedasticNoise.name not in effects
+    asked, pilot = choose_effects(effects, registry), pilot_fit(case.records)
+    check_effect_priors(case, registry)
+    # Readings may show that noise grows, though nobody asked for it.
+    shown = adapt_noise and _may_grow(case, asked) and noise_grows(case, pilot)
+    chosen = (*asked, HeteroscedasticNoise) if shown else asked
+    case = _with_constant_part(case, pilot.noise_sd) if shown else case
+    form = decide_structure(case, asked, with_gap, pilot)
     shipped = effect_priors(case.gear.full_scale) | (_SHOWN if shown else {})
     theory = theory or case.gear.theory
     priors = problem_priors(case, chosen, shipped, theory)
@@ -195,26 +197,11 @@ def calibrate(
     return posterior
 
 
-def _chosen(
-    case: Case,
-    names: Sequence[str],
-    registry: Mapping[str, type[Effect]],
-    adapt_noise: bool,
-) -> tuple[Case, tuple[type[Effect], ...]]:
-    """Return case and effects.
-
-    With noise that grows where it does and no effect is of noise.
-    """
-    effects, pilot = choose_effects(names, registry), pilot_fit(case.records)
-    check_effect_priors(case, registry)
-    spoken_of = any(effect.stage == "noise" for effect in effects)
+def _may_grow(case: Case, effects: Sequence[type[Effect]]) -> bool:
+    """Return whether it is open how noise goes with the force."""
     stated = case.gear.effect_priors.get(_SHARE)
-    decided = spoken_of or (stated is not None and stated.family == "fixed")
-    grows = adapt_noise and not decided and noise_grows(case, pilot)
-    if not grows:
-        return case, effects
-    case = _with_constant_part(case, pilot.noise_sd)
-    return case, (*effects, HeteroscedasticNoise)
+    fixed = stated is not None and stated.family == "fixed"
+    return not fixed and all(effect.stage != "noise" for effect in effects)
 
 
 def _with_constant_part(case: Case, noise_sd: float) -> Case:
@@ -233,7 +220,7 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
 def _specifics(
     case: Case,
     problem: Problem,
-    form: Structure,
+    form: ModelStructure,
     found: Draws,
     *,
     plain: bool,
@@ -248,8 +235,9 @@ def _specifics(
     sigma, rows = found.values["sigma"], len(case.records.force)
     line_checks = []
     if plain:
-        line_checks += [line_check(case.records, found.values["stiffness"])]
-        line_checks += [straight_check(case)]
+        stiffness = found.values["stiffness"]
+        line_checks += [line_check(case.records, stiffness)]
+        line_checks += [straight_check(case, stiffness)]
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         slopes={

@@ -95,7 +95,7 @@ reading_options = combined(
         "--range",
         metavar="LOW:HIGH",
         help="Working range: 0.1:0.6 of the deformation [mm], or 10%:40% of the "
-        "largest force, or all of the curve [default: until the force drops for good; "
+        "largest force, or all until the force drops for good [default: all; "
         "calibrate takes the longest straight part of a curve that is no line].",
     ),
     click.option(

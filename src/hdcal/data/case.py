@@ -101,6 +101,8 @@ class Case:
             empty where none is stated.
         left_out: specimens left out because of a faulty row, each with the finding;
             empty unless `skip_bad` was given.
+        excluded: deformations as read whose rows were left out because the part gave
+            way, or for a working range: ends of each stretch [mm].
         screening: of the whole record before rows were cut; None where the rows are
             not those of a file.
     """
@@ -118,6 +120,7 @@ class Case:
     rigs: tuple[str, ...] = ()
     dates: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
+    excluded: tuple[tuple[float, float], ...] = ()
     screening: Screening | None = None
 
     def __repr__(self) -> str:

@@ -10,6 +10,8 @@ the slope counts the scatter.
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
+from hdcal.data.records import less_run_means
+
 # Of fewer rows SciPy makes no spline.
 _LEAST_ROWS = 5
 
@@ -32,11 +34,6 @@ def without_scatter(
         if len(rows) >= _LEAST_ROWS:
             order = np.arange(len(rows), dtype=float)
             smooth[rows] = make_smoothing_spline(order, deformation[rows])(order)
-    place, height = (values - _means(values, run) for values in (smooth, force))
+    place, height = (less_run_means(values, run) for values in (smooth, force))
     slope = float(place @ height) / float(place @ place)
     return smooth, force + slope * (smooth - deformation)
-
-
-def _means(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Return the mean of the run of each row."""
-    return (np.bincount(run, values) / np.bincount(run))[run]

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.measurements import read_columns
+from hdcal.data.used_columns import read_columns
 
 _COLUMNS = ("time", "force")
 

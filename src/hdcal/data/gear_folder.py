@@ -12,25 +12,21 @@ import numpy as np
 
 from hdcal.data.bad_gears import offer
 from hdcal.data.case import Case, Gear
+from hdcal.data.case_of import case_of
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
 from hdcal.data.gear_files import gear_files, gear_labels, not_read
-from hdcal.data.measurements import (
-    Columns,
-    Measurements,
-    labels_of,
-    read_measurements,
-    runs_of,
-)
+from hdcal.data.measurements import Measurements, labels_of, read_measurements, runs_of
 from hdcal.data.mountings import run_labels
-from hdcal.data.reading import GEAR_NAME, asked_columns, case_of, gear_of
+from hdcal.data.reading import GEAR_NAME, asked_columns, gear_of
 from hdcal.data.reading_notes import mountings_note, unused_columns
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.grid import ArrayGrid
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.theory_names import SPRING
 from hdcal.data.too_far import too_far
+from hdcal.data.used_columns import Columns
 from hdcal.errors import Finding, Findings
 
 # What may differ between the files of gears of one kind, as dotted keys begin.
@@ -256,7 +252,7 @@ def _joined(parts: Sequence[_Part], warm: float) -> Measurements:
         for note in (*columns.notes, *unused_columns(columns))
     )
     grid = ArrayGrid(_places(parts), 0, [], values.__getitem__)
-    table = Table((), 0, grid, rows)
+    table = ReadTable((), 0, grid, rows)
     columns = Columns(
         values,
         {},

@@ -12,11 +12,12 @@ import pandas as pd
 
 from hdcal.data.bad_gears import bad_gears, offer
 from hdcal.data.case import Case, Gear
+from hdcal.data.case_of import case_of
 from hdcal.data.findings import FileFindings
 from hdcal.data.measurements import Measurements, read_measurements
-from hdcal.data.reading import GEAR_NAME, case_of, gear_of
+from hdcal.data.reading import GEAR_NAME, gear_of
 from hdcal.data.tables.arrow_grid import arrow_grid
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import GROUPINGS, LABELS, parse_header
 from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.parquet_files import parquet_files, parquet_table
@@ -173,7 +174,7 @@ def read_batches(
         with FileFindings(file) as findings:
             size = batch.num_rows
             grid = arrow_grid(batch.schema, batch.column, size, row, days=True)
-            table = Table(tuple(headers), row, grid, size)
+            table = ReadTable(tuple(headers), row, grid, size)
             values, _ = read_values(table, numeric, findings)
             labels = {
                 quantity: read_labels(table, column, findings, [])

@@ -6,11 +6,12 @@ import numpy as np
 
 from hdcal.data.case import Gear
 from hdcal.data.loading import Motion
-from hdcal.data.measurements import ASSUMED, Columns, Measurements
+from hdcal.data.measurements import Measurements
 from hdcal.data.mountings import TELLING
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.tables.headers import LABELS, parse_header
 from hdcal.data.theory_names import SPRING
+from hdcal.data.used_columns import ASSUMED, Columns
 from hdcal.errors import quoted
 
 MOST_ROWS = 8  # listed in one note

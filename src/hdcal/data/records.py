@@ -83,3 +83,24 @@ class Records(_InDoublePrecision):
     force: Float[Array, " n"]
     force_sd: Float[Array, " n"]
     known: frozenset[str] = eqx.field(static=True)
+
+
+# Readings of a test that begins at the origin have their middle at half their range.
+_FAR = 1.0
+
+
+def lies_far(records: Records) -> bool:
+    """Return whether deformations lie far from their origin, beside their range."""
+    low, high = float(np.min(records.deformation)), float(np.max(records.deformation))
+    return abs(low + high) / 2.0 > _FAR * (high - low)
+
+
+def less_run_means(values: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Return values less the mean of their run, shape (n,).
+
+    Args:
+        values: shape (n,).
+        run: index of the run of each, shape (n,).
+    """
+    count = np.maximum(np.bincount(run), 1)
+    return values - (np.bincount(run, values) / count)[run]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from hdcal.data.case import Case
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.errors import Finding, InputError
 
 # Shares of the range of forces that are no more than rounding of what was computed.
@@ -64,11 +64,10 @@ def least_step(force) -> float:
 def _beside_lines(records: Records) -> np.ndarray:
     """Return what a line of each specimen, with a zero of each run, leaves [N]."""
     run, specimen = np.asarray(records.run), np.asarray(records.specimen)
-
-    def within_runs(values) -> np.ndarray:
-        return values - (np.bincount(run, values) / np.bincount(run))[run]
-
-    x, y = map(within_runs, map(np.asarray, (records.deformation, records.force)))
+    x, y = (
+        less_run_means(np.asarray(values), run)
+        for values in (records.deformation, records.force)
+    )
     squares = np.bincount(specimen, x * x)
     slope = np.bincount(specimen, x * y) / np.where(squares > 0.0, squares, 1.0)
     return y - slope[specimen] * x

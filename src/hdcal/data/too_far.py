@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from hdcal.data.case import Gear
-from hdcal.data.measurements import Columns, Labels
+from hdcal.data.measurements import Labels
+from hdcal.data.used_columns import Columns
 
 _REMEDY = "Check the unit of the column and the radius in the gear file"
 

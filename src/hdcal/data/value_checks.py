@@ -9,7 +9,7 @@ from hdcal.data.plausible import RANGES
 from hdcal.data.tables.headers import DIMENSIONS
 
 if TYPE_CHECKING:
-    from hdcal.data.measurements import Columns
+    from hdcal.data.used_columns import Columns
 
 FEWEST_ROWS = 5
 # Kelvin become degrees Celsius with an error of rounding.

@@ -78,13 +78,23 @@ def verdict_document(
             *_budget(found),
             _corrected(found, refit),
             Section("What this cannot say", [Sentences(found.limits)], brief=True),
-            *([Section("Remarks", [Sentences(found.notes)], True)] * bool(found.notes)),
+            *(
+                [Section("Remarks", [Sentences(found.notes)], True)]
+                if found.notes
+                else []
+            ),
             *([] if case is None else [_data(case)]),
         ],
         provenance=[] if case is None else _provenance(case, found, command),
         failed=found.reasons,
         failed_words=_FAILED,
     )
+
+
+def _remarks(found: VerdictAnswer) -> list[Section]:
+    if not found.notes:
+        return []
+    return [Section("Remarks", [Sentences(found.notes)], True)]
 
 
 def _data(case: Case) -> Section:

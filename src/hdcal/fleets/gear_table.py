@@ -13,7 +13,7 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.gear_schema import size_faults
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Geometry
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import has_comma, read_numbers
 from hdcal.data.tables.headers import parse_header
 from hdcal.data.tables.sources import is_frame, read_source
@@ -83,7 +83,7 @@ def gear_sizes(source: Any, case: Case) -> GearSizes:
 
 
 def _read(
-    table: Table, case: Case, findings: FileFindings
+    table: ReadTable, case: Case, findings: FileFindings
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Return sizes and gear of each row."""
     sizes = _sizes(table, findings)
@@ -103,7 +103,7 @@ def _ratio(stated: dict[str, np.ndarray], gear: Gear) -> np.ndarray:
     return np.broadcast_to(own / one, len(next(iter(stated.values())))).copy()
 
 
-def _sizes(table: Table, findings: FileFindings) -> dict[str, np.ndarray]:
+def _sizes(table: ReadTable, findings: FileFindings) -> dict[str, np.ndarray]:
     """Return the sizes of each row [mm], by their names in a geometry."""
     places = {h: place for place, h in enumerate(table.headers) if h in SIZES}
     for header in table.headers:
@@ -130,7 +130,7 @@ def _sizes(table: Table, findings: FileFindings) -> dict[str, np.ndarray]:
 
 
 def _at_odds(
-    table: Table, sizes: Mapping[str, np.ndarray], base: Geometry
+    table: ReadTable, sizes: Mapping[str, np.ndarray], base: Geometry
 ) -> Iterator[tuple[int, str, str]]:
     """Yield rows whose sizes cannot be beside each other, or those of the gear file."""
     other = {name: float(size) for name, size in vars(base).items() if name in _NAMES}
@@ -143,7 +143,7 @@ def _at_odds(
             yield int(row), f"{name}_mm: {words}", remedy
 
 
-def _labels(table: Table, case: Case, findings: FileFindings) -> list[str]:
+def _labels(table: ReadTable, case: Case, findings: FileFindings) -> list[str]:
     """Return the gear of each row."""
     known = case.columns.get("specimen")
     places = [

@@ -7,7 +7,7 @@ import numpy as np
 
 from hdcal.data.case import Case
 from hdcal.data.loading import loading_side
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.inference.serial_correlation import previous_rows
 from hdcal.report.answer import Real
 
@@ -94,13 +94,10 @@ def beside_lines(records: Records) -> tuple[np.ndarray, np.ndarray]:
 def _beside_lines(records: Records, values: np.ndarray) -> np.ndarray:
     """Return what a straight line for each gear, with zeros for its runs, leaves."""
     run, gear = np.asarray(records.run), np.asarray(records.specimen)
-    line, left = _within(run, np.asarray(records.deformation)), _within(run, values)
+    line = less_run_means(np.asarray(records.deformation), run)
+    left = less_run_means(values, run)
     slope = np.bincount(gear, left * line) / np.bincount(gear, line**2)
     return left - slope[gear] * line
-
-
-def _within(run: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return values - (np.bincount(run, values) / np.bincount(run))[run]
 
 
 def _fitted(shapes: np.ndarray, error: np.ndarray, sd: np.ndarray):

@@ -15,7 +15,10 @@ from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.inference.posterior_tree import COVARIATES, group_of
 
-_ABOUT = ("name", "run_labels", "specimen_labels", "data_sha256", "notes")
+_ABOUT = (
+    *("name", "run_labels", "specimen_labels", "data_sha256", "notes"),
+    "excluded",
+)
 _TABLES = (
     "priors",
     "scale_priors",
@@ -81,4 +84,4 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
 
 
 def _tuples(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value

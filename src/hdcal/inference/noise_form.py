@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import fdtrc, ndtr
 
 from hdcal.data.case import Case
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.inference.loop_cells import loop_cells
 from hdcal.inference.serial_correlation import previous_rows, whiten
 
@@ -59,15 +59,15 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
         size = np.abs(scaled)
         shapes += [records.sense * size, records.sense * size**2]
         shapes += [*loop_cells(records, _REACHES)]
-    count = np.bincount(records.run)
-    table = [
-        column - (np.bincount(records.run, column) / count)[records.run]
-        for column in (*own, *shapes, np.asarray(records.force))
-    ]
-    design, force = np.array(table[:-1]).T, table[-1]
+    run = np.asarray(records.run)
+    *columns, force = (
+        less_run_means(np.asarray(values), run)
+        for values in (*own, *shapes, records.force)
+    )
+    design = np.array(columns).T
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
-    free = max(len(force) - len(count) - int(rank), 1)
+    free = max(len(force) - int(np.max(run)) - 1 - int(rank), 1)
     return Pilot(residual, float(np.sqrt(residual @ residual / free)), free)
 
 

@@ -31,7 +31,7 @@ from hdcal.inference.posterior_file import (
 )
 from hdcal.inference.posterior_tree import OVER_DRAWS, group_of, joined_draws
 from hdcal.inference.problem import Problem, build_problem
-from hdcal.inference.structure import Structure
+from hdcal.inference.structure import ModelStructure
 from hdcal.inference.values import site_shapes
 from hdcal.notebook import Shown
 from hdcal.physics.effect import Effect
@@ -75,9 +75,9 @@ class Posterior(Shown):
         return site_shapes(self.case, self.effects, self.structure)
 
     @property
-    def structure(self) -> Structure:
+    def structure(self) -> ModelStructure:
         """What the model contains beside line and effects."""
-        return Structure(**self.settings[STRUCTURE])
+        return ModelStructure(**self.settings[STRUCTURE])
 
     def __repr__(self) -> str:
         names = ", ".join(effect.name for effect in self.effects) or "none"

@@ -1,7 +1,6 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import equinox as eqx
 import numpy as np
@@ -11,7 +10,7 @@ from hdcal.data.case import Case
 from hdcal.data.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
-from hdcal.data.records import Array, Records
+from hdcal.data.records import Array, Records, lies_far
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
@@ -26,15 +25,13 @@ from hdcal.inference.member_counts import (
 )
 from hdcal.inference.padding import pad_records
 from hdcal.inference.sampled_problem import Sampled
-from hdcal.inference.structure import Structure, decide_structure
+from hdcal.inference.structure import ModelStructure, decide_structure
 from hdcal.physics.chain import Reading, linear_columns
 from hdcal.physics.effect import Effect, parameters
 from hdcal.physics.effects.scatter import Scatter
 from hdcal.physics.theory import THEORIES
 
 _base_columns = jit(linear_columns)
-# Readings of a test that begins at the origin have their middle at half their range.
-_FAR = 1.0
 
 
 class Problem(Sampled):
@@ -217,7 +214,7 @@ def build_problem(
     effects: Sequence[type[Effect]] = (),
     *,
     theory: Theory | None = None,
-    structure: Structure | None = None,
+    structure: ModelStructure | None = None,
 ) -> Problem:
     """Turn a case into a problem, its rows compressed but for effects and rounding.
 
@@ -259,17 +256,10 @@ def build_problem(
         specimens=members.get("specimen", 0),
         integrated=integrated,
         zero_stated=is_stated(case.gear.priors["force_offset"]),
-        **_place(records),
+        centre=float(np.min(records.deformation) + np.max(records.deformation)) / 2.0,
+        far=lies_far(records),
         **rows,
     )
-
-
-def _place(records: Records) -> dict[str, Any]:
-    """Return where the readings lie, as the fields of a problem hold it."""
-    deformation = np.asarray(records.deformation)
-    low, high = float(np.min(deformation)), float(np.max(deformation))
-    centre = (low + high) / 2.0
-    return {"centre": centre, "far": abs(centre) > _FAR * (high - low)}
 
 
 def _linear_members(effects, rounded: bool, *, compressed: bool) -> frozenset[str]:

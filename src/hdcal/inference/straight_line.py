@@ -5,26 +5,25 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.inference.checks import Check
+from hdcal.screening.result import LEAST_DIFFERENCE
 
 # So many rows decide a line; of more every second, third, … is taken.
 _MOST_ROWS = 20_000
-# A difference below this share matters to nobody, however well both slopes are known.
-LEAST_DIFFERENCE = 0.1
 # Residuals of normal noise have their median size at so many sds.
 _MEDIAN_SIZE = 0.6745
 _NORMAL_95 = 1.96
 
 
-class Line(NamedTuple):
+class RobustLine(NamedTuple):
     """A slope with the half-width of its 95 % confidence interval [N/mm]."""
 
     slope: float
     half_width: float
 
 
-def robust_line(records: Records) -> Line | None:
+def robust_line(records: Records) -> RobustLine | None:
     """Return the slope of the readings, as read; None where nothing was deformed.
 
     Zeros of runs and a linear dependence on temperature are fitted beside it. The loss
@@ -36,7 +35,7 @@ def robust_line(records: Records) -> Line | None:
     rows = slice(None, None, -(-len(records.force) // _MOST_ROWS))
     run = np.asarray(records.run)[rows]
     deformation, rise, force = (
-        _centred(np.asarray(values, float)[rows], run)
+        less_run_means(np.asarray(values, float)[rows], run)
         for values in (records.deformation, records.temperature, records.force)
     )
     span = float(np.ptp(deformation))
@@ -60,13 +59,7 @@ def robust_line(records: Records) -> Line | None:
     spread = np.sum(weight * residual**2) / free
     inverse = np.linalg.pinv(design.T @ (weight[:, None] * design))
     half = _NORMAL_95 * float(np.sqrt(spread * inverse[0, 0]))
-    return Line(float(found.x[0]) / span, half / span)
-
-
-def _centred(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Return values less the mean of their run."""
-    index = np.unique(run, return_inverse=True)[1]
-    return values - (np.bincount(index, values) / np.bincount(index))[index]
+    return RobustLine(float(found.x[0]) / span, half / span)
 
 
 def line_check(records: Records, stiffness: np.ndarray) -> Check:

@@ -13,13 +13,14 @@ import numpy as np
 from scipy.special import logsumexp
 
 from hdcal.data.case import Case
-from hdcal.data.records import Records
+from hdcal.data.records import Records, less_run_means
 from hdcal.inference.discrepancy import (
     BASIS_SIZE,
     build_discrepancy,
     discrepancy_columns,
 )
-from hdcal.inference.noise_form import pilot_fit
+from hdcal.inference.distributions import frozen
+from hdcal.inference.noise_form import Pilot, pilot_fit
 from hdcal.inference.padding import pad_records
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.physics.effect import Effect
@@ -48,7 +49,7 @@ _MOST_MEMBERS = 50
 
 
 @dataclass(frozen=True)
-class Structure:
+class ModelStructure:
     """Form of a model beside its effects.
 
     Attributes:
@@ -67,8 +68,11 @@ class Structure:
 
 
 def decide_structure(
-    case: Case, effects: Sequence[type[Effect]] = (), with_gap: bool | None = None
-) -> Structure:
+    case: Case,
+    effects: Sequence[type[Effect]] = (),
+    with_gap: bool | None = None,
+    pilot: Pilot | None = None,
+) -> ModelStructure:
     """Return the structure that the readings of a case show.
 
     Args:
@@ -76,41 +80,55 @@ def decide_structure(
         effects: in the model. What they explain cannot be told from a bend here, so
             that with effects a leftover is in the model only where it is asked for.
         with_gap: whether the leftover discrepancy is in the model; None decides.
+        pilot: fit of these records, where there is one.
     """
-    records = case.records
-    noise_sd = pilot_fit(records).noise_sd
-    rounded = _needs_exact_rounding(case, effects, noise_sd)
-    if with_gap is None and (effects or len(records.force) < _LEAST_ROWS_OF_A_GAP):
-        with_gap = False
+    noise_sd = (pilot or pilot_fit(case.records)).noise_sd
+    rounded = _needs_exact_rounding(case, effects, noise_sd, bool(with_gap))
     reason = _why_independent(case, effects, rounded)
-    weights = _Evidence(records, case.gear.scale_priors, generous=bool(effects))
-    if with_gap is None and _line_suffices(case, weights.residual):
-        with_gap = False
     # What the gear file states of the correlation is in the model.
-    asked = case.gear.scale_priors[CORRELATION].family == "uniform"
-    ties = (False,) if reason else _EITHER if asked else (True,)
+    is_stated = case.gear.scale_priors[CORRELATION].family != "uniform"
+    ties = (False,) if reason else (True,) if is_stated else _EITHER
+    if with_gap is None and (effects or not _may_bend(case)):
+        with_gap = False
     gaps = _EITHER if with_gap is None else (with_gap,)
-    forms = [(gap, tied) for gap in gaps for tied in ties]
-    gap, tied = max(
-        forms, key=lambda form: weights.log_evidence(*form) - sum(form) * _LOG_POSITIVE
-    )
+    gap, tied = _best_form(case, bool(effects), gaps, ties)
     if not (reason or tied):
         reason = NONE_SHOWN
-    return Structure(noise_sd, rounded, gap, tied, reason)
+    rounded = _needs_exact_rounding(case, effects, noise_sd, gap)
+    return ModelStructure(noise_sd, rounded, gap, tied, reason)
 
 
-def _needs_exact_rounding(case: Case, effects, noise_sd: float) -> bool:
-    known, rows = case.records.known, len(case.records.force)
-    members = known & {"run", "specimen"}
-    fine = _FINE_STEP_OF_FEW if rows <= _FEW_ROWS and not members else _FINE_STEP
+def _best_form(
+    case: Case, generous: bool, gaps: tuple[bool, ...], ties: tuple[bool, ...]
+) -> tuple[bool, bool]:
+    """Return whether there is a leftover and a correlation, of those considered."""
+    forms = [(gap, tied) for gap in gaps for tied in ties]
+    if len(forms) == 1:
+        return forms[0]
+    priors = case.gear.scale_priors
+    evidence = _Evidence(case.records, priors, generous=generous, with_gap=any(gaps))
+    return max(
+        forms, key=lambda form: evidence.log_evidence(*form) - sum(form) * _LOG_POSITIVE
+    )
+
+
+def _may_bend(case: Case) -> bool:
+    """Return whether rows are enough, and a line misses one by more than its step."""
+    if len(case.records.force) < _LEAST_ROWS_OF_A_GAP:
+        return False
+    base, force = _base(case.records, generous=False)
+    left = force - base @ (base.T @ force)
+    return float(np.max(np.abs(left))) > case.gear.force_resolution
+
+
+def _needs_exact_rounding(case: Case, effects, noise_sd: float, with_gap: bool) -> bool:
+    # Beside members, which then were not linear, only where nothing else will do.
+    members = with_gap or case.records.known & {"run", "specimen"}
+    few = len(case.records.force) <= _FEW_ROWS and not members
+    fine = _FINE_STEP_OF_FEW if few else _FINE_STEP
     if any(effect.mixture for effect in effects):
         fine = _FINE_STEP_OF_A_MIXTURE
     return case.gear.force_resolution > fine * noise_sd
-
-
-def _line_suffices(case: Case, residual: np.ndarray) -> bool:
-    """Return whether a line passes within one step of every reading."""
-    return float(np.max(np.abs(residual))) <= case.gear.force_resolution
 
 
 def _why_independent(case: Case, effects, rounded: bool) -> str:
@@ -134,14 +152,14 @@ class _Evidence:
     z zᵀ over rows, over rows that follow another one, and of neighbours.
     """
 
-    def __init__(self, records: Records, priors, generous: bool):
+    def __init__(self, records: Records, priors, *, generous: bool, with_gap: bool):
         base, force = _base(records, generous)
-        self.residual = force - base @ (base.T @ force)
-        gap = build_discrepancy(records)
-        padded = pad_records(records)
-        shapes = np.asarray(discrepancy_columns(gap, padded))[: len(force)]
-        shapes = shapes - base @ (base.T @ shapes)
-        table = np.column_stack([base, shapes, self.residual])
+        gap = build_discrepancy(records) if with_gap else None
+        shapes = np.empty((len(force), 0))
+        if gap is not None:
+            shapes = np.asarray(discrepancy_columns(gap, pad_records(records)))
+        beside = np.column_stack([shapes[: len(force)], force])
+        table = np.hstack([base, beside - base @ (base.T @ beside)])
         before = previous_rows(records)
         follows = before >= 0
         earlier, later = table[before[follows]], table[follows]
@@ -152,10 +170,10 @@ class _Evidence:
         self._rows, self._following = len(force), int(np.count_nonzero(follows))
         self._base = base.shape[1]
         self._alike = _quantiles(priors[CORRELATION], CORRELATION, _CORRELATIONS)
-        self._scales = [
-            np.asarray(gap.prior_sd(1.0, length))
-            for length in _quantiles(priors["gap_length"], "gap_length", _LENGTHS)
-        ]
+        self._scales: list[np.ndarray] = []
+        if gap is not None:
+            lengths = _quantiles(priors["gap_length"], "gap_length", _LENGTHS)
+            self._scales = [np.asarray(gap.prior_sd(1.0, one)) for one in lengths]
 
     def log_evidence(self, gap: bool, tied: bool) -> float:
         """Return the log probability of the readings under a form, up to a constant.
@@ -218,19 +236,13 @@ def _base(records: Records, generous: bool) -> tuple[np.ndarray, np.ndarray]:
     if len(runs) <= _MOST_MEMBERS:
         columns += [(run == i).astype(float) for i in runs]
     else:
-        count = np.bincount(run)
-        *columns, force = (
-            values - (np.bincount(run, values) / count)[run]
-            for values in (*columns, force)
-        )
+        *columns, force = (less_run_means(values, run) for values in (*columns, force))
     left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
     return left[:, size > 1e-10 * size[0]], force
 
 
 def _quantiles(prior, name: str, count: int) -> np.ndarray:
     """Return quantiles of a prior that stand for it with equal weights."""
-    from hdcal.inference.distributions import frozen
-
     if prior.family == "fixed":
         return np.array([float(prior.numbers[0])])
     return np.asarray(frozen(prior, name).ppf((np.arange(count) + 0.5) / count))

@@ -13,7 +13,7 @@ from hdcal.inference.gauges import as_read
 from hdcal.inference.member_counts import member_counts
 from hdcal.inference.problem import Problem, without_scatter
 from hdcal.inference.serial_correlation import CORRELATION
-from hdcal.inference.structure import Structure
+from hdcal.inference.structure import ModelStructure
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
@@ -37,7 +37,7 @@ LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 def site_shapes(
     case: Case,
     effects: Sequence[type[Effect]],
-    structure: Structure,
+    structure: ModelStructure,
 ) -> dict[str, tuple[int, ...]]:
     """Return the shape of each parameter that a draw of the model holds.
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import AliasGenerator, BaseModel, ConfigDict, Field, computed_field
-from pydantic.json_schema import GenerateJsonSchema
 
 from hdcal.report.chart_spec import RED, Chart
+from hdcal.report.result_schema import DIALECT, ResultSchema
 from hdcal.report.sentences import rendered
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
 INTERVAL = 0.95
 _FIRST = ("schema", "status", "reasons", "headline", "next_step")
 # A failed result has reasons, any other result has none.
@@ -60,23 +59,6 @@ def quantity(
 def _json_name(name: str) -> str:
     # `schema` is a method of pydantic's models, `from` a keyword.
     return "schema" if name == "format" else name.rstrip("_")
-
-
-class _Schema(GenerateJsonSchema):
-    """JSON Schema in which floats may be null unless NaN is refused.
-
-    Later versions may add keys.
-    """
-
-    def model_schema(self, schema: Any) -> dict[str, Any]:
-        found = super().model_schema(schema)
-        found.pop("additionalProperties", None)
-        return found
-
-    def float_schema(self, schema: Any) -> dict[str, Any]:
-        found = super().float_schema(schema)
-        finite = schema.get("allow_inf_nan") is False
-        return found if finite else {"anyOf": [found, {"type": "null"}]}
 
 
 class Item(BaseModel):
@@ -234,7 +216,9 @@ class Result(Item):
     @classmethod
     def json_schema(cls) -> dict[str, Any]:
         """Return the JSON Schema of what `to_json` returns."""
-        found = cls.model_json_schema(mode="serialization", schema_generator=_Schema)
+        found = cls.model_json_schema(
+            mode="serialization", schema_generator=ResultSchema
+        )
         return {"$schema": DIALECT, **found}
 
     def to_frame(self) -> "pd.DataFrame":

@@ -13,6 +13,7 @@ from hdcal.screening.local_fit import (
     spread,
     windows,
 )
+from hdcal.screening.turning_points import noise_sd
 
 # Share of the tested range within which the deformation counts as at rest.
 _REST = 0.01
@@ -80,11 +81,6 @@ def _sample(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     rows = np.linspace(0, x.size - 1, min(x.size, 100)).astype(int)
     offsets = np.arange(-5, 5)
     return windows(x, rows, offsets), windows(y, rows, offsets)
-
-
-def noise_of(y: np.ndarray) -> float:
-    """Return a robust sd of the noise, from second differences."""
-    return float(median(np.abs(np.diff(y, 2)))) / (0.6745 * 6**0.5)
 
 
 def rows_after_drop(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
@@ -160,6 +156,6 @@ def _first_loading(x: np.ndarray, y: np.ndarray) -> tuple[int, float] | None:
         return None
     drop = float(smooth[peak] - np.median(y[fallen]))
     least = _DROP if fallen.sum() > 1 else _GONE
-    if drop < max(least * whole, 6.0 * noise_of(y)):
+    if drop < max(least * whole, 6.0 * noise_sd(y, fewest=3)):
         return None
     return top + 1, drop

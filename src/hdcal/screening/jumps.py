@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.screening.ends import noise_of
 from hdcal.screening.local_fit import REACH, resolution
 from hdcal.screening.possible_jumps import SIDE, possible_jumps
-from hdcal.screening.turning_points import turning_points
+from hdcal.screening.turning_points import noise_sd, turning_points
 
 # Places that are tried.
 _TRIED = 5
@@ -77,7 +76,7 @@ def find_jump(x: np.ndarray, y: np.ndarray, scatter: float) -> Jump | None:
 
 def _block(values: np.ndarray) -> int:
     """Return how many rows make noise smaller than the steps of their means."""
-    noise = noise_of(values)
+    noise = noise_sd(values, fewest=3)
     lag = max(values.size // 20, 1)
     step = float(np.median(np.abs(values[lag:] - values[:-lag]))) / lag
     if step == 0.0:

@@ -34,6 +34,9 @@ SEGMENTS = (
     "outside the range",
 )
 LOADING, UNLOADING, HOLDING, TARE, DROPPED, WILD, SATURATED, OUTSIDE = range(8)
+# Share by which stiffnesses differ at least: less matters to nobody, however well both
+# are known.
+LEAST_DIFFERENCE = 0.1
 # First and last row of each stretch of rows.
 Stretches = tuple[tuple[int, int], ...]
 
@@ -118,6 +121,22 @@ class Screening:
     trembling: bool = False
     straight: StraightPart | None = None
     working_range: str = ""
+
+    @property
+    def excluded(self) -> tuple[tuple[float, float], ...]:
+        """Deformations whose rows were left out, beyond those that stayed [mm].
+
+        Where the force has dropped for good all that lies farther is excluded.
+        """
+        x, found = self.deformation, []
+        low, high = float(x[self.kept].min()), float(x[self.kept].max())
+        for segment, without_end in ((DROPPED, True), (OUTSIDE, False)):
+            left = x[self.segment == segment]
+            if left.size and left.max() > high:
+                found.append((high, np.inf if without_end else float(left.max())))
+            if left.size and left.min() < low:
+                found.append((-np.inf if without_end else float(left.min()), low))
+        return tuple(found)
 
     @property
     def asked(self) -> tuple[Observation, ...]:

@@ -11,16 +11,17 @@ HOLD_SHARE, HOLD_MOST = 2.5e-3, 0.05
 FEWEST_FOR_NOISE = 50
 
 
-def noise_sd(x: np.ndarray) -> float:
+def noise_sd(x: np.ndarray, fewest: int = FEWEST_FOR_NOISE) -> float:
     """Sd of the reading noise in a dense sequence, from second differences.
 
     Args:
-        x: deformation in the order it was taken [mm], shape (n,).
+        x: readings in the order they were taken, shape (n,).
+        fewest: rows that tell it.
 
     Returns:
-        A robust sd [mm]; 0 for fewer than 50 rows.
+        A robust sd, in the unit of the readings; 0 for fewer rows.
     """
-    if x.size < FEWEST_FOR_NOISE:
+    if x.size < fewest:
         return 0.0
     # the sd of x[i-1] - 2 x[i] + x[i+1] is √6 times that of x
     return float(np.median(np.abs(np.diff(x, 2)))) / (0.6745 * 6**0.5)

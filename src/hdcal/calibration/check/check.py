@@ -7,11 +7,13 @@ import numpy as np
 from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
+from hdcal.calibration.check.screened import Screened, StraightRange, screened
+from hdcal.calibration.straight_part import straight_range
 from hdcal.data.case import Case
 from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_schema import certificates_in
 from hdcal.data.loading import loading
-from hdcal.data.records import Array
+from hdcal.data.records import Array, less_run_means
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.physics.registry import EFFECTS
 from hdcal.physics.theory import THEORIES
@@ -19,7 +21,7 @@ from hdcal.report.chart_spec import Chart
 from hdcal.report.result import Count, Digest, EffectName, Item, Result, Words, quantity
 from hdcal.report.sentences import rendered
 from hdcal.report.units import UNITS
-from hdcal.screening.result import HOLDING, LOADING, SEGMENTS, Screening
+from hdcal.screening.result import HOLDING, LOADING, SEGMENTS
 
 # Prior standard deviations of log K that contain 99.7 % of it.
 _FAR = 3.0
@@ -69,43 +71,6 @@ class CheckedData(Item):
     direction: RowsByMovement
     known: tuple[str, ...]
     sha256: Digest
-
-
-class ScreenedFinding(Item):
-    """A finding of the screening: what it is, where, how large, and what was done."""
-
-    kind: str
-    rows: str
-    row_count: Count
-    size: float
-    unit: str
-    action: str
-    words: Words
-
-
-class StraightRange(Item):
-    """The longest straight part of the curve.
-
-    Attributes:
-        deformation_mm: its ends, as read.
-        stiffness_N_per_mm: slope of a straight line there.
-        standard_error_N_per_mm: of that slope.
-        whole: whether the whole curve is straight.
-    """
-
-    deformation_mm: Ends
-    stiffness_N_per_mm: float
-    standard_error_N_per_mm: float
-    whole: bool
-
-
-class Screened(Item):
-    """What the screening found, with the number of rows of each segment."""
-
-    findings: tuple[ScreenedFinding, ...]
-    segments: dict[str, Count]
-    working_range: str
-    straight_part: StraightRange | None
 
 
 class TestableEffects(Item):
@@ -177,6 +142,11 @@ class Check(Result):
         return self.screening.straight_part
 
     @property
+    def takes_part(self) -> bool:
+        """Whether `calibrate` takes the longest straight part only."""
+        return straight_range(self.case) is not None
+
+    @property
     def stiffness_range(self) -> float:
         """Difference of the largest and the smallest stiffness of a specimen [N/mm]."""
         slopes = np.array([one.stiffness_N_per_mm for one in self.specimens])
@@ -216,43 +186,11 @@ def check(case: Case, *, each_effect: bool = False) -> Check:
             testable=tuple(name for name, lack in lacking.items() if not lack),
             not_testable={name: lack for name, lack in lacking.items() if lack},
         ),
-        screening=_screened(case.screening),
+        screening=screened(case.screening),
         case=case,
         implausible_K=_implausible_K(case),
         each_effect=each_effect,
         part="part" if gear.theory == SPRING else "gear",
-    )
-
-
-def _screened(found: Screening | None) -> Screened | None:
-    if found is None:
-        return None
-    part, rows = found.straight, np.bincount(found.segment, minlength=len(SEGMENTS))
-    straight = None
-    if part is not None:
-        ends = part.low, part.high
-        straight = StraightRange(
-            deformation_mm=ends,
-            stiffness_N_per_mm=part.slope,
-            standard_error_N_per_mm=part.slope_sd,
-            whole=part.whole,
-        )
-    return Screened(
-        findings=tuple(
-            ScreenedFinding(
-                kind=one.kind,
-                rows=one.where,
-                row_count=one.count,
-                size=one.size,
-                unit=one.unit,
-                action=one.action,
-                words=one.words,
-            )
-            for one in found.observations
-        ),
-        segments={n: int(k) for n, k in zip(SEGMENTS, rows, strict=True) if k},
-        working_range=found.working_range,
-        straight_part=straight,
     )
 
 
@@ -318,7 +256,7 @@ def _specimens(case: Case) -> tuple[Specimen, ...]:
     x, y = np.asarray(records.deformation), np.asarray(records.force)
     first = np.unique(run, return_index=True)[1]
     # Counted from its first reading, a deformation that is held is exactly zero.
-    x, y = _centred(x - x[first][run], run), _centred(y, run)
+    x, y = (less_run_means(v, run) for v in (x - x[first][run], y))
     xx, xy = np.bincount(specimen, x * x), np.bincount(specimen, x * y)
     slopes = np.divide(xy, xx, out=np.full(len(xx), np.nan), where=xx > 0.0)
     rows, runs = np.bincount(specimen), np.bincount(specimen[first])
@@ -327,8 +265,3 @@ def _specimens(case: Case) -> tuple[Specimen, ...]:
         Specimen(name=name, rows=rows, runs=runs, stiffness_N_per_mm=slope)
         for name, rows, runs, slope in zip(*columns, strict=True)
     )
-
-
-def _centred(values: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Return values less the mean of their run."""
-    return values - (np.bincount(run, values) / np.bincount(run))[run]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.grid import ArrayGrid, Line, stored_text
+from hdcal.data.tables.grid import ArrayGrid, SourceLine, stored_text
 from hdcal.errors import quoted
 
 # What findings call a table in memory.
@@ -24,7 +24,7 @@ def array_grid(names: Sequence[str], columns: Sequence[np.ndarray]) -> ArrayGrid
     """
     rows = len(columns[0]) if columns else 0
     counted = all(name.isdigit() for name in names)
-    header = [] if counted else [Line(1, [*names], fits=True)]
+    header = [] if counted else [SourceLine(1, [*names], fits=True)]
     numeric = [i for i, one in enumerate(columns) if one.dtype.kind in "iuf"]
     return ArrayGrid(
         rows=np.arange(rows) + (1 if counted else 2),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.grid import ArrayGrid, Line, stored_text
+from hdcal.data.tables.grid import ArrayGrid, SourceLine, stored_text
 
 if TYPE_CHECKING:
     from pyarrow import Schema
@@ -84,7 +84,7 @@ def arrow_grid(
     return ArrowGrid(
         rows=np.arange(rows) + first,
         width=len(plain),
-        loose=[Line(first - 1, [field.name for field in plain], fits=True)],
+        loose=[SourceLine(first - 1, [field.name for field in plain], fits=True)],
         load=load,
         numeric=frozenset(numeric),
         arrow=lambda place: arrow(plain[place].name),

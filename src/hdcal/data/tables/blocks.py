@@ -12,7 +12,7 @@ import numpy as np
 
 from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import ArrayGrid, Grid, Line
+from hdcal.data.tables.grid import ArrayGrid, Grid, SourceLine
 from hdcal.data.tables.headings import Heading, find_heading
 from hdcal.data.tables.other_lines import OtherLines, is_summary
 
@@ -21,7 +21,7 @@ _SAMPLE = 400
 
 
 @dataclass(frozen=True)
-class Table:
+class ReadTable:
     """Readings of a source.
 
     Attributes:
@@ -58,7 +58,7 @@ class Table:
         """Return the row of the source of each reading, shape (n,)."""
         return self.grid.rows
 
-    def take(self, kept: np.ndarray) -> "Table":
+    def take(self, kept: np.ndarray) -> "ReadTable":
         """Return the rows that are true in a mask, shape (n,)."""
         return replace(
             self,
@@ -68,7 +68,7 @@ class Table:
         )
 
 
-def find_table(grid: Grid, findings: FileFindings) -> tuple[Table, tuple[str, ...]]:
+def find_table(grid: Grid, findings: FileFindings) -> tuple[ReadTable, tuple[str, ...]]:
     """Return the readings of a grid under their headers, and the titles above these.
 
     Args:
@@ -192,8 +192,8 @@ def _summaries(words: list[str]) -> np.ndarray:
 
 
 def _groups(
-    rows: np.ndarray, lines: list[Line]
-) -> tuple[list[Line], dict[int, list[Line]]]:
+    rows: np.ndarray, lines: list[SourceLine]
+) -> tuple[list[SourceLine], dict[int, list[SourceLine]]]:
     """Return the lines above all readings, and others by the readings above them.
 
     Args:
@@ -213,7 +213,7 @@ def _joined(
     empty: frozenset[int],
     others: OtherLines,
     findings: FileFindings,
-) -> Table:
+) -> ReadTable:
     """Return the readings of all blocks under the headings of the first one."""
     main = headings[0]
     block = np.searchsorted([one.last for one in headings[1:]], grid.rows)
@@ -235,7 +235,7 @@ def _joined(
             f"the columns stand in another order below the headers of {rows}"
         )
     runs = np.unique(block, return_inverse=True)[1]
-    return Table(
+    return ReadTable(
         headers=main.names,
         header_row=main.row or (int(grid.rows[0]) if len(grid.rows) else 1),
         grid=grid,

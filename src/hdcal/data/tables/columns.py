@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
     LABELS,
     QUANTITIES,
@@ -26,7 +26,7 @@ _SHOWN = 12
 
 
 def choose_columns(
-    table: Table,
+    table: ReadTable,
     mapping: Mapping[str, str],
     quantities: Sequence[str],
     required: Sequence[str],
@@ -69,7 +69,7 @@ def choose_columns(
 
 
 def _check_names(
-    table: Table, mapping: Mapping[str, str], findings: FileFindings
+    table: ReadTable, mapping: Mapping[str, str], findings: FileFindings
 ) -> None:
     """Refuse a table without headers, and quantities that do not exist."""
     if not table.named and not any(text[:1].isdigit() for text in mapping.values()):
@@ -94,7 +94,7 @@ class _Chooser:
         findings: of the file.
     """
 
-    def __init__(self, table: Table, findings: FileFindings):
+    def __init__(self, table: ReadTable, findings: FileFindings):
         self._table, self._findings = table, findings
         self._headers = [*map(parse_header, table.headers)]
         self._filled = [
@@ -209,7 +209,7 @@ class _Chooser:
 
 
 def _refuse_conflicts(
-    columns: Mapping[str, Column], table: Table, findings: FileFindings
+    columns: Mapping[str, Column], table: ReadTable, findings: FileFindings
 ) -> None:
     """Add columns of two quantities, and units that differ from those of headers."""
     owners: dict[int, str] = {}

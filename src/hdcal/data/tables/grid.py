@@ -16,7 +16,7 @@ SEPARATORS = "\t;|,"
 T = TypeVar("T")
 
 
-class Line(NamedTuple):
+class SourceLine(NamedTuple):
     """A row of a source that is no reading, or none yet.
 
     Attributes:
@@ -56,7 +56,7 @@ class Grid(ABC):
 
     rows: np.ndarray
     width: int
-    loose: list[Line]
+    loose: list[SourceLine]
 
     @abstractmethod
     def read(self, columns: Iterable[int]) -> dict[int, np.ndarray]:
@@ -86,13 +86,13 @@ class Grid(ABC):
         """Tell whether texts may have decimal commas that `read` takes for such."""
         return False
 
-    def lines(self) -> list[Line]:
+    def lines(self) -> list[SourceLine]:
         """Return the rows."""
         if not len(self.rows):
             return []
         cells = zip(*(self.texts(column) for column in range(self.width)), strict=True)
         rows = zip(self.rows.tolist(), cells, strict=True)
-        return [Line(row, [*texts], fits=True) for row, texts in rows]
+        return [SourceLine(row, [*texts], fits=True) for row, texts in rows]
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class TextGrid(Grid):
 
     rows: np.ndarray
     width: int
-    loose: list[Line]
+    loose: list[SourceLine]
     separator: str
     text: list[str]
     quoted: bool
@@ -189,7 +189,7 @@ class ArrayGrid(Grid):
 
     rows: np.ndarray
     width: int
-    loose: list[Line]
+    loose: list[SourceLine]
     load: Callable[[int], np.ndarray]
     numeric: frozenset[int] = frozenset()
     index: np.ndarray | None = None

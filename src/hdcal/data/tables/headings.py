@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from hdcal.data.tables.grid import Line
+from hdcal.data.tables.grid import SourceLine
 from hdcal.data.tables.headers import (
     DIMENSIONS,
     LABELS,
@@ -46,7 +46,7 @@ class Heading(NamedTuple):
 
 
 def find_heading(
-    lines: list[Line], width: int, first: Heading | None = None
+    lines: list[SourceLine], width: int, first: Heading | None = None
 ) -> Heading | None:
     """Return names and units among the lines above a block.
 
@@ -90,7 +90,7 @@ def find_heading(
     )
 
 
-def _may_name(line: Line, quantities: int, width: int) -> bool:
+def _may_name(line: SourceLine, quantities: int, width: int) -> bool:
     """Tell whether a line may hold names: not more than a reading has cells."""
     filled = max((i + 1 for i, cell in enumerate(line.cells) if cell), default=0)
     several = filled >= 2 or line.fits
@@ -98,14 +98,14 @@ def _may_name(line: Line, quantities: int, width: int) -> bool:
     return several and filled <= width and words
 
 
-def _quantities(line: Line, units: list[str]) -> int:
+def _quantities(line: SourceLine, units: list[str]) -> int:
     """Return how many cells of a line name a quantity of a spring, or a run."""
     pairs = zip(line.cells, [*units, *[""] * len(line.cells)], strict=False)
     found = [parse_header(_with_unit(_MARK.sub("", n), unit)) for n, unit in pairs]
     return sum(h.quantity in (*DIMENSIONS, *LABELS[:2]) for h in found)
 
 
-def _is_unit_line(line: Line, near: list[Line]) -> bool:
+def _is_unit_line(line: SourceLine, near: list[SourceLine]) -> bool:
     """Tell whether a line holds units, behind a label such as 'Unit' or near names."""
     filled = [cell for cell in line.cells if cell]
     if not filled or line.numbers:
@@ -116,13 +116,13 @@ def _is_unit_line(line: Line, near: list[Line]) -> bool:
     return line in near and any(map(find_unit, filled)) and 2 * len(units) > len(filled)
 
 
-def _units_of(line: Line | None, width: int) -> list[str]:
+def _units_of(line: SourceLine | None, width: int) -> list[str]:
     """Return the units of a line, without its label, shape (c,)."""
     cells = _padded(line.cells if line is not None else [], width)
     return [cell.strip("()[] ") if is_unit_text(cell) else "" for cell in cells]
 
 
-def _bare_names(line: Line, lines: list[Line], width: int) -> list[str]:
+def _bare_names(line: SourceLine, lines: list[SourceLine], width: int) -> list[str]:
     """Return headers as written; LabVIEW's first one where it is the time."""
     names = _padded(line.cells, width)
     names[0] = _MARK.sub("", names[0])

@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.grid import ArrayGrid, Grid
 from hdcal.data.tables.shapes import table_of
 from hdcal.errors import quoted
 
 
-def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> Table:
+def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> ReadTable:
     """Return sheets below each other, with a column that names the sheet.
 
     Args:
@@ -53,7 +53,7 @@ def joined_sheets(grids: Mapping[str, Grid], findings: FileFindings) -> Table:
         np.zeros(len(table.rows), int) if table.runs is None else table.runs
         for table in tables.values()
     ]
-    return Table(
+    return ReadTable(
         headers=(*tables[first].headers, "specimen"),
         header_row=1,
         grid=ArrayGrid(np.arange(len(labels)) + 2, width + 1, [], load),

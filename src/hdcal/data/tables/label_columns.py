@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from itertools import pairwise
 
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import GROUPINGS, Header
 
 
-def label_columns(table: Table, headers: Sequence[Header], quantity: str) -> list[int]:
+def label_columns(
+    table: ReadTable, headers: Sequence[Header], quantity: str
+) -> list[int]:
     """Return where the labels of a quantity stand, by headers and cells.
 
     Of columns that tell the same rows apart the first one, and of those that tell none

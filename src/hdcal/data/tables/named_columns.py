@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import DIMENSIONS, LABELS, parse_header, unit_advice
 from hdcal.data.units import Unit, find_unit
 
@@ -33,7 +33,7 @@ class Column:
 
 
 def named_column(
-    quantity: str, wanted: str, table: Table, findings: FileFindings
+    quantity: str, wanted: str, table: ReadTable, findings: FileFindings
 ) -> Column | None:
     """Return the column that a user named, or None after a finding.
 
@@ -78,7 +78,7 @@ def named_column(
     return Column(quantity, header, place, unit, against=against)
 
 
-def _places(wanted: str, name: str, table: Table) -> list[int]:
+def _places(wanted: str, name: str, table: ReadTable) -> list[int]:
     """Return where the columns stand that a text may name."""
     # A header may itself end in brackets, so the whole text is tried as well.
     wholes = {_squeezed(wanted), _squeezed(name)}

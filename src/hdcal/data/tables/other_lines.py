@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 from hdcal.data.findings import FileFindings, row_list
 from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import Line
+from hdcal.data.tables.grid import SourceLine
 from hdcal.data.tables.headings import Heading
 from hdcal.errors import quoted
 
@@ -25,7 +25,7 @@ def is_summary(cell: str) -> bool:
     return cell.strip(" .:").lower() in _SUMMARIES
 
 
-def _is_open(line: Line) -> bool:
+def _is_open(line: SourceLine) -> bool:
     """Tell whether a quotation mark is not closed."""
     return len(line.cells) == 1 and line.cells[0].count('"') % 2 == 1
 
@@ -51,10 +51,12 @@ class OtherLines:
         self.spoilt: list[int] = []
         self._wrong: list[tuple[int, str, str]] = []
         self.repeated = self.above = self.titles = self.footers = 0
-        self._remarks: list[Line] = []
+        self._remarks: list[SourceLine] = []
         self._other_tables: list[int] = []
 
-    def sort_above(self, lines: list[Line], heading: Heading | None) -> list[Heading]:
+    def sort_above(
+        self, lines: list[SourceLine], heading: Heading | None
+    ) -> list[Heading]:
         """Sort the lines above the first reading, and return the first heading.
 
         Without one, columns are called by their numbers.
@@ -78,7 +80,7 @@ class OtherLines:
 
     def sort(
         self,
-        lines: list[Line],
+        lines: list[SourceLine],
         *,
         titled: bool = False,
         below: bool = False,
@@ -112,7 +114,7 @@ class OtherLines:
         elif others:
             self._other_tables += [line.row for line in others]
 
-    def _is_spoilt(self, line: Line, *, titled: bool) -> bool:
+    def _is_spoilt(self, line: SourceLine, *, titled: bool) -> bool:
         """Tell whether a line is a reading, though one with a bad cell."""
         if not line.fits or is_summary(line.first) or _COMMENT.match(line.first):
             return False
@@ -122,7 +124,7 @@ class OtherLines:
             return is_number(cells[0])
         return any(map(is_number, cells)) or all(cells)
 
-    def _is_remark(self, line: Line, *, titled: bool, below: bool) -> bool:
+    def _is_remark(self, line: SourceLine, *, titled: bool, below: bool) -> bool:
         """Tell whether a line is words, which may stand where it does."""
         if _COMMENT.match(line.first) or is_summary(line.first):
             return True
@@ -130,7 +132,7 @@ class OtherLines:
             return False
         return titled or (below and line.numbers < 2) or line.fits
 
-    def refuse_line(self, line: Line, *, top: bool = False) -> None:
+    def refuse_line(self, line: SourceLine, *, top: bool = False) -> None:
         """Add what is wrong with a line that has another number of cells."""
         words = f"has {len(line.cells)} cells where the header row has {self._width}"
         remedy = f"Write {self._width} cells"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.blocks import Table, find_table
+from hdcal.data.tables.blocks import ReadTable, find_table
 from hdcal.data.tables.cells import unit_in
 from hdcal.data.tables.grid import ArrayGrid, Grid
 from hdcal.data.tables.headers import parse_header
@@ -17,14 +17,14 @@ from hdcal.errors import quoted
 _SHOWN = 50
 
 
-def table_of(grid: Grid, findings: FileFindings) -> Table:
+def table_of(grid: Grid, findings: FileFindings) -> ReadTable:
     """Return the table in a grid, whatever its shape."""
     table, titles = find_table(grid, findings)
     table = with_unit_cells(with_unit_columns(table, findings), findings)
     return stacked(table, titles)
 
 
-def with_unit_columns(table: Table, findings: FileFindings) -> Table:
+def with_unit_columns(table: ReadTable, findings: FileFindings) -> ReadTable:
     """Return a table whose headers have the units from columns behind them.
 
     Args:
@@ -50,7 +50,7 @@ def with_unit_columns(table: Table, findings: FileFindings) -> Table:
     return replace(table, headers=tuple(headers), notes=tuple(notes))
 
 
-def with_unit_cells(table: Table, findings: FileFindings) -> Table:
+def with_unit_cells(table: ReadTable, findings: FileFindings) -> ReadTable:
     """Return a table whose headers have the units that stand in their cells.
 
     Args:
@@ -77,7 +77,7 @@ def with_unit_cells(table: Table, findings: FileFindings) -> Table:
     return replace(table, headers=tuple(headers))
 
 
-def stacked(table: Table, titles: tuple[str, ...]) -> Table:
+def stacked(table: ReadTable, titles: tuple[str, ...]) -> ReadTable:
     """Return a table with each column once, where specimens stand side by side.
 
     Args:

@@ -10,7 +10,7 @@ from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
 from hdcal.data.tables.arrow_grid import PARQUET, parquet_grid
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.joined_sheets import joined_sheets
 from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text_file import LARGEST_FILE, decode, read_bytes
@@ -40,7 +40,7 @@ def read_source(
     findings: FileFindings,
     encoding: str | None = None,
     sheet: str | None = None,
-) -> tuple[Table, str]:
+) -> tuple[ReadTable, str]:
     """Return the table of a file, or of a table in memory, and the hash of its source.
 
     Args:
@@ -99,7 +99,7 @@ def _kind(path: Path) -> bytes:
 
 def _file_table(
     path: Path, findings: FileFindings, encoding: str | None, sheet: str | None
-) -> tuple[Table, str]:
+) -> tuple[ReadTable, str]:
     """Return the table of a file, and the hash of its bytes."""
     kind = _kind(path)
     _refuse_kind(kind, findings, encoding, sheet)

@@ -7,7 +7,7 @@ from itertools import compress
 import numpy as np
 
 from hdcal.data.tables.cells import is_number
-from hdcal.data.tables.grid import SEPARATORS, Line, TextGrid, split_line
+from hdcal.data.tables.grid import SEPARATORS, SourceLine, TextGrid, split_line
 
 # Lines at the top, and spread over the rest, by which the separator is judged.
 _SAMPLE = 300
@@ -52,7 +52,7 @@ def text_grid(text: str) -> tuple[TextGrid, list[str]]:
         len(lines),
     )
     loose = [
-        Line(index + 1, cells_of(lines[index], separator), fits=False)
+        SourceLine(index + 1, cells_of(lines[index], separator), fits=False)
         for index in np.flatnonzero(~fits & ~empty).tolist()
     ]
     kept = fits & ~empty

@@ -6,7 +6,7 @@ import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.formula_cells import with_formula
-from hdcal.data.tables.blocks import Table
+from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.cells import (
     NOT_STATED,
     Fault,
@@ -25,7 +25,7 @@ _FEWEST = 5
 
 
 def read_values(
-    table: Table, used: Mapping[str, Column], findings: FileFindings
+    table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> tuple[dict[str, np.ndarray], list[str]]:
     """Read the used columns.
 
@@ -53,8 +53,8 @@ def read_values(
 
 
 def without_slow_channels(
-    table: Table, used: Mapping[str, Column], required: tuple[str, ...]
-) -> tuple[Table, dict[str, Column], list[str]]:
+    table: ReadTable, used: Mapping[str, Column], required: tuple[str, ...]
+) -> tuple[ReadTable, dict[str, Column], list[str]]:
     """Return the rows in which slow channels were read as well.
 
     A channel that is read more seldom than others leaves most of its cells empty. Where
@@ -97,7 +97,7 @@ def _is_regular(filled: np.ndarray) -> bool:
 
 
 def _numbers(
-    table: Table, used: Mapping[str, Column], findings: FileFindings
+    table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> dict[str, np.ndarray]:
     """Return the columns of numbers in the units of the file."""
     numeric = [column for quantity, column in used.items() if quantity not in LABELS]
@@ -122,7 +122,7 @@ def _numbers(
 
 
 def read_labels(
-    table: Table, column: Column, findings: FileFindings, notes: list[str]
+    table: ReadTable, column: Column, findings: FileFindings, notes: list[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the index of each row's label, and the labels, as objects.
 
@@ -150,7 +150,7 @@ def read_labels(
 
 
 def _add(
-    table: Table, faults: list[Fault], column: Column, findings: FileFindings
+    table: ReadTable, faults: list[Fault], column: Column, findings: FileFindings
 ) -> None:
     rows = table.rows
     each = ((int(rows[place]), words, remedy) for place, words, remedy in faults)

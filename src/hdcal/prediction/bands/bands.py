@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hdcal.data.plausible import implausible
-from hdcal.data.records import Records
+from hdcal.data.records import Records, lies_far
 from hdcal.errors import Finding, InputError
 from hdcal.notebook import Shown
 from hdcal.prediction.engine.causes import Cause, causes_of, likeliest
@@ -19,6 +19,7 @@ from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
     SENSE,
     Direction,
+    excluded_findings,
     far_findings,
     is_tested,
     temperature_findings,
@@ -233,6 +234,8 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
         find("deformation", problem, "Give it in mm")
     else:
         findings += far_findings(worst, float(np.max(np.abs(tested))))
+        each = (excluded_findings(cause.posterior.case, one) for one in deformation)
+        findings += next(filter(None, each), [])
     if temperature.size == 0:
         find("temperature", "is empty", "give numbers in °C")
     else:
@@ -257,13 +260,18 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
     """
     case = causes_of(models, allow_failed=True)[0].posterior.case
     records, nominal = case.records, case.gear.nominal_deformation
-    ends = [0.0, float(np.min(records.deformation)), float(np.max(records.deformation))]
+    ends = [float(np.min(records.deformation)), float(np.max(records.deformation))]
+    if not lies_far(records):
+        ends.append(0.0)
     if nominal is not None:
         ends.append(nominal)
     low, high = min(ends), max(ends)
     beyond = 0.1 * (high - low)
     # Not beyond an end that is the unloaded gear and no tested deformation.
-    low, high = low - beyond * (low < 0.0), high + beyond * (high > 0.0)
+    low, high = low - beyond * float(low != 0.0), high + beyond * float(high != 0.0)
+    for left, right in case.excluded:
+        low, high = (low, left) if left >= ends[1] else (right, high)
+    ends = [end for end in ends if low <= end <= high]
     grid = np.linspace(low, high, 67)
     # The ends of the data themselves, so that the tested range shows whole.
     grid = np.union1d(grid, ends)

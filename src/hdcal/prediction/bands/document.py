@@ -55,7 +55,7 @@ def bands_document(bands: Bands) -> Document:
     numbers += ("band of a new reading",)
     rows = [_row(bands, row) for row in range(min(size, _MOST_ROWS))]
     columns = [*numbers[:2], "direction", *numbers[2:], "tested"]
-    more = [Text(f"The first {_MOST_ROWS} of {size}.")] * (size > _MOST_ROWS)
+    more = [Text(f"The first {_MOST_ROWS} of {size}.")] if size > _MOST_ROWS else []
     unusable = () if bands.usable.all() else ("the calibration failed its checks",)
     return Document(
         name="Bands",

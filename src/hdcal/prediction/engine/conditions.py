@@ -166,6 +166,24 @@ def far_findings(
     return [Finding("deformation", words, "Give it in mm")]
 
 
+def excluded_findings(case: Case, deformation: float) -> list[Finding]:
+    """Return a finding where rows were read and left out, or the part had given way.
+
+    Args:
+        case: that was calibrated.
+        deformation: as given [mm].
+    """
+    if not any(low < deformation < high for low, high in case.excluded):
+        return []
+    tested = np.asarray(case.records.deformation)
+    words = (
+        f"{deformation:g} mm is outside the part of the curve that was calibrated, "
+        f"{tested.min():.4g} to {tested.max():.4g} mm; readings there were left out"
+    )
+    remedy = "See the notes of the calibration; `range` chooses another part"
+    return [Finding("deformation", words, remedy)]
+
+
 def level_findings(
     temperature: np.ndarray, name: str, most: int = MOST_LEVELS
 ) -> list[Finding]:

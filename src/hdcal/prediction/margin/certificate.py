@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from datetime import date
 
 from hdcal.data.certificates import ZEROS, is_stated
-from hdcal.data.measurements import ASSUMED
+from hdcal.data.used_columns import ASSUMED
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED
@@ -86,7 +86,8 @@ def _measured(posterior: Posterior) -> Facts:
     parts = []
     for stated, said in words.items():
         listed = [_OF_GAUGES[name] for name, one in known.items() if one is stated]
-        parts += [said + ", ".join(listed)] * bool(listed)
+        if listed:
+            parts.append(said + ", ".join(listed))
     apart = {"case", "gear", "SHA-256 of the data"}
     gear = dict(gear_rows(case, posterior.theory))
     sizes = [f"{name} {words}" for name, words in gear.items() if name not in apart]

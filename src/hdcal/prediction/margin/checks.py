@@ -5,10 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from hdcal.data.plausible import implausible
+from hdcal.data.priors import rig_priors
+from hdcal.data.records import lies_far
 from hdcal.errors import Finding, InputError
+from hdcal.inference.posterior import Posterior
 from hdcal.prediction.engine.causes import Cause, likeliest
 from hdcal.prediction.engine.conditions import (
     DIRECTIONS,
+    excluded_findings,
     level_findings,
     slip_findings,
     temperature_findings,
@@ -67,8 +71,19 @@ def check_margin(
     if limit is not None and not wrong:
         findings += capacity_findings("limit_force", limit, sense, place)
     findings += _check_choices(request, criteria)
+    if request.quantity == "load" and not _knows_contact(cause.posterior):
+        words = "needs the place of first contact, and the readings are far from 0"
+        remedy = "State deformation_offset in [priors], or count from there"
+        findings.append(Finding("quantity", words, remedy))
     if findings:
         raise InputError(findings)
+
+
+def _knows_contact(posterior: Posterior) -> bool:
+    """Return whether the origin may be first contact, or the gear file states that."""
+    name = "deformation_offset"
+    stated = posterior.priors[name].source != rig_priors()[name].source
+    return stated or not lies_far(posterior.case.records)
 
 
 def check_sign(
@@ -112,7 +127,7 @@ def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
     if abs(deformation) >= gear.reach:
         words = f"{deformation:g} mm on a radius of {gear.geometry.radius:g} mm"
         return [Finding("deformation", words, "Give it in mm")]
-    return []
+    return excluded_findings(cause.posterior.case, deformation)
 
 
 def _check_choices(request: MarginRequest, criteria: Criteria) -> list[Finding]:

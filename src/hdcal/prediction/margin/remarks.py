@@ -155,8 +155,10 @@ def _rig_drift(force: PopulationForce) -> str:
     (_, zero), (_, frame) = untested.zero, untested.frame
     radial = force.cause.problem.reading.radial_per_read
     moves = frame * float(np.median(stiff)) / radial
-    parts = [f"{zero:.2g} N per kelvin by the zero of its gauge"] * (zero > 0.0)
-    parts += [f"{moves:.2g} N per kelvin by the length of its frame"] * (moves > 0.0)
+    drifts = (zero, "zero of its gauge"), (moves, "length of its frame")
+    parts = [
+        f"{sd:.2g} N per kelvin by the {cause}" for sd, cause in drifts if sd > 0.0
+    ]
     if force.whose.quantity == "load" or not parts:
         return ""
     return (

@@ -1,0 +1,130 @@
+"""From measurements and gear to a case: screened, with motion and priors."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.correlation_prior import with_correlation_prior
+from hdcal.data.deformation_scatter import without_scatter
+from hdcal.data.full_scale import scale_of
+from hdcal.data.further_labels import further_labels
+from hdcal.data.gear import at_full_scale
+from hdcal.data.loading import Motion, derive_motion
+from hdcal.data.measurements import Measurements
+from hdcal.data.reading_notes import reading_notes
+from hdcal.data.records import Records
+from hdcal.data.screened import asked_range, screened, screening_notes, with_zeros
+
+MANY = 3  # labels from which a spread between runs or specimens can be estimated
+
+
+def case_of(
+    measured: Measurements,
+    found: Gear,
+    told: Sequence[str],
+    name: str,
+    range: str | None = None,
+    skip_bad: bool | None = None,
+) -> Case:
+    """Return what was measured on a gear, or several of its kind, as a case.
+
+    Args:
+        measured: in which nothing is wrong.
+        found: as its file has it.
+        told: notes on how that was found.
+        name: of the case.
+        range: working range; by default that of the gear file.
+        skip_bad: as in `read_case`.
+
+    Raises:
+        InputError: as `screened`.
+    """
+    wanted = asked_range(range or found.source.get("measurement", {}).get("range"))
+    measured, screening = screened(measured, wanted, skip_bad)
+    motion = _motion(measured, hidden=screening.trembling)
+    of_reading = [*reading_notes(measured, found, motion)]
+    of_reading += screening_notes(screening)
+    run = with_zeros(measured.run, screening)
+    if run is not measured.run:
+        measured = replace(measured, run=run)
+        motion = _motion(measured, hidden=screening.trembling)
+    if screening.deformation_sd > 0.0:
+        measured = _without_scatter(measured)
+    further, of_further = further_labels(
+        measured.columns.values, measured.specimen, measured.run
+    )
+    values = measured.columns.values
+    found = with_correlation_prior(
+        found, values["deformation"], measured.run.index, values.get("time")
+    )
+    scale = scale_of(values["force"], values["deformation"], found.reading)
+    return Case(
+        name=name,
+        gear=at_full_scale(found, scale),
+        records=_records(measured, found, motion),
+        run_labels=measured.run.names,
+        specimen_labels=measured.specimen.names,
+        data_sha256=measured.columns.sha256,
+        notes=(
+            *measured.columns.notes,
+            *told,
+            *of_reading,
+            *of_further,
+        ),
+        columns=measured.columns.as_named(),
+        left_out=measured.left_out,
+        excluded=screening.excluded if len(measured.specimen.names) == 1 else (),
+        screening=screening,
+        **further,
+    )
+
+
+def _without_scatter(measured: Measurements) -> Measurements:
+    """Return measurements without the scatter of the displacement gauge."""
+    values = measured.columns.values
+    steady, force = without_scatter(
+        values["deformation"], values["force"], measured.run.index
+    )
+    moved = values | {"deformation": steady, "force": force}
+    return replace(measured, columns=replace(measured.columns, values=moved))
+
+
+def _motion(measured: Measurements, *, hidden: bool) -> Motion:
+    values, run = measured.columns.values, measured.run.index
+    time = values.get("time")
+    return derive_motion(values["deformation"], run, time, hidden=hidden)
+
+
+def _records(measured: Measurements, gear: Gear, motion: Motion) -> Records:
+    values, run = measured.columns.values, measured.run.index
+    zeros = np.zeros(len(run))
+    # NumPy arrays: JAX takes them when it computes, and reading starts no device
+    return Records(
+        deformation=values["deformation"],
+        temperature=values.get("temperature", zeros + gear.reference_temperature),
+        time=values.get("time", zeros),
+        angle=values.get("angle", zeros),
+        direction=motion.direction,
+        sense=motion.sense,
+        rate=motion.rate,
+        run=run,
+        specimen=measured.specimen.index,
+        force=values["force"],
+        force_sd=values.get("force_sd", zeros),
+        known=motion.features | _known(measured),
+    )
+
+
+def _known(measured: Measurements) -> frozenset[str]:
+    values = measured.columns.values
+    known = {"temperature", "time", "angle", "force_sd"} & values.keys()
+    if "force_sd" in known and not values["force_sd"].any():
+        known.remove("force_sd")  # a column of zeros says that nothing is known
+    for name, labels in (("run", measured.run), ("specimen", measured.specimen)):
+        if len(labels.names) > 1:
+            known.add(name)
+        if len(labels.names) >= MANY:
+            known.add(name + "s")
+    return frozenset(known)
