@@ -47,11 +47,16 @@ def graded(spring: Spring, middle: float, low: float, high: float) -> Answer:
     return Answer("right" if off <= WRONG else "wrong", middle, low, high)
 
 
-def least_squares(spring: Spring) -> Answer:
-    """Return the straight line through all rows."""
-    (slope, _), cov = np.polyfit(spring.deformation, spring.force, 1, cov=True)
+def _line(spring: Spring, x: np.ndarray, y: np.ndarray) -> Answer:
+    """Return the straight line through some rows of a spring."""
+    (slope, _), cov = np.polyfit(x, y, 1, cov=True)
     half = NORMAL * float(np.sqrt(cov[0, 0]))
     return graded(spring, slope, slope - half, slope + half)
+
+
+def least_squares(spring: Spring) -> Answer:
+    """Return the straight line through all rows."""
+    return _line(spring, spring.deformation, spring.force)
 
 
 def least_squares_of_kept(spring: Spring) -> Answer:
@@ -59,10 +64,7 @@ def least_squares_of_kept(spring: Spring) -> Answer:
     found = screen(spring.deformation, spring.force)
     if found.asked:
         return Answer("asked")
-    x, y = found.deformation[found.kept], found.force[found.kept]
-    (slope, _), cov = np.polyfit(x, y, 1, cov=True)
-    half = NORMAL * float(np.sqrt(cov[0, 0]))
-    return graded(spring, slope, slope - half, slope + half)
+    return _line(spring, found.deformation[found.kept], found.force[found.kept])
 
 
 def straight_part(spring: Spring) -> Answer:
