@@ -13,7 +13,13 @@ from hdcal.errors import Finding, InputError
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
 from hdcal.screening.words import HIDDEN_DIRECTION, in_words, question
-from hdcal.screening.working_range import FORM, WorkingRange, in_range, read_range
+from hdcal.screening.working_range import (
+    FORM,
+    STRAIGHT,
+    WorkingRange,
+    in_range,
+    read_range,
+)
 
 
 def asked_range(wanted: str | None) -> WorkingRange | None:
@@ -61,6 +67,9 @@ def screened(
         offered = skip_bad is False and len(bad) < many
         raise InputError([*bad.values(), *([offer(bad, many)] if offered else [])])
     if wanted is not None:
+        if wanted.unit == STRAIGHT and len(measured.run.names) > 1:
+            words = "is straight, which only one run has"
+            raise InputError([Finding("range", words, FORM)])
         found = in_range(found, wanted, run)
     told = [in_words(one, labels, found.working_range) for one in found.observations]
     found = replace(found, observations=tuple(told))

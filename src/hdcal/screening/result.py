@@ -73,12 +73,12 @@ class Observation:
 
 @dataclass(frozen=True)
 class StraightPart:
-    """The longest straight part of the first loading.
+    """The longest straight part of the first run's largest movement.
 
     Attributes:
         low: smallest deformation of it, as read [mm].
         high: largest deformation of it, as read [mm].
-        rows: whether a row lies in this range of the deformation, shape (n,).
+        rows: which rows it has, shape (n,); other branches have none of them.
         slope: of the force over the deformation there, by least squares [N/mm].
         slope_sd: its standard error [N/mm].
         whole: whether the whole curve is straight.

@@ -8,7 +8,7 @@ from pydantic import Field, InstanceOf, computed_field
 
 from hdcal.calibration.check.charts import readings_chart
 from hdcal.calibration.check.screened import Screened, StraightRange, screened
-from hdcal.calibration.straight_part import straight_range
+from hdcal.calibration.straight_part import takes_straight_part
 from hdcal.data.case import Case
 from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
 from hdcal.data.gear_schema import certificates_in
@@ -144,7 +144,7 @@ class Check(Result):
     @property
     def takes_part(self) -> bool:
         """Whether `calibrate` takes the longest straight part only."""
-        return straight_range(self.case) is not None
+        return takes_straight_part(self.case)
 
     @property
     def stiffness_range(self) -> float:
