@@ -19,14 +19,13 @@ _NORMAL_95 = 1.96
 def takes_straight_part(case: Case) -> bool:
     """Tell whether the stiffness of a curve is asked over its straight part.
 
-    It is not where that part has the stiffness of a straight line through all readings,
-    nor of repeated cycles, whose stiffness is that of all their branches.
+    It is not where that part has the stiffness of a straight line through all readings.
 
     Args:
         case: records with their screening.
     """
     part, x = _part(case), np.asarray(case.records.deformation)
-    if part is None or "cycles" in case.records.known or not np.ptp(x):
+    if part is None or not np.ptp(x):
         return False
     slope = float(np.polyfit(x, case.records.force, 1)[0])
     return abs(slope - part.slope) > _unsure(part, _CLASS)
@@ -57,14 +56,13 @@ def straight_check(case: Case, stiffness: np.ndarray) -> "Check":
 def _part(case: Case) -> StraightPart | None:
     """Return the longest straight part of a curve that is no line.
 
-    None where a range was chosen, and of several runs and specimens, whose stiffness
-    is that of all of them.
+    None where a range was chosen.
     """
     found = case.screening
     part = None if found is None else found.straight
     if found is None or part is None or part.whole or found.working_range:
         return None
-    return None if case.records.known & {"run", "specimen"} else part
+    return part
 
 
 def _unsure(part: StraightPart, share: float) -> float:

@@ -67,8 +67,8 @@ def screened(
         offered = skip_bad is False and len(bad) < many
         raise InputError([*bad.values(), *([offer(bad, many)] if offered else [])])
     if wanted is not None:
-        if wanted.unit == STRAIGHT and len(measured.run.names) > 1:
-            words = "is straight, which only one run has"
+        if wanted.unit == STRAIGHT and found.straight is None:
+            words = "is straight, and the data are no single run with a straight part"
             raise InputError([Finding("range", words, FORM)])
         found = in_range(found, wanted, run)
     told = [in_words(one, labels, found.working_range) for one in found.observations]

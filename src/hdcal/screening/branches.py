@@ -13,8 +13,9 @@ from hdcal.screening.turning_points import turning_points
 
 # Rows from which on a line has a slope and scatter.
 _FEWEST = 5
-# A movement over this share of the range is a branch.
-_BRANCH = 0.1
+# A movement over this share of the range is a branch; from so many on they are cycles,
+# of which so many are looked at.
+_BRANCH, _CYCLES, _MOST_MOVEMENTS = 0.1, 3, 12
 
 
 def name_segments(one: Run) -> None:
@@ -33,24 +34,37 @@ def name_segments(one: Run) -> None:
 
 
 def straight_part(one: Run, n: int) -> StraightPart | None:
-    """Return the longest straight part of a run's largest movement."""
-    rows = np.flatnonzero(one.kept)
+    """Return the longest straight part of a run's largest movement.
+
+    Of cycles it is the largest movement that is straight as a whole, where at least
+    half of them are: one that yields once goes back and forth along another line. In
+    a loop none is straight, and the stiffness is that of all of it. Rows that only
+    repeat a reading add nothing to what is known.
+    """
+    rows = one.distinct()
     if rows.size < _FEWEST:
         return None
     turns, _ = _branches(one, rows)
-    ends = [0, *turns.tolist(), rows.size - 1]
-    first = int(np.argmax(np.abs(np.diff(one.y[rows[ends]]))))
-    loading = rows[ends[first] : ends[first + 1] + 1]
-    found = longest_straight(one.x[loading], one.y[loading], one.scatter)
-    part = loading[found.rows]
+    ends = np.r_[0, turns, rows.size - 1]
+    largest = np.argsort(-np.abs(np.diff(one.y[rows[ends]])), kind="stable")
+    branches = [rows[ends[i] : ends[i + 1] + 1] for i in largest[:_MOST_MOVEMENTS]]
+    found = [longest_straight(one.x[b], one.y[b], one.scatter) for b in branches]
+    pairs = list(zip(branches, found, strict=True))
+    if largest.size >= _CYCLES:
+        pairs = [(b, s) for b, s in pairs if s.whole and b.size >= _SHOWN]
+        if 2 * len(pairs) < len(branches):
+            return None
+    branch, straight = pairs[0]
+    part = branch[straight.rows]
     if not np.ptp(one.x[part]):
         return None
     low, high = float(one.x[part].min()), float(one.x[part].max())
     inside = np.zeros(n, bool)
-    inside[one.rows[part]] = True
+    inside[one.rows[one.with_repeats(part)]] = True
     slope, sd = _line(one.x[part], one.y[part], one.scatter)
-    sd *= math.sqrt(found.inflation)
-    return StraightPart(low, high, inside, slope, sd, found.whole)
+    sd *= math.sqrt(straight.inflation)
+    whole = all(each.whole for each in found)
+    return StraightPart(low, high, inside, slope, sd, whole)
 
 
 def _branches(one: Run, rows: np.ndarray) -> tuple[np.ndarray, int]:
@@ -81,6 +95,8 @@ def _line(x: np.ndarray, y: np.ndarray, scatter: float) -> tuple[float, float]:
     return slope, float(sd)
 
 
+# Rows of a movement from which on it is seen whether it is straight.
+_SHOWN = 20
 # The curve is cut into straight pieces between this many points, means of rows.
 _POINTS = 120
 _PIECES = 6
@@ -94,6 +110,8 @@ _PARAMETERS = 3.0
 # Share of a piece that is left out where it meets another one: the place of a cut is
 # known to some points only, and a curve that bends gradually has none.
 _MARGIN = 0.1
+# Points from which on noise that remembers can be told from a kink: ten for each piece.
+_FEWEST_FOR_MEMORY = 10 * _PIECES
 
 
 class Straight(NamedTuple):
@@ -196,6 +214,8 @@ def _edges(came: np.ndarray, points: int, count: int) -> list[int]:
 
 def _inflation(x: np.ndarray, y: np.ndarray, edges: list[int]) -> float:
     """Return (1 + r) / (1 - r) of the neighbours' correlation r, if it is positive."""
+    if x.size < _FEWEST_FOR_MEMORY:
+        return 1.0
     pieces = [(a, b) for a, b in pairwise(edges) if b > a]
     left = np.concatenate([_left(x[a:b], y[a:b]) for a, b in pieces])
     square = float(left @ left)

@@ -136,10 +136,8 @@ class Check(Result):
 
     @property
     def straight_part(self) -> StraightRange | None:
-        """The longest straight part; of several specimens none is told."""
-        if self.screening is None or len(self.data.specimens) > 1:
-            return None
-        return self.screening.straight_part
+        """The longest straight part of a single run."""
+        return self.screening.straight_part if self.screening else None
 
     @property
     def takes_part(self) -> bool:
