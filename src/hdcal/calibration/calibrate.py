@@ -13,6 +13,7 @@ from hdcal.data.case import Case, Theory, require_case
 from hdcal.data.prior import Prior
 from hdcal.data.priors import effect_priors, rig_priors
 from hdcal.data.scatter import require_scatter
+from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
@@ -186,7 +187,7 @@ def calibrate(
     found = sample(problem, fitted, seed, progress=progress, **size)
     # An effect, or a bend that was asked for, is a reason for another stiffness.
     plain = not asked and with_gap is None
-    own = _specifics(case, problem, form, found, plain=plain, shown=shown)
+    own = _specifics(case, theory, problem, form, found, plain=plain, shown=shown)
     parts = assemble(case, priors, problem, found, own, seed)
     parts[0][laplace.GROUP] = xr.DataTree(laplace.to_group(fitted))
     settings = {"seed": seed, **size, "with_gap": form.with_gap}
@@ -219,6 +220,7 @@ def _with_constant_part(case: Case, noise_sd: float) -> Case:
 
 def _specifics(
     case: Case,
+    theory: Theory,
     problem: Problem,
     form: ModelStructure,
     found: Draws,
@@ -236,7 +238,7 @@ def _specifics(
     line_checks = []
     if plain:
         stiffness = found.values["stiffness"]
-        line_checks += [line_check(case.records, stiffness)]
+        line_checks += [line_check(case.records, stiffness, sized=theory != SPRING)]
         line_checks += [straight_check(case, stiffness)]
     return Specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
