@@ -6,13 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.correlation_prior import with_correlation_prior
 from hdcal.data.deformation_scatter import without_scatter
 from hdcal.data.full_scale import scale_of
 from hdcal.data.further_labels import further_labels
 from hdcal.data.gear import at_full_scale
+from hdcal.data.gear_file.rig_facts import correlation_prior
 from hdcal.data.loading import Motion, derive_motion
 from hdcal.data.measurements import Measurements
+from hdcal.data.priors import rig_priors
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
 from hdcal.data.screened import asked_range, screened, screening_notes, with_zeros
@@ -56,9 +57,7 @@ def case_of(
         measured.columns.values, measured.specimen, measured.run
     )
     values = measured.columns.values
-    found = with_correlation_prior(
-        found, values["deformation"], measured.run.index, values.get("time")
-    )
+    found = _with_correlation(found, measured)
     scale = scale_of(values["force"], values["deformation"], found.reading)
     return Case(
         name=name,
@@ -79,6 +78,21 @@ def case_of(
         screening=screening,
         **further,
     )
+
+
+def _with_correlation(gear: Gear, measured: Measurements) -> Gear:
+    """Return a gear with the prior of the correlation, unless its file states one."""
+    name = "noise_correlation"
+    own = gear.scale_priors.get(name)
+    if own is None or own.source != rig_priors()[name].source:
+        return gear
+    values, cutoff = (
+        measured.columns.values,
+        gear.source.get("rig", {}).get("filter_Hz"),
+    )
+    moved, run = values["deformation"], measured.run.index
+    found = correlation_prior(cutoff, moved, run, values.get("time"))
+    return replace(gear, scale_priors=gear.scale_priors | {name: found})
 
 
 def _without_scatter(measured: Measurements) -> Measurements:

@@ -10,7 +10,7 @@ import numpy as np
 from hdcal.data.bad_gears import among, bad_gears
 from hdcal.data.case import Case, Gear
 from hdcal.data.findings import FileFindings
-from hdcal.data.gear_schema import size_faults
+from hdcal.data.gear_file.schema import size_faults
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Geometry
 from hdcal.data.tables.blocks import ReadTable

@@ -82,7 +82,7 @@ def init(console: Console, folder, data, columns, sheet, **given):
     """Write FOLDER with a gear file, from options or from answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
-    from hdcal.data.gear_text import gear_text
+    from hdcal.data.gear_file.gear_text import gear_text
     from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
     from hdcal.data.tables.sources import text_of
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from datetime import date
 
-from hdcal.data.certificates import ZEROS, is_stated
+from hdcal.data.gear_file.certificates import ZEROS, is_stated
 from hdcal.data.used_columns import ASSUMED
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
