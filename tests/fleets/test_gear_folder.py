@@ -10,7 +10,7 @@ import pytest
 from commands import Hdcal
 
 import hdcal as api
-from hdcal.data.gear_files import gear_files
+from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 from hdcal.fleets.left_out import left_out_of

@@ -9,9 +9,9 @@ from typing import Any
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
-from hdcal.data.tables.arrow_grid import PARQUET, parquet_grid
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.joined_sheets import joined_sheets
+from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
 from hdcal.data.tables.shapes import table_of
 from hdcal.data.tables.text_file import LARGEST_FILE, decode, read_bytes
 from hdcal.data.tables.text_grid import text_grid
