@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.tables.text_file import LONGEST_LINE
+from hdcal.data.tables.text import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.measurements.measurements import read_columns
+from hdcal.data.measurements.force_table import read_columns
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 

@@ -25,6 +25,8 @@ def bad_gears(
         gears: label of each reading's, shape (n,).
     """
     found: dict[str, Finding] = {}
+    if not findings.rows:
+        return found
     for place in np.flatnonzero(np.isin(rows, [*findings.rows])):
         label = str(gears[place])
         if label and label not in found:

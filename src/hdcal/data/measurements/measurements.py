@@ -1,6 +1,6 @@
 """From the table of a source to readings in code units, checked."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -29,7 +29,7 @@ from hdcal.errors import Finding, quoted
 
 FEWEST_ROWS = 5
 # Quantities of a spring under a force.
-_READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
+READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
 # Labels that one finding names.
 _LISTED = 20
 
@@ -91,37 +91,6 @@ class Measurements:
         return mountings(self.frame)
 
 
-def read_columns(
-    data: Any,
-    mapping: Mapping[str, str] | None,
-    findings: FileFindings,
-    *,
-    quantities: Sequence[str] = _READ,
-    required: tuple[str, ...] = REQUIRED,
-    fewest: int = FEWEST_ROWS,
-) -> pd.DataFrame:
-    """Read the columns of a source that hold known quantities, right or wrong.
-
-    Args:
-        data: the file, or a table in memory.
-        mapping: quantity -> header with its unit in brackets, or None.
-        findings: of the source; gets one for everything that is wrong.
-        quantities: what to look for.
-        required: which of them must be there.
-        fewest: rows that are needed.
-
-    Raises:
-        InputError: no table can be found.
-    """
-    table, _ = read_source(data, findings)
-    used = choose_columns(table, mapping or {}, quantities, required, findings)
-    values, _ = read_values(table, used, findings)
-    frame = pd.DataFrame(values, index=table.rows)
-    check_whole(frame, used, table.filled, fewest, findings)
-    check_rows(frame, used, findings)
-    return frame
-
-
 def read_measurements(
     data: Any,
     mapping: Mapping[str, str] | None = None,
@@ -148,7 +117,7 @@ def read_measurements(
     """
     with FileFindings(source_name(data)) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
-        used = choose_columns(table, mapping or {}, _READ, REQUIRED, findings)
+        used = choose_columns(table, mapping or {}, READ, REQUIRED, findings)
         table, used, notes = without_slow_channels(table, used, REQUIRED)
         found = measured_in(table, used, findings, gear, skip_bad=skip_bad)
     used = {name: column for name, column in used.items() if name in found.stated}
@@ -185,8 +154,8 @@ def measured_in(
         wrong = FileFindings(findings.file)
         wrong.places = findings.places
         found = _measured(table, used, wrong, gear, whole=whole)
-        rows, gears = table.rows, found["specimen"]
-        bad = bad_gears(wrong, rows, gears)
+        gears = found["specimen"] if wrong.rows else []
+        bad = bad_gears(wrong, table.rows, gears)
         many = len({*gears} - {""})
         if not skip_bad or not bad or (whole and len(bad) == many):
             break
@@ -217,14 +186,12 @@ def _measured(
         check_whole(frame, used, table.filled, FEWEST_ROWS, findings)
     check_rows(frame, used, findings)
     stated = frozenset(values)
-    if "specimen" not in frame:
-        frame["specimen"] = "1"
-    if "run" not in frame:
-        gears = pd.factorize(frame["specimen"])[0]
-        labels = run_labels(values, gears)
-        frame["run"] = "" if labels is None else labels
-    labels = frame[["specimen", "run"]].astype("category")
-    frame = frame.assign(specimen=labels["specimen"], run=labels["run"], zero=0)
+    one = np.zeros(len(frame), np.int8)
+    gears = values.get("specimen", pd.Categorical.from_codes(one, ["1"]))
+    runs = values.get("run", run_labels(values, pd.factorize(gears)[0]))
+    runs = pd.Categorical.from_codes(one, [""]) if runs is None else runs
+    frame["specimen"], frame["run"] = pd.Categorical(gears), pd.Categorical(runs)
+    frame["zero"] = 0
     found = Measurements(frame, findings.file, stated=stated)
     found, note = _with_time(found, used, findings)
     if gear is not None and "deformation" in used:
@@ -285,27 +252,3 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
         words = f"the deformation of specimen {quoted(label)} is constant"
         findings.refuse(words, "Measure at several")
     return found
-
-
-def read_force(
-    path: Any, columns: Mapping[str, str] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Read time [s] and force [N] from a table without a deformation, (n,) each.
-
-    Args:
-        path: the file; other columns than time and force are not looked at.
-        columns: quantity -> header with its unit in brackets.
-
-    Raises:
-        InputError: holds everything that is wrong with the file.
-    """
-    both = ("time", "force")
-    with FileFindings(str(path)) as findings:
-        how: dict = {"quantities": both, "required": both, "fewest": 2}
-        found = read_columns(path, columns, findings, **how)
-        if "time" in found:
-            words = "the time is not later than that of the row before"
-            remedy = "Write a jump of the force as two rows a little apart"
-            back = found.index[1:][np.diff(found["time"]) <= 0.0].tolist()
-            findings.add_rows(((row, words, remedy) for row in back), "time")
-    return found["time"].to_numpy(), found["force"].to_numpy()
