@@ -298,3 +298,24 @@ def test_of_many_gears_those_since_a_day_may_be_none_of_the_first(
 def test_a_scheduler_reads_no_table(frame):
     with pytest.raises(InputError, match="no Parquet"):
         read_fleet(frame, scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("batch", [90, 1 << 18])
+def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch, batch):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
+    rng = np.random.default_rng(5)
+    x, gears, rows = np.linspace(0.0, 1.0, 60), 4, 60
+    table = pd.DataFrame({"serial": np.repeat([f"G{g}" for g in range(gears)], rows)})
+    table["deformation_mm"] = np.tile(x, gears)
+    force = 100.0 * table["deformation_mm"] + rng.normal(0.0, 0.1, gears * rows)
+    force[70] += 60.0
+    force[2 * rows + 30 : 3 * rows] -= 40.0
+    table.assign(force_N=force).to_parquet(tmp_path / "line.parquet", index=False)
+    found = read_fleet(tmp_path / "line.parquet")
+    whole = read_fleet(table.assign(force_N=force))
+    same_sums = [np.sort(one.sums.xy) for one in (found, whole)]
+    assert same_sums[0] == pytest.approx(same_sums[1], rel=1e-9)
+    assert len(found.runs) == len(whole.runs) == gears + 1
+    assert np.bincount(found.sums.gear, found.sums.rows).tolist() == [60, 59, 60, 60]
+    part = read_fleet(tmp_path / "line.parquet", range="0.2:0.8")
+    assert part.case.records.deformation.max() <= 0.8
