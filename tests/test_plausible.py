@@ -17,11 +17,11 @@ from hdcal.cli.option_types import Parsed
 from hdcal.data.case import Case
 from hdcal.data.findings import FileFindings
 from hdcal.data.gear import read_gear
-from hdcal.data.measurements import read_measurements
+from hdcal.data.measurements.force_table import read_columns
+from hdcal.data.measurements.measurements import read_measurements
 from hdcal.data.plausible import NAMES, RANGES, Range, implausible, range_of
 from hdcal.data.tables.headers import DIMENSIONS
 from hdcal.data.units import unit_names
-from hdcal.data.used_columns import read_columns
 from hdcal.errors import InputError
 
 GEAR = "[gear]\nwall_thickness_mm = 0.68\nradius_mm = 40\nlength_mm = 70\n"

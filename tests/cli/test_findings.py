@@ -6,7 +6,7 @@ from moving import still_posterior
 
 from hdcal import InputError
 from hdcal.calibration.calibrate import choose_effects
-from hdcal.data.measurements import read_measurements
+from hdcal.data.measurements.measurements import read_measurements
 from hdcal.errors import Finding
 from hdcal.inference.sample import check_settings
 

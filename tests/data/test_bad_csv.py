@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from hdcal.data.reading import read_case
-from hdcal.data.tables.text_file import LONGEST_LINE
+from hdcal.data.tables.text import LONGEST_LINE
 from hdcal.errors import InputError
 
 H = "deformation_mm,force_N\n"
@@ -239,7 +239,7 @@ def test_a_specimen_may_be_named_by_its_number_and_has_to_be_moved(folder):
     table.loc[6:, "Weg [mm]"] = 0.1
     table.to_csv(data, index=False)
     assert len(read_case(data, specimen="1").records.force) == 6
-    with pytest.raises(InputError, match="the deformation is constant"):
+    with pytest.raises(InputError, match="the deformation of specimen '2' is constant"):
         read_case(data, specimen="2")
 
 

@@ -74,18 +74,18 @@ CASES = {
         [(6, "priors.Eo", "'E0'")],
     ),
     "prior is a number": (P + "K = 2.0\n", [(6, "priors.K", "not a table")]),
-    "no family": (P + "K = { median = 2 }\n", [(6, "priors.K.family", "no family")]),
+    "no family": (P + "K = { median = 2 }\n", [(6, "priors.K.family", "is missing")]),
     "family": (
         P + 'K = { family = "log-normal", median = 2, log_sd = 1 }\n',
         [(6, "priors.K.family", "'lognormal'")],
     ),
     "number missing": (
         P + 'K = { family = "lognormal", median = 2 }\n',
-        [(6, "priors.K.log_sd", "needs 'log_sd'")],
+        [(6, "priors.K.log_sd", "is missing")],
     ),
     "number extra": (
         P + 'K = { family = "lognormal", median = 2, log_sd = 1, sd = 1 }\n',
-        [(6, "priors.K.sd", "no part")],
+        [(6, "priors.K.sd", "unknown key")],
     ),
     "sd negative": (
         P + 'force_offset = { family = "normal", mean = 0, sd = -1 }\n',
@@ -97,11 +97,11 @@ CASES = {
     ),
     "low above high": (
         P + 'K = { family = "uniform", low = 3, high = 2 }\n',
-        [(6, "priors.K.low", "not below")],
+        [(6, "priors.K.high", "not below")],
     ),
     "K negative": (
         P + 'K = { family = "normal", mean = -2, sd = 1 }\n',
-        [(6, "priors.K.mean", "positive")],
+        [(6, "priors.K.mean", "does not lie")],
     ),
     "no unit": (
         P + 'E0 = { family = "normal", mean = 207, sd = 3 }\n',
@@ -121,7 +121,7 @@ CASES = {
     ),
     "effect family": (
         GEAR + "[priors.coulomb_friction]\nforce = { family = 'cauchy' }\n",
-        [(6, "priors.coulomb_friction.force.family", "unknown family")],
+        [(6, "priors.coulomb_friction.force.family", "unknown choice")],
     ),
     "effect unit": (
         GEAR + "[priors.slack]\nc = { family = 'half_normal', sd = 1, unit = 'mA' }\n",
@@ -144,7 +144,7 @@ CASES = {
             (3, "gear.radius_mm", "-4 mm does not lie"),
             (5, "gear.material", "'steel'"),
             (7, "measurement.deformation", "'radial'"),
-            (9, "priors.K.sd", "needs 'sd'"),
+            (9, "priors.K.sd", "is missing"),
         ],
     ),
 }

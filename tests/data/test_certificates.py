@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hdcal.data.certificates import CLASSES, is_stated
 from hdcal.data.gear import read_gear
+from hdcal.data.gear_file.certificates import CLASSES, is_stated
 from hdcal.data.priors import rig_priors
 from hdcal.errors import InputError
 
@@ -136,7 +136,7 @@ BAD = {
     "two classes": ('iso376_class = "1", astm_e74_class = "A"', HERE, "one gain"),
     "unknown class": ('iso376_class = "0"', f"{HERE}.iso376_class", "unknown choice"),
     "another class": ('astm_e74_class = "AAA"', f"{HERE}.astm_e74_class", "'AA'"),
-    "k of a class": ('iso376_class = "1", k = 2', f"{HERE}.k", "Leave it out"),
+    "k of a class": ('iso376_class = "1", k = 2', HERE, "Leave k out"),
     "k below one": ("expanded_N = 1, k = 0.5", f"{HERE}.k", "does not lie"),
     "negative": ("expanded_percent = -1", f"{HERE}.expanded_percent", "does not lie"),
     "zero": ("expanded_N = 0", f"{HERE}.expanded_N", "does not lie"),

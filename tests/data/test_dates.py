@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hdcal.data.dates import dates_of
+from hdcal.data.measurements.dates import dates_of
 from hdcal.data.tables.cells import NOT_STATED
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hdcal.data.formula_cells import with_formula, without_formula
-from hdcal.data.measurements import read_measurements
+from hdcal.data.measurements.measurements import read_measurements
 from hdcal.report.table_files import columns_csv
 
 FORMULAS = [
@@ -86,4 +86,4 @@ def test_labels_that_were_written_are_read_as_they_were(tmp_path: Path):
     columns = {"deformation_mm": number, "force_N": number}
     table = columns_csv(columns | {"run": np.array(labels, object)})
     (tmp_path / "data.csv").write_text(table, "utf-8")
-    assert read_measurements(tmp_path / "data.csv").run.names == tuple(labels)
+    assert read_measurements(tmp_path / "data.csv").runs[1] == tuple(labels)

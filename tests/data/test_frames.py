@@ -104,7 +104,7 @@ def test_a_unit_against_its_header_is_told():
     )
     case = hdcal.read_case(table, columns={"force": "F_kN[N]"})
     assert case.records.force.max() == FRAME["Kraft [kN]"].max()
-    assert any("in N, as was said, though it names kN" in n for n in case.notes)
+    assert any("in N, as was stated, though it names kN" in n for n in case.notes)
 
 
 def test_columns_are_named_in_a_mapping():

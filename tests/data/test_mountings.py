@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hdcal.data.mountings import run_labels
+from hdcal.data.measurements.labels import run_labels
 from hdcal.data.reading import read_case
 from hdcal.data.tables.cells import NOT_STATED
 
@@ -102,7 +102,7 @@ def test_nothing_is_said_where_nothing_changes(rows):
 def test_one_gear_of_several_has_its_mountings():
     case = read_case(table(), specimen="A")
     assert case.records.run.tolist() == np.repeat(range(3), 5).tolist()
-    assert case.run_labels[1] == "A/2026-10-12 north"
+    assert case.run_labels[1] == "2026-10-12 north"
     assert "3 mountings of 1 gear." in notes(case)[0]
 
 

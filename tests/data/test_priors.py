@@ -94,5 +94,5 @@ def test_a_correlation_out_of_bounds_is_one_finding(tmp_path, entry, number):
         read_gear(tmp_path / "gear.toml")
     (found,) = caught.value.findings
     assert found.column == f"priors.noise_correlation.{number}"
-    assert "from 0 to below 1" in found.problem and '"beta"' in found.remedy
+    assert "lie" in found.problem and found.row == 6
     assert "gear.toml" in str(caught.value)

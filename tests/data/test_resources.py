@@ -20,8 +20,9 @@ def test_from_a_zip(tmp_path):
     with zipfile.ZipFile(archive, "w") as target:
         target.writestr("hdcal/__init__.py", "")
         target.write(package / "errors.py", "hdcal/errors.py")
-        for source in [*package.glob("data/*.py"), *package.glob("programs/*.py")]:
-            target.write(source, f"hdcal/{source.parent.name}/{source.name}")
+        for folder in ("data", "screening"):
+            for source in package.joinpath(folder).rglob("*.py"):
+                target.write(source, f"hdcal/{source.relative_to(package)}")
         for source in Path(str(priors_folder())).glob("*.toml"):
             target.write(source, f"hdcal/_data/priors/{source.name}")
     code = (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from hdcal.data.correlation_prior import rows_of_half_cycle
 from hdcal.data.gear import read_gear
+from hdcal.data.gear_file.rig_facts import rows_of_half_cycle
 from hdcal.data.priors import rig_priors
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError

@@ -10,7 +10,7 @@ import pytest
 from commands import Hdcal
 
 import hdcal as api
-from hdcal.data.gear_files import gear_files
+from hdcal.data.measurements.gear_files import gear_files
 from hdcal.data.reading import read_case
 from hdcal.errors import InputError
 from hdcal.fleets.left_out import left_out_of
@@ -274,3 +274,14 @@ def test_one_gear_of_a_folder_is_a_case_of_its_own(tmp_path):
     named = read_case(folder, specimen="G1")
     assert named.specimen_labels == ("G1",)
     assert np.array_equal(named.records.force, alone.records.force)
+
+
+def test_files_of_a_folder_may_be_of_any_kind(tmp_path):
+    folder, frame = as_files(tmp_path / "line"), measured()
+    for place, kind in enumerate(("xlsx", "parquet", "tsv")):
+        part = frame[frame["specimen"] == f"G{place}"].drop(columns="specimen")
+        (folder / f"G{place}.csv").unlink()
+        write = {"xlsx": part.to_excel, "parquet": part.to_parquet, "tsv": part.to_csv}
+        write[kind](folder / f"G{place}.{kind}", index=False)
+    (folder / "remarks.txt").write_text("measured on a Friday\n")
+    same(read_fleet(folder), frame)

@@ -13,9 +13,10 @@ from pyarrow import dataset as tables
 from pyarrow import parquet as pq
 
 import hdcal as api
-from hdcal.data import parquet
+from hdcal.data.measurements import parquet
 from hdcal.data.tables.parquet_files import is_parquet
 from hdcal.errors import InputError
+from hdcal.fleets import pool
 from hdcal.fleets.pool import Pool
 from hdcal.fleets.read_fleet import read_fleet
 
@@ -89,7 +90,7 @@ def test_batches_come_to_what_all_rows_come_to(
 
 
 def test_of_many_rows_the_first_are_kept(frame, tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 50)
+    monkeypatch.setattr(pool, "_SHOWN", 50)
     frame.to_parquet(tmp_path / "line.parquet", index=False)
     found = read_fleet(tmp_path / "line.parquet")
     assert len(found.case.records.force) == 50
@@ -136,7 +137,7 @@ def wrong(path):
 
 
 def test_a_cell_that_is_no_reading_is_named_with_its_row(frame, tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 40)
+    monkeypatch.setattr(pool, "_SHOWN", 40)
     given = frame.copy()
     given.loc[200, "force_N"] = np.nan
     given.loc[201, "force_N"] = 1e30
@@ -195,7 +196,7 @@ def test_labels_with_gaps_are_those_of_a_table(frame, tmp_path, monkeypatch):
     given = frame.copy()
     given.loc[300, "serial"] = ""
     given.to_parquet(tmp_path / "line.parquet", index=False)
-    monkeypatch.setattr(parquet, "_SHOWN", 100)
+    monkeypatch.setattr(pool, "_SHOWN", 100)
     assert "row 301" in wrong(tmp_path / "line.parquet")
 
 
@@ -218,7 +219,7 @@ def test_a_fault_of_the_first_rows_is_told_with_its_file(frame, tmp_path):
 
 def test_what_is_no_parquet_inside_is_refused(tmp_path):
     (tmp_path / "line.parquet").write_bytes(b"PAR1 and nothing else")
-    assert "no Parquet that can be read" in wrong(tmp_path / "line.parquet")
+    assert "no Parquet file that can be read" in wrong(tmp_path / "line.parquet")
 
 
 def test_without_gears_or_numbers_it_is_refused(frame, tmp_path):
@@ -240,7 +241,7 @@ def test_the_command_reads_it(frame, here: Hdcal, tmp_path):
 
 @pytest.mark.thorough
 def test_a_cluster_leaves_out_the_same_gears(frame, tmp_path, local, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 40)
+    monkeypatch.setattr(pool, "_SHOWN", 40)
     given = frame.copy()
     given.loc[[200, 300], "force_N"] = np.nan
     for gear, part in given.groupby("serial"):
@@ -283,7 +284,7 @@ def test_a_cluster_whose_worker_is_killed_reads_the_same(
 def test_of_many_gears_those_since_a_day_may_be_none_of_the_first(
     frame, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(parquet, "_SHOWN", 2 * RUNS * ROWS)
+    monkeypatch.setattr(pool, "_SHOWN", 2 * RUNS * ROWS)
     frame = frame.drop(columns=GROUPS)
     frame.to_parquet(tmp_path / "line.parquet", index=False)
     found = api.fleet(tmp_path / "line.parquet", since="2026-04-03")
@@ -297,3 +298,24 @@ def test_of_many_gears_those_since_a_day_may_be_none_of_the_first(
 def test_a_scheduler_reads_no_table(frame):
     with pytest.raises(InputError, match="no Parquet"):
         read_fleet(frame, scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("batch", [90, 1 << 18])
+def test_rows_are_screened_as_those_of_a_table(tmp_path, monkeypatch, batch):
+    monkeypatch.setattr(parquet, "_BATCH", batch)
+    rng = np.random.default_rng(5)
+    x, gears, rows = np.linspace(0.0, 1.0, 60), 4, 60
+    table = pd.DataFrame({"serial": np.repeat([f"G{g}" for g in range(gears)], rows)})
+    table["deformation_mm"] = np.tile(x, gears)
+    force = 100.0 * table["deformation_mm"] + rng.normal(0.0, 0.1, gears * rows)
+    force[70] += 60.0
+    force[2 * rows + 30 : 3 * rows] -= 40.0
+    table.assign(force_N=force).to_parquet(tmp_path / "line.parquet", index=False)
+    found = read_fleet(tmp_path / "line.parquet")
+    whole = read_fleet(table.assign(force_N=force))
+    same_sums = [np.sort(one.sums.xy) for one in (found, whole)]
+    assert same_sums[0] == pytest.approx(same_sums[1], rel=1e-9)
+    assert len(found.runs) == len(whole.runs) == gears + 1
+    assert np.bincount(found.sums.gear, found.sums.rows).tolist() == [60, 59, 60, 60]
+    part = read_fleet(tmp_path / "line.parquet", range="0.2:0.8")
+    assert part.case.records.deformation.max() <= 0.8

@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 import hdcal as api
-from hdcal.data import parquet
+from hdcal.data.measurements import parquet
+from hdcal.fleets import pool
 from hdcal.fleets.read_fleet import read_fleet
 
 GEARS, ROWS = 8, 8
@@ -63,13 +64,13 @@ def test_batches_of_parquet_tell_the_same(frame, tmp_path, monkeypatch, batch):
 
 
 def test_the_first_rows_of_parquet_have_their_runs(frame, tmp_path, monkeypatch):
-    monkeypatch.setattr(parquet, "_SHOWN", 3 * ROWS)
+    monkeypatch.setattr(pool, "_SHOWN", 3 * ROWS)
     bad = frame.copy()
     bad.loc[bad["specimen"] == "G1", "force_N"] = np.nan
     bad.to_parquet(tmp_path / "line.parquet", index=False)
     found = read_fleet(tmp_path / "line.parquet", skip_bad=True)
-    assert found.case.records.run.tolist() == [0] * ROWS + [1] * ROWS
-    assert found.case.run_labels[:2] == ("G0/2026-10-01 south", "G0/2026-10-11 north")
+    assert found.case.records.run.tolist() == np.repeat([0, 1, 2], ROWS).tolist()
+    assert found.case.run_labels[:2] == ("2026-10-01 south", "2026-10-11 north")
     assert len(found.case.run_labels) == 11 and [*found.case.left_out] == ["G1"]
 
 

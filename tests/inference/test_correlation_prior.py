@@ -9,7 +9,7 @@ import pytest
 from scipy import signal, stats
 from scipy.special import logsumexp
 
-from hdcal.data.correlation_prior import rows_of_half_cycle
+from hdcal.data.gear_file.rig_facts import rows_of_half_cycle
 
 RUNS = 4000
 

@@ -13,7 +13,7 @@ from scipy import stats
 from structures import form_of
 
 from hdcal.calibration.calibrate import _specifics
-from hdcal.data.certificates import ForceCertificate, certificate_priors
+from hdcal.data.gear_file.certificates import ForceCertificate, certificate_priors
 from hdcal.data.priors import Prior, effect_priors
 from hdcal.inference import laplace
 from hdcal.inference.assembly import assemble

@@ -14,7 +14,7 @@ from slices import slice_of
 from structures import form_of
 
 from hdcal.calibration.calibrate import calibrate, choose_effects
-from hdcal.data.certificates import (
+from hdcal.data.gear_file.certificates import (
     GAUGE_UNITS,
     ForceCertificate,
     certificate_priors,

@@ -14,7 +14,7 @@ from scipy import stats
 from slices import slice_of
 
 import hdcal
-from hdcal.data.certificates import GAINS
+from hdcal.data.gear_file.certificates import GAINS
 from hdcal.prediction.engine.causes import causes_of
 from hdcal.prediction.engine.forces import force_of, grid_records
 from hdcal.prediction.engine.gear_forces import gear_forces

@@ -68,7 +68,7 @@ def read_drive(
         columns: headers of the table by quantity; None where they cannot be read.
         amplitude: of a shape; a table has its own.
     """
-    from hdcal.data.force_table import read_force
+    from hdcal.data.measurements.force_table import read_force
 
     if force in _SHAPES:
         return force

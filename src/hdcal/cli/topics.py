@@ -17,8 +17,8 @@ def show_topic(console: Console, topic):
 
     The library's effects are topics too, as in `hdcal help hysteresis`.
     """
+    from hdcal.data.gear_file.toml_file import did_you_mean
     from hdcal.data.resources import pages
-    from hdcal.data.toml_file import did_you_mean
 
     found = pages()
     if topic is None:

@@ -1,8 +1,8 @@
-"""What was measured, on what, and what is believed of it.
+"""Readings and gear file: from files to a case.
 
-A table goes through one file for each step: `text_file` (bytes to text), `csv_table`
-(text to headers and cells), `columns` (which header is which quantity), `cells` (cells
-to numbers and labels), `value_checks`; `measurements` calls them in this order. A
-gear file goes through `toml_file`, `gear_schema`, `prior_entry` and `gear`. `reading`
-makes a case of both. What is wrong on the way is collected in `findings`.
+`tables` makes one grid of cells of any source, and of it columns of readings.
+`measurements` makes readings in code units of them, checked, labelled and screened; so
+it does of a folder of tables and of batches of Parquet. `gear` reads the gear file by
+the schema in `gear_file`. `reading` makes a case of both. What is wrong on the way is
+collected in `findings`.
 """

@@ -1,21 +1,23 @@
 """Prior tables: a family, its numbers, a unit and a source for every parameter."""
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import Any
 
 from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.gear_file.prior_entry import read_prior
+from hdcal.data.gear_file.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.data.prior import Prior as Prior
-from hdcal.data.prior_entry import read_prior
 from hdcal.data.resources import priors_folder
-from hdcal.data.toml_file import TomlFile, did_you_mean, read_toml
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_MATERIALS = ("rig", "effects", "dynamics")
 # Of a radius: whatever is read.
 _FACTS = ("large_deflection.curvature",)
 
-# What a prior table may speak of: name -> its unit inside hdcal.
+# What a prior table may hold: name -> its unit inside hdcal.
 MODEL_UNITS = {
     "K": "1",
     "E0": "MPa",
@@ -37,7 +39,7 @@ SCALE_UNITS = {
     "gap_length": "1",
     "noise_correlation": "1",
 }
-# A gear file may speak of these; `mass` takes the place of the shipped mass_ratio.
+# A gear file may state these; `mass` takes the place of the shipped mass_ratio.
 DYNAMIC_UNITS = {
     "mass": "N*s^2/mm",
     "damping_ratio": "1",
@@ -55,31 +57,65 @@ MATERIAL_UNITS = {
 }
 
 
+def read_entries(
+    table: Mapping[str, Any],
+    units: Mapping[str, str],
+    toml: TomlFile,
+    prefix: str = "",
+    *,
+    effects: bool = False,
+) -> dict[str, Prior]:
+    """Return the priors in a table.
+
+    Args:
+        table: as parsed.
+        units: name -> code unit of every parameter that it may hold.
+        toml: the file in which it stands.
+        prefix: dotted key of the table, empty at the top.
+        effects: whether it may hold parameters of effects too, as a table for each
+            effect or as `effect.parameter`. Their names are not checked here.
+
+    Raises:
+        InputError: holds everything that is wrong with the table.
+    """
+    found: dict[str, Prior] = {}
+    with Findings() as wrong:
+        for name, entry in table.items():
+            key = f"{prefix}.{name}" if prefix else name
+            several = isinstance(entry, dict) and "family" not in entry
+            if name in units or (effects and "." in name):
+                entries = {name: (entry, key)}
+            elif effects and several:
+                entries = {f"{name}.{n}": (e, f"{key}.{n}") for n, e in entry.items()}
+            else:
+                words, remedy = "unknown key", did_you_mean(name, list(units))
+                remedy += "; or a table for each effect" if effects else ""
+                wrong.append(toml.finding(words, remedy, key))
+                continue
+            for parameter, (one, place) in entries.items():
+                unit = units.get(parameter)
+                if prior := wrong.attempt(read_prior, one, place, toml, unit):
+                    found[parameter] = prior
+    return found
+
+
 def read_priors(
-    source: Traversable | Path, units: dict[str, str], file: str = ""
+    source: Traversable | Path, units: Mapping[str, str], file: str = ""
 ) -> dict[str, Prior]:
     """Read a prior file whose top-level tables are parameters.
 
     Args:
         source: the file.
-        units: name -> code unit of every parameter it may speak of.
+        units: name -> code unit of every parameter it may hold.
         file: how to name it in findings; its own name when empty.
 
     Raises:
         InputError: holds everything that is wrong with the file.
     """
     toml = read_toml(source, file or source.name)
-    found: dict[str, Prior] = {}
-    with Findings() as wrong:
-        for key, entry in toml.table.items():
-            if key in ("name", "description"):
-                continue
-            if key not in units:
-                remedy = did_you_mean(key, list(units))
-                wrong.append(toml.finding("unknown parameter", remedy, key))
-            elif prior := wrong.attempt(read_prior, entry, key, toml, units[key]):
-                found[key] = prior
-    return found
+    words = ("name", "description")
+    table = {name: entry for name, entry in toml.table.items() if name not in words}
+    return read_entries(table, units, toml)
 
 
 @cache
@@ -88,6 +124,12 @@ def _shipped(name: str) -> dict[str, Prior]:
     units = {"rig": MODEL_UNITS | SCALE_UNITS | SPRING_UNITS, "dynamics": moving}
     source = priors_folder() / f"{name}.toml"
     return read_priors(source, units.get(name, MATERIAL_UNITS))
+
+
+@cache
+def _shipped_effects() -> dict[str, Prior]:
+    toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
+    return read_entries(toml.table, {}, toml, effects=True)
 
 
 def rig_priors() -> dict[str, Prior]:
@@ -113,41 +155,6 @@ def effect_priors(full_scale: FullScale = REFERENCE) -> dict[str, Prior]:
         name: prior if name in _FACTS else full_scale.own(prior)
         for name, prior in _shipped_effects().items()
     }
-
-
-@cache
-def _shipped_effects() -> dict[str, Prior]:
-    toml = read_toml(priors_folder() / "effects.toml", "effects.toml")
-    return read_effect_priors(toml.table, "", toml)
-
-
-def read_effect_priors(tables: dict, prefix: str, toml: TomlFile) -> dict[str, Prior]:
-    """Read tables of effects; physics knows their names, not this reader.
-
-    Args:
-        tables: effect -> parameter -> entry.
-        prefix: dotted key of the tables, empty at the top.
-        toml: the file they stand in.
-
-    Returns:
-        The priors by `effect.parameter`.
-
-    Raises:
-        InputError: holds everything that is wrong with the tables.
-    """
-    found: dict[str, Prior] = {}
-    with Findings() as wrong:
-        for effect, parameters in tables.items():
-            key = ".".join(filter(None, (prefix, effect)))
-            if not isinstance(parameters, dict):
-                words, remedy = "is not a table of parameters", f"Write [{key}]"
-                wrong.append(toml.finding(words, remedy, key))
-                continue
-            for parameter, entry in parameters.items():
-                place = f"{key}.{parameter}"
-                if prior := wrong.attempt(read_prior, entry, place, toml):
-                    found[f"{effect}.{parameter}"] = prior
-    return found
 
 
 def material_names() -> list[str]:

@@ -3,24 +3,22 @@
 import os
 import re
 from collections.abc import Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.case_of import case_of
 from hdcal.data.gear import read_gear, unsized
-from hdcal.data.measurements import of_specimen, read_measurements
-from hdcal.data.screened import asked_range
+from hdcal.data.measurements.case_of import case_of
+from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME, file_of_gear
+from hdcal.data.measurements.measurements import of_specimen, read_measurements
+from hdcal.data.measurements.notes import ASSUMED
+from hdcal.data.measurements.screened import asked_range
 from hdcal.data.tables.arrays import NAME
 from hdcal.data.tables.sources import is_frame
 from hdcal.data.theory_names import SPRING
-from hdcal.data.too_far import too_far
-from hdcal.data.used_columns import ASSUMED
 from hdcal.errors import Finding, Findings, InputError
 
 _NO_NAME = re.compile(r'[\\/:?"<>|]+')
-DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
 _BESIDE = f"the gear file is the {GEAR_NAME} beside the data"
 # What is told where no gear file was named, and none lies beside the data.
 UNSIZED = (
@@ -77,47 +75,32 @@ def read_case(
     """
     columns, in_memory = asked_columns(data, columns)
     asked_range(range)
-    table, data = data, Path(NAME if in_memory else data)
+    path = Path(NAME if in_memory else data)
     # Of a folder with a file for each gear, the one that is called after it.
-    own = data if in_memory else _own_file(data, specimen)
-    alone, data = own != data, own
+    own = path if in_memory else file_of_gear(path, specimen)
     # As `is_dir`, but a path that no system takes is no folder.
-    folder = not in_memory and os.path.isdir(data)
-    csv_path = data / DATA_NAME if folder else data
+    folder = not in_memory and os.path.isdir(own)
+    table = data if in_memory else (own / DATA_NAME if folder else own)
     with Findings() as wrong:
-        # The gear file may name the columns; what is wrong with it is told second.
+        # The gear file may name the columns; what is wrong with it comes second.
         of_gear = Findings()
-        beside = None if in_memory else csv_path.parent / GEAR_NAME
-        found, told = of_gear.attempt(
-            gear_of, gear, beside, folder, (theory, material, reading)
-        ) or (None, ())
-        named = dict(found.source.get("columns", {}) if found is not None else {})
-        named |= columns
+        beside = None if in_memory else Path(table).parent / GEAR_NAME
+        asked = (theory, material, reading)
+        found = of_gear.attempt(gear_of, gear, beside, folder, asked)
+        stated = found[0].source.get("columns", {}) if found is not None else {}
+        how: dict = {"gear": found and found[0], "skip_bad": skip_bad}
+        named = stated | columns
         measured = wrong.attempt(
-            read_measurements,
-            table if in_memory else csv_path,
-            named,
-            encoding,
-            sheet,
-            check=None if found is None else partial(too_far, gear=found),
-            skip_bad=skip_bad,
+            read_measurements, table, named, encoding, sheet, **how
         )
         wrong += of_gear
-        whole = alone and measured is not None and len(measured.specimen.names) == 1
-        if measured is not None and specimen is not None and not whole:
+        alone = own != path and measured is not None and len(measured.gears[1]) == 1
+        if measured is not None and specimen is not None and not alone:
             measured = wrong.attempt(of_specimen, measured, str(specimen))
     assert measured is not None and found is not None
-    label = None if alone else specimen
-    return case_of(
-        measured, found, told, _name(data, folder, sheet, label), range, skip_bad
-    )
-
-
-def _own_file(data: Path, specimen: str | None) -> Path:
-    # Late: that builds on this.
-    from hdcal.data.gear_files import own_file
-
-    return own_file(data, specimen)
+    label = None if own != path else specimen
+    name = _name(own, folder, sheet, label)
+    return case_of(measured, *found, name, range, skip_bad)
 
 
 def asked_columns(

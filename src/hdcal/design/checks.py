@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from hdcal.data.gear_file.toml_file import did_you_mean
 from hdcal.data.plausible import implausible
-from hdcal.data.toml_file import did_you_mean
 from hdcal.design.design_draws import DesignDraws
 from hdcal.errors import Finding
 from hdcal.prediction.engine.conditions import level_findings, temperature_findings

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from hdcal.data.gear_file.toml_file import did_you_mean
 from hdcal.data.priors import (
     MATERIAL_UNITS,
     Prior,
@@ -9,7 +10,6 @@ from hdcal.data.priors import (
     material_priors,
     read_priors,
 )
-from hdcal.data.toml_file import did_you_mean
 from hdcal.errors import Finding, InputError
 
 _FACTS = ("E0", "alpha", "poisson")

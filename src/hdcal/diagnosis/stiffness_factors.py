@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from hdcal.data.case import Case, Gear
-from hdcal.data.certificates import GAINS
+from hdcal.data.gear_file.certificates import GAINS
 from hdcal.data.theory_names import SPRING
 from hdcal.diagnosis.budget import Budget, BudgetPart
 from hdcal.evidence.case_evidence import CaseEvidence

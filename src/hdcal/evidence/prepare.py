@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from hdcal.data.case import Case
-from hdcal.data.certificates import GAINS
+from hdcal.data.gear_file.certificates import GAINS
 from hdcal.data.priors import Prior
 from hdcal.data.records import Array, Records
 from hdcal.evidence.effect_curves import base_reading

@@ -112,7 +112,7 @@ def fleet(
 
 def read_gears(console: Console, scheduler: str | None, given: dict):
     """Return what was measured; Parquet is read in batches, whatever its size."""
-    from hdcal.data.gear_files import gear_files
+    from hdcal.data.measurements.gear_files import gear_files
     from hdcal.data.tables.parquet_files import is_parquet
     from hdcal.fleets.read_fleet import read_fleet
 

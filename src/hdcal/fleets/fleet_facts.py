@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
+from hdcal.data.gear_file.validation import within
 from hdcal.data.theory_names import Theory
-from hdcal.data.typed_json import STRICT, Count, Number, Size, typed, within
 from hdcal.data.versions import versions
+from hdcal.fleets.typed_json import STRICT, Count, Number, Size, typed
 from hdcal.inference.checks import Check
 
 if TYPE_CHECKING:

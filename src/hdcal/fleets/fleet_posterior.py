@@ -14,7 +14,6 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.plausible import implausible
-from hdcal.data.typed_json import typed_text
 from hdcal.errors import Finding, Findings, NotUsable
 from hdcal.fleets.fleet_facts import FleetFacts, facts_of
 from hdcal.fleets.next_force import (
@@ -24,6 +23,7 @@ from hdcal.fleets.next_force import (
     next_force,
 )
 from hdcal.fleets.next_gear import CONFIDENCE
+from hdcal.fleets.typed_json import typed_text
 from hdcal.inference.posterior_file import (
     FLEET,
     content,

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.bad_gears import among, bad_gears
 from hdcal.data.case import Case, Gear
 from hdcal.data.findings import FileFindings
-from hdcal.data.gear_schema import size_faults
+from hdcal.data.gear_file.schema import size_faults
+from hdcal.data.measurements.bad_gears import among, bad_gears
 from hdcal.data.plausible import implausible
 from hdcal.data.records import Geometry
 from hdcal.data.tables.blocks import ReadTable
@@ -67,7 +67,7 @@ def gear_sizes(source: Any, case: Case) -> GearSizes:
             findings.refuse(words, "Name one, as `gear` FILE.toml")
         table, _ = read_source(source, findings)
     sizes, labels = _read(table, case, findings)
-    bad = bad_gears(findings, table.rows, np.arange(len(labels)), labels)
+    bad = bad_gears(findings, table.rows, labels)
     if findings:
         # What is wrong without them is wrong with the table.
         table, again = table.take(~among(labels, bad)), FileFindings(findings.file)

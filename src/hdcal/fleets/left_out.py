@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hdcal.data.bad_gears import cause
 from hdcal.data.case import Case
+from hdcal.data.measurements.bad_gears import cause
 from hdcal.report.answer import Words
 
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hdcal.data.bad_gears import left_out_words
-from hdcal.data.certificates import GAINS
+from hdcal.data.gear_file.certificates import GAINS
+from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.tables.cells import NOT_STATED
 from hdcal.data.theory_names import SPRING
 from hdcal.fleets.fleet import Fleet

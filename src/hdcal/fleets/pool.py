@@ -1,20 +1,20 @@
 """Rows that come in batches: of each mounting sums are kept, whatever their number."""
 
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from hdcal.data.bad_gears import among
-from hdcal.data.case import Gear
-from hdcal.data.further_labels import further_labels
-from hdcal.data.measurements import Labels
-from hdcal.data.mountings import TELLING, run_labels
-from hdcal.data.parquet import Batch, Parquet, read_batches
-from hdcal.data.reading_notes import mountings_note
+from hdcal.data.case import Case
+from hdcal.data.measurements.case_of import screened_case
+from hdcal.data.measurements.folder import joined
+from hdcal.data.measurements.labels import further_labels, mountings, run_labels
+from hdcal.data.measurements.measurements import Measurements
+from hdcal.data.measurements.notes import mountings_note
+from hdcal.data.measurements.parquet import Parquet, read_batches
 from hdcal.data.tables.headers import GROUPINGS
-from hdcal.data.tables.named_columns import Column
-from hdcal.errors import Finding
+from hdcal.errors import Finding, InputError
 from hdcal.fleets.gear_sums import MountingSums
 from hdcal.fleets.groups import read_by
 from hdcal.fleets.readings import (
@@ -24,9 +24,10 @@ from hdcal.fleets.readings import (
     row_sums,
 )
 
-# Stands in no label.
-_BETWEEN = "\n"
 _LOST = "start again: reading takes a small part of the time"
+# First rows that are kept, and notes of the screening.
+_SHOWN, _NOTES = 50_000, 20
+_SUMS = ("rows", "x", "y", "xx", "xy", "yy")
 
 
 @dataclass
@@ -34,146 +35,136 @@ class Pool:
     """Sums of what was read so far; two of them can be joined.
 
     Attributes:
-        gear: what is known of all gears.
-        gears: index of each gear, in order of appearance.
-        runs: index of each gear and run, likewise.
-        parts: run, reach, rows, means and sums of each mounting in each batch.
-        told: of each batch, runs, and their lots, operators, rigs and dates.
-        left_out: gears of which something is wrong, each with what that is. Rows of
-            those that were known before are not read.
+        source: where they are from.
+        parts: labels, sums and reach of the rows with the same labels in each batch.
+        shown: the first rows.
+        notes: of their screening.
+        left_out: gears of which something is wrong, each with what that is.
     """
 
-    gear: Gear
-    gears: dict[str, int] = field(default_factory=dict)
-    runs: dict[tuple[int, str], int] = field(default_factory=dict)
-    parts: list[tuple[np.ndarray, ...]] = field(default_factory=list)
-    told: list[dict[str, np.ndarray]] = field(default_factory=list)
+    source: Parquet
+    parts: list[pd.DataFrame] = field(default_factory=list)
+    shown: list[Measurements] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
     left_out: dict[str, Finding] = field(default_factory=dict)
 
-    def add(self, batch: Batch) -> None:
+    @property
+    def keys(self) -> list[str]:
+        """Labels by which rows are told apart."""
+        stated = [name for name in ("run", *GROUPINGS) if name in self.source.used]
+        return ["specimen", "zero", *stated]
+
+    def add(self, found: Measurements) -> None:
         """Add some rows."""
-        gear_of, gears = batch.labels["specimen"]
-        batch = batch.where(~among(gears, self.left_out)[gear_of])
-        self.left_out |= batch.bad
-        if not len(batch.values["deformation"]):
+        self.left_out = found.left_out | self.left_out
+        self.notes += found.notes
+        frame = found.frame
+        if frame.empty:
             return
-        gear, read = self.gear, batch.values["deformation"]
-        warm = batch.values.get("temperature", gear.reference_temperature)
-        x = read * modulus_left(gear, warm)
-        gear_of, gears = batch.labels["specimen"]
-        run_of, runs = batch.labels.get("run") or _told(batch)
-        first, pair = _in_order(gear_of * len(runs) + run_of)
-        each = zip(gears[gear_of[first]], runs[run_of[first]], strict=True)
-        index = np.array([self._run(str(one), str(run)) for one, run in each])
-        reach = largest_of(pair, np.abs(read))
-        self.parts.append((index, reach, *row_sums(pair, x, batch.values["force"])))
-        further = {name: one for name, one in batch.labels.items() if name in GROUPINGS}
-        first = _apart(pair, further.values())[0]
-        told = {name: texts[place[first]] for name, (place, texts) in further.items()}
-        self.told.append({"run": index[pair[first]], **told})
+        self._show([found])
+        labels = frame[self.keys].astype(dict.fromkeys(self.keys[2:], str))
+        of_row = labels.groupby(self.keys, sort=False, observed=True).ngroup()
+        of_row, gear, read = of_row.to_numpy(), self.source.gear, found["deformation"]
+        warm = found.get("temperature", gear.reference_temperature)
+        sums = row_sums(of_row, read * modulus_left(gear, warm), found["force"])
+        each = labels.drop_duplicates().astype({"specimen": str})
+        each = each.assign(**dict(zip(_SUMS, sums, strict=True)))
+        self.parts.append(each.assign(reach=largest_of(of_row, np.abs(read))))
 
-    def join(self, other: "Pool", labels: Iterable[str] | None = None) -> None:
-        """Add what another one has, whose rows come after those of this one.
+    def _show(self, parts: list[Measurements]) -> None:
+        """Keep rows while they are among the first."""
+        for part in parts:
+            bad = part.frame["specimen"].isin([*self.left_out])
+            part = part.where(~bad.to_numpy())
+            room = _SHOWN - sum(len(one.frame) for one in self.shown)
+            if room > 0:
+                self.shown.append(replace(part, frame=part.frame[:room]))
 
-        Args:
-            other: the other one.
-            labels: of each of its runs; by default its own.
-        """
-        gears, of = [*other.gears], [gear for gear, _ in other.runs]
-        labels = [run for _, run in other.runs] if labels is None else labels
-        each = zip(of, labels, strict=True)
-        index = np.array([self._run(gears[g], run) for g, run in each], int)
-        self.parts += [(index[run], *sums) for run, *sums in other.parts]
-        self.told += [told | {"run": index[told["run"]]} for told in other.told]
+    def join(self, other: "Pool") -> None:
+        """Add what another one has, whose rows come after those of this one."""
+        self.parts += other.parts
         self.left_out = other.left_out | self.left_out
+        self._show(other.shown)
+        self.notes += other.notes
 
-    def _run(self, gear: str, run: str) -> int:
-        known = self.gears.setdefault(gear, len(self.gears))
-        return self.runs.setdefault((known, run), len(self.runs))
-
-    def mounted(self, told: Sequence[str]) -> "Pool":
-        """Return the same, its runs told by their dates, rigs and operators.
-
-        Args:
-            told: those of these that the runs are labelled by, so far.
-        """
-        of = np.array([gear for gear, _ in self.runs])
-        cells = np.array([run.split(_BETWEEN) for _, run in self.runs], object)
-        columns = cells.reshape(-1, len(told)).T
-        labels = run_labels(dict(zip(told, columns, strict=True)), of)
-        whole = Pool(self.gear)
-        whole.join(self, [""] * len(of) if labels is None else labels)
-        return whole
-
-    def readings(self, source: Parquet) -> FleetReadings:
+    def readings(self) -> FleetReadings:
         """Return what all of them come to, without the gears that are left out.
 
-        Args:
-            source: where they are from.
+        Raises:
+            InputError: none is left.
         """
-        parts = map(np.concatenate, zip(*self.parts, strict=True))
-        run, reach, rows, x, y, xx, xy, yy = parts
-
-        def whole(part: np.ndarray) -> np.ndarray:
-            return np.bincount(run, part)
-
-        total = whole(rows)
-        mean_x, mean_y = whole(rows * x) / total, whole(rows * y) / total
-        off_x, off_y = x - mean_x[run], y - mean_y[run]
-        squares = [
-            whole(own + rows * between)
-            for own, between in ((xx, off_x**2), (xy, off_x * off_y), (yy, off_y**2))
-        ]
-        gears, gear = tuple(self.gears), np.array([g for g, _ in self.runs])
-        names = tuple(f"{gears[g]}/{r}" if r else gears[g] for g, r in self.runs)
+        table: Any = pd.concat([*self.parts, pd.DataFrame(columns=self.keys)])
+        table = table[~table["specimen"].isin([*self.left_out])].reset_index(drop=True)
+        if table.empty:
+            raise InputError(self.left_out.values())
+        specimen, gears = pd.factorize(table["specimen"])
+        if "run" not in table:
+            stated = {name: table[name].to_numpy() for name in self.keys[2:]}
+            labels = run_labels(stated, specimen)
+            table["run"] = "" if labels is None else labels
+        run, runs = mountings(table)
+        further, of_labels = further_labels(table, specimen, tuple(gears), run, runs)
+        many = len(mountings(table.assign(zero=0))[1])
+        notes = [*mountings_note(self.source.used, many, len(gears)), *of_labels]
+        notes += self.notes[:_NOTES]
+        if more := len(self.notes[_NOTES:]):
+            notes.append(f"and {more} more findings in the records")
         case = replace(
-            source.case,
-            name=source.name,
-            specimen_labels=gears,
-            run_labels=names,
-            data_sha256=source.sha256,
+            self._case(table.assign(run_index=run, gear_index=specimen)),
+            run_labels=runs,
+            specimen_labels=tuple(gears),
+            left_out=self.left_out,
+            **further,
         )
-        nobody = np.zeros(len(gear), int)
-        sums = MountingSums(
-            gear, total, mean_x, mean_y, *squares, operator=nobody, rig=nobody
-        )
-        runs, farthest = np.arange(len(gear)), largest_of(run, reach)
-        readings = FleetReadings(case, sums, runs, farthest)
-        left = ~among(gears, self.left_out)[gear]
-        found = self._labelled(readings.without(self.left_out), gear, left)
-        case = found.case
-        many = len(case.run_labels), len(case.specimen_labels)
-        if "run" in source.used or many[0] == many[1]:
-            return found
-        notes = (*case.notes, mountings_note(source.used, *many))
-        return replace(found, case=replace(case, notes=notes))
+        case = replace(case, notes=(*self.source.notes, *notes))
+        _, first = np.unique(run, return_index=True)
+        each, parts = np.arange(len(runs)), _joined_sums(table, run)
+        sums = MountingSums(specimen[first], *parts, **read_by(case, each))
+        reach = largest_of(run, table["reach"].to_numpy(float))
+        return FleetReadings(case, sums, each, reach)
 
-    def _labelled(
-        self, readings: FleetReadings, gear: np.ndarray, left: np.ndarray
-    ) -> FleetReadings:
-        """Return readings with what further labels say of the gears that are left.
+    def _case(self, table: pd.DataFrame) -> Case:
+        """Return the first rows as a case, with the gears and runs of all rows.
 
         Args:
-            readings: of these.
-            gear: of each run of all gears, shape (r,).
-            left: which runs are of gears that are left, shape (r,).
+            table: labels of all rows, with the indexes of their gears and runs.
         """
-        told = {
-            name: np.concatenate([one[name] for one in self.told])
-            for name in self.told[0]
-        }
-        of = told.pop("run")
-        rows, case = left[of], readings.case
-        run = np.searchsorted(np.flatnonzero(left), of[rows])
-        own = np.searchsorted(np.unique(gear[left]), gear[of[rows]])
-        further, notes = further_labels(
-            {name: labels[rows] for name, labels in told.items()},
-            Labels(own, case.specimen_labels),
-            Labels(run, case.run_labels),
+        source, warm = self.source, self.source.gear.reference_temperature
+        found = joined(self.shown, warm, {})
+        found = found.where(~found.frame["specimen"].isin([*self.left_out]).to_numpy())
+        found = replace(found, sha256=source.sha256, named=source.named)
+        case = screened_case(found, None, source.gear, (), source.name)
+        labels = found.frame[self.keys].astype(dict.fromkeys(self.keys, str))
+        known = table.astype(dict.fromkeys(self.keys, str)).drop_duplicates(self.keys)
+        index = labels.merge(known, "left", self.keys, sort=False)
+        records = replace(
+            case.records,
+            run=index["run_index"].to_numpy(),
+            specimen=index["gear_index"].to_numpy(),
         )
-        case = replace(case, notes=(*case.notes, *notes), **further)
-        sums = replace(readings.sums, **read_by(case, readings.runs))
-        return replace(readings, case=case, sums=sums)
+        return replace(case, records=records)
+
+
+def _joined_sums(table: pd.DataFrame, index: np.ndarray) -> list[np.ndarray]:
+    """Return number, means and sums about them of rows from those of their parts.
+
+    Args:
+        table: of the parts.
+        index: of the whole of each part, shape (p,).
+    """
+    rows, x, y, xx, xy, yy = (table[name].to_numpy(float) for name in _SUMS)
+
+    def whole(part: np.ndarray) -> np.ndarray:
+        return np.bincount(index, part)
+
+    total = whole(rows)
+    mean_x, mean_y = whole(rows * x) / total, whole(rows * y) / total
+    off_x, off_y = x - mean_x[index], y - mean_y[index]
+    squares = [
+        whole(own + rows * between)
+        for own, between in ((xx, off_x**2), (xy, off_x * off_y), (yy, off_y**2))
+    ]
+    return [total, mean_x, mean_y, *squares]
 
 
 def pool_of(
@@ -192,67 +183,32 @@ def pool_of(
             or works there.
         HdcalError: the cluster was lost.
     """
-    known = source.case.left_out
-    about = source.root, source.used, source.case.gear, known, skip_bad
-    tasks = ((place, file, *about) for place, file in enumerate(source.files))
+    tasks = ((place, file, source, skip_bad) for place, file in enumerate(source.files))
     if scheduler is None:
         found = (file_pool(*task) for task in tasks)
     else:
         from hdcal.cli.cluster import completed_on_cluster
 
         found = completed_on_cluster(file_pool, tasks, scheduler, _LOST)
-    whole, early, joined = Pool(source.case.gear, left_out={**known}), {}, 0
+    whole, early, joined_files = Pool(source), {}, 0
     for place, pool in found:
         early[place] = pool
         # In the order of the files, so that the answer hangs on no worker.
-        while joined in early:
-            whole.join(early.pop(joined))
-            joined += 1
-    told = [name for name in TELLING if name in source.used]
-    return whole.mounted(told) if told and "run" not in source.used else whole
+        while joined_files in early:
+            whole.join(early.pop(joined_files))
+            joined_files += 1
+    return whole
 
 
 def file_pool(
-    place: int,
-    file: str,
-    root: str,
-    used: Mapping[str, Column],
-    gear: Gear,
-    left_out: Mapping[str, Finding],
-    skip_bad: bool | None = None,
+    place: int, file: str, source: Parquet, skip_bad: bool | None = None
 ) -> tuple[int, Pool]:
     """Return what one file comes to, and its place among all.
 
     Raises:
         InputError: holds what is wrong with its first batch that is.
     """
-    pool = Pool(gear, left_out={**left_out})
-    for batch in read_batches(file, root, used, gear, skip_bad=skip_bad):
+    pool = Pool(source)
+    for batch in read_batches(source, file, skip_bad=skip_bad):
         pool.add(batch)
     return place, pool
-
-
-def _told(batch: Batch) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index of each row's date, rig and operator, and these as one label."""
-    told = [batch.labels[name] for name in TELLING if name in batch.labels]
-    first, index = _apart(np.zeros(len(batch.values["deformation"]), int), told)
-    cells = zip(*(texts[place[first]] for place, texts in told), strict=True)
-    return index, np.array([_BETWEEN.join(each) for each in cells] or [""], object)
-
-
-def _apart(
-    code: np.ndarray, labels: Iterable[tuple[np.ndarray, np.ndarray]]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return as `_in_order`, of values that also differ where one of labels does."""
-    for place, texts in labels:
-        code = _in_order(code * len(texts) + place)[1]
-    return _in_order(code)
-
-
-def _in_order(code: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return where each value stands first, in that order, and each row's value's."""
-    _, first, index = np.unique(code, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return first[order], rank[index]

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from hdcal.data.case import Case
-from hdcal.data.gear_files import gear_files
-from hdcal.data.gear_folder import read_gear_folder
-from hdcal.data.parquet import read_parquet
+from hdcal.data.measurements.folder import read_gear_folder
+from hdcal.data.measurements.gear_files import gear_files
+from hdcal.data.measurements.parquet import open_parquet
 from hdcal.data.reading import read_case
 from hdcal.data.tables.parquet_files import is_parquet
 from hdcal.errors import Finding, InputError
@@ -42,7 +42,7 @@ def read_fleet(
         scheduler: address of a Dask scheduler, whose workers read the files of a
             Parquet folder.
         skip_bad: leave out gears of which a row is wrong, whole.
-        range: working range, as in `read_case`; not of Parquet, which is not screened.
+        range: working range, as in `read_case`.
 
     Raises:
         InputError: holds everything that is wrong with the data.
@@ -50,20 +50,17 @@ def read_fleet(
     if isinstance(data, FleetReadings):
         return data
     how: dict = {"columns": columns, "theory": theory, "reading": reading}
-    how |= {"skip_bad": skip_bad}
-    if is_parquet(data) and range is not None:
-        words = "is not known of Parquet, which is read in batches"
-        raise InputError([Finding("range", words, "Save the rows that are meant")])
+    how |= {"range": range}
     if is_parquet(data):
-        source = read_parquet(data, gear, **how)
-        return pool_of(source, scheduler, skip_bad=skip_bad).readings(source)
+        source = open_parquet(data, gear, **how)
+        return pool_of(source, scheduler, skip_bad=skip_bad).readings()
     if scheduler is not None:
         words = "is no Parquet, which alone is read by several"
         remedy = "Leave it out, or save the data as Parquet files"
         raise InputError([Finding("scheduler", f"the data {words}", remedy)])
     if isinstance(data, Case):
         return fleet_readings(data)
-    how |= {"encoding": encoding, "range": range}
+    how |= {"encoding": encoding, "skip_bad": skip_bad}
     if gear_files(data):
         case, sizes = read_gear_folder(data, gear, **how)
         # A gear that is bad in one file may stand in others.

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hdcal.data.bad_gears import among
 from hdcal.data.case import Case, Gear
+from hdcal.data.measurements.bad_gears import among
 from hdcal.errors import Finding, InputError, quoted
 from hdcal.evidence.prepare import moments
 from hdcal.evidence.row_features import take_rows

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hdcal.data.bad_gears import among, offer
 from hdcal.data.findings import LISTED
 from hdcal.data.full_scale import scale_of
 from hdcal.data.gear import at_full_scale
+from hdcal.data.measurements.bad_gears import among, offer
 from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, quoted
 from hdcal.fleets.gear_table import GearSizes, gear_sizes

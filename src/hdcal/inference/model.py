@@ -12,7 +12,7 @@ import numpyro
 import numpyro.distributions as dist
 from jax.nn import log_sigmoid, softplus
 
-from hdcal.data.certificates import GAUGE_UNITS
+from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.priors import Prior
 from hdcal.inference.density import log_likelihood
 from hdcal.inference.distributions import distribution

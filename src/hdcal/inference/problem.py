@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from hdcal.data.case import Case
-from hdcal.data.certificates import is_stated
+from hdcal.data.gear_file.certificates import is_stated
 from hdcal.data.prior import Prior, scaled
 from hdcal.data.priors import SCALE_UNITS
 from hdcal.data.records import Array, Records, lies_far

@@ -11,8 +11,8 @@ import numpy as np
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
-from hdcal.data.bad_gears import offer
 from hdcal.data.case import Case
+from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.plausible import implausible
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError

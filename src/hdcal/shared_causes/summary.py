@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hdcal.data.bad_gears import left_out_words
+from hdcal.data.measurements.bad_gears import left_out_words
 from hdcal.data.versions import versions
 from hdcal.diagnosis.naming import naming
 from hdcal.evidence.case_evidence import NONE, UNKNOWN

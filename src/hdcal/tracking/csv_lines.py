@@ -11,7 +11,7 @@ from hdcal.data.tables.grid import split_line
 from hdcal.data.tables.headers import LABELS
 from hdcal.data.tables.named_columns import Column
 from hdcal.data.tables.shapes import table_of
-from hdcal.data.tables.text_grid import text_grid
+from hdcal.data.tables.text import text_grid
 from hdcal.errors import InputError
 
 # What a tracker takes of a reading.

@@ -10,8 +10,8 @@ from hdcal.calibration.check.charts import readings_chart
 from hdcal.calibration.check.screened import Screened, StraightRange, screened
 from hdcal.calibration.straight_part import takes_straight_part
 from hdcal.data.case import Case
-from hdcal.data.certificates import ZEROS, certificate_priors, is_stated
-from hdcal.data.gear_schema import certificates_in
+from hdcal.data.gear_file.certificates import ZEROS, certificate_priors, is_stated
+from hdcal.data.gear_file.schema import certificates_in
 from hdcal.data.loading import loading
 from hdcal.data.records import Array, less_run_means
 from hdcal.data.theory_names import SPRING, Theory

@@ -79,7 +79,7 @@ def check(console: Console, effects, write_gear, plot, force, **given):
 
 def _gear_file(case: "Case") -> str:
     """Return a gear file for readings that came without one."""
-    from hdcal.data.gear_text import gear_text
+    from hdcal.data.gear_file.gear_text import gear_text
 
     # Whether they are radial or diametral is unknown, so it is left out.
     measured = {"reference_temperature_C": case.gear.reference_temperature}

@@ -16,8 +16,8 @@ def read_whole(console: Console, given: dict[str, Any]) -> "Case | None":
         console: of the command.
         given: values of these options.
     """
-    from hdcal.data.gear_files import gear_files
-    from hdcal.data.gear_folder import read_gear_folder
+    from hdcal.data.measurements.folder import read_gear_folder
+    from hdcal.data.measurements.gear_files import gear_files
 
     one = given["specimen"] is not None or given["columns"] is None
     if one or not gear_files(given["data"]):

@@ -82,8 +82,9 @@ def init(console: Console, folder, data, columns, sheet, **given):
     """Write FOLDER with a gear file, from options or from answers to questions."""
     stated = dict(_answers(given))
     from hdcal.data.gear import read_gear
-    from hdcal.data.gear_text import gear_text
-    from hdcal.data.reading import DATA_NAME, GEAR_NAME, read_case
+    from hdcal.data.gear_file.gear_text import gear_text
+    from hdcal.data.measurements.gear_files import DATA_NAME, GEAR_NAME
+    from hdcal.data.reading import read_case
     from hdcal.data.tables.sources import text_of
 
     tables = {"name": Path(folder).resolve().name, **stated}

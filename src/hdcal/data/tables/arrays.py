@@ -2,15 +2,19 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.grid import ArrayGrid, SourceLine, stored_text
 from hdcal.errors import quoted
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from pyarrow import Schema
 
 # What findings call a table in memory.
 NAME = "DataFrame"
@@ -74,13 +78,62 @@ def frame_grid(data: Any, findings: FileFindings) -> tuple[ArrayGrid, str]:
     return array_grid(names, columns), digest.hexdigest()
 
 
-def plain_column(column: Any) -> np.ndarray:
+def arrow_grid(
+    schema: "Schema",
+    arrow: Callable[[str], Any],
+    rows: int,
+    first: int,
+    *,
+    days: bool = False,
+) -> ArrayGrid:
+    """Return a grid of columns of Arrow, each loaded when it is needed.
+
+    Args:
+        schema: of the columns; nested ones are no cells.
+        arrow: returns a column by its name.
+        rows: how many there are.
+        first: what the first one is called.
+        days: whether of times the day alone is read, as clocks there showed it.
+    """
+    from pyarrow import types
+
+    plain = [field for field in schema if not types.is_nested(field.type)]
+    kinds = types.is_integer, types.is_floating
+    numeric = frozenset(
+        place
+        for place, field in enumerate(plain)
+        if any(kind(field.type) for kind in kinds)
+    )
+
+    def load(place: int) -> np.ndarray:
+        kind, cells = plain[place].type, arrow(plain[place].name)
+        if days and types.is_timestamp(kind):
+            times = cells.to_pandas().dt.tz_localize(None)
+            return plain_column(times.dt.normalize().astype("category"))
+        if place not in numeric and not types.is_dictionary(kind):
+            cells = cells.dictionary_encode()
+        return plain_column(cells.to_pandas())
+
+    return ArrayGrid(
+        rows=np.arange(rows) + first,
+        width=len(plain),
+        loose=[SourceLine(first - 1, [field.name for field in plain], fits=True)],
+        load=load,
+        numeric=numeric,
+    )
+
+
+def plain_column(column: "pd.Series") -> np.ndarray:
     """Return a column of a DataFrame as numbers, or as objects: texts and numbers."""
     import pandas as pd
 
     types = pd.api.types
     if types.is_numeric_dtype(column) and not types.is_bool_dtype(column):
         return column.to_numpy(float, na_value=np.nan)
+    if isinstance(column.dtype, pd.CategoricalDtype):
+        cells = plain_column(column.cat.categories.to_series())
+        # The code of an empty cell is -1.
+        return np.append(cells.astype(object), "")[column.cat.codes]
     objects = column.astype(object).where(column.notna(), "").to_numpy()
     kinds = str, int, float
     return np.array(

@@ -6,17 +6,19 @@ a unit is missing, that is asked; nothing is guessed.
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from itertools import pairwise
 
 from hdcal.data.findings import FileFindings
 from hdcal.data.tables.blocks import ReadTable
 from hdcal.data.tables.headers import (
+    GROUPINGS,
     LABELS,
     QUANTITIES,
+    Header,
     parse_header,
     unit_advice,
     weight_unit,
 )
-from hdcal.data.tables.label_columns import label_columns
 from hdcal.data.tables.named_columns import Column, named_column
 from hdcal.errors import quoted
 
@@ -148,7 +150,7 @@ class _Chooser:
 
     def label(self, quantity: str) -> Column | None:
         """Return the only column of labels; which run or specimen is meant is asked."""
-        found = label_columns(self._table, self._headers, quantity)
+        found = _label_columns(self._table, self._headers, quantity)
         if len(found) > 1 and quantity in ("run", "specimen"):
             self._ask_which(quantity, found)
         return self._column(quantity, found[0]) if len(found) == 1 else None
@@ -224,3 +226,36 @@ def _refuse_conflicts(
             words = f"{quoted(column.header)} names {column.unit.name}, and the row of "
             remedy = "Leave one of them out"
             findings.add(f"{words}units {unit}", remedy, table.unit_row)
+
+
+def _label_columns(
+    table: ReadTable, headers: Sequence[Header], quantity: str
+) -> list[int]:
+    """Return where the labels of a quantity stand, by headers and cells.
+
+    Of columns that tell the same rows apart the first one, and of those that tell none
+    apart one only where no other does. More than one: headers do not say which.
+
+    Args:
+        table: the readings.
+        headers: what its headers mean.
+        quantity: one of the labels.
+    """
+    found = [i for i, header in enumerate(headers) if header.quantity == quantity]
+    exact = [i for i in found if headers[i].exact]
+    if exact:
+        return exact
+    # One that names nothing else is meant rather than one that says more.
+    found = [i for i in found if headers[i].whole] or found
+    kinds: dict[tuple, int] = {}
+    for place in found:
+        labels = table.grid.texts(place)
+        names = {label: index for index, label in enumerate(dict.fromkeys(labels))}
+        if quantity not in GROUPINGS:
+            # A number for each reading is no label of a run or a gear; a run lasts.
+            counted = quantity == "run" and all(a != b for a, b in pairwise(labels))
+            if counted or len(names) >= len(labels):
+                continue
+        kind = tuple(names[label] for label in labels) if len(names) > 1 else ()
+        kinds.setdefault(kind, place)
+    return [place for kind, place in kinds.items() if kind] or [*kinds.values()]

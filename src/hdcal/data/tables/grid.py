@@ -200,7 +200,13 @@ class ArrayGrid(Grid):
 
     def texts(self, column: int) -> list[str]:
         """As in `Grid`."""
-        return [stored_text(cell) for cell in self._column(column).tolist()]
+        index, texts = self.labels(column)
+        return np.array(texts, object)[index].tolist()
+
+    def labels(self, column: int) -> tuple[np.ndarray, list[str]]:
+        """As in `Grid`."""
+        index, cells = factorize(self._column(column).tolist())
+        return index, [stored_text(cell) for cell in cells]
 
     def take(self, chosen: np.ndarray) -> "ArrayGrid":
         """As in `Grid`."""

@@ -1,5 +1,6 @@
 """Columns that the user named, as 'Load [kN]', 'Load[kN]' or '2[kN]'."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -103,3 +104,25 @@ def split_brackets(text: str) -> tuple[str, str | None]:
 
 def _squeezed(text: str) -> str:
     return "".join(text.split())
+
+
+def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
+    """Return how a user would name each column: its header or number, with its unit.
+
+    Those that hdcal's own headers name need no other name.
+
+    Args:
+        table: whose columns they are.
+        used: columns by quantity.
+    """
+    named = {}
+    for quantity, column in used.items():
+        header = parse_header(column.header)
+        if header.exact and header.quantity == quantity and not column.against:
+            continue
+        alone = table.headers.count(column.header) == 1
+        name = column.header if alone else str(column.position + 1)
+        enough = alone and header.unit == column.unit
+        unit = "" if column.unit is None else column.unit.name
+        named[quantity] = name if enough or not unit else f"{name}[{unit}]"
+    return named

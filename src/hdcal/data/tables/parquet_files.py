@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hdcal.data.findings import FileFindings
-from hdcal.data.tables.arrow_grid import PARQUET
+from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.grid import ArrayGrid
 from hdcal.data.tables.headers import parse_header
 from hdcal.errors import InputError, quoted
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from pyarrow import Schema
     from pyarrow.dataset import Dataset
 
+# What a Parquet file begins with.
+PARQUET = b"PAR1"
 _REMEDY = "Save it anew"
 # Tables of other kinds, of which a folder is a case.
 _OTHERS = {".csv", ".txt", ".tsv", ".xlsx", ".lvm", ".dat"}
@@ -73,7 +76,7 @@ def parquet_table(files: Sequence[str], root: str, findings: FileFindings) -> "D
     except InputError:
         raise
     except Exception as error:  # whatever a parser makes of a broken file
-        findings.refuse(f"is no Parquet that can be read ({error})", _REMEDY)
+        findings.refuse(f"is no Parquet file that can be read ({error})", _REMEDY)
 
 
 def _joined(schemas, files: Sequence[str], findings: FileFindings) -> "Schema":
@@ -106,3 +109,17 @@ def _joined(schemas, files: Sequence[str], findings: FileFindings) -> "Schema":
     if findings:
         raise InputError(findings)
     return arrow.schema(whole)
+
+
+def parquet_grid(path: Path, findings: FileFindings) -> tuple[ArrayGrid, list[str]]:
+    """Return the grid of a Parquet file, and nothing that was assumed.
+
+    Raises:
+        InputError: it is none, or pyarrow is missing.
+    """
+    dataset = parquet_table([str(path)], "", findings)
+
+    def column(name: str) -> Any:
+        return dataset.to_table(columns=[name], use_threads=False).column(0)
+
+    return arrow_grid(dataset.schema, column, dataset.count_rows(), 2), []

@@ -9,12 +9,10 @@ from typing import Any
 from hdcal.data.findings import FileFindings
 from hdcal.data.regular_file import why_not_readable
 from hdcal.data.tables.arrays import NAME, frame_grid, mat_grid
-from hdcal.data.tables.arrow_grid import PARQUET, parquet_grid
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.joined_sheets import joined_sheets
-from hdcal.data.tables.shapes import table_of
-from hdcal.data.tables.text_file import LARGEST_FILE, decode, read_bytes
-from hdcal.data.tables.text_grid import text_grid
+from hdcal.data.tables.parquet_files import PARQUET, parquet_grid
+from hdcal.data.tables.shapes import joined_sheets, table_of
+from hdcal.data.tables.text import LARGEST_FILE, decode, read_bytes, text_grid
 from hdcal.data.tables.workbook import refuse_formulas, sheet_grids
 
 _WORKBOOK, _OLD_WORKBOOK = b"PK\x03\x04", b"\xd0\xcf\x11\xe0"

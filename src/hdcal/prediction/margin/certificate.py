@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator
 from datetime import date
 
-from hdcal.data.certificates import ZEROS, is_stated
-from hdcal.data.used_columns import ASSUMED
+from hdcal.data.gear_file.certificates import ZEROS, is_stated
+from hdcal.data.measurements.notes import ASSUMED
 from hdcal.inference.posterior import Posterior
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.budget import CERTIFIED

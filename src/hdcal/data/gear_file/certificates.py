@@ -7,14 +7,13 @@ the error of finding that point a displacement gauge adds its own.
 """
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict
+from pydantic import BaseModel, BeforeValidator, model_validator
 
+from hdcal.data.gear_file.validation import STRICT, fault, within
 from hdcal.data.prior import Prior
-from hdcal.data.priors import MODEL_UNITS
-from hdcal.data.typed_json import within
 
 # Relative expanded uncertainty [%], k = 2, of a force gauge of a class. ISO 376:2011:
 # every component at the limit of its class, combined as its annex C does and rounded
@@ -28,6 +27,8 @@ CLASS_K = 2.0
 GAINS = ("force_gain", "deformation_gain")
 ZEROS = ("force_offset", "deformation_offset")
 GAUGE_UNITS = {**dict.fromkeys(GAINS, "1"), "temperature_offset": "K"}
+_ZERO_UNITS = {"force_offset": "N", "deformation_offset": "mm"}
+_SOURCE = "certificate: "
 
 _Percent = Annotated[float, within("expanded_percent")]
 # A class is a name, but 0.5 without quotation marks is meant as one.
@@ -35,22 +36,44 @@ _Named = BeforeValidator(lambda x: str(x) if type(x) in (int, float) else x)
 
 
 class GaugeCertificate(BaseModel):
-    """What every certificate may state."""
+    """What every certificate may state.
 
-    model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, allow_inf_nan=False
-    )
+    Attributes:
+        SITES: the site of the model of each key.
+        k: coverage factor.
+    """
+
+    model_config = STRICT
+    SITES: ClassVar[dict[str, str]]
     k: Annotated[float, within("k")] | None = None
 
+    @property
     def stated(self) -> dict[str, Any]:
-        """Return what is given, by key, k left out."""
-        given = self.model_dump(exclude_none=True)
-        return {key: value for key, value in given.items() if key != "k"}
+        """What is given, by key, without k."""
+        return self.model_dump(exclude_none=True, exclude={"k"})
+
+    @model_validator(mode="after")
+    def _states_each_site_once(self) -> Self:
+        stated = self.stated
+        if not stated:
+            keys = ", ".join(self.SITES)
+            raise fault("states no uncertainty", f"Write one of {keys}")
+        if len({self.SITES[key] for key in stated}) < len(stated):
+            raise fault(f"states one gain as {' and as '.join(stated)}", "Keep one")
+        if self.k is not None and stated.keys() <= CLASSES.keys():
+            raise fault("a class has a coverage factor of its own", "Leave k out")
+        return self
 
 
 class ForceCertificate(GaugeCertificate):
-    """Of the force gauge."""
+    """The certificate of the force gauge."""
 
+    SITES: ClassVar = {
+        "expanded_percent": "force_gain",
+        "iso376_class": "force_gain",
+        "astm_e74_class": "force_gain",
+        "expanded_N": "force_offset",
+    }
     expanded_percent: _Percent | None = None
     expanded_N: Annotated[float, within("expanded_N")] | None = None
     iso376_class: Annotated[Literal["00", "0.5", "1", "2"], _Named] | None = None
@@ -58,65 +81,26 @@ class ForceCertificate(GaugeCertificate):
 
 
 class DeformationCertificate(GaugeCertificate):
-    """Of the displacement gauge."""
+    """The certificate of the displacement gauge."""
 
+    SITES: ClassVar = {
+        "expanded_percent": "deformation_gain",
+        "expanded_mm": "deformation_offset",
+    }
     expanded_percent: _Percent | None = None
     expanded_mm: Annotated[float, within("expanded_mm")] | None = None
 
 
 class TemperatureCertificate(GaugeCertificate):
-    """Of the thermometer."""
+    """The certificate of the thermometer."""
 
+    SITES: ClassVar = {"expanded_K": "temperature_offset"}
     expanded_K: Annotated[float, within("expanded_K")] | None = None
-
-
-# Site that each key speaks of: gains and the temperature's zero are sites of their own,
-# zeros of force and deformation are what the model has anyway.
-_SITES = {
-    "force_calibration": {
-        "expanded_percent": "force_gain",
-        "iso376_class": "force_gain",
-        "astm_e74_class": "force_gain",
-        "expanded_N": "force_offset",
-    },
-    "deformation_calibration": {
-        "expanded_percent": "deformation_gain",
-        "expanded_mm": "deformation_offset",
-    },
-    "temperature_calibration": {"expanded_K": "temperature_offset"},
-}
-
-
-_SOURCE = "certificate: "
 
 
 def is_stated(prior: Prior) -> bool:
     """Tell whether a prior is one that a certificate states."""
     return prior.family == "normal" and prior.source.startswith(_SOURCE)
-
-
-def certificate_faults(
-    given: Mapping[str, GaugeCertificate],
-) -> Iterator[tuple[str, str, str]]:
-    """Yield what certificates cannot state: key, problem and remedy.
-
-    Args:
-        given: by their keys in [measurement].
-    """
-    for name, one in given.items():
-        stated = one.stated()
-        sites = [_SITES[name][key] for key in stated]
-        if not stated:
-            keys = list(_SITES[name])
-            yield name, "states no uncertainty", f"Write one of {', '.join(keys)}"
-        elif len(set(sites)) < len(sites):
-            yield name, f"states one gain as {' and as '.join(stated)}", "Keep one"
-        elif one.k is not None and stated.keys() <= CLASSES.keys():
-            yield (
-                f"{name}.k",
-                "a class has a coverage factor of its own",
-                "Leave it out",
-            )
 
 
 def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior]:
@@ -126,16 +110,15 @@ def certificate_priors(given: Mapping[str, GaugeCertificate]) -> dict[str, Prior
         given: by their keys in [measurement].
     """
     found = {}
-    for name, one in given.items():
-        for key, value in one.stated().items():
-            of_class = key in CLASSES
+    for one in given.values():
+        for key, value in one.stated.items():
+            of_class, site = key in CLASSES, one.SITES[key]
             expanded = CLASSES[key][value] if of_class else value
             k = CLASS_K if of_class else one.k or CLASS_K
             gain = of_class or key == "expanded_percent"
             sd = expanded / k * (0.01 if gain else 1.0)
             source = f"{_SOURCE}{key} = {value}, k = {k:g}"
-            site = _SITES[name][key]
-            unit = GAUGE_UNITS.get(site) or MODEL_UNITS[site]
+            unit = (GAUGE_UNITS | _ZERO_UNITS)[site]
             found[site] = Prior("normal", (0.0, sd), unit, source)
     return found
 

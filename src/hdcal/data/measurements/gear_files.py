@@ -1,4 +1,4 @@
-"""Which files of a folder hold a gear each, and whose they are."""
+"""Files of a folder that hold a gear each, and what each gear is called."""
 
 import os
 from collections import Counter
@@ -6,9 +6,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from hdcal.data.reading import DATA_NAME, GEAR_NAME
 from hdcal.errors import Finding, InputError, quoted
 
+DATA_NAME, GEAR_NAME = "data.csv", "gear.toml"
+# Tables of readings by their names. A text may be a remark: it counts as one only where
+# nothing else does.
+_TABLES = (".csv", ".tsv", ".dat", ".asc", ".lvm", ".xlsx", ".mat", ".parquet")
+_TEXT = ".txt"
 _FIRST_FEW = 3
 
 
@@ -16,12 +20,14 @@ def gear_files(data: Any) -> list[Path]:
     """Return the files of a folder that has one for each gear; none of other data."""
     if not isinstance(data, str | Path) or not os.path.isdir(data):
         return []
-    inside = sorted(Path(data).iterdir())
+    inside = sorted(one for one in Path(data).iterdir() if one.name[0] not in "._")
     if any(one.name == DATA_NAME for one in inside):
         return []
     cases = [one / DATA_NAME for one in inside if (one / DATA_NAME).is_file()]
-    files = [one for one in inside if one.suffix.lower() == ".csv" and one.is_file()]
-    return cases + [one for one in files if not one.name.startswith(".")]
+    kinds = {one: one.suffix.lower() for one in inside if one.is_file()}
+    files = [one for one, kind in kinds.items() if kind in _TABLES]
+    texts = [one for one, kind in kinds.items() if kind == _TEXT]
+    return cases + (files or ([] if cases else texts))
 
 
 def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
@@ -35,19 +41,17 @@ def gear_labels(files: Sequence[Path], folder: Path) -> tuple[list[str], bool]:
         words = f"holds gears as folders, as {cases[0].parent.name}, and as files"
         remedy = f"Keep one of both; {files[-1].name} is such a file"
         raise InputError([Finding(str(folder), words, remedy)])
-    labels = [file.parent.name if cases else file.stem for file in files]
-    labels = [label.strip() for label in labels]
+    labels = [(file.parent.name if cases else file.stem).strip() for file in files]
     twice = [label for label, many in Counter(labels).items() if many > 1]
     words, remedy = "is what several files are called after", "Rename all but one"
     if twice:
-        alike = [
+        raise InputError(
             Finding(str(folder), f"{quoted(one)} {words}", remedy) for one in twice
-        ]
-        raise InputError(alike)
+        )
     return labels, bool(cases)
 
 
-def own_file(data: Path, label: str | None) -> Path:
+def file_of_gear(data: Path, label: str | None) -> Path:
     """Return where one gear lies, of a folder that has a file for each; else the data.
 
     Args:
@@ -78,5 +82,6 @@ def not_read(files: Sequence[Path], folder: Path) -> Iterator[str]:
     others = [one for one in inside if one not in known and not one.startswith(".")]
     if others:
         more = len(others) - _FIRST_FEW
-        named = ", ".join(others[:_FIRST_FEW]) + f" and {more} more" * (more > 0)
-        yield f"not read, as it is no .csv and no folder with a {DATA_NAME}: {named}"
+        named = ", ".join(others[:_FIRST_FEW])
+        named += f" and {more} more" if more > 0 else ""
+        yield f"not read, as it is no table and no folder with a {DATA_NAME}: {named}"

@@ -74,34 +74,31 @@ def read_toml(source: Traversable | Path, file: str) -> TomlFile:
     Raises:
         InputError: missing, unreadable, too large, or not TOML.
     """
+
+    def refusal(problem: str, remedy: str, row: int | None = None) -> InputError:
+        return InputError([Finding(file, problem, remedy, row)])
+
     if isinstance(source, Path) and (why := why_not_readable(source, LARGEST)):
-        raise _refusal(file, *why)
+        raise refusal(*why)
     try:
-        with source.open("rb") as stream:
-            raw = stream.read(LARGEST + 1)
+        raw = source.read_bytes()
     except FileNotFoundError:
-        raise _refusal(file, "does not exist", "Check the name") from None
+        raise refusal("does not exist", "Check the name") from None
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        words = f"cannot be read ({reason})"
-        raise _refusal(file, words, "Check name and permissions") from None
-    if len(raw) > LARGEST:
-        raise _refusal(file, "is larger than 1 MiB", "Name a TOML file")
+        words = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+        raise refusal(words, "Check name and permissions") from None
     try:
-        text = raw.decode("utf-8-sig")
+        table = tomllib.loads(text := raw.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         row = raw.count(b"\n", 0, error.start) + 1
-        words = "is not UTF-8 text"
-        raise _refusal(file, words, "Save it as UTF-8", row) from None
-    try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
+        raise refusal("is not UTF-8 text", "Save it as UTF-8", row) from None
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         # RecursionError: thousands of nested brackets
-        message = str(error) if isinstance(error, ValueError) else "nested too deeply"
-        place = _PLACE.search(message)
-        words = f"is not TOML: {_PLACE.sub('', message)[:200]}"
+        message = "nested too deeply" if isinstance(error, RecursionError) else error
+        place = _PLACE.search(str(message))
+        words = f"is not TOML: {_PLACE.sub('', str(message))[:200]}"
         row = int(place["row"]) if place else None
-        raise _refusal(file, words, "Mend that line", row) from None
+        raise refusal(words, "Correct that line", row) from None
     return TomlFile(file, table, text)
 
 
@@ -115,9 +112,3 @@ def did_you_mean(name: str, known: list[str], what: str = "Known are") -> str:
 
 def _bare(name: str) -> str:
     return re.sub(r"[\"'\s]", "", name)
-
-
-def _refusal(
-    file: str, problem: str, remedy: str, row: int | None = None
-) -> InputError:
-    return InputError([Finding(file, problem, remedy, row)])

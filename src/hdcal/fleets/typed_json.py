@@ -6,8 +6,6 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from hdcal.data.plausible import range_of
-
 T = TypeVar("T")
 
 # Of dataclasses, as `__pydantic_config__`: no other fields, no text for a number.
@@ -15,18 +13,6 @@ STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Size = Annotated[float, Field(ge=0.0, le=1e12)]
 Count = Annotated[int, Field(ge=0, le=10**12)]
 Number = Annotated[float, Field(ge=-1e12, le=1e12)]
-
-
-def within(quantity: str) -> Any:
-    """Return the constraint of a field to the range of a quantity.
-
-    Args:
-        quantity: a key of `RANGES` or `NAMES`.
-    """
-    known = range_of(quantity)
-    if known.inner:
-        return Field(gt=known.low, lt=known.high)
-    return Field(ge=known.low, le=known.high)
 
 
 def typed(kind: type[T], data: Any) -> T:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ _FIRST_FEW = 3
 
 
 def bad_gears(
-    findings: FileFindings, rows: np.ndarray, index: np.ndarray, names: Iterable[str]
+    findings: FileFindings, rows: np.ndarray, gears: Any
 ) -> dict[str, Finding]:
     """Return gears of which a row is wrong, each with the first thing that is.
 
@@ -20,14 +21,14 @@ def bad_gears(
 
     Args:
         findings: what is wrong with the file.
-        rows: row of the text of each reading, shape (n,).
-        index: of the gear of each reading, shape (n,).
-        names: of gears, by index.
+        rows: row of the source of each reading, shape (n,).
+        gears: label of each reading's, shape (n,).
     """
     found: dict[str, Finding] = {}
-    labels = [*names]
+    if not findings.rows:
+        return found
     for place in np.flatnonzero(np.isin(rows, [*findings.rows])):
-        label = str(labels[index[place]])
+        label = str(gears[place])
         if label and label not in found:
             found[label] = findings.of_row(int(rows[place]))
     return found
@@ -39,7 +40,7 @@ def among(names: Iterable[str], bad: Mapping[str, Finding]) -> np.ndarray:
 
 
 def offer(bad: Mapping[str, Finding], many: int | None = None) -> Finding:
-    """Return that bad gears can be left out, which ends what is told of them.
+    """Return that bad gears can be left out.
 
     Args:
         bad: at least one.
@@ -75,6 +76,6 @@ def _be(gears: Mapping[str, Finding]) -> str:
     return "is" if len(gears) == 1 else "are"
 
 
-def _few(told: Iterable[str], many: int) -> str:
-    more = f" and {many - _FIRST_FEW} more" * (many > _FIRST_FEW)
-    return ", ".join(islice(told, _FIRST_FEW)) + more
+def _few(words: Iterable[str], many: int) -> str:
+    more = f" and {many - _FIRST_FEW} more" if many > _FIRST_FEW else ""
+    return ", ".join(islice(words, _FIRST_FEW)) + more

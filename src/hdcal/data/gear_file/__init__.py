@@ -1,0 +1,1 @@
+"""The gear file: TOML, its schema, and the priors that it states."""

@@ -1,0 +1,105 @@
+"""Facts of a rig that sharpen priors: the table [rig]."""
+
+import math
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel
+
+from hdcal.data.full_scale import REFERENCE, FullScale
+from hdcal.data.gear_file.validation import STRICT, within
+from hdcal.data.prior import Prior
+from hdcal.data.priors import effect_priors, rig_priors
+from hdcal.screening.turning_points import TURN_MOST, turning_points
+
+# Of a pitch by its drawing.
+_PITCH_LOG_SD = 0.02
+# Noise is what is faster than the loading: readings err alike over a fifth of a half
+# cycle at most, so that each holds five independent stretches. Slower is a bend.
+_FAST = 0.2
+# How many neighbours that err alike a filter stands for, and what is believed of the
+# correlation where it is hardly any.
+_AS_GOOD_AS, _UNFILTERED = 20.0, (0.5, 1.5)
+
+
+class RigTable(BaseModel):
+    """The table [rig]; each fact sharpens a prior, none is needed."""
+
+    model_config = STRICT
+    load_cell_capacity_N: Annotated[float, within("load_cell_capacity")] | None = None
+    gauge_range_mm: Annotated[float, within("size")] | None = None
+    displacement_pitch_mm: Annotated[float, within("size")] | None = None
+    filter_Hz: Annotated[float, within("filter")] | None = None
+
+
+def rig_fact_priors(facts: RigTable, radial_per_read: float) -> dict[str, Prior]:
+    """Return the effects' priors that a rig's facts sharpen, by `effect.parameter`.
+
+    An error of a gauge is a share of its range, not of what was read of it.
+
+    Args:
+        facts: of the rig, its deformations as read.
+        radial_per_read: radial deformation per deformation as read.
+    """
+    found, shipped = {}, effect_priors()
+    if capacity := facts.load_cell_capacity_N:
+        name = "force_saturation.curvature"
+        prior = FullScale(capacity, REFERENCE.deformation).own(shipped[name])
+        source = "[rig] load_cell_capacity_N: the shipped share, lost at capacity"
+        found[name] = replace(prior, source=source)
+    if reach := facts.gauge_range_mm:
+        name = "displacement_nonlinearity.curvature"
+        prior = FullScale(REFERENCE.force, reach * radial_per_read).own(shipped[name])
+        source = "[rig] gauge_range_mm: the shipped linearity error, of the range"
+        found[name] = replace(prior, source=source)
+    if pitch := facts.displacement_pitch_mm:
+        numbers = (pitch * radial_per_read, _PITCH_LOG_SD)
+        source = "[rig] displacement_pitch_mm"
+        found["screw_error.pitch"] = Prior("lognormal", numbers, "mm", source)
+    return found
+
+
+def correlation_prior(
+    cutoff: float | None,
+    deformation: np.ndarray,
+    run: np.ndarray,
+    time: np.ndarray | None,
+) -> Prior:
+    """Return the prior of the correlation of neighbouring readings.
+
+    White noise behind a filter of first order is correlated by e^(−2π f Δt). Where
+    that is little nothing is known: what else there is may err alike for longer.
+
+    Args:
+        cutoff: f, of the rig's low-pass filter [Hz]; None where none is stated.
+        deformation: in the order it was taken [mm], shape (n,).
+        run: index of the mounting, shape (n,).
+        time: of the readings [s], shape (n,); None where it was not measured.
+    """
+    if cutoff is not None and time is not None and np.any(np.diff(time) > 0.0):
+        steps = np.diff(time)
+        typical = float(np.median(steps[steps > 0.0]))
+        likely = math.exp(-2.0 * math.pi * cutoff * typical)
+        (a, b), known = _UNFILTERED, _AS_GOOD_AS * likely
+        numbers = (a + known * likely, b + known * (1.0 - likely))
+        return Prior("beta", numbers, "1", "[rig] filter_Hz, at the typical step")
+    most = math.exp(-1.0 / (_FAST * rows_of_half_cycle(deformation, run)))
+    return replace(rig_priors()["noise_correlation"], numbers=(0.0, most))
+
+
+def rows_of_half_cycle(deformation: np.ndarray, run: np.ndarray) -> float:
+    """Return the median number of rows between two turns of the loading.
+
+    Args:
+        deformation: in the order it was taken [mm], shape (n,).
+        run: index of the mounting, shape (n,).
+    """
+    lengths: list[int] = []
+    order = np.argsort(run, kind="stable")
+    cuts = np.flatnonzero(np.diff(run[order])) + 1
+    for own in np.split(deformation[order], cuts):
+        span = float(np.ptp(own))
+        turns = turning_points(own, TURN_MOST * span)[0] if span > 0.0 else ()
+        lengths += np.diff([0, *turns, len(own)]).tolist()
+    return float(np.median(lengths))

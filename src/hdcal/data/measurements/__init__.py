@@ -1,0 +1,1 @@
+"""From tables of cells to a case: units, checks, labels, screening."""

@@ -1,0 +1,157 @@
+"""From measurements and gear to a case: screened, with motion and priors."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.full_scale import scale_of
+from hdcal.data.gear import at_full_scale
+from hdcal.data.gear_file.rig_facts import correlation_prior
+from hdcal.data.loading import Motion, derive_motion
+from hdcal.data.measurements.deformation_scatter import without_scatter
+from hdcal.data.measurements.labels import further_labels
+from hdcal.data.measurements.measurements import Measurements
+from hdcal.data.measurements.notes import (
+    ASSUMED,
+    gear_notes,
+    mountings_note,
+    resets_note,
+    rigs_note,
+    temperature_note,
+)
+from hdcal.data.measurements.screened import asked_range, screened, screening_notes
+from hdcal.data.priors import rig_priors
+from hdcal.data.records import Records
+from hdcal.screening.result import Screening
+
+MANY = 3  # labels from which a spread between runs or specimens can be estimated
+_CORRELATION = "noise_correlation"
+
+
+def case_of(
+    measured: Measurements,
+    gear: Gear,
+    notes: Sequence[str],
+    name: str,
+    range: str | None = None,
+    skip_bad: bool | None = None,
+) -> Case:
+    """Return what was measured on a gear, or several of its kind, as a case.
+
+    Args:
+        measured: in which nothing is wrong.
+        gear: as its file has it.
+        notes: on how that was found.
+        name: of the case.
+        range: working range; by default that of the gear file.
+        skip_bad: as in `read_case`.
+
+    Raises:
+        InputError: as `screened`.
+    """
+    wanted = asked_range(range or gear.source.get("measurement", {}).get("range"))
+    before = gear_notes(gear, measured["force"])
+    notes = [*notes, *before, *temperature_note(measured.get("temperature"))]
+    measured, screening = screened(measured, wanted, skip_bad)
+    return screened_case(measured, screening, gear, notes, name)
+
+
+def screened_case(
+    measured: Measurements,
+    screening: Screening | None,
+    gear: Gear,
+    notes: Sequence[str],
+    name: str,
+) -> Case:
+    """Return measurements that were screened as a case.
+
+    Args:
+        measured: without the rows that were cut.
+        screening: of all rows; None of those of several parts.
+        gear: as its file has it.
+        notes: on how that was found.
+        name: of the case.
+    """
+    (specimen, gears), (run, runs) = measured.gears, measured.runs
+    motion = _motion(measured, run, screening)
+    further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
+    of_record = [*resets_note(motion, measured.rows)]
+    mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
+    of_record += mountings_note(measured.stated, mounted, len(gears))
+    of_record += rigs_note(measured.get("rig", ()), len(gears))
+    of_record += [] if screening is None else screening_notes(screening)
+    if screening is not None and screening.deformation_sd > 0.0:
+        moved, force = without_scatter(measured["deformation"], measured["force"], run)
+        measured = measured.assign(deformation=moved, force=force)
+    x, force = measured["deformation"], measured["force"]
+    shipped = rig_priors()[_CORRELATION].source
+    if gear.scale_priors[_CORRELATION].source == shipped:
+        cutoff = gear.source.get("rig", {}).get("filter_Hz")
+        prior = correlation_prior(cutoff, x, run, measured.get("time"))
+        gear = replace(gear, scale_priors=gear.scale_priors | {_CORRELATION: prior})
+    cut = screening is not None and len(gears) == 1
+    every = [*measured.notes, *notes, *of_record, *of_labels]
+    return Case(
+        name=name,
+        gear=at_full_scale(gear, scale_of(force, x, gear.reading)),
+        records=_records(measured, gear, motion, run, specimen),
+        run_labels=runs,
+        specimen_labels=gears,
+        data_sha256=measured.sha256,
+        notes=tuple(sorted(every, key=lambda note: not note.startswith(ASSUMED))),
+        columns=measured.named,
+        left_out=measured.left_out,
+        excluded=screening.excluded if cut and screening is not None else (),
+        screening=screening,
+        **further,
+    )
+
+
+def _motion(
+    measured: Measurements, run: np.ndarray, screening: Screening | None
+) -> Motion:
+    hidden = screening is not None and screening.trembling
+    return derive_motion(
+        measured["deformation"], run, measured.get("time"), hidden=hidden
+    )
+
+
+def _records(
+    measured: Measurements,
+    gear: Gear,
+    motion: Motion,
+    run: np.ndarray,
+    specimen: np.ndarray,
+) -> Records:
+    zeros = np.zeros(len(run))
+    # NumPy arrays: JAX takes them when it computes, and reading starts no device
+    return Records(
+        deformation=measured["deformation"],
+        temperature=measured.get("temperature", zeros + gear.reference_temperature),
+        time=measured.get("time", zeros),
+        angle=measured.get("angle", zeros),
+        direction=motion.direction,
+        sense=motion.sense,
+        rate=motion.rate,
+        run=run,
+        specimen=specimen,
+        force=measured["force"],
+        force_sd=measured.get("force_sd", zeros),
+        known=motion.features | _known(measured, run, specimen),
+    )
+
+
+def _known(
+    measured: Measurements, run: np.ndarray, specimen: np.ndarray
+) -> frozenset[str]:
+    """Return what is known of the rows, as `Records` has it."""
+    known = {"temperature", "time", "angle", "force_sd"} & {*measured.frame}
+    if "force_sd" in known and not measured["force_sd"].any():
+        known.remove("force_sd")  # a column of zeros says that nothing is known
+    for name, index in (("run", run), ("specimen", specimen)):
+        many = int(index.max(initial=0)) + 1
+        known |= {name} if many > 1 else set()
+        known |= {f"{name}s"} if many >= MANY else set()
+    return frozenset(known)

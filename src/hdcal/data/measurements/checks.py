@@ -1,0 +1,107 @@
+"""Checks of readings, whatever the rig."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.case import Gear
+from hdcal.data.findings import FileFindings
+from hdcal.data.plausible import RANGES
+from hdcal.data.tables.headers import DIMENSIONS
+from hdcal.data.tables.named_columns import Column
+
+# Kelvin become degrees Celsius with an error of rounding.
+_ROUNDED = 1e-9
+
+
+def check_whole(
+    frame: pd.DataFrame,
+    used: Mapping[str, Column],
+    filled: int,
+    fewest: int,
+    findings: FileFindings,
+) -> None:
+    """Find what is wrong with a source as a whole.
+
+    Args:
+        frame: its readings.
+        used: columns by quantity.
+        filled: rows with any cell in them.
+        fewest: rows that are needed.
+        findings: of the source.
+    """
+    if filled < fewest:
+        words = f"holds {filled} rows of readings"
+        findings.add(words, f"At least {fewest} are needed")
+    if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
+        words = "the deformation is constant, so no stiffness can be seen"
+        header = used["deformation"].header
+        findings.add(words, "Measure at several", None, header)
+
+
+def is_constant(deformation: np.ndarray) -> bool:
+    """Tell whether a deformation never changes."""
+    known = deformation[np.isfinite(deformation)]
+    return known.size > 1 and known.min() == known.max()
+
+
+def check_rows(
+    frame: pd.DataFrame, used: Mapping[str, Column], findings: FileFindings
+) -> None:
+    """Find numbers that no rig reads.
+
+    Args:
+        frame: of the readings.
+        used: columns by quantity.
+        findings: of the source.
+    """
+    for quantity in filter(frame.columns.__contains__, DIMENSIONS):
+        known, values = RANGES[quantity], frame[quantity].to_numpy()
+        slack = _ROUNDED if quantity == "temperature" else 0.0
+        wild = (values < known.low - slack) | (values > known.high)
+        words = known.problem(), "Check the number and its unit"
+        rows = frame.index[wild].tolist()
+        findings.add_rows(((row, *words) for row in rows), used[quantity].header)
+
+
+def too_far(
+    frame: pd.DataFrame, gear: Gear, findings: FileFindings
+) -> Iterator[tuple[int, str, str]]:
+    """Yield the farthest row of each specimen that no gear of this radius reaches.
+
+    Rows of which something else is wrong do not count.
+
+    Args:
+        frame: of the readings.
+        gear: whose radius it is.
+        findings: of the source.
+    """
+    size = np.abs(frame["deformation"].to_numpy())
+    beyond = (size >= gear.reach) & ~np.isin(frame.index, [*findings.rows])
+    places = np.flatnonzero(beyond)
+    rising = places[np.argsort(size[places], kind="stable")]
+    gears = frame["specimen"].to_numpy()
+    farthest = {gears[place]: int(place) for place in rising}
+    remedy = "Check the unit of the column and the radius in the gear file"
+    for place in sorted(farthest.values()):
+        words = f"a deformation of {size[place]:g} mm on a radius of "
+        words += f"{gear.geometry.radius:g} mm"
+        yield int(frame.index[place]), words, remedy
+
+
+def rows_back_in_time(time: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Tell which rows have a time before that of their run's last row, shape (n,).
+
+    Args:
+        time: of each row, shape (n,); NaN where it is wrong.
+        run: index of the mounting, shape (n,).
+    """
+    order = np.flatnonzero(np.isfinite(time))
+    order = order[np.argsort(run[order], kind="stable")]
+    # A wild number may overflow here; it has a finding of its own.
+    with np.errstate(over="ignore"):
+        back = (np.diff(time[order]) < 0) & (np.diff(run[order]) == 0)
+    found = np.zeros(len(time), bool)
+    found[order[1:][back]] = True
+    return found

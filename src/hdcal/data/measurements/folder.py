@@ -1,0 +1,236 @@
+"""A folder with a file, or a folder, for each gear."""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from hdcal.data.case import Case, Gear
+from hdcal.data.gear import read_gear
+from hdcal.data.measurements.bad_gears import offer
+from hdcal.data.measurements.case_of import case_of
+from hdcal.data.measurements.gear_files import (
+    GEAR_NAME,
+    gear_files,
+    gear_labels,
+    not_read,
+)
+from hdcal.data.measurements.measurements import Measurements, read_measurements
+from hdcal.data.reading import asked_columns, gear_of
+from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.headers import GROUPINGS
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import Finding, Findings
+
+# What may differ between the files of gears of one kind, as dotted keys begin.
+_OWN = ("gear.wall_thickness_mm", "gear.radius_mm", "gear.length_mm")
+_OWN += ("gear.load_height_mm", "gear.name", "gear.nominal_deformation_mm", "columns.")
+_SIZES = ("wall_thickness", "radius", "length", "load_height")
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one file holds.
+
+    Attributes:
+        label: of its gear, where the file names none.
+        measured: what was read, its specimens named.
+        gear: as the file beside it says; None where each has none.
+    """
+
+    label: str
+    measured: Measurements
+    gear: Gear | None
+
+
+def read_gear_folder(
+    data: Path | str,
+    gear: Path | str | Mapping[str, Any] | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    theory: str | None = None,
+    reading: str | None = None,
+    encoding: str | None = None,
+    skip_bad: bool | None = None,
+    range: str | None = None,
+) -> tuple[Case, dict[str, list] | None]:
+    """Read a folder with a file for each gear, or with a folder for each.
+
+    Where a file names no gears, all of its rows are of the one that it, or its folder,
+    is called after.
+
+    Args:
+        data: a folder of which `gear_files` knows.
+        gear: as in `read_case`; by default the gear.toml in the folder, or that of the
+            first gear. Others may differ from it in their sizes.
+        columns: as in `read_case`.
+        theory: likewise.
+        reading: likewise.
+        range: likewise.
+        encoding: likewise.
+        skip_bad: likewise. A file that cannot be read is a gear that is bad.
+
+    Raises:
+        InputError: holds everything that is wrong with any file.
+
+    Returns:
+        The case, and a table of the sizes of each gear where they have files.
+    """
+    asked, (named, _) = (theory, None, reading), asked_columns(data, columns)
+    files, folder = gear_files(data), Path(data)
+    labels, cases = gear_labels(files, folder)
+    own = [file.parent / GEAR_NAME for file in files] if cases else []
+    own = own if any(path.exists() for path in own) else []
+    beside = folder / GEAR_NAME
+    if gear is None and own and not beside.exists():
+        gear = next(path for path in own if path.exists())
+    base = str(beside) if gear is None else "`gear`"
+    base = str(gear) if isinstance(gear, str | Path) else base
+    with Findings() as wrong:
+        found, notes = wrong.attempt(gear_of, gear, beside, False, asked) or (None, ())
+        parts, unread = [], {}
+        for place, (file, label) in enumerate(zip(files, labels, strict=True)):
+            each, its = Findings(), None
+            if own:
+                its = each.attempt(read_gear, own[place], *asked)
+            if its is not None and found is not None:
+                each += _differences(its, found, own[place], base)
+            here = its or found
+            mine = named if here is None else here.source.get("columns", {}) | named
+            how: dict = {"gear": here, "skip_bad": skip_bad or None}
+            measured = each.attempt(read_measurements, file, mine, encoding, **how)
+            if each:
+                unread[label] = each
+            elif measured is not None:
+                parts.append(_Part(label, _labelled(measured, label), its))
+        wrong += _unread(parts, unread, skip_bad=skip_bad)
+    assert found is not None
+    bad = {label: _why(each[0], folder) for label, each in unread.items()}
+    whole = joined([part.measured for part in parts], found.reference_temperature, bad)
+    kind = "folder" if cases else "file"
+    told = [f"each {kind} is a gear, called after it, unless it names gears itself"]
+    compared = f"the gear file, with sizes at which gears are compared, is {base}"
+    told += [*([compared] if own else []), *not_read(files, folder), *_untold(parts)]
+    name = folder.resolve().name
+    case = case_of(whole, found, (*told, *notes), name, range, skip_bad)
+    return case, _sizes(parts) if own and found.theory != SPRING else None
+
+
+def _labelled(measured: Measurements, label: str) -> Measurements:
+    """Return measurements with the gear of each row, and the file in its row's name.
+
+    A gear of two files was mounted for each of them.
+    """
+    frame = measured.frame.set_axis([f"{row} of {label}" for row in measured.rows])
+    if "specimen" not in measured.stated:
+        frame = frame.assign(specimen=label)
+    else:
+        runs = frame["run"].cat.rename_categories(lambda run: f"{label} {run}".strip())
+        frame = frame.assign(run=runs)
+    return replace(measured, frame=frame)
+
+
+def joined(
+    parts: Sequence[Measurements], warm: float, bad: Mapping[str, Finding]
+) -> Measurements:
+    """Return the rows of all parts below each other.
+
+    Args:
+        parts: the first one names the whole.
+        warm: temperature of those that state none [°C].
+        bad: gears that are not among them, beside those of the parts.
+    """
+    blank = {"temperature": warm, **dict.fromkeys(GROUPINGS, NOT_STATED)}
+    frames = [part.frame for part in parts]
+    names = dict.fromkeys(name for frame in frames for name in frame)
+    kept = [n for n in names if n in blank or all(n in frame for frame in frames)]
+    frames = [
+        frame.assign(**{n: blank[n] for n in kept if n not in frame})[kept]
+        for frame in frames
+    ]
+    labels = dict.fromkeys(("specimen", "run"), str)
+    whole: Any = pd.concat([frame.astype(labels) for frame in frames])
+    left_out = {gear: why for part in parts for gear, why in part.left_out.items()}
+    hashes = "".join(part.sha256 for part in parts)
+    return Measurements(
+        whole.astype(dict.fromkeys(labels, "category")),
+        parts[0].file,
+        hashlib.sha256(hashes.encode()).hexdigest(),
+        frozenset().union(*(part.stated for part in parts)),
+        notes=tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+        left_out={**bad, **left_out},
+    )
+
+
+def _unread(
+    parts: Sequence[_Part], unread: Mapping[str, Findings], *, skip_bad: bool | None
+) -> list[Finding]:
+    """Return what stops all: files that cannot be read, unless they may be left out.
+
+    Where others name gears themselves nobody knows which gears such a file holds.
+    """
+    known = not any("specimen" in part.measured.stated for part in parts)
+    if skip_bad and known and parts:
+        return []
+    found = [finding for each in unread.values() for finding in each]
+    if unread and known and parts and skip_bad is False:
+        bad = {label: each[0] for label, each in unread.items()}
+        found.append(offer(bad, len(parts) + len(bad)))
+    return found
+
+
+def _why(first: Finding, folder: Path) -> Finding:
+    """Return why a gear is left out; where no row says in which file, the words do."""
+    if first.row is not None:
+        return first
+    return Finding(str(folder), f"{first.where}: {first.problem}", first.remedy)
+
+
+def _differences(one: Gear, other: Gear, file: Path, base: str) -> Iterator[Finding]:
+    """Yield what a gear file says otherwise than that of all gears, beside sizes."""
+    mine, theirs = (dict(_flat(each.source)) for each in (one, other))
+    remedy = "Gears of one kind differ in their sizes only"
+    keys = [key for key in sorted({*mine, *theirs}) if not key.startswith(_OWN)]
+    keys = [key for key in keys if mine.get(key) != theirs.get(key)]
+    for key in keys:
+        here, there = (str(each.get(key, "not stated")) for each in (mine, theirs))
+        words = f"is {here}, and {there} in {base}"
+        yield Finding(str(file), words, remedy, None, key)
+    priors = [
+        {n: (p.family, p.numbers) for n, p in g.priors.items()} for g in (one, other)
+    ]
+    if not keys and priors[0] != priors[1]:
+        words = f"its material is another one than in {base}"
+        yield Finding(str(file), words, remedy, None, "gear.material")
+
+
+def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def _sizes(parts: Sequence[_Part]) -> dict[str, list]:
+    """Return the sizes of each gear as a table; one of two sizes stands there twice."""
+    rows = dict.fromkeys(
+        (gear, *(float(getattr(part.gear.geometry, name)) for name in _SIZES))
+        for part in parts
+        if part.gear is not None
+        for gear in part.measured.gears[1]
+    )
+    names = ["specimen", *(f"{name}_mm" for name in _SIZES)]
+    return pd.DataFrame([*rows], columns=names).to_dict("list")
+
+
+def _untold(parts: Sequence[_Part]) -> Iterator[str]:
+    """Yield a note on what some files state and others do not."""
+    open_ = {"specimen", "temperature", "run", *GROUPINGS}
+    each = [part.measured.stated - open_ for part in parts]
+    for name in sorted(frozenset().union(*each) - each[0].intersection(*each)):
+        many = sum(name in stated for stated in each)
+        yield f"{name} is not read: {many} of {len(each)} files state it"

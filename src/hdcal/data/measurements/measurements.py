@@ -1,0 +1,254 @@
+"""From the table of a source to readings in code units, checked."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.case import Gear
+from hdcal.data.findings import FileFindings, row_list
+from hdcal.data.measurements.bad_gears import bad_gears, offer
+from hdcal.data.measurements.checks import (
+    check_rows,
+    check_whole,
+    is_constant,
+    rows_back_in_time,
+    too_far,
+)
+from hdcal.data.measurements.labels import mountings, run_labels
+from hdcal.data.measurements.notes import ASSUMED, source_notes
+from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.columns import REQUIRED, choose_columns
+from hdcal.data.tables.headers import DIMENSIONS, LABELS
+from hdcal.data.tables.named_columns import Column, as_named
+from hdcal.data.tables.sources import read_source, source_name
+from hdcal.data.tables.values import read_values, without_slow_channels
+from hdcal.errors import Finding, quoted
+
+FEWEST_ROWS = 5
+# Quantities of a spring under a force.
+READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
+# Labels that one finding names.
+_LISTED = 20
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """What was measured, in the order it was taken.
+
+    Attributes:
+        frame: by quantity, in code units, indexed by the row of the source. Always
+            there are deformation, force, and the labels `specimen` and `run`, "1" and
+            "" where nothing is stated; `zero` counts the jumps of a zero before a row.
+        file: how findings call the source.
+        sha256: hash of the source.
+        stated: quantities that the source states.
+        named: quantity -> header with its unit, of headers that are not hdcal's own.
+        notes: what was assumed.
+        left_out: gears that are not among them, each with what is wrong with it.
+    """
+
+    frame: pd.DataFrame
+    file: str
+    sha256: str = ""
+    stated: frozenset[str] = frozenset()
+    named: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    left_out: dict[str, Finding] = field(default_factory=dict)
+
+    def __getitem__(self, quantity: str) -> np.ndarray:
+        """Return a column, shape (n,)."""
+        return self.frame[quantity].to_numpy()
+
+    def get(self, quantity: str, default: Any = None) -> Any:
+        """Return a column, shape (n,), or what stands for one that is not there."""
+        return self[quantity] if quantity in self.frame else default
+
+    @property
+    def rows(self) -> np.ndarray:
+        """What each row is called in the source, shape (n,)."""
+        return self.frame.index.to_numpy()
+
+    def where(self, kept: np.ndarray) -> "Measurements":
+        """Return the rows that are true in a mask, shape (n,)."""
+        return self if kept.all() else replace(self, frame=self.frame.loc[kept])
+
+    def assign(self, **columns: np.ndarray) -> "Measurements":
+        """Return the same with other columns, shape (n,) each."""
+        return replace(self, frame=self.frame.assign(**columns))
+
+    @property
+    def gears(self) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Return the index of each row's gear, shape (n,), and what each is called."""
+        index, names = pd.factorize(self.frame["specimen"])
+        return index, tuple(names)
+
+    @property
+    def runs(self) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Return the index of each row's mounting, shape (n,), and its name."""
+        return mountings(self.frame)
+
+
+def read_measurements(
+    data: Any,
+    mapping: Mapping[str, str] | None = None,
+    encoding: str | None = None,
+    sheet: str | None = None,
+    *,
+    gear: Gear | None = None,
+    skip_bad: bool | None = None,
+) -> Measurements:
+    """Read a source of measurements.
+
+    Args:
+        data: the file, or a table in memory (see `read_source`).
+        mapping: quantity -> header, the unit in brackets, as in
+            `{"force": "Load[kgf]"}`; for headers that do not name themselves.
+        encoding: of the text; by default what it looks like.
+        sheet: of a workbook; by default the one with readings.
+        gear: whose radius bounds the deformations; None where it is not known.
+        skip_bad: leave out gears of which a row is wrong, whole; False: refuse them,
+            and say that this can be asked for.
+
+    Raises:
+        InputError: holds everything that is wrong with the source.
+    """
+    with FileFindings(source_name(data)) as findings:
+        table, sha256 = read_source(data, findings, encoding, sheet)
+        used = choose_columns(table, mapping or {}, READ, REQUIRED, findings)
+        table, used, notes = without_slow_channels(table, used, REQUIRED)
+        found = measured_in(table, used, findings, gear, skip_bad=skip_bad)
+    used = {name: column for name, column in used.items() if name in found.stated}
+    notes = source_notes(table, used, [*notes, *found.notes])
+    return replace(
+        found, sha256=sha256, named=as_named(table, used), notes=tuple(notes)
+    )
+
+
+def measured_in(
+    table: ReadTable,
+    used: Mapping[str, Column],
+    findings: FileFindings,
+    gear: Gear | None = None,
+    *,
+    skip_bad: bool | None = None,
+    whole: bool = True,
+) -> Measurements:
+    """Return what stands in the columns of a table; its notes are of cells alone.
+
+    Gears that are left out count as if they had never been in the file: what is guessed
+    of cells, such as their decimal sign, is guessed of all the others.
+
+    Args:
+        table: the readings.
+        used: columns by quantity.
+        findings: of the source; gets what is wrong with the rows that count.
+        gear: as in `read_measurements`.
+        skip_bad: likewise.
+        whole: whether these are all rows of the source.
+    """
+    left_out: dict[str, Finding] = {}
+    while True:
+        wrong = FileFindings(findings.file)
+        wrong.places = findings.places
+        found = _measured(table, used, wrong, gear, whole=whole)
+        gears = found["specimen"] if wrong.rows else []
+        bad = bad_gears(wrong, table.rows, gears)
+        many = len({*gears} - {""})
+        if not skip_bad or not bad or (whole and len(bad) == many):
+            break
+        left_out |= bad
+        table = table.take(~found.frame["specimen"].isin([*bad]).to_numpy())
+    findings += wrong
+    findings.rows |= wrong.rows
+    if skip_bad is False and bad and (len(bad) < many or not whole):
+        findings.append(offer(bad, many if whole else None))
+    return replace(found, left_out=left_out)
+
+
+def _measured(
+    table: ReadTable,
+    used: Mapping[str, Column],
+    findings: FileFindings,
+    gear: Gear | None,
+    *,
+    whole: bool,
+) -> Measurements:
+    """Return what stands in columns, right or wrong: the findings say."""
+    values, notes = read_values(table, used, findings)
+    if table.runs is not None and "run" not in used:
+        values["run"] = np.char.mod("%d", table.runs + 1).astype(object)
+        notes.append("the readings below each row of headers are a run")
+    frame = pd.DataFrame(values, index=table.rows)
+    if whole:
+        check_whole(frame, used, table.filled, FEWEST_ROWS, findings)
+    check_rows(frame, used, findings)
+    stated = frozenset(values)
+    one = np.zeros(len(frame), np.int8)
+    gears = values.get("specimen", pd.Categorical.from_codes(one, ["1"]))
+    runs = values.get("run", run_labels(values, pd.factorize(gears)[0]))
+    runs = pd.Categorical.from_codes(one, [""]) if runs is None else runs
+    frame["specimen"], frame["run"] = pd.Categorical(gears), pd.Categorical(runs)
+    frame["zero"] = 0
+    found = Measurements(frame, findings.file, stated=stated)
+    found, note = _with_time(found, used, findings)
+    if gear is not None and "deformation" in used:
+        far = too_far(frame, gear, findings)
+        findings.add_rows(far, used["deformation"].header)
+    return replace(found, notes=(*note, *(f"{ASSUMED}{one}" for one in notes)))
+
+
+def _with_time(
+    found: Measurements, used: Mapping[str, Column], findings: FileFindings
+) -> tuple[Measurements, list[str]]:
+    """Return measurements with a time that never goes back within a run, or without.
+
+    A time that goes back is refused where the user names it, or a header `time_UNIT`,
+    and not used where its header was guessed. A note says so.
+    """
+    if "time" not in found.frame:
+        return found, []
+    index, names = found.runs
+    back = rows_back_in_time(found["time"], index)
+    if not back.any():
+        return found, []
+    label = quoted(names[index[int(np.argmax(back))]])
+    words = f"the time goes back within {f'run {label}' if len(names) > 1 else 'a run'}"
+    header, rows = used["time"].header, found.frame.index[back].tolist()
+    if not used["time"].guessed:
+        remedy = "Keep the order of taking; label runs in a column 'run' if it restarts"
+        findings.add_rows(((row, words, remedy) for row in rows), header)
+        return found, []
+    note = f"{ASSUMED}{quoted(header)} is not used: {words}, at {row_list(rows)}. If "
+    note += "the rig was reset there, label the runs in a column 'run'"
+    without = replace(
+        found, frame=found.frame.drop(columns="time"), stated=found.stated - {"time"}
+    )
+    return without, [note]
+
+
+def of_specimen(measured: Measurements, label: str) -> Measurements:
+    """Return what was measured on one of several specimens.
+
+    Raises:
+        InputError: none is called so, or it has too few rows, or was not moved.
+    """
+    findings, (_, names) = FileFindings(measured.file), measured.gears
+    if label not in names:
+        listed = ", ".join(map(quoted, names[:_LISTED]))
+        more = len(names) - _LISTED
+        listed += f" and {more} more" if more > 0 else ""
+        words = f"no specimen is called {quoted(label)}"
+        if len(names) == 1:
+            findings.refuse(words, "Say `columns` 'specimen=HEADER', which names them")
+        findings.refuse(words, f"There are {listed}")
+    found = measured.where((measured.frame["specimen"] == label).to_numpy())
+    if len(found.frame) < FEWEST_ROWS:
+        words = f"specimen {quoted(label)} has {len(found.frame)} rows"
+        findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
+    if is_constant(found["deformation"]):
+        words = f"the deformation of specimen {quoted(label)} is constant"
+        findings.refuse(words, "Measure at several")
+    return found

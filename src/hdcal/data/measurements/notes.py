@@ -1,0 +1,163 @@
+"""Notes on a case that was read: what was assumed, and what is unusual."""
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+
+import numpy as np
+
+from hdcal.data.case import Gear
+from hdcal.data.loading import Motion
+from hdcal.data.measurements.labels import TELLING
+from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.cells import NOT_STATED
+from hdcal.data.tables.headers import LABELS, parse_header
+from hdcal.data.tables.named_columns import Column
+from hdcal.data.theory_names import SPRING
+from hdcal.errors import quoted
+
+# How a note begins that says what was assumed.
+ASSUMED = "ASSUMED: "
+MOST_ROWS = 8  # listed in one note
+USUAL = -100.0, 500.0  # temperatures of rigs, heated and cooled ones [°C]
+THIN = 0.1  # largest wall over radius of what textbooks call a thin-walled cylinder
+
+
+def source_notes(
+    table: ReadTable, used: Mapping[str, Column], others: Sequence[str] = ()
+) -> list[str]:
+    """Return what was assumed of a source, and what of it is not used.
+
+    Args:
+        table: its readings.
+        used: columns by quantity.
+        others: further notes.
+    """
+    notes = [*_assumed(table, used), *table.left_out, *others]
+    return [*notes, *_unused_columns(table, used)]
+
+
+def _assumed(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
+    """Yield what was assumed of a source, each with how to say otherwise."""
+    for note in table.notes:
+        yield f"{ASSUMED}{note}"
+    for column in used.values():
+        if column.against and column.unit is not None:
+            yield (
+                f"{ASSUMED}{quoted(column.header)} is in {column.unit.name}, as was "
+                f"stated, though it names {column.against}"
+            )
+    guesses = [column for column in used.values() if column.guessed]
+    if guesses:
+        meanings = ", ".join(
+            f"{quoted(column.header)} is the {column.quantity}"
+            + ("" if column.unit is None else f" in {column.unit.name}")
+            for column in guesses
+        )
+        first = guesses[0]
+        form = "HEADER" if first.unit is None else "HEADER[UNIT]"
+        option = f"--column '{first.quantity}={form}'"
+        yield f"{ASSUMED}{meanings}. If not, name the column: {option}"
+
+
+def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
+    """Yield what of a file was not read."""
+    positions = {column.position for column in used.values()}
+    headers = [*enumerate(table.headers)]
+    extra = [header for place, header in headers if place not in positions and header]
+    for header in extra:
+        found = parse_header(header)
+        label = found.quantity in LABELS
+        if found.quantity and found.quantity not in used and (label or not found.unit):
+            why = "differs from row to row" if label else "names no unit"
+            option = f"'{found.quantity}={header}{'' if label else '[UNIT]'}'"
+            yield (
+                f"{ASSUMED}{quoted(header)}, which may be the {found.quantity}, is not "
+                f"used, as it {why}. Name the column to use it: --column {option}"
+            )
+    if extra:
+        yield f"columns not used: {', '.join(map(quoted, extra))}"
+    if table.skipped:
+        yield f"{table.skipped} empty lines between the readings were skipped"
+
+
+def gear_notes(gear: Gear, force: np.ndarray) -> Iterator[str]:
+    """Yield what is unusual of a gear file, or at odds with its readings.
+
+    Args:
+        gear: as its file states it.
+        force: as read [N], shape (n,).
+    """
+    size, step = gear.geometry, gear.force_resolution
+    if gear.theory != SPRING and float(size.wall_thickness / size.radius) > THIN:
+        yield (
+            f"a wall of {size.wall_thickness:g} mm at a radius of {size.radius:g} mm "
+            "is not thin, as the theories take it to be. Check both sizes, and units"
+        )
+    if step:
+        off = int((np.abs(force / step - np.round(force / step)) > 0.02).sum())
+        if off:
+            yield f"{off} of {force.size} forces are not multiples of {step:g} N"
+
+
+def temperature_note(temperature: np.ndarray | None) -> Iterator[str]:
+    """Yield that temperatures [°C], shape (n,), are those of no rig."""
+    if temperature is None:
+        return
+    if not USUAL[0] <= (typical := np.median(temperature)) <= USUAL[1]:
+        yield (
+            f"temperatures about {typical:.4g} °C are far from those of any "
+            "rig. Check the unit of the column"
+        )
+
+
+def resets_note(motion: Motion, rows: np.ndarray) -> Iterator[str]:
+    """Yield that the deformation was reset.
+
+    Args:
+        motion: of the readings.
+        rows: what each is called in its source, shape (n,).
+    """
+    if motion.resets:
+        few = [str(rows[row]) for row in motion.resets[:MOST_ROWS]]
+        more = ", …" if len(motion.resets) > MOST_ROWS else ""
+        yield (
+            f"the deformation goes back over most of its range in one step (row "
+            f"{', '.join(few)}{more}), which counts as no measured "
+            "unloading. Where a new mounting begins there, say so in a column `run`"
+        )
+
+
+def mountings_note(stated: Container[str], runs: int, gears: int) -> Iterator[str]:
+    """Yield by what mountings are told apart, where no column `run` does that.
+
+    Args:
+        stated: quantities that the source states.
+        runs: how many mounting there are.
+        gears: of how many gears.
+    """
+    telling = ", ".join(name for name in TELLING if name in stated)
+    if "run" in stated or runs <= gears or not telling:
+        return
+    telling = " or ".join(telling.rsplit(", ", 1))
+    yield (
+        f"{ASSUMED}without a column `run`, rows of a gear that differ in {telling} are "
+        f"of different mountings: {runs} mountings of {gears} "
+        f"gear{'s' if gears > 1 else ''}. "
+        "If not, name the mountings in a column `run`"
+    )
+
+
+def rigs_note(rigs: Sequence[str], gears: int) -> Iterator[str]:
+    """Yield that several rigs read one gear.
+
+    Args:
+        rigs: of all rows or runs.
+        gears: how many gears they read.
+    """
+    many = len({*rigs} - {NOT_STATED})
+    if gears == 1 and many > 1:
+        yield (
+            f"{many} rigs read this gear, and a calibration or a diagnosis takes "
+            "them for one: where their gains differ it sees a change of the gear. "
+            "Leave the rows of one rig at a time; `hdcal fleet` tells rigs apart by "
+            "the gears that several of them read"
+        )

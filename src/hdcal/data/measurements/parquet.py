@@ -1,0 +1,189 @@
+"""Parquet, a file or a folder of them: read in batches, whatever the number of rows."""
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from hdcal.data.case import Gear
+from hdcal.data.findings import FileFindings
+from hdcal.data.measurements.gear_files import GEAR_NAME
+from hdcal.data.measurements.measurements import Measurements, measured_in
+from hdcal.data.measurements.notes import source_notes
+from hdcal.data.measurements.screened import asked_range, screened, screening_notes
+from hdcal.data.reading import gear_of
+from hdcal.data.tables.arrays import arrow_grid
+from hdcal.data.tables.blocks import ReadTable
+from hdcal.data.tables.columns import REQUIRED, choose_columns
+from hdcal.data.tables.headers import GROUPINGS
+from hdcal.data.tables.named_columns import Column, as_named
+from hdcal.data.tables.parquet_files import parquet_files, parquet_table
+from hdcal.data.tables.shapes import table_of
+
+if TYPE_CHECKING:
+    from pyarrow import Schema, Table
+    from pyarrow.dataset import Dataset
+
+# Rows by which the columns are chosen, and rows of a batch.
+_SHOWN, _BATCH = 50_000, 1 << 18
+_USED = (*REQUIRED, "temperature", "time", "specimen", "run", *GROUPINGS)
+
+
+@dataclass(frozen=True)
+class Parquet:
+    """Files that are read in batches.
+
+    Attributes:
+        name: of the file, or of the folder.
+        gear: what is known of all gears.
+        files: in their order.
+        root: of their folder; empty where there is one file.
+        schema: of all files.
+        used: columns by quantity.
+        named: as in `Measurements`.
+        notes: what was assumed.
+        range: working range; None of all rows.
+    """
+
+    name: str
+    gear: Gear
+    files: Sequence[str]
+    root: str
+    schema: "Schema"
+    used: Mapping[str, Column]
+    named: dict[str, str]
+    notes: tuple[str, ...]
+    range: str | None
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the file, or of the hashes of several."""
+        each = []
+        for name in self.files:
+            with open(name, "rb") as file:
+                each.append(hashlib.file_digest(file, "sha256").hexdigest())
+        several = hashlib.sha256("".join(each).encode()).hexdigest()
+        return each[0] if len(each) == 1 else several
+
+
+def open_parquet(
+    data: Path | str,
+    gear: Path | str | Mapping[str, Any] | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    theory: str | None = None,
+    reading: str | None = None,
+    range: str | None = None,
+) -> Parquet:
+    """Look into a Parquet file, or a folder of them, partitioned or not.
+
+    Args:
+        data: the file, or the folder.
+        gear: as in `read_case`; by default the gear.toml beside the file, or in the
+            folder.
+        columns: as in `read_case`.
+        theory: likewise.
+        reading: likewise.
+        range: likewise.
+
+    Raises:
+        InputError: holds everything that is wrong with its columns.
+    """
+    path = Path(data)
+    files = parquet_files(path)
+    root = str(path) if path.is_dir() else ""
+    beside = (path if root else path.parent) / GEAR_NAME
+    asked_range(range)
+    with FileFindings(str(path)) as findings:
+        dataset = parquet_table(files, root, findings)
+        found, notes = gear_of(gear, beside, False, (theory, None, reading))
+        named = {**found.source.get("columns", {}), **(columns or {})}
+        first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
+        grid = arrow_grid(first.schema, first.column, first.num_rows, 2)
+        table = table_of(grid, findings)
+        used = choose_columns(table, named, _USED, REQUIRED, findings)
+        if "specimen" not in used:
+            remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
+            findings.refuse("no column says which gear a row is of", remedy)
+    return Parquet(
+        path.resolve().name if root else path.stem,
+        found,
+        files,
+        root,
+        dataset.schema,
+        used,
+        as_named(table, used),
+        (*source_notes(table, used), *notes),
+        range or found.source.get("measurement", {}).get("range"),
+    )
+
+
+def _plain(schema: "Schema") -> list[str]:
+    """Return the columns that hold plain cells."""
+    from pyarrow import types
+
+    return [one.name for one in schema if not types.is_nested(one.type)]
+
+
+def read_batches(
+    source: Parquet, file: str, *, skip_bad: bool | None = None
+) -> Iterator[Measurements]:
+    """Yield the rows of one file, in their order and screened.
+
+    Args:
+        source: where it is from.
+        file: one of its files.
+        skip_bad: as in `read_case`.
+
+    Raises:
+        InputError: holds what is wrong with the first batch that is.
+    """
+    with FileFindings(file) as findings:
+        dataset = parquet_table([file], source.root, findings)
+    dataset, names = dataset.replace_schema(source.schema), _plain(source.schema)
+    headers = [names[column.position] for column in source.used.values()]
+    places = {q: place for place, q in enumerate(source.used)}
+    used = {q: replace(one, position=places[q]) for q, one in source.used.items()}
+    for first, rows in _whole_gears(dataset, headers, places["specimen"]):
+        with FileFindings(file) as findings:
+            grid = arrow_grid(rows.schema, rows.column, rows.num_rows, first, days=True)
+            table = ReadTable(tuple(headers), first, grid, rows.num_rows)
+            how: dict = {"skip_bad": skip_bad, "whole": False}
+            found = measured_in(table, used, findings, source.gear, **how)
+        if len(found.frame):
+            wanted = asked_range(source.range)
+            found, screening = screened(found, wanted, skip_bad, whole=False)
+            found = replace(found, notes=tuple(screening_notes(screening)))
+        yield found
+
+
+def _whole_gears(
+    dataset: "Dataset", headers: list[str], specimen: int
+) -> Iterator[tuple[int, "Table"]]:
+    """Yield rows that do not end within those of a gear, and the number of the first.
+
+    Args:
+        dataset: a file.
+        headers: of the columns that are read.
+        specimen: place of the gears' labels among them.
+    """
+    import pyarrow
+
+    held, first = None, 1
+    for batch in dataset.to_batches(columns=headers, batch_size=_BATCH):
+        rows = pyarrow.Table.from_batches([batch])
+        labels = pd.factorize(batch.column(specimen).to_pandas())[0]
+        others = np.flatnonzero(labels != labels[-1:])
+        end = int(others[-1]) + 1 if others.size else 0
+        parts = [rows[:end]] if held is None else [held, rows[:end]]
+        held = rows[end:] if end else pyarrow.concat_tables([*parts[:-1], rows])
+        if end:
+            whole = pyarrow.concat_tables(parts)
+            yield first, whole
+            first += whole.num_rows
+    if held is not None and held.num_rows:
+        yield first, held
