@@ -63,7 +63,7 @@ def test_a_coordinate_that_forgets_its_scale_is_told(both_forms, monkeypatch):
     monkeypatch.setattr(
         model,
         "_scaled_and_moved",
-        lambda law, scale, by: real(law, 1.1 * scale, by),
+        lambda name, prior, scale, by: real(name, prior, 1.1 * scale, by),
     )
     jax.clear_caches()
     found = off_the_stated_density(*both_forms)

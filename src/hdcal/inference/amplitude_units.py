@@ -1,4 +1,4 @@
-"""How finely the data see each amplitude: the unit of its sampling coordinate."""
+"""How finely the data resolve each amplitude: the unit of its coordinate."""
 
 from collections.abc import Mapping, Sequence
 
@@ -49,9 +49,9 @@ def amplitude_units(
             for field, prior in own.items()
             if prior.family == "half_normal"
         }
-        if not widest:
-            continue
-        slopes = _slopes(base, values, widest, padded, reading, effect=effect)
+        slopes = {}
+        if widest:
+            slopes = _slopes(base, values, widest, padded, reading, effect=effect)
         for field, column in slopes.items():
             column = np.asarray(column)[: len(columns)]
             unit = finest(column, columns, noise_sd, widest[field])
@@ -71,8 +71,8 @@ def finest(
         widest: prior sd of the amplitude, which its error never exceeds.
     """
     fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
-    seen = np.linalg.norm(column - fitted)
-    unit = noise_sd / float(seen) if seen > 0.0 else widest
+    length = np.linalg.norm(column - fitted)
+    unit = noise_sd / float(length) if length > 0.0 else widest
     return min(widest, unit) or widest
 
 
@@ -94,6 +94,5 @@ def _slopes(base: Base, values, prior_sds, records, reading, *, effect):
 def _median(prior: Prior, null: float | None) -> float:
     if null is not None:
         return null
-    return (
-        float(prior.numbers[0]) if prior.family == "fixed" else frozen(prior).median()
-    )
+    fixed = prior.family == "fixed"
+    return float(prior.numbers[0]) if fixed else frozen(prior).median()

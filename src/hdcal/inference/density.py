@@ -9,17 +9,15 @@ from jaxtyping import Float
 
 from hdcal.data.records import Array, Records
 from hdcal.exported import jit
-from hdcal.inference import compress
 from hdcal.inference.distributions import distribution
-from hdcal.inference.integrated import linear_part
 from hdcal.inference.likelihood import log_probability
+from hdcal.inference.marginal import linear_part
 from hdcal.inference.padding import measured
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.serial_correlation import given_before
 from hdcal.inference.values import (
     Values,
-    block_coefficients,
     correlation_of,
     predict_rows,
     with_rounding,
@@ -64,14 +62,8 @@ def log_likelihood(problem: Sampled, values: Values) -> Float[Array, ""]:
 
 @log_likelihood.register
 def _(problem: Problem, values: Values) -> Float[Array, ""]:
-    if problem.integrated:
+    if problem.integrated or problem.blocks is not None:
         return linear_part(problem, values).log_likelihood()
-    if problem.blocks is not None:
-        correlation = correlation_of(values)
-        noise = values["sigma"], problem.step
-        blocks = problem.blocks.whitened(correlation, *noise)
-        coefficients = block_coefficients(problem, blocks, values)
-        return compress.log_likelihood(blocks, coefficients, *noise, correlation)
     rows = problem.rows, problem.columns, problem.before
     each = pointwise_log_likelihood(problem, values, *rows)
     return jnp.sum(jnp.where(measured(len(each), problem.count), each, 0.0))

@@ -22,7 +22,7 @@ class Sampled(eqx.Module):
         priors: dict[str, Prior]
 
     @property
-    def bent(self) -> bool:
+    def non_smooth(self) -> bool:
         """Whether its density has bends, at which the gradient jumps."""
         return False
 

@@ -16,8 +16,8 @@ from hdcal.exported import jit
 from hdcal.inference import laplace
 from hdcal.inference.amplitude_units import finest
 from hdcal.inference.distributions import frozen
-from hdcal.inference.dynamic_priors import FRICTION
-from hdcal.inference.dynamic_problem import (
+from hdcal.motion.dynamic_priors import FRICTION
+from hdcal.motion.dynamic_problem import (
     STOP,
     DynamicProblem,
     predict_motion,
