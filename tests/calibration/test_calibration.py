@@ -72,7 +72,6 @@ def test_a_posterior_survives_the_disk(posterior, tmp_path):
         "observed_data",
         "constant_data",
         "log_likelihood",
-        "laplace",
     }
     assert set(back.tree.children) == groups
 

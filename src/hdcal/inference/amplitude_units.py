@@ -24,7 +24,7 @@ def amplitude_units(
 ) -> dict[str, float]:
     """Return the standard error of each half-normal amplitude near its null.
 
-    Linear least squares beside the base model: σ/‖P c‖ with c the derivative of the
+    Linear least squares with the base model: σ/‖P c‖ with c the derivative of the
     reading and P the projection off the base columns; never more than the prior sd.
 
     Args:
@@ -62,7 +62,7 @@ def amplitude_units(
 def finest(
     column: np.ndarray, columns: np.ndarray, noise_sd: float, widest: float
 ) -> float:
-    """Return the standard error of an amplitude beside other parameters.
+    """Return the standard error of an amplitude fitted with other parameters.
 
     Args:
         column: derivative of the mean reading by the amplitude, shape (n,).
@@ -82,8 +82,8 @@ def _slopes(base: Base, values, prior_sds, records, reading, *, effect):
 
     def slope(field, sd):
         def mean(size):
-            one = effect(**{**values, field: size})
-            return predict_reading(base, (one,), records, reading)[0]
+            present = effect(**{**values, field: size})
+            return predict_reading(base, (present,), records, reading)[0]
 
         # A tenth of the prior sd: at zero itself an effect may have no slope.
         return jax.jvp(mean, (sd / 10.0,), (1.0,))[1]

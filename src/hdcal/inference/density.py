@@ -30,7 +30,7 @@ def pointwise_log_likelihood(
 ) -> Float[Array, " n"]:
     """Return the log likelihood of each row given all values [log 1/N].
 
-    And given the rows before it in its run, where neighbours may err alike.
+    And given the rows before it in its run, where neighbours may be correlated.
 
     Args:
         problem: structure.
@@ -74,8 +74,7 @@ def log_prior(problem: Sampled, values: Values) -> Float[Array, ""]:
     total = jnp.zeros(())
     for name, prior in problem.priors_given(values).items():
         if name in values and prior.family != "fixed":
-            law = distribution(prior, name)
-            total = total + law.log_prob(values[name])
+            total = total + distribution(prior, name).log_prob(values[name])
     return total
 
 

@@ -19,7 +19,7 @@ _FAR = -20.0
 def log_interval(low, high):
     """Return log(Φ(high) − Φ(low)) without cancellation in either tail.
 
-    In NumPy of NumPy's arrays, whose shapes may be of any kind: nothing is compiled.
+    By NumPy for NumPy's arrays, whose shapes are many: nothing is compiled.
     """
     xp, erfc = (np, special.erfc) if isinstance(low, np.ndarray) else (jnp, jax_erfc)
     flip = low > 0.0

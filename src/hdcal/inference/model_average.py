@@ -30,12 +30,11 @@ Library = Mapping[str, type[Effect]]
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Hypotheses of a diagnosis that were not calibrated, or whose calibration failed.
+    """Hypotheses of a diagnosis without a usable calibration.
 
     Attributes:
         probability: of them all.
-        counted_as: the calibrated hypothesis that carries their probability beside its
-            own.
+        counted_as: the calibrated hypothesis to which their probability is added.
     """
 
     probability: float

@@ -1,4 +1,4 @@
-"""What samplers can take: a problem with priors and a declared density."""
+"""The interface of what is sampled: priors and a declared density."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING

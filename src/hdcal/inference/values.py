@@ -1,4 +1,4 @@
-"""The parameters of one draw, and what they say of each row."""
+"""Mean and noise of each row, from the parameters of one draw."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,13 +17,13 @@ from hdcal.inference.structure import ModelStructure
 from hdcal.physics.chain import Base, linear_coefficients, predict_reading
 from hdcal.physics.effect import Effect, Noise, parameters
 
-# Float scalars and arrays by site name; what each one is depends on the name.
+# Float scalars and arrays by site name.
 Values = Mapping[str, Any]
 
 # Columns of the linear core: deformation, deformation × ΔT, one, ΔT.
 CORE, ONE = 4, 2
-# Least noise sd that rounded readings can tell from none, in steps; twice as much noise
-# is raised by 5e-4 of it.
+# Least noise sd that rounded readings distinguish from none, in steps; twice as much
+# noise is raised by 5e-4 of it.
 LEAST_NOISE, _SHARPNESS = 0.1, 8.0
 
 
@@ -121,7 +121,7 @@ def with_rounding(noise: Noise, step, *, rounded: bool = False) -> Noise:
     """Add Sheppard's variance of the rounding to the noise.
 
     Where rounding has its exact likelihood, the noise is at least what such readings
-    can tell from none: without any the likelihood has walls that no sampler passes.
+    distinguish from none: without any the likelihood has walls that no sampler passes.
     The smooth maximum leaves larger noise as it is, for what is predicted from it.
     """
     if not rounded:
