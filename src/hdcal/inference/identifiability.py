@@ -1,4 +1,4 @@
-"""Which parameters the data identify: sensitivities, and what the prior decides."""
+"""Sensitivities of the readings: standard errors, and what the prior decides."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +11,12 @@ from hdcal.data.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
-from hdcal.inference.distributions import moments
+from hdcal.inference.distributions import frozen, moments
 from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sampled_problem import Sampled
 from hdcal.inference.values import predict_rows
+from hdcal.physics.effect import parameters
 
 # Parameters of the mean besides those of effects; sigma is not one of them.
 _MEAN = ("K", "E0", "alpha", "force_offset", "deformation_offset", *GAUGE_UNITS)
@@ -127,6 +128,62 @@ def _derivatives(problem: Problem, values, records: Records, columns, *, names):
 
     slopes, sd = jax.jacfwd(mean, has_aux=True)({name: values[name] for name in names})
     return sd, slopes, jax.jvp(stiffer, (0.0,), (1.0,))[1]
+
+
+def resolved_units(
+    problem: Problem, records: Records, base_columns: np.ndarray, noise_sd: float
+) -> dict[str, float]:
+    """Return the standard error of each half-normal amplitude near its null.
+
+    By linear least squares with the base model, and never more than the prior sd.
+
+    Args:
+        problem: structure, with the prior sds of the amplitudes as their units.
+        records: the rows, not padded.
+        base_columns: of the base model, shape (n, 4).
+        noise_sd: pilot noise [N].
+    """
+    slope = np.polyfit(records.deformation, records.force, 1)[0]
+    unit_slope = problem.unit_stiffness * problem.reading.radial_per_read
+    values = {"K": slope / unit_slope, "E0": 1.0, "sigma": noise_sd}
+    values |= dict.fromkeys(("alpha", "force_offset", "deformation_offset"), 0.0)
+    for effect in problem.effects:
+        for field, spec in parameters(effect).items():
+            name = f"{effect.name}.{field}"
+            prior = problem.priors[name]
+            if name in problem.units:
+                # A tenth of the prior sd: at zero itself an effect may have no slope.
+                values[name] = problem.units[name] / 10.0
+            elif spec.null is not None:
+                values[name] = spec.null
+            else:
+                fixed = prior.family == "fixed"
+                values[name] = prior.numbers[0] if fixed else frozen(prior).median()
+    padded, names = pad_records(records), tuple(problem.units)
+    _, slopes, _ = _derivatives(problem, values, padded, None, names=names)
+    rows = len(base_columns)
+    return {
+        name: standard_error(
+            np.asarray(slopes[name])[:rows], base_columns, noise_sd, widest
+        )
+        for name, widest in problem.units.items()
+    }
+
+
+def standard_error(
+    column: np.ndarray, columns: np.ndarray, noise_sd: float, most: float
+) -> float:
+    """Return the standard error of a parameter fitted together with others.
+
+    Args:
+        column: derivative of the mean reading by the parameter, shape (n,).
+        columns: derivatives by the others, to any scale, shape (n, p).
+        noise_sd: of the readings.
+        most: the largest error, such as a prior sd.
+    """
+    fitted = columns @ np.linalg.lstsq(columns, column, rcond=None)[0]
+    length = float(np.linalg.norm(column - fitted))
+    return min(most, noise_sd / length) if length > 0.0 and noise_sd > 0.0 else most
 
 
 @jit

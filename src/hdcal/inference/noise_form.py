@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import fdtrc, ndtr
+from scipy.special import ndtr
 
 from hdcal.data.case import Case
 from hdcal.data.records import Records, less_run_means
@@ -17,8 +17,6 @@ from hdcal.physics.history import stop_cells
 _LEAST_ROWS = 12
 # Noise sds over a range that differ by less count as one.
 _LEAST_GROWTH = 1.1
-# Least degrees of freedom of the noise beside a loop.
-_FEWEST_FREE = 4
 # Correlation of neighbours that is taken off residuals, at most.
 _MOST_ALIKE = 0.95
 # Shares of the range after which the cells of a loop slip.
@@ -35,12 +33,10 @@ class Pilot:
     Attributes:
         residual: of each row [N].
         noise_sd: of the noise [N].
-        free: degrees of freedom that it has.
     """
 
     residual: np.ndarray
     noise_sd: float
-    free: int
 
 
 def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
@@ -72,7 +68,7 @@ def pilot_fit(records: Records, *, with_loop: bool = False) -> Pilot:
     beta, _, rank, _ = np.linalg.lstsq(design, force, rcond=None)
     residual = force - design @ beta
     free = max(len(force) - int(np.max(run)) - 1 - int(rank), 1)
-    return Pilot(residual, float(np.sqrt(residual @ residual / free)), free)
+    return Pilot(residual, float(np.sqrt(residual @ residual / free)))
 
 
 def loop_cells(records: Records, shares: np.ndarray) -> Float[np.ndarray, "c n"]:
@@ -103,21 +99,10 @@ def noise_grows(case: Case, pilot: Pilot | None = None) -> bool:
     if len(records.force) < _LEAST_ROWS or coarse or "force_sd" in records.known:
         return False
     if "unloading" in records.known:
-        looped = pilot_fit(records, with_loop=True)
-        pilot = looped if _is_better(looped, pilot) else pilot
+        pilot = pilot_fit(records, with_loop=True)
     square = _added(pilot.residual, previous_rows(records)) ** 2
     clear = growth_p_value(square, records.deformation) < _FALSE_ALARM
     return clear and _variance_ratio(square, records.deformation) > _LEAST_GROWTH**2
-
-
-def _is_better(larger: Pilot, smaller: Pilot) -> bool:
-    """Return whether a larger model explains more than noise would, by the F test."""
-    more = smaller.free - larger.free
-    if more <= 0 or larger.free < _FEWEST_FREE:
-        return False
-    one, two = (p.free * p.noise_sd**2 for p in (smaller, larger))
-    ratio = (one - two) / more * larger.free / max(two, 1e-300)
-    return float(fdtrc(more, larger.free, ratio)) < _FALSE_ALARM
 
 
 def _added(residual: np.ndarray, before: np.ndarray) -> np.ndarray:

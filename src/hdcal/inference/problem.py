@@ -1,6 +1,7 @@
 """One inference problem: data, priors and structure, as a pytree of arrays."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import equinox as eqx
 import numpy as np
@@ -14,7 +15,6 @@ from hdcal.data.records import Array, Records, lies_far
 from hdcal.data.theory_names import SPRING, Theory
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
-from hdcal.inference.amplitude_units import amplitude_units
 from hdcal.inference.compression import CompressedRows, keep_or_compress
 from hdcal.inference.discrepancy import Discrepancy, build_discrepancy
 from hdcal.inference.distributions import effective_priors
@@ -220,11 +220,14 @@ def build_problem(
         # Through an effect the force need not be linear in the stiffness.
         linear |= {"specimen"} if rows["blocks"] is not None else set()
     members = member_counts(case, form.with_gap)
-    return Problem(
+    problem = Problem(
         priors=without_texts(priors),
-        units=amplitude_units(
-            records, columns, reading, effects, priors, form.noise_sd
-        ),
+        units={
+            f"{effect.name}.{field}": float(prior.numbers[0])
+            for effect in effects
+            for field in parameters(effect)
+            if (prior := priors[f"{effect.name}.{field}"]).family == "half_normal"
+        },
         unit_stiffness=unit_stiffness(case, theory),
         reading=reading,
         discrepancy=leftover,
@@ -240,6 +243,13 @@ def build_problem(
         far=lies_far(records),
         **rows,
     )
+    if not problem.units:
+        return problem
+    # Late: sensitivities are those of a problem.
+    from hdcal.inference.identifiability import resolved_units
+
+    units = resolved_units(problem, records, columns, form.noise_sd)
+    return replace(problem, units=units)
 
 
 def check_covariates(case: Case, effects: Sequence[type[Effect]]) -> None:
