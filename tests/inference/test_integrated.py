@@ -22,7 +22,7 @@ from hdcal.errors import InputError
 from hdcal.inference import compression, density, marginal
 from hdcal.inference import values as of_draw
 from hdcal.inference.likelihood import log_probability
-from hdcal.inference.marginal import Grouped, Linear, contrasts
+from hdcal.inference.linear_gaussian import Grouped, Linear, contrasts
 from hdcal.inference.members import MEMBER_SD, MEMBERS, integrated_kinds
 from hdcal.inference.problem import build_problem
 from hdcal.inference.sampled_problem import model
