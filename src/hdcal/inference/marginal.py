@@ -7,7 +7,6 @@ numerous kind is eliminated one by one.
 """
 
 import math
-from functools import singledispatch
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -149,15 +148,9 @@ def gap_distribution(
     return scale * mean[-len(scale) :], scale[:, None] * root[-len(scale) :]
 
 
-@singledispatch
 def draw_members(problem: Sampled, values: Values, key: Key[Array, ""]) -> dict:
-    """Draw the integrated members given the shared parameters of one draw."""
-    return {}
-
-
-@draw_members.register
-def _(problem: Problem, values: Values, key: Key[Array, ""]) -> dict:
-    if not problem.integrated:
+    """Draw the integrated members, if any, given the shared parameters of one draw."""
+    if not isinstance(problem, Problem) or not problem.integrated:
         return {}
     scores, members = linear_part(problem, values).draw(key)
     drawn, used = {}, 0

@@ -38,12 +38,6 @@ class Kind(NamedTuple):
 
 CALIBRATION = Kind("hdcal.posterior", "of a calibration", "calibrate again")
 FLEET = Kind("hdcal.fleet-posterior", "of a fleet", "run hdcal fleet again")
-# Schemas of answers without a posterior file.
-_WITHOUT = {
-    "hdcal.compare/1": "a comparison has no posterior",
-    "hdcal.causes/1": "causes across gears have no posterior",
-    "hdcal.verdict/2": "a quick diagnosis holds no calibrated model",
-}
 
 
 def file_of(path: Path | str) -> Path:
@@ -152,7 +146,7 @@ def _kind(written: object) -> Kind | None:
 
 
 def _missing(path: Path) -> Finding:
-    """Return the finding for a missing file, by the answer beside it.
+    """Return the finding for a missing file, by the answer in the same folder.
 
     Raises:
         NotUsable: the answer is of a diagnosis that failed.
@@ -161,7 +155,7 @@ def _missing(path: Path) -> Finding:
     for name in ("summary.json", "verdict.json"):
         try:
             answer = json.loads((path.parent / name).read_bytes())
-            problem = _WITHOUT.get(answer["schema"], problem)
+            problem = f"the result {answer['schema']} in this folder has no posterior"
             failed = answer["status"] == "failed"
         except (OSError, ValueError, KeyError, TypeError):
             continue
