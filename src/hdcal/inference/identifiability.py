@@ -7,7 +7,7 @@ from itertools import combinations
 import jax
 import numpy as np
 
-from hdcal.data.certificates import GAUGE_UNITS
+from hdcal.data.gear_file.certificates import GAUGE_UNITS
 from hdcal.data.records import Records
 from hdcal.exported import jit
 from hdcal.inference.discrepancy import Discrepancy, discrepancy_columns
