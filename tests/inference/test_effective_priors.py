@@ -81,7 +81,7 @@ def posterior() -> Posterior:
     problem = build_problem(case, shipped, structure=form)
     found = near_the_mode(problem)
     priors = problem_priors(case, (), shipped, theory)
-    own = _specifics(case, problem, form, found, plain=False, shown=False)
+    own = _specifics(case, theory, problem, form, found, plain=False, shown=False)
     parts = assemble(case, priors, problem, found, own, 2)
     return Posterior(
         case, theory, (), priors, *parts, {"with_gap": False, STRUCTURE: asdict(form)}
