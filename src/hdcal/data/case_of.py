@@ -16,6 +16,7 @@ from hdcal.data.measurements import Measurements
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
 from hdcal.data.screened import asked_range, screened, screening_notes, with_zeros
+from hdcal.data.turning_rows import sense_at_turns
 
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
@@ -94,7 +95,9 @@ def _without_scatter(measured: Measurements) -> Measurements:
 def _motion(measured: Measurements, *, hidden: bool) -> Motion:
     values, run = measured.columns.values, measured.run.index
     time = values.get("time")
-    return derive_motion(values["deformation"], run, time, hidden=hidden)
+    motion = derive_motion(values["deformation"], run, time, hidden=hidden)
+    sense = sense_at_turns(motion.sense, values["deformation"], values["force"], run)
+    return replace(motion, sense=sense)
 
 
 def _records(measured: Measurements, gear: Gear, motion: Motion) -> Records:

@@ -21,7 +21,6 @@ from hdcal.diagnosis.refit import (
     refit,
     with_sampled_size,
 )
-from hdcal.diagnosis.repeats import without_repeats
 from hdcal.diagnosis.seen import what_is_seen
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
@@ -68,7 +67,6 @@ def diagnose(
     library = library_of(library)
     _check(case, library, seed)
     require_scatter(case)
-    case, repeated = without_repeats(case)
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.
     weighed = weigh(case, library, rng.spawn(1)[0])
@@ -93,7 +91,6 @@ def diagnose(
         library=tuple(library),
         notes=(
             *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
-            *_left_out(repeated),
             *[note for note in fitted.notes if note not in case.notes and not quick],
         ),
         reasons=failure_reasons(fits),
@@ -190,10 +187,3 @@ def _fitted(case: Case, step: int) -> Case:
     few = thin_rows(case, max(step, -(-rows // _MOST_FITTED)), turns=True)
     words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
     return replace(few, notes=(*few.notes, words))
-
-
-def _left_out(repeated: int) -> list[str]:
-    many = f"{repeated} readings that repeat a turning point are"
-    many = "1 reading that repeats a turning point is" if repeated == 1 else many
-    words = f"{many} left out: of loading or of unloading, nothing tells"
-    return [words] * (repeated > 0)
