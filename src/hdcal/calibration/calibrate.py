@@ -16,7 +16,12 @@ from hdcal.data.scatter import require_scatter
 from hdcal.errors import Finding, Findings, InputError
 from hdcal.inference import laplace
 from hdcal.inference.assembly import Specifics, assemble, run_settings
-from hdcal.inference.checks import correlation_check, growth_check, rounding_check
+from hdcal.inference.checks import (
+    Check,
+    correlation_check,
+    growth_check,
+    rounding_check,
+)
 from hdcal.inference.flat_directions import remove_members
 from hdcal.inference.linearisation import linearise
 from hdcal.inference.noise_form import noise_grows, pilot_fit
@@ -245,13 +250,20 @@ def _specifics(
             for name, slope in near.slopes.items()
         },
         mixed=_other_quantities(problem, found),
-        checks=[
+        checks=_said(
+            case,
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(found.values, rows, form.why_independent),
             growth_check(found.values, unasked=shown),
             *line_checks,
-        ],
+        ),
     )
+
+
+def _said(case: Case, *checks: Check) -> list[Check]:
+    """Return checks whose words name what was measured."""
+    say = case.units.say
+    return [replace(one, name=say(one.name), words=say(one.words)) for one in checks]
 
 
 def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:

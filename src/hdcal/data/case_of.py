@@ -16,7 +16,10 @@ from hdcal.data.measurements import Measurements
 from hdcal.data.reading_notes import reading_notes
 from hdcal.data.records import Records
 from hdcal.data.screened import asked_range, screened, screening_notes, with_zeros
+from hdcal.data.theory_names import SPRING
 from hdcal.data.turning_rows import sense_at_turns
+from hdcal.errors import Finding, InputError
+from hdcal.quantities import TORQUE
 
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
 
@@ -42,11 +45,13 @@ def case_of(
     Raises:
         InputError: as `screened`.
     """
+    if measured.columns.units == TORQUE:
+        _require_torsion(found, name)
     wanted = asked_range(range or found.source.get("measurement", {}).get("range"))
     measured, screening = screened(measured, wanted, skip_bad)
     motion = _motion(measured, hidden=screening.trembling)
     of_reading = [*reading_notes(measured, found, motion)]
-    of_reading += screening_notes(screening)
+    of_reading += screening_notes(screening, measured.columns.units)
     run = with_zeros(measured.run, screening)
     if run is not measured.run:
         measured = replace(measured, run=run)
@@ -61,9 +66,14 @@ def case_of(
         found, values["deformation"], measured.run.index, values.get("time")
     )
     scale = scale_of(values["force"], values["deformation"], found.reading)
+    found = at_full_scale(found, scale)
+    if measured.columns.units == TORQUE:
+        # The shipped prior is that of a contact, in mm.
+        zero = {"deformation_offset": scale.own(found.priors["deformation_offset"])}
+        found = replace(found, priors=found.priors | zero)
     return Case(
         name=name,
-        gear=at_full_scale(found, scale),
+        gear=found,
         records=_records(measured, found, motion),
         run_labels=measured.run.names,
         specimen_labels=measured.specimen.names,
@@ -78,8 +88,28 @@ def case_of(
         left_out=measured.left_out,
         excluded=screening.excluded if len(measured.specimen.names) == 1 else (),
         screening=screening,
+        units=measured.columns.units,
         **further,
     )
+
+
+def _require_torsion(found: Gear, name: str) -> None:
+    """Refuse a gear file that speaks of forces where torques were measured.
+
+    Raises:
+        InputError: it does.
+    """
+    if found.theory != SPRING:
+        words = f"torques over angles are no readings of the theory {found.theory}"
+        remedy = "Leave the gear file out, or state the theory spring in it"
+        raise InputError([Finding(name, words, remedy)])
+    stated = found.source.get("measurement", {})
+    lengths = [key for key in stated if key.endswith(("_N", "_mm", "_calibration"))]
+    wrong = [*lengths, *(key for key in ("priors", "rig") if key in found.source)]
+    if wrong:
+        words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
+        words += "and the readings are torques over angles"
+        raise InputError([Finding(name, words, "Leave these entries out")])
 
 
 def _without_scatter(measured: Measurements) -> Measurements:

@@ -82,11 +82,12 @@ def _unusual_temperature(measured: Measurements) -> Iterator[str]:
 def unused_columns(columns: Columns) -> Iterator[str]:
     """Yield what of a file was not read."""
     positions = {column.position for column in columns.used.values()}
+    quantities = {column.quantity for column in columns.used.values()}
     headers = [*enumerate(columns.table.headers)]
     extra = [header for place, header in headers if place not in positions and header]
     for header in extra:
         found = parse_header(header)
-        named = found.quantity and found.quantity not in columns.used
+        named = found.quantity and found.quantity not in quantities
         if named and (found.quantity in LABELS or found.unit is None):
             label = found.quantity in LABELS
             why = "differs from row to row" if label else "names no unit"

@@ -10,9 +10,10 @@ from hdcal.data.bad_gears import among, offer
 from hdcal.data.measurements import Labels, Measurements
 from hdcal.data.value_checks import FEWEST_ROWS
 from hdcal.errors import Finding, InputError
+from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
-from hdcal.screening.words import HIDDEN_DIRECTION, in_words, question
+from hdcal.screening.words import hidden_direction, in_words, question
 from hdcal.screening.working_range import FORM, WorkingRange, in_range, read_range
 
 
@@ -46,12 +47,13 @@ def screened(
         InputError: holds what only the user can decide about; or hardly a row is left.
     """
     values, run = measured.columns.values, measured.run.index
+    units = measured.columns.units
     found = screen(values["deformation"], values["force"], values.get("time"), run)
     labels, file = measured.columns.table.rows, measured.columns.findings.file
     if found.asked:
         bad = {
             measured.specimen.names[measured.specimen.index[one.rows[0][0]]]: Finding(
-                file, *question(one, labels)
+                file, *question(one, labels, units)
             )
             for one in found.asked
         }
@@ -61,27 +63,31 @@ def screened(
         offered = skip_bad is False and len(bad) < many
         raise InputError([*bad.values(), *([offer(bad, many)] if offered else [])])
     if wanted is not None:
-        found = in_range(found, wanted, run)
-    told = [in_words(one, labels, found.working_range) for one in found.observations]
-    found = replace(found, observations=tuple(told))
+        found = in_range(found, wanted, run, units)
+    observations = tuple(
+        in_words(one, labels, found.working_range, units) for one in found.observations
+    )
+    found = replace(found, observations=observations)
     rows = int(found.kept.sum())
     if rows < min(FEWEST_ROWS, run.size):
         words = f"{rows} of {run.size} rows are left"
-        words += f" between {wanted}" if wanted is not None else ""
+        words += f" between {wanted.words(units)}" if wanted is not None else ""
         x = values["deformation"]
-        remedy = f"At least {FEWEST_ROWS} are needed. The deformation was read from "
-        remedy += f"{x.min():.4g} to {x.max():.4g} mm"
+        remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
+        ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
+        remedy += f"read from {ends}"
         raise InputError([Finding(file, words, remedy)])
     return _kept(measured, found), found
 
 
-def screening_notes(found: Screening) -> tuple[str, ...]:
+def screening_notes(found: Screening, units: Quantities) -> tuple[str, ...]:
     """Return what was found in a record, each finding in one sentence.
 
     Args:
         found: its screening.
+        units: of what was measured.
     """
-    hidden = [HIDDEN_DIRECTION] if found.trembling else []
+    hidden = [hidden_direction(units)] if found.trembling else []
     return (*(one.words for one in found.observations), *hidden)
 
 

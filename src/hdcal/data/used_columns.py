@@ -15,9 +15,11 @@ from hdcal.data.tables.sources import read_source
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.data.value_checks import FEWEST_ROWS, check_values
 from hdcal.errors import quoted
+from hdcal.quantities import FORCE, TORQUE, Quantities
 
-# Quantities of a spring under a force.
-_READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
+_READ = (*DIMENSIONS, *LABELS)
+# What stands for the quantities of a spring where it is twisted.
+_TURNED = {"angle": "deformation", "torque": "force"}
 # How a note begins that says what was guessed.
 ASSUMED = "ASSUMED: "
 
@@ -43,14 +45,22 @@ class Columns:
     findings: FileFindings
     notes: tuple[str, ...] = ()
 
+    @property
+    def units(self) -> Quantities:
+        """Names and units of what was measured."""
+        return TORQUE if self._quantity("force") == "torque" else FORCE
+
+    def _quantity(self, name: str) -> str:
+        return self.used[name].quantity if name in self.used else name
+
     def as_named(self) -> dict[str, str]:
         """Return how a user would name each: its header or number, with its unit.
 
         Those that hdcal's own headers name need no other name.
         """
         named = {}
-        for quantity, column in self.used.items():
-            header = parse_header(column.header)
+        for column in self.used.values():
+            quantity, header = column.quantity, parse_header(column.header)
             if header.exact and header.quantity == quantity and not column.against:
                 continue
             alone = self.table.headers.count(column.header) == 1
@@ -108,6 +118,8 @@ def find_columns(
     """Return where the columns stand, without their values, as `read_columns` does."""
     table, sha256 = read_source(data, findings, encoding, sheet)
     used = choose_columns(table, mapping or {}, quantities, required, findings)
+    if "torque" in used and "force" in required:
+        used = {_TURNED.get(quantity, quantity): one for quantity, one in used.items()}
     table, used, left_out = without_slow_channels(table, used, required)
     notes = (*_assumed(table, used), *table.left_out, *left_out)
     return Columns({}, used, table, sha256, findings, notes)

@@ -28,14 +28,15 @@ def check_values(columns: "Columns", fewest: int) -> None:
         words = f"holds {count} rows of readings"
         columns.findings.add(words, f"At least {fewest} are needed")
     for quantity in filter(values.__contains__, DIMENSIONS):
-        wild = wild_rows(values[quantity], quantity, columns.table.rows)
-        columns.findings.add_rows(wild, columns.used[quantity].header)
+        used = columns.used[quantity]
+        wild = wild_rows(values[quantity], used.quantity, columns.table.rows)
+        columns.findings.add_rows(wild, used.header)
     if "deformation" in values:
         known = values["deformation"][np.isfinite(values["deformation"])]
         if known.size > 1 and known.min() == known.max():
-            words = "the deformation is constant, so no stiffness can be seen"
-            header = columns.used["deformation"].header
-            columns.findings.add(words, "Measure at several", None, header)
+            used = columns.used["deformation"]
+            words = f"the {used.quantity} is constant, so no stiffness can be seen"
+            columns.findings.add(words, "Measure at several", None, used.header)
 
 
 def wild_rows(

@@ -39,6 +39,7 @@ def declare_cells(
     records: Records,
     run_labels: tuple[str, ...] = (),
     specimen_labels: tuple[str, ...] = (),
+    unit: str = "mm",
 ) -> list[DeclaredCell]:
     """Divide the rows by every covariate that was measured, and by pairs of them.
 
@@ -46,9 +47,10 @@ def declare_cells(
         records: rows in any order.
         run_labels: of each run index.
         specimen_labels: of each specimen index.
+        unit: of the deformation.
     """
-    by_deformation = _parts("deformation", records.deformation, "mm", 3)
-    found = _parts("deformation", records.deformation, "mm", 3)
+    by_deformation = _parts("deformation", records.deformation, unit, 3)
+    found = _parts("deformation", records.deformation, unit, 3)
     other: list[DeclaredCell] = []
     if "temperature" in records.known:
         other += _levels("temperature", records.temperature, "°C")

@@ -84,7 +84,7 @@ def diagnose(
         where=found.where,
         which=with_sampled_size(which, fits),
         shrink=closed,
-        next_test=runs,
+        next_test=tuple(replace(run, run=case.units.say(run.run)) for run in runs),
         budget=stiffness_budget(evidence, case, which.named, _stiffness(fits)),
         posteriors=dict(fits.models),
         left_out=fits.left_out,
@@ -124,7 +124,8 @@ def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     deformation = case.records.deformation - np.mean(case.records.deformation)
     if deformation @ np.asarray(case.records.force) > 0.0:
         return
-    words = "the force does not grow with the deformation"
+    units = case.units
+    words = f"the {units.load} does not grow with the {units.displacement}"
     remedy = "check the signs of both columns and that the load cell was connected"
     raise InputError([Finding(case.name, words, remedy)])
 

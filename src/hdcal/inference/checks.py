@@ -170,12 +170,13 @@ def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> C
         draws: by parameter.
         unasked: because the readings showed it.
     """
-    name = "readings scatter alike at any force"
+    name = "readings scatter alike at any {load}"
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
     words = (
-        f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
+        f"readings scatter by {np.median(share):.1%} of the {{load}}, beside σ at no "
+        "{load}"
     )
     words += "; every interval allows for it"
     remedy = "--constant-noise, or adapt_noise=False, keeps it of one size"
@@ -196,8 +197,8 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     return _check(
         "rounding is treated rightly",
         rounded or step <= limit,
-        f"step {step:g} N, {exact}"
-        + ("" if rounded else f"; that holds up to {limit:.3g} N"),
+        f"step {step:g} {{N}}, {exact}"
+        + ("" if rounded else f"; that holds up to {limit:.3g} {{N}}"),
     )
 
 

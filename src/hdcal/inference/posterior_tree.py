@@ -15,6 +15,7 @@ from hdcal.inference.padding import pad_records
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.serial_correlation import previous_rows
+from hdcal.quantities import FORCE, Quantities
 
 # The log likelihood of every row and draw is not kept above this many numbers.
 MOST_LOG_LIKELIHOODS = 8_000_000
@@ -71,13 +72,13 @@ def build_tree(
             rows under `TOTAL`, (chain, draw).
         observed: columns of the records that the model explains.
     """
-    units = {**_DERIVED, **units}
+    units = _in(case.units, {**_DERIVED, **units})
     labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
     groups = {
         "posterior": dataset(draws.values, units=units, labels=labels),
         "prior": dataset({n: v[None] for n, v in prior_draws.items()}, units=units),
         "sample_stats": dataset(_sampler_statistics(draws)),
-        **data_groups(case.records, observed),
+        **data_groups(case.records, observed, case.units),
         "log_likelihood": dataset(log_likelihood),
     }
     if TOTAL in log_likelihood:
@@ -116,15 +117,21 @@ def dataset(
 
 
 def data_groups(
-    records: Records, observed: tuple[str, ...] = ("force",)
+    records: Records,
+    observed: tuple[str, ...] = ("force",),
+    units: Quantities = FORCE,
 ) -> dict[str, xr.Dataset]:
     """Return the groups of the rows: what the model explains, and the other columns."""
     columns = {name: np.asarray(getattr(records, name)) for name in COVARIATES}
     explained = {name: np.asarray(getattr(records, name)) for name in observed}
     return {
-        "observed_data": dataset(explained, OVER_ROWS, units=_OBSERVED),
-        "constant_data": dataset(columns, OVER_ROWS, units=COVARIATES),
+        "observed_data": dataset(explained, OVER_ROWS, units=_in(units, _OBSERVED)),
+        "constant_data": dataset(columns, OVER_ROWS, units=_in(units, COVARIATES)),
     }
+
+
+def _in(units: Quantities, codes: Mapping[str, str]) -> dict[str, str]:
+    return {name: units.unit(code) for name, code in codes.items()}
 
 
 def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:

@@ -78,13 +78,13 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
     shapes: Shapes = {
         "curvature": (
             scaled * np.abs(scaled),
-            "bend upwards (convex): the measured force grows faster than the model",
-            "bend downwards (concave): the measured force grows slower than the model",
+            "bend upwards (convex): the measured {load} grows faster than the model",
+            "bend downwards (concave): the measured {load} grows slower than the model",
         ),
         "end": (
             scaled**4,
-            "turn up at the largest deformations",
-            "turn down at the largest deformations",
+            "turn up at the largest {displacement}s",
+            "turn down at the largest {displacement}s",
         ),
         "direction": (
             np.asarray(records.sense),
@@ -98,8 +98,8 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
         ),
         "temperature x deformation": (
             rise * scaled,
-            "rise with temperature in proportion to deformation",
-            "fall with temperature in proportion to deformation",
+            "rise with temperature in proportion to {displacement}",
+            "fall with temperature in proportion to {displacement}",
         ),
         "time": (
             np.asarray(records.time),
@@ -145,7 +145,8 @@ def find_structure(
             break
         rms = float(abs(part) * np.sqrt(np.mean((left[: len(sd)] * sd) ** 2)))
         column, up, down = shapes.pop(name)
-        words = f"The residuals {up if part > 0.0 else down} ({rms:.2g} N rms)."
+        way = up if part > 0.0 else down
+        words = f"The residuals {way} ({rms:.2g} {{N}} rms)."
         # What is left of the column is of unit length.
         length = float(left @ column)
         found.append(Structure(name, p, rms, words, part / length, error / length))

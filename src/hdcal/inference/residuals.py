@@ -26,6 +26,7 @@ from hdcal.inference.residual_shapes import (
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
 from hdcal.notebook import Shown
+from hdcal.quantities import FORCE, Quantities
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
@@ -56,6 +57,7 @@ class Residuals(Shown):
         standardised: residual over the noise sd [-].
         structure: shapes that noise would rarely show.
         noise: in which ways the rest is not the noise that the model has.
+        units: names and units of what was measured.
     """
 
     deformation: np.ndarray
@@ -68,6 +70,7 @@ class Residuals(Shown):
     standardised: np.ndarray
     structure: tuple[Structure, ...]
     noise: tuple[Structure, ...]
+    units: Quantities = FORCE
 
 
 def residuals(posterior: Posterior) -> Residuals:
@@ -85,6 +88,14 @@ def residuals(posterior: Posterior) -> Residuals:
     shapes = [whitened.shapes[shape.name][0] for shape in structure]
     rest = replace(whitened, absorbed=np.column_stack([whitened.absorbed, *shapes]))
     coarse = float(problem.step) > float(np.median(near.sd))
+    noise = noise_faults(
+        rest,
+        records,
+        near.sd,
+        rounded=coarse,
+        mixed=any(effect.mixture for effect in posterior.effects),
+        correlation=float(correlation_of(centre)),
+    )
     return Residuals(
         deformation=np.asarray(records.deformation),
         temperature=np.asarray(records.temperature),
@@ -94,16 +105,15 @@ def residuals(posterior: Posterior) -> Residuals:
         fitted=fitted,
         residual=residual,
         standardised=residual / near.sd,
-        structure=structure,
-        noise=noise_faults(
-            rest,
-            records,
-            near.sd,
-            rounded=coarse,
-            mixed=any(effect.mixture for effect in posterior.effects),
-            correlation=float(correlation_of(centre)),
-        ),
+        structure=_said(structure, posterior),
+        noise=_said(noise, posterior),
+        units=posterior.case.units,
     )
+
+
+def _said(found: tuple[Structure, ...], posterior: Posterior) -> tuple[Structure, ...]:
+    units = posterior.case.units
+    return tuple(replace(one, words=units.say(one.words)) for one in found)
 
 
 def _thinned(draws: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

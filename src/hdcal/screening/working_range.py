@@ -7,10 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from hdcal.quantities import Quantities
 from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
-FORM = "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force; or all"
+FORM = "Write it like 0.1:0.6, or 10%:40% of the largest force; or all"
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,12 @@ class WorkingRange:
     high: float
     unit: Literal["mm", "%"]
 
-    def __str__(self) -> str:
+    def words(self, units: Quantities) -> str:
+        """Return the range in words."""
         if math.isinf(self.high):
             return "all of the curve"
-        if self.unit == "mm":
-            return f"{self.low:g} to {self.high:g} mm"
-        return f"{self.low:g} to {self.high:g} % of the largest force"
+        ends = f"{self.low:g} to {self.high:g} {units.unit(self.unit)}"
+        return f"{ends} of the largest {units.load}" if self.unit == "%" else ends
 
     def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Tell which rows of a run lie in the range.
@@ -73,13 +74,16 @@ def read_range(text: str) -> WorkingRange:
     return WorkingRange(low, high, unit)
 
 
-def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Screening:
+def in_range(
+    screening: Screening, wanted: WorkingRange, run: np.ndarray, units: Quantities
+) -> Screening:
     """Return a screening in which the rows outside the range are cut.
 
     Args:
         screening: of the whole record.
         wanted: the range.
         run: index of each row's run, shape (n,).
+        units: of what was measured.
     """
     inside = np.zeros(run.size, bool)
     for index in np.unique(run):
@@ -87,7 +91,7 @@ def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Scr
         inside[rows] = wanted.inside(screening.deformation[rows], screening.force[rows])
     outside = np.flatnonzero(screening.kept & ~inside)
     if not outside.size:
-        return replace(screening, working_range=str(wanted))
+        return replace(screening, working_range=wanted.words(units))
     segment = screening.segment.copy()
     segment[outside] = OUTSIDE
     observed = Observation(
@@ -102,5 +106,5 @@ def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Scr
         observations=(*screening.observations, observed),
         segment=segment,
         kept=inside,
-        working_range=str(wanted),
+        working_range=wanted.words(units),
     )
