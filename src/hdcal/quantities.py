@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 # What stands in texts for a name, or for a unit.
 _SAID = {
@@ -37,7 +38,7 @@ class Quantities:
             force and a deformation.
     """
 
-    load: str
+    load: Literal["force", "torque"]
     displacement: str
     stiffness: str
     load_unit: str

@@ -15,6 +15,8 @@ from hdcal.calibration.check.check import check
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.summary import verdict_report
 from hdcal.errors import InputError
+from hdcal.fleets.answer import FleetAnswer
+from hdcal.fleets.summary import fleet_report
 from hdcal.prediction.bands.summary import prediction_answer
 from hdcal.prediction.margin.answer import MarginAnswer
 from hdcal.prediction.margin.summary import margin_report
@@ -174,7 +176,7 @@ def test_the_diagnosis_is_of_torques(case):
     assert charts[0].y == "measured − model [N·m]"
 
 
-@pytest.mark.parametrize("ask", [hdcal.fit, hdcal.fleet, hdcal.calibrate_dynamic])
+@pytest.mark.parametrize("ask", [hdcal.fit, hdcal.causes, hdcal.calibrate_dynamic])
 def test_what_is_of_forces_refuses_torques(case, ask):
     with pytest.raises(InputError, match="torque"):
         ask(case)
@@ -202,3 +204,26 @@ def test_a_margin_is_of_torques(posterior):
     for words in (told["headline"], *told["answer"], *told["remarks"], text):
         assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)
     assert "N·m" in told["headline"]
+
+
+def test_a_fleet_is_of_torques():
+    rng = np.random.default_rng(5)
+    angle = np.tile(np.linspace(0.0, 12.0 * ARCMIN, 12), 12)
+    gear = np.repeat(np.arange(12), 12)
+    stiffness = STIFFNESS * (1.0 + 0.03 * rng.normal(size=12))
+    torque = stiffness[gear] * angle + 0.1 * rng.normal(size=angle.size)
+    table = {"angle_rad": angle, "torque_Nm": torque}
+    found = hdcal.fleet({**table, "specimen": gear.astype(str)}, seed=1)
+    force = found.posterior.next_force(0.003, 40.0)
+    report = fleet_report(found, force=force)
+    told = json.loads(as_json(report.answer))
+    assert not _in_newtons(_keys(told))
+    centre = told["population"]["stiffness_N_m_per_rad"]
+    assert centre["lo"] < STIFFNESS < centre["hi"]
+    assert told["next_force"]["torque_N_m"]["median"] == pytest.approx(27.0, rel=0.05)
+    assert not _in_newtons({*report.tables()["gears.csv"]})
+    Draft202012Validator(json_schema(FleetAnswer, TORQUE)).validate(told)
+    page = report_files(report.document, report.figures())["report.html"].decode()
+    text = re.sub(r"<(style|script|svg).*?</\1>", "", page, flags=re.DOTALL)
+    for words in (told["headline"], *told["notes"], text):
+        assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)

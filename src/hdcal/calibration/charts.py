@@ -123,7 +123,7 @@ def _readings(
         x: places of all rows, by default the deformation.
     """
     x = left.deformation if x is None else x
-    words = movement_words(left.deformation)
+    words = movement_words(left.deformation, left.units.displacement)
     for sense, (marker, usual) in _MARKERS.items():
         rows = here & (left.direction == sense)
         if rows.any():

@@ -185,7 +185,7 @@ def require_force(case: Case, question: str) -> None:
         words = (
             f"torques over angles are no readings for {question}, which is of forces"
         )
-        remedy = "Ask check, calibrate, diagnose, predict, margin or compare"
+        remedy = "Ask check, calibrate, diagnose, predict, margin, fleet or compare"
         raise InputError([Finding(case.name, words, remedy)])
 
 

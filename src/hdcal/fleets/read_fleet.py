@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from hdcal.data.case import Case, require_force
+from hdcal.data.case import Case
 from hdcal.data.gear_files import gear_files
 from hdcal.data.gear_folder import read_gear_folder
 from hdcal.data.parquet import read_parquet
@@ -56,21 +56,16 @@ def read_fleet(
         raise InputError([Finding("range", words, "Save the rows that are meant")])
     if is_parquet(data):
         source = read_parquet(data, gear, **how)
-        require_force(source.case, "fleet")
         return pool_of(source, scheduler, skip_bad=skip_bad).readings(source)
     if scheduler is not None:
         words = "is no Parquet, which alone is read by several"
         remedy = "Leave it out, or save the data as Parquet files"
         raise InputError([Finding("scheduler", f"the data {words}", remedy)])
     if isinstance(data, Case):
-        require_force(data, "fleet")
         return fleet_readings(data)
     how |= {"encoding": encoding, "range": range}
     if gear_files(data):
         case, sizes = read_gear_folder(data, gear, **how)
-        require_force(case, "fleet")
         # A gear that is bad in one file may stand in others.
         return replace(fleet_readings(case), sizes=sizes).without(case.left_out)
-    case = read_case(data, gear, **how)
-    require_force(case, "fleet")
-    return fleet_readings(case)
+    return fleet_readings(read_case(data, gear, **how))

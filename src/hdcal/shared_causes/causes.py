@@ -12,7 +12,7 @@ from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
 from hdcal.data.bad_gears import offer
-from hdcal.data.case import Case
+from hdcal.data.case import Case, require_force
 from hdcal.data.plausible import implausible
 from hdcal.diagnosis.library import library_of
 from hdcal.errors import Finding, Findings, InputError
@@ -158,6 +158,7 @@ def causes(
         effects = wrong.attempt(library_of, library)
     assert effects is not None
     readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
+    require_force(readings.case, "causes")
     case, gears = gears_alone(readings, effects, skip_bad=skip_bad, seed=seed)
     # What differs between mountings and between gears is told of the fleet.
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}

@@ -71,7 +71,8 @@ def branches(bands: Bands) -> list[Branch]:
     # The tested side; the curves may go beyond zero to a nominal deformation.
     tested = np.asarray(bands.tested, bool)
     places = bands.deformation_mm[tested if tested.any() else slice(None)]
-    side, words = loading_side(places), movement_words(places)
+    side, name = loading_side(places), bands.units.displacement
+    words = movement_words(places, name)
     found: list[Branch] = []
     for level, colour in zip(levels.tolist(), colours, strict=True):
         here = bands.temperature_C == level
