@@ -19,6 +19,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "mathml",
     "schemas",
+    "stiffness_pictures",
 ]
 exclude_patterns = ["_build"]
 

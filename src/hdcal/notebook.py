@@ -27,7 +27,7 @@ TELLERS = {
 TABLES = {
     "Bands": "report.tables.own_columns",
     "DynamicPosterior": "report.parameters.parameter_estimates",
-    "Fleet": "fleets.summary.gear_columns",
+    "Fleet": "fleets.summary.gear_table",
     "FleetCauses": "shared_causes.summary.cause_columns",
     "Margin": "prediction.margin.chart.level_rows",
     "NextForce": "fleets.force.chart.bound_rows",

@@ -196,12 +196,6 @@ def test_columns_of_a_file_without_headers_are_named_by_number(tmp_path):
     check(read(tmp_path, text, columns={"deformation": "2[mm]", "force": "3[N]"}))
 
 
-def test_a_torque_over_an_angle_is_called_so(tmp_path):
-    text = "Drehmoment [Nm];Verdrehwinkel [arcmin]\n" + rows(F, X, separator=";")
-    (found,) = refused(tmp_path, text)
-    assert "torsion" in found
-
-
 @pytest.mark.parametrize(
     ("headers", "newton_metres", "radians"),
     [

@@ -16,10 +16,11 @@ from hdcal.diagnosis.answer import VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.gap import Cell
 from hdcal.diagnosis.places import places
 from hdcal.diagnosis.summary import verdict_answer
+from hdcal.quantities import FORCE
 from hdcal.report.answer import json_schema
 from hdcal.report.intervals import Interval
 from hdcal.report.plain import as_json
-from hdcal.report.words import likely, newton, percent
+from hdcal.report.words import likely, load, percent
 
 
 def plain(kind: str) -> dict:
@@ -116,7 +117,7 @@ def test_readings_whose_neighbours_err_alike_are_said_to_tell_less():
     correlation = 0.8 ** np.abs(np.subtract.outer(np.arange(rows), np.arange(rows)))
     worth = np.linalg.inv(correlation).sum()
     assert f"{rows} tell about as much as {worth:.0f} independent" in told.limits[0]
-    least = newton(4.2 * NOISE / np.sqrt(worth))
+    least = load(4.2 * NOISE / np.sqrt(worth))
     assert f"a gap of less than about {least} on average" in " ".join(told.answer)
 
 
@@ -163,11 +164,11 @@ def cell(covariate: str, low: float, high: float, bias: float) -> Cell:
 def test_places_in_words(region: Cell, words: str):
     ends = cell("time", 0.0, 1.0, 0.0), cell("time", 1.0, 2000.0, 0.0)
     where = WhereAnswer(0.0, {}, (), (region,), (region, *ends))
-    assert list(places(where)) == [(words, 1.0)]
+    assert list(places(where, FORCE)) == [(words, 1.0)]
 
 
 def test_numbers_in_words():
-    assert [newton(x) for x in (0.0312, 3.14, 31.4, 314.0, None)] == [
+    assert [load(x) for x in (0.0312, 3.14, 31.4, 314.0, None)] == [
         "0.031 N",
         "3.1 N",
         "31 N",

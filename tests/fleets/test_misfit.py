@@ -6,6 +6,7 @@ import pytest
 from hdcal.data.reading import read_case
 from hdcal.fleets.misfit import misfit, misfit_words
 from hdcal.fleets.own_shapes import own_shapes
+from hdcal.quantities import FORCE
 
 GEARS, UP = 20, np.linspace(0.02, 0.5, 12)
 PATH = np.concatenate([UP, UP[-2::-1]])
@@ -48,7 +49,9 @@ def test_a_loop_has_its_width():
     one = found(0.4 * WAYS)
     assert one.loop_N == pytest.approx(0.8, abs=0.05) and one.bend_N == 0.0
     assert one.correlation == 0.0
-    assert "0.8 N higher while the deformation increases" in " ".join(misfit_words(one))
+    assert "0.8 N higher while the deformation increases" in FORCE.say(
+        " ".join(misfit_words(one))
+    )
 
 
 @pytest.mark.parametrize("noise", [0.3, 1e-9])
@@ -78,7 +81,7 @@ def test_a_bend_has_its_size_in_compression_and_in_tension(side):
     line = np.polyval(np.polyfit(path, curve, 1), path)
     one = found(curve - line, path=path)
     assert one.bend_N == pytest.approx(np.ptp(curve - line), rel=0.15)
-    assert "stiffens" in " ".join(misfit_words(one)) and one.loop_N == 0.0
+    assert "stiffens" in FORCE.say(" ".join(misfit_words(one))) and one.loop_N == 0.0
 
 
 def test_a_bend_is_that_of_most_gears_not_of_the_widest_stroke():
@@ -93,7 +96,7 @@ def test_a_bend_is_that_of_most_gears_not_of_the_widest_stroke():
 def test_neighbours_that_err_alike_are_told_with_what_comes_of_it():
     one = found(correlation=0.8)
     assert 0.55 < one.correlation < 0.85
-    assert "too narrow" in " ".join(misfit_words(one))
+    assert "too narrow" in FORCE.say(" ".join(misfit_words(one)))
 
 
 def test_the_factor_is_that_of_the_means_of_long_runs():

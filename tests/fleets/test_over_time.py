@@ -12,6 +12,7 @@ from hdcal.fleets.figure import time_figure
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.fleets.summary import fleet_answer
 from hdcal.fleets.time_chart import time_charts
+from hdcal.quantities import FORCE
 
 DAYS = 20
 
@@ -103,7 +104,7 @@ def test_without_dates_nothing_is_said():
 def test_the_pictures_show_every_value_and_its_limits():
     found = hdcal.fleet(measured(stiffness=-0.04))
     series = time_series(found)
-    stiffness, zero, noise, sums = time_charts(series)
+    stiffness, zero, noise, sums = time_charts(series, FORCE)
     assert len(stiffness.names) == len(noise.names) == 2 * DAYS
     # Both mountings of a gear were on one day.
     assert len(zero.names) == 2 * DAYS
@@ -111,7 +112,7 @@ def test_the_pictures_show_every_value_and_its_limits():
     # A step of four standard deviations leaves the limits of the sums, if not others.
     softer = next(s for s in sums.series if s.label.startswith("sum of softer"))
     assert np.min(softer.y[DAYS:]) < -5.0
-    figure = time_figure(series)
+    figure = time_figure(series, FORCE)
     assert isinstance(figure, Figure)
     assert len(figure.axes) == 4
     assert time_answer(series[0]).changed

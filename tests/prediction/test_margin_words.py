@@ -9,6 +9,7 @@ import hdcal
 from hdcal.prediction.margin.budget_words import coverage_words
 from hdcal.prediction.margin.number_words import chance, newtons_down
 from hdcal.prediction.margin.stated import BudgetCheck
+from hdcal.quantities import FORCE
 
 
 @pytest.mark.thorough
@@ -41,7 +42,7 @@ def test_what_may_be_accepted_is_never_rounded_up():
         (-88.85, "-88.9 N"),
         (23456.0, "2.345e+04 N"),
     ):
-        assert newtons_down(value) == words
+        assert FORCE.say(newtons_down(value)) == words
 
 
 def test_a_law_of_very_many_degrees_of_freedom_is_called_normal():

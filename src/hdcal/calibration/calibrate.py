@@ -21,7 +21,12 @@ from hdcal.inference.assembly import (
     force_log_likelihood,
     run_settings,
 )
-from hdcal.inference.checks import correlation_check, growth_check, rounding_check
+from hdcal.inference.checks import (
+    Check,
+    correlation_check,
+    growth_check,
+    rounding_check,
+)
 from hdcal.inference.identifiability import linearise
 from hdcal.inference.members import MEMBER_SD, MEMBERS
 from hdcal.inference.noise_form import noise_grows, pilot_fit
@@ -243,13 +248,20 @@ def _specifics(
         log_likelihood=force_log_likelihood(case, problem, found),
         sensitivities=linearise(problem, centre, case.records).sensitivities(),
         mixed=_other_quantities(problem, found),
-        checks=[
+        checks=_said(
+            case,
             rounding_check(float(problem.step), problem.rounded, sigma),
             correlation_check(found.values, rows, form.why_independent),
             growth_check(found.values, unasked=shown),
             *line_checks,
-        ],
+        ),
     )
+
+
+def _said(case: Case, *checks: Check) -> list[Check]:
+    """Return checks whose words name what was measured."""
+    say = case.units.say
+    return [replace(one, name=say(one.name), words=say(one.words)) for one in checks]
 
 
 def _other_quantities(problem: Problem, found: Draws) -> dict[str, np.ndarray]:

@@ -10,11 +10,11 @@ from hdcal.inference.posterior import Posterior
 from hdcal.inference.residuals import Residuals
 from hdcal.prediction.bands.bands import Bands
 from hdcal.prediction.bands.charts import (
-    FORCE,
     band_marks,
     branch_marks,
     branches,
 )
+from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.chart_spec import (
     CYCLE,
     GREY,
@@ -44,7 +44,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
         left: residuals of the posterior.
     """
     gear, gap = posterior.case.gear, posterior.problem.discrepancy
-    axis = f"deformation as read ({gear.reading}) [mm]"
+    axis, units = displacement_axis(posterior.case), posterior.case.units
     levels = np.unique(bands.temperature_C)
     colours = ascending_colours(len(levels))
     nearest = np.argmin(np.abs(left.temperature[:, None] - levels), axis=1)
@@ -69,7 +69,7 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
         panels.append(
             Panel(
                 x=axis,
-                y="measured − fit [N]",
+                y=load_axis(units, "measured − fit"),
                 title="distance from the fit"
                 if len(levels) == 1
                 else f"at {level:g} °C",
@@ -78,8 +78,9 @@ def calibration_chart(posterior: Posterior, bands: Bands, left: Residuals) -> Ch
                 height=2.3,
             )
         )
-    title = f"{gear.name}: force as read"
-    first = Panel(x=axis, y=FORCE, title=title, marks=top, wide=True, height=4.6)
+    title = f"{gear.name}: {units.load} as read"
+    load = load_axis(units)
+    first = Panel(x=axis, y=load, title=title, marks=top, wide=True, height=4.6)
     columns = min(len(levels), _MOST_COLUMNS)
     return Chart(panels=[first, *panels], columns=columns, share_x=True, share_y=True)
 
@@ -128,7 +129,7 @@ def _readings(
         x: places of all rows, by default the deformation.
     """
     x = left.deformation if x is None else x
-    words = movement_words(left.deformation)
+    words = movement_words(left.deformation, left.units.displacement)
     for sense, (marker, usual) in _MARKERS.items():
         rows = here & (left.direction == sense)
         if rows.any():
@@ -149,8 +150,10 @@ def residual_chart(left: Residuals, runs: Sequence[str] = ()) -> Chart:
         left: residuals.
         runs: labels of the runs.
     """
+    units = left.units
     y, order = left.standardised, np.arange(1.0, len(left.residual) + 1.0)
-    places = {"deformation as read [mm]": left.deformation, "row of the data": order}
+    axis = f"{units.displacement} as read [{units.displacement_unit}]"
+    places = {axis: left.deformation, "row of the data": order}
     if np.ptp(left.temperature) > 0.0:
         places["temperature [°C]"] = left.temperature
     reach = max(3.0, 1.1 * float(np.max(np.abs(y))))

@@ -52,7 +52,7 @@ class ResidualReport(Result):
         import pandas as pd
 
         left = self.left
-        return pd.DataFrame(
+        frame = pd.DataFrame(
             {
                 "deformation_mm": left.deformation,
                 "temperature_C": left.temperature,
@@ -64,6 +64,7 @@ class ResidualReport(Result):
                 "standardised": left.standardised,
             }
         )
+        return frame.rename(columns=self.units.key)
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the standardised residuals."""
@@ -73,7 +74,8 @@ class ResidualReport(Result):
 def residual_report(left: Residuals) -> ResidualReport:
     """Return residuals as a result."""
     rms = float(np.sqrt(np.mean(left.residual**2)))
-    return ResidualReport(shapes=residual_shapes(left), rms_N=rms, left=left)
+    shapes = residual_shapes(left)
+    return ResidualReport(shapes=shapes, rms_N=rms, left=left, units=left.units)
 
 
 def residual_shapes(left: Residuals) -> tuple[ResidualShape, ...]:

@@ -44,9 +44,11 @@ def straight_check(case: Case, stiffness: np.ndarray) -> "Check":
     middle = float(np.median(stiffness))
     if part is None or abs(middle - part.slope) <= _unsure(part, LEAST_DIFFERENCE):
         return Check(name, "passed", "no straight part has another one")
+    units = case.units
+    ends = f"{part.low:.4g} to {part.high:.4g} {units.displacement_unit}"
     words = (
-        f"the curve is no straight line: its longest straight part, {part.low:.4g} to "
-        f"{part.high:.4g} mm, has {part.slope:.4g} N/mm and the model {middle:.4g}. "
+        f"the curve is no straight line: its longest straight part, {ends}, has "
+        f"{part.slope:.4g} {units.stiffness_unit} and the model {middle:.4g}. "
         "Choose this part by the range straight, another one by its ends, or all of "
         "the curve by the range all"
     )

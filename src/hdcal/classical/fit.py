@@ -14,7 +14,7 @@ from hdcal.classical.polynomial import (
     columns,
     fit_polynomial,
 )
-from hdcal.data.case import Case, require_case
+from hdcal.data.case import Case, require_case, require_force
 from hdcal.data.plausible import implausible
 from hdcal.data.theory_names import SPRING
 from hdcal.errors import Finding, Findings
@@ -155,6 +155,7 @@ def fit(
         NotUsable: the calibration failed its checks.
     """
     require_case(case)
+    require_force(case, "fit")
     at = case.gear.nominal_deformation if at is None else at
     models = None if posterior is None else pool(posterior)
     _check_request(case, degrees, at, models)

@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hdcal.quantities import Quantities
 from hdcal.report.chart_spec import ORANGE, Chart, Panel, Points
 
 if TYPE_CHECKING:
     from hdcal.comparison.compare import Compared
 
 
-def stiffness_chart(results: "Sequence[Compared]") -> Chart:
+def stiffness_chart(results: "Sequence[Compared]", units: Quantities) -> Chart:
     """Return the stiffness of each result with its interval."""
     spans = [one.stiffness_N_per_mm for one in results]
     points = Points(
@@ -22,6 +23,6 @@ def stiffness_chart(results: "Sequence[Compared]") -> Chart:
         high=np.array([span.hi for span in spans]),
         colour=ORANGE,
     )
-    axis = results[0].label("stiffness_N_per_mm")
+    axis = f"{units.stiffness} as read [{units.stiffness_unit}]"
     names = [one.name for one in results]
     return Chart(panels=[Panel(x="result", y=axis, marks=[points], names=names)])

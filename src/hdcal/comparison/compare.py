@@ -99,7 +99,7 @@ class Comparison(Result):
 
     def make_charts(self) -> Mapping[str, Chart]:
         """Return the stiffness of every result."""
-        return {"results": stiffness_chart(self.results)}
+        return {"results": stiffness_chart(self.results, self.units)}
 
 
 def compare(
@@ -141,6 +141,7 @@ def compare(
             for (name, case), draws in zip(cases.items(), stiffness, strict=True)
         ),
         tolerance_N_per_mm=tolerance,
+        units=next(iter(cases.values())).units,
         seed=seed,
         versions=versions(),
         stiffness=stiffness,
@@ -199,11 +200,15 @@ def _draws(models: Sequence[Cause], rng: np.random.Generator) -> np.ndarray:
 
 
 def _require_same_reading(cases: Mapping[str, Case]) -> None:
-    """Check that all results were read along the radius, or all along the diameter.
+    """Check that all results are of one kind: forces or torques, radius or diameter.
 
     Raises:
         InputError: they were not.
     """
+    loads = {case.units.load for case in cases.values()}
+    if len(loads) > 1:
+        words = "hold stiffnesses over deformations and over angles"
+        raise InputError([Finding("results", words, "Give results of one kind")])
     readings = {name: case.gear.reading for name, case in cases.items()}
     if len(set(readings.values())) > 1:
         kinds = ", ".join(f"{name} is {how}" for name, how in readings.items())

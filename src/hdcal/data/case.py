@@ -12,6 +12,7 @@ from hdcal.data.prior import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.data.theory_names import Theory
 from hdcal.errors import Finding, InputError
+from hdcal.quantities import FORCE, Quantities
 from hdcal.screening.result import Screening
 
 if TYPE_CHECKING:
@@ -105,6 +106,8 @@ class Case:
             way, or for a working range: ends of each stretch [mm].
         screening: of the whole record before rows were cut; None where the rows are
             not those of a file.
+        units: names and units of force and deformation; of a torsional spring they
+            are a torque [N·m] and an angle [rad].
     """
 
     name: str
@@ -122,6 +125,7 @@ class Case:
     left_out: dict[str, Finding] = field(default_factory=dict)
     excluded: tuple[tuple[float, float], ...] = ()
     screening: Screening | None = None
+    units: Quantities = FORCE
 
     def __repr__(self) -> str:
         rows = len(self.records.force)
@@ -139,8 +143,8 @@ class Case:
 
         records = self.records
         columns: dict[str, Any] = {
-            "deformation_mm": records.deformation,
-            "force_N": records.force,
+            self.units.header("deformation_mm"): records.deformation,
+            self.units.header("force_N"): records.force,
         }
         for header in ("temperature_C", "time_s", "angle_rad", "force_sd_N"):
             name = header.rpartition("_")[0]
@@ -168,6 +172,21 @@ class Case:
     def _check(self) -> Any:
         # Imported by its name: data are below the questions that are asked of them.
         return import_module("hdcal.calibration.check.check").check(self)
+
+
+def require_force(case: Case, question: str) -> None:
+    """Raise InputError where torques and angles were measured.
+
+    Args:
+        case: what was measured.
+        question: the command that is asked.
+    """
+    if not case.units.is_force:
+        words = (
+            f"torques over angles are no readings for {question}, which is of forces"
+        )
+        remedy = "Ask check, calibrate, diagnose, predict, margin, fleet or compare"
+        raise InputError([Finding(case.name, words, remedy)])
 
 
 def require_case(given: object) -> None:

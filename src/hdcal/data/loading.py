@@ -89,15 +89,18 @@ def loading(deformation: np.ndarray, movement: np.ndarray) -> np.ndarray:
     return np.asarray(movement) * side
 
 
-def movement_words(deformation: np.ndarray) -> dict[int, str]:
+def movement_words(
+    deformation: np.ndarray, name: str = "deformation"
+) -> dict[int, str]:
     """Return what to call increasing (+1) and decreasing (-1) deformation.
 
     Args:
         deformation: of all rows, as read [mm], shape (n,).
+        name: of the deformation.
     """
     side = loading_side(deformation)
     if side == 0:
-        return {1: "increasing deformation", -1: "decreasing deformation"}
+        return {1: f"increasing {name}", -1: f"decreasing {name}"}
     return {side: "loading", -side: "unloading"}
 
 

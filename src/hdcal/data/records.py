@@ -59,7 +59,8 @@ class Records(_InDoublePrecision):
         time: since the reset of the row's run [s]; 0 when not measured.
         angle: rotation of the specimen under the load [rad]; 0 when not measured.
         direction: +1 loading, 0 holding, -1 unloading.
-        sense: sign of the last movement, +1 or -1; a hold keeps it.
+        sense: sign of the last movement, +1 or -1; a hold keeps it, and a turning row
+            has that of the branch its force fits.
         rate: deformation rate [mm/s]; 0 without time.
         run: index of the mounting.
         specimen: index of the gear.

@@ -39,12 +39,12 @@ _RUNS = (
         *("one change of temperature", 6.0, "loop", 1.0, "other temperature"),
     ),
     (
-        "re-seat the gear and load again in finer steps at small deformation",
+        "re-seat the gear and load again in finer steps at small {{displacement}}s",
         *("one mounting", 2.0, "fine", 1.0, ""),
     ),
     ("small loops between half and 0.7 of the top", "one cycle", 1.5, "inner", 1.0, ""),
     (
-        "load to 1.25 of the tested deformation",
+        "load to 1.25 of the tested {{displacement}}",
         *("one run beyond the tested range", 5.0, "beyond", 1.0, ""),
     ),
     ("turn the gear by 90° and load again", "one mounting", 2.0, "up", 1.0, "angle"),

@@ -58,11 +58,11 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     which = found.which
     assert which.effect is not None and which.group is not None
     yield what_is_seen(found)
+    say = found.units.say
     own = [GROUPS[name] for name in which.group.split(JOINED) if name in GROUPS]
     # What is seen may tell which of two opposite ones it is.
-    told = [
-        g for g in own if any(s.statement.startswith(g.meaning) for s in found.seen)
-    ]
+    seen = tuple(each.statement for each in found.seen)
+    told = [g for g in own if any(s.startswith(say(g.meaning)) for s in seen)]
     meaning = ", or ".join(group.meaning for group in told or own) or which.group
     likely = [n for n in which.group_members if which.inclusion[n] >= _WORTH_SAYING]
     ranked = sorted(likely, key=lambda name: -which.inclusion[name])
@@ -70,7 +70,7 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
     # Chances that each one acts: together they are more than one where two may.
     more = "; what acts together counts for each"
     causes += more * (sum(which.inclusion[name] for name in likely) > _ONE)
-    yield f"{capital(meaning)} ({percent(which.group_probability)}): {causes}."
+    yield f"{capital(say(meaning))} ({percent(which.group_probability)}): {causes}."
     others = [n for n in which.named if n not in which.group_members]
     if others:
         told = " and ".join(_with_chance(which, name) for name in others)
@@ -89,12 +89,12 @@ def group_of_causes(found: VerdictAnswer) -> Iterator[str]:
         )
     for group in own:
         what = "any of these" if len(own) == 1 else f"that {group.meaning}"
-        yield f"Against {what}: {group.remedy}."
+        yield say(f"Against {what}: {group.remedy}.")
     for name in others:
         groups = EFFECTS[name].groups if name in EFFECTS else ()
         remedies = [GROUPS[one].remedy for one in groups if GROUPS[one] not in own]
         if remedies:
-            yield f"Against {label(name)}: {'; '.join(remedies)}."
+            yield say(f"Against {label(name)}: {'; '.join(remedies)}.")
     yield from _looks_the_same(which)
     yield from _twins(which)
     yield from _beside(which, label(which.effect))

@@ -7,11 +7,13 @@ import numpy as np
 
 from hdcal.diagnosis.gap import Cell
 from hdcal.diagnosis.verdict import Verdict
+from hdcal.quantities import Quantities
+from hdcal.report.axes import covariate_axis, load_axis
 from hdcal.report.canvas import thinned
 from hdcal.report.chart import COLOURS, Chart, Series, boxes
 from hdcal.report.words import or_zero
 
-_AXIS, _NOISE = "measured − model [N]", "what noise alone leaves (95 %)"
+_NOISE = "what noise alone leaves (95 %)"
 
 
 def hypothesis_columns(verdict: Verdict) -> dict[str, list]:
@@ -37,9 +39,10 @@ def where_charts(verdict: Verdict) -> tuple[Chart, ...]:
     The running sums come last.
     """
     ranges, names = verdict.where.by_covariate()
+    units = verdict.case.units
     over = [_over(verdict, name, cells) for name, cells in ranges.items()]
-    by = [_by(name, cells) for name, cells in names.items()]
-    every = [*over, *by, *map(_sum, running_sums(verdict))]
+    by = [_by(name, cells, units) for name, cells in names.items()]
+    every = [*over, *by, *(_sum(drawn, units) for drawn in running_sums(verdict))]
     return tuple(chart for chart in every if chart.series)
 
 
@@ -57,7 +60,8 @@ def running_sums(
     memory = min(max(verdict.gap.autocorrelation, 0.0), 0.98)
     stretch = math.sqrt((1.0 + memory) / (1.0 - memory))
     reach = 1.36 * verdict.gap.noise_sd_N * math.sqrt(len(residual)) * stretch
-    yield "deformation [mm]", deformation[order], np.cumsum(residual[order]), reach
+    axis = covariate_axis("deformation", "mm", verdict.case.units)
+    yield axis, deformation[order], np.cumsum(residual[order]), reach
     row = np.arange(1.0, len(residual) + 1.0)
     yield "row of the data", row, np.cumsum(residual), reach
 
@@ -65,36 +69,41 @@ def running_sums(
 def _over(verdict: Verdict, name: str, cells: list[Cell]) -> Chart:
     """Return the residuals over a covariate, with the means of its ranges."""
     residual, gap = verdict.where.residual_N, verdict.where.gap_N
+    units = verdict.case.units
+    axis = load_axis(units, "measured − model")
     values = verdict.where.values_of(name)
     series, bands = _means(
         cells,
         np.array([cell.from_ for cell in cells]),
         np.array([cell.to for cell in cells]),
+        units,
     )
     if values is not None:
         rows, values = thinned(len(residual)), np.asarray(values)
-        points = [(_AXIS, residual, "#8a949c")]
+        points = [(axis, residual, "#8a949c")]
         if name == "deformation":
-            points.append(("the gap [N]", gap, COLOURS[2]))
+            points.append((load_axis(units, "the gap"), gap, COLOURS[2]))
         series += [
             Series(label, values[rows], np.asarray(y)[rows], colour, points=True)
             for label, y, colour in points
             if len(y) == len(values)
         ]
-    unit = cells[0].unit if cells else "mm"
+    along = covariate_axis(name, cells[0].unit if cells else "mm", units)
     tall = 380 if name == "deformation" else 240
-    return Chart(f"{name} [{unit}]" if unit else name, _AXIS, series, bands, tall)
+    return Chart(along, axis, series, bands, tall)
 
 
-def _by(name: str, cells: list[Cell]) -> Chart:
+def _by(name: str, cells: list[Cell], units: Quantities) -> Chart:
     """Return the means of cells that have names."""
     place = np.arange(1.0, len(cells) + 1.0)
-    means = _means(cells, place - 0.3, place + 0.3)
-    return Chart(name, _AXIS, *means, 380, [cell.label for cell in cells])
+    means = _means(cells, place - 0.3, place + 0.3, units)
+    axis = load_axis(units, "measured − model")
+    names = [cell.label for cell in cells]
+    return Chart(units.name(name), axis, *means, 380, names)
 
 
 def _means(
-    cells: list[Cell], starts: np.ndarray, stops: np.ndarray
+    cells: list[Cell], starts: np.ndarray, stops: np.ndarray, units: Quantities
 ) -> tuple[list[Series], list[tuple[int, int, float]]]:
     """Return the mean of each cell, and how far noise alone would move it."""
     if not cells or not all(math.isfinite(cell.bias_N.hi) for cell in cells):
@@ -114,10 +123,10 @@ def _means(
     )
     hot = np.array([cells[k].hot for k in order])
     levels = [
-        (f"{_NOISE}, upper [N]", high - middle, COLOURS[0], 0.0),
-        (f"{_NOISE}, lower [N]", middle - high, COLOURS[0], 0.0),
-        ("mean [N]", np.where(hot, np.nan, middle), COLOURS[0], 2.0),
-        ("mean, off [N]", np.where(hot, middle, np.nan), COLOURS[1], 3.0),
+        (load_axis(units, f"{_NOISE}, upper"), high - middle, COLOURS[0], 0.0),
+        (load_axis(units, f"{_NOISE}, lower"), middle - high, COLOURS[0], 0.0),
+        (load_axis(units, "mean"), np.where(hot, np.nan, middle), COLOURS[0], 2.0),
+        (load_axis(units, "mean, off"), np.where(hot, middle, np.nan), COLOURS[1], 3.0),
     ]
     series = [
         Series(label, *boxes(starts, stops, level), colour, width=width)
@@ -127,15 +136,14 @@ def _means(
     return series, [(0, 1, 0.16)]
 
 
-def _sum(drawn: tuple[str, np.ndarray, np.ndarray, float]) -> Chart:
+def _sum(drawn: tuple[str, np.ndarray, np.ndarray, float], units: Quantities) -> Chart:
     along, x, total, reach = drawn
-    rows = thinned(len(total))
-    series = [Series("running sum [N]", x[rows], total[rows], COLOURS[0])]
+    rows, axis = thinned(len(total)), load_axis(units, "running sum")
+    series = [Series(axis, x[rows], total[rows], COLOURS[0])]
     if not math.isfinite(reach):
-        return Chart(along, "running sum [N]", series, height=240)
+        return Chart(along, axis, series, height=240)
     ends = np.array([x[0], x[-1]])
-    series += [
-        Series(f"{_NOISE}, {side} [N]", ends, np.full(2, level), "#8a949c", width=0.0)
-        for side, level in (("upper", reach), ("lower", -reach))
-    ]
-    return Chart(along, "running sum [N]", series, [(1, 2, 0.16)], 240)
+    for side, level in (("upper", reach), ("lower", -reach)):
+        edge, label = np.full(2, level), load_axis(units, f"{_NOISE}, {side}")
+        series.append(Series(label, ends, edge, "#8a949c", width=0.0))
+    return Chart(along, axis, series, [(1, 2, 0.16)], 240)

@@ -50,7 +50,7 @@ def closure(
     if not names:
         reason = "no effect of the library is named, so that none can be added"
     elif not len(design.columns):
-        reason = f"{' and '.join(names)} changes the noise, not the mean force"
+        reason = f"{' and '.join(names)} changes the noise, not the mean reading"
     else:
         reason = ""
     if reason:

@@ -84,7 +84,7 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
         "deformation",
         side * depth**2,
         ("stiffens", "softens"),
-        "the curve {way} with the deformation, {size} off a straight line",
+        "the curve {way} with the {{displacement}}, {size} off a straight line",
         beside=x,
         share=share,
     )
@@ -92,14 +92,14 @@ def _along_the_stroke(x: np.ndarray, *, both: bool) -> Iterator[Contrast]:
         "deformation",
         side * np.maximum(_TOE - depth, 0.0),
         ("high", "low"),
-        "at small deformations the force lies {size} too {way}",
+        "at small {{displacement}}s the {{load}} lies {size} too {way}",
         share=share,
     )
     yield Contrast(
         "deformation",
         side * np.maximum(depth - _HEAD, 0.0),
         ("up", "down"),
-        "at the largest deformations the force turns {way} by {size}",
+        "at the largest {{displacement}}s the {{load}} turns {way} by {size}",
         share=share,
     )
 
@@ -115,17 +115,17 @@ def _over_direction(
     down, up = ("unloading", "loading")
     while_down, while_up = f"on {down}", f"on {up}"
     if both:
-        down, up = "decreasing deformation", "increasing"
-        while_down = "while the deformation decreases"
+        down, up = "decreasing {{displacement}}", "increasing"
+        while_down = "while the {{displacement}} decreases"
         while_up = "while it increases"
     ways = ("lower", "higher")
-    words = f"the force lies {{size}} {{way}} {while_down} than {while_up}"
+    words = f"the {{{{load}}}} lies {{size}} {{way}} {while_down} than {while_up}"
     yield Contrast("direction", sense, ways, words)
     if "unloading" in records.known:
         for cell in loop_cells(records, _REACHES):
             yield Contrast("direction", cell, ways, words)
     words = (
-        f"the larger the deformation, the {{way}} {down} lies against {up}, "
+        f"the larger the {{{{displacement}}}}, the {{way}} {down} lies against {up}, "
         "by {size} over the range"
     )
     yield Contrast("direction", sense * np.abs(x), ways, words)
@@ -138,7 +138,7 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
             "rate",
             np.asarray(records.rate),
             ("more", "less"),
-            "a faster movement takes {way} force, by {size} over the speeds tested",
+            "a faster movement takes {way} {{load}}, by {size} over the speeds tested",
             beside=x,
         )
     # A place that was read twice, as where the movement turns, was not held.
@@ -147,21 +147,21 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
             "time",
             _held(records),
             ("rises", "falls"),
-            "while the deformation is held the force {way} by {size}",
+            "while the {{displacement}} is held the {{load}} {way} by {size}",
             beside=x,
         )
     yield Contrast(
         "time",
         np.asarray(records.time),
         ("up", "down"),
-        "the force drifts {way} by {size} within a run",
+        "the {{load}} drifts {way} by {size} within a run",
         beside=x,
     )
     yield Contrast(
         "order",
         np.linspace(0.0, 1.0, len(x)),
         ("rises", "falls"),
-        "from the first reading to the last the force {way} by {size}",
+        "from the first reading to the last the {{load}} {way} by {size}",
         beside=x,
     )
     # Whole cycles: where loading and unloading differ in slope, half of one is no less.
@@ -170,7 +170,8 @@ def _over_time(records: Records, x: np.ndarray) -> Iterator[Contrast]:
         "order",
         (cycle - cycle.mean()) * x,
         ("rises", "falls"),
-        "the slope {way} from cycle to cycle, which moves the force by {size} in all",
+        "the slope {way} from cycle to cycle, which moves the {{load}} by {size} in "
+        "all",
         beside=x,
     )
 
@@ -206,7 +207,7 @@ def _over_temperature(
         (warm - warm.mean()) * x,
         ("rises", "falls"),
         f"the slope {{way}} with temperature{beyond}, "
-        "which moves the force by {size}",
+        "which moves the {{load}} by {size}",
         beside=x,
     )
 
@@ -219,7 +220,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
                 wave(turns * np.asarray(records.angle)) * x,
                 ("goes", "goes"),
                 f"the stiffness {{way}} with the angle, {often} a turn, "
-                "which moves the force by {size}",
+                "which moves the {{load}} by {size}",
                 beside=x,
             )
     runs = [*map(_literally, case.run_labels)]
@@ -245,7 +246,7 @@ def _of_members(records: Records, case: Case, x: np.ndarray) -> Iterator[Contras
             (np.asarray(records.specimen) == k) * x,
             ("stiffer", "softer"),
             f"gear {gears[k]} is {{way}} than the others, "
-            "which moves its force by {size}",
+            "which moves its {{load}} by {size}",
             beside=x,
         )
 

@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from hdcal.data.loading import movement_words
 from hdcal.data.records import Array, Records
+from hdcal.quantities import FORCE, Quantities
 
 # A mean of fewer rows says little.
 _FEWEST = 3
@@ -39,6 +40,7 @@ def declare_cells(
     records: Records,
     run_labels: tuple[str, ...] = (),
     specimen_labels: tuple[str, ...] = (),
+    units: Quantities = FORCE,
 ) -> list[DeclaredCell]:
     """Divide the rows by every covariate that was measured, and by pairs of them.
 
@@ -46,14 +48,16 @@ def declare_cells(
         records: rows in any order.
         run_labels: of each run index.
         specimen_labels: of each specimen index.
+        units: names and units of what was measured.
     """
-    by_deformation = _parts("deformation", records.deformation, "mm", 3)
-    found = _parts("deformation", records.deformation, "mm", 3)
+    unit = units.displacement_unit
+    by_deformation = _parts("deformation", records.deformation, unit, 3)
+    found = _parts("deformation", records.deformation, unit, 3)
     other: list[DeclaredCell] = []
     if "temperature" in records.known:
         other += _levels("temperature", records.temperature, "°C")
     if "unloading" in records.known:
-        other += _directions(records)
+        other += _directions(records, units)
     runs = _labels("run", records.run, run_labels)
     alone = list(other)
     if "time" in records.known:
@@ -114,8 +118,8 @@ def _levels(name: str, values, unit: str) -> list[DeclaredCell]:
     ]
 
 
-def _directions(records: Records) -> list[DeclaredCell]:
-    words = movement_words(np.asarray(records.deformation))
+def _directions(records: Records, units: Quantities) -> list[DeclaredCell]:
+    words = movement_words(np.asarray(records.deformation), units.displacement)
     return [
         DeclaredCell(
             "direction",

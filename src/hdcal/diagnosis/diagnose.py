@@ -21,7 +21,6 @@ from hdcal.diagnosis.refit import (
     refit,
     with_sampled_size,
 )
-from hdcal.diagnosis.repeats import without_repeats
 from hdcal.diagnosis.seen import what_is_seen
 from hdcal.diagnosis.stiffness_factors import stiffness_budget
 from hdcal.diagnosis.verdict import Closure, Verdict, Which
@@ -68,7 +67,6 @@ def diagnose(
     library = library_of(library)
     _check(case, library, seed)
     require_scatter(case)
-    case, repeated = without_repeats(case)
     rng = np.random.default_rng(seed)
     # Draws of its own: what follows does not depend on how many there were.
     weighed = weigh(case, library, rng.spawn(1)[0])
@@ -86,14 +84,13 @@ def diagnose(
         where=found.where,
         which=with_sampled_size(which, fits),
         shrink=closed,
-        next_test=runs,
+        next_test=tuple(replace(run, run=case.units.say(run.run)) for run in runs),
         budget=stiffness_budget(evidence, case, which.named, _stiffness(fits)),
         posteriors=dict(fits.models),
         left_out=fits.left_out,
         library=tuple(library),
         notes=(
             *_notes(evidence, fits, weighed.averaged_rows, weighed.row_step),
-            *_left_out(repeated),
             *[note for note in fitted.notes if note not in case.notes and not quick],
         ),
         reasons=failure_reasons(fits),
@@ -127,7 +124,8 @@ def _check(case: Case, library: Mapping[str, type[Effect]], seed: int) -> None:
     deformation = case.records.deformation - np.mean(case.records.deformation)
     if deformation @ np.asarray(case.records.force) > 0.0:
         return
-    words = "the force does not grow with the deformation"
+    units = case.units
+    words = f"the {units.load} does not grow with the {units.displacement}"
     remedy = "check the signs of both columns and that the load cell was connected"
     raise InputError([Finding(case.name, words, remedy)])
 
@@ -190,10 +188,3 @@ def _fitted(case: Case, step: int) -> Case:
     few = thin_rows(case, max(step, -(-rows // _MOST_FITTED)), turns=True)
     words = f"{len(few.records.force)} of {rows} rows were calibrated on, turns kept"
     return replace(few, notes=(*few.notes, words))
-
-
-def _left_out(repeated: int) -> list[str]:
-    many = f"{repeated} readings that repeat a turning point are"
-    many = "1 reading that repeats a turning point is" if repeated == 1 else many
-    words = f"{many} left out: of loading or of unloading, nothing tells"
-    return [words] * (repeated > 0)

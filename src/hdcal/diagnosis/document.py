@@ -73,7 +73,7 @@ def verdict_document(
             seen_section(found),
             where_section(found),
             which_section(found),
-            shrink_section(found.shrink),
+            shrink_section(found.shrink, found.units),
             _next_runs(found),
             *_budget(found),
             _corrected(found, refit),
@@ -184,11 +184,14 @@ def _corrected(found: VerdictAnswer, refit: tuple[str, Posterior] | None) -> Sec
         "band: where one new reading lies with 95 % probability. Hatched and dotted: "
         "outside what was tested."
     )
-    shows = "Measured force over deformation with the bands of the corrected model"
+    units = found.units
+    shows = f"Measured {units.load} over {units.displacement} with the bands of the "
+    shows += "corrected model"
+    estimates = measured(parameter_estimates(posterior), posterior.theory)
     blocks = [
         Text(words),
         Picture("bands", shows, caption),
-        parameter_table(measured(parameter_estimates(posterior), posterior.theory)),
+        parameter_table(estimates, units),
         PARAMETER_NOTE,
     ]
     return Section(heading, blocks)

@@ -31,7 +31,7 @@ from hdcal.physics.effect import Effect
 # Hypotheses that take part, draws of each, and the least that is worth a run.
 _MOST, _DRAWS, _LEAST_NATS, _LEAST_SHARE = 6, 256, 0.02, 0.01
 _TOO_FEW = (
-    "fewer than two hypotheses about the mean force are left to tell apart; a cause "
+    "fewer than two hypotheses about the mean reading are left to tell apart; a cause "
     "outside the library predicts nothing"
 )
 _TELLS_LITTLE = "no run that a rig of this kind can do would tell more"

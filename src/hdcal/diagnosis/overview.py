@@ -9,7 +9,7 @@ from hdcal.diagnosis.many_cases import REFUSED, AskedCases, Refused
 from hdcal.diagnosis.words import count_words, verdict_word
 from hdcal.report.document import Document, Section, Table, spoken_of
 from hdcal.report.plain import as_json
-from hdcal.report.words import hypothesis, known, newton, percent
+from hdcal.report.words import hypothesis, known, load, percent
 
 _MEND = "Mend what is listed as refused."
 
@@ -96,6 +96,6 @@ def _overview_row(name: str, found: VerdictAnswer) -> list[str]:
         word,
         "–" if word == "none" else hypothesis(cause),
         percent(chance),
-        newton(size) if known(size) else "–",
+        load(size, found.units) if known(size) else "–",
         "–" if closed is None else percent(closed.median),
     ]

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from hdcal.diagnosis.answer import WhereAnswer
 from hdcal.diagnosis.gap import Cell
+from hdcal.quantities import Quantities
 from hdcal.report.words import known, with_unit
 
 _PREPOSITIONS = {
@@ -14,7 +15,7 @@ _PREPOSITIONS = {
 _SIDES = {"time": ("after", "before")}
 
 
-def places(where: WhereAnswer) -> Iterator[tuple[str, float]]:
+def places(where: WhereAnswer, units: Quantities) -> Iterator[tuple[str, float]]:
     """Yield the two worst places in words, each with the bias there [N]."""
     plain = [cell for cell in where.regions if "×" not in cell.covariate]
     worst: dict[str, Cell] = {}
@@ -27,10 +28,12 @@ def places(where: WhereAnswer) -> Iterator[tuple[str, float]]:
             continue
         joined = _stretch(cell, where.regions)
         biases = [other.bias_N.median for other in joined]
-        yield _range(covariate, joined, where), max(biases, key=abs)
+        yield _range(covariate, joined, where, units), max(biases, key=abs)
 
 
-def _range(covariate: str, joined: list[Cell], where: WhereAnswer) -> str:
+def _range(
+    covariate: str, joined: list[Cell], where: WhereAnswer, units: Quantities
+) -> str:
     low, high = min(c.from_ for c in joined), max(c.to for c in joined)
     cells = [c for c in where.cells if c.covariate == covariate]
     starts = [c.from_ for c in cells if known(c.from_)]
@@ -40,7 +43,7 @@ def _range(covariate: str, joined: list[Cell], where: WhereAnswer) -> str:
     if low == high:
         return f"at {with_unit(_round(low), unit)}"
     if low <= min(starts) and high >= max(stops):
-        return f"at every {covariate}"
+        return f"at every {units.name(covariate)}"
     if high >= max(stops):
         return f"{above} {with_unit(_round(low), unit)}"
     if low <= min(starts):

@@ -7,6 +7,8 @@ from hdcal.diagnosis.cause_words import held_out
 from hdcal.diagnosis.gap import Cell, Gap
 from hdcal.diagnosis.verdict import Closure
 from hdcal.diagnosis.words import one_reading
+from hdcal.quantities import Quantities
+from hdcal.report.axes import load_axis
 from hdcal.report.document import (
     Block,
     Facts,
@@ -21,7 +23,7 @@ from hdcal.report.words import (
     hypothesis,
     known,
     likely,
-    newton,
+    load,
     number,
     or_zero,
     percent,
@@ -46,12 +48,12 @@ def seen_section(found: VerdictAnswer) -> Section:
         ]
         for each in found.seen
     ]
-    numbers = ("size [N]", "95 % interval", "p")
+    numbers = (f"size [{found.units.load_unit}]", "95 % interval", "p")
     note = (
         "Size: from the lowest to the highest place of what slope and zero cannot take "
         "up. Intervals hold all together; p counts all that was looked for. The "
         "clearest comes first; each was found in what larger ones leave. It matters "
-        "from a thousandth of the largest force on."
+        f"from a thousandth of the largest {found.units.load} on."
     )
     table = Table(["seen", *numbers, "matters"], rows, frozenset(numbers))
     return Section(heading, [table, Text(note, soft=True)], brief=True)
@@ -59,21 +61,22 @@ def seen_section(found: VerdictAnswer) -> Section:
 
 def where_section(found: VerdictAnswer) -> Section:
     """Return where the gap lies; its picture is called where."""
+    units = found.units
     facts = Table(["", "found", "meaning"], _gap_rows(found), frozenset({"found"}))
     caption = (
-        "Bars: mean of measured minus calibrated force in ranges chosen before "
+        f"Bars: mean of measured minus calibrated {units.load} in ranges chosen before "
         "looking. Blue shade: how far noise alone would move them, in 95 % of all "
         "programs for all ranges together. Red or orange: off. Thin line or green: "
         "gap. In the running sums noise stays in the grey band, a gap keeps its course."
     )
-    shows = "Measured minus calibrated force over everything that was measured"
+    shows = f"Measured minus calibrated {units.load} over everything that was measured"
     picture = Picture("where", shows, caption, tall=True)
     shares = ", ".join(
-        f"{percent_span(each.share)} with {each.covariate}"
+        f"{percent_span(each.share)} with {units.name(each.covariate)}"
         for each in found.where.shares
     )
     varies = [Text(f"The gap varies {shares}.")] if shares else []
-    regions = _regions(found.where.regions)
+    regions = _regions(found.where.regions, units)
     return Section("Where the gap lies", [facts, picture, *regions, *varies])
 
 
@@ -83,45 +86,46 @@ def _gap_rows(found: VerdictAnswer) -> list[tuple[str, str, str]]:
     words = "a gap is seen" if gap.detected else "no gap is seen"
     seen = ("seen", chance, f"{words}; how often noise alone looks like this")
     if known(gap.rounding_N):
-        steps = f"in steps of {newton(gap.rounding_N)}"
+        steps = f"in steps of {load(gap.rounding_N, found.units)}"
         seen = ("seen", "rounding", f"{steps}; nothing else is seen ({chance})")
     noise = f"standard deviation of {one_reading(found)}"
     return [
         seen,
         ("probability", percent(gap.probability), "that anything is missing"),
-        *_size_rows(gap),
-        ("noise", newton(gap.noise_sd_N), noise),
+        *_size_rows(gap, found.units),
+        ("noise", load(gap.noise_sd_N, found.units), noise),
     ]
 
 
-def _size_rows(gap: Gap) -> list[tuple[str, str, str]]:
+def _size_rows(gap: Gap, units: Quantities) -> list[tuple[str, str, str]]:
     if not known(gap.rms_N.median):
         return [("size", "–", "of what is not seen there is no size")]
     middle, span = estimate(gap.rms_N)
-    share = percent(gap.share_of_full_scale)
+    share, unit = percent(gap.share_of_full_scale), units.load_unit
     return [
-        ("size", f"{middle} N", f"root mean square; 95 % interval {span} N"),
-        ("of full scale", share, "size over the largest force tested"),
+        ("size", f"{middle} {unit}", f"root mean square; 95 % interval {span} {unit}"),
+        ("of full scale", share, f"size over the largest {units.load} tested"),
     ]
 
 
-def _regions(regions: Sequence[Cell]) -> Iterator[Block]:
+def _regions(regions: Sequence[Cell], units: Quantities) -> Iterator[Block]:
     if not regions:
         yield Text("No range is off by more than noise alone would make it.")
         return
-    numbers = ("rows", "measured − model [N]", "in standard errors", "share of the gap")
-    rows = [_region_row(cell) for cell in regions[:_MOST_ROWS]]
+    distance = load_axis(units, "measured − model")
+    numbers = ("rows", distance, "in standard errors", "share of the gap")
+    rows = [_region_row(cell, units) for cell in regions[:_MOST_ROWS]]
     yield Table(["off", "in", *numbers], rows, frozenset(numbers))
     hidden = len(regions) - _MOST_ROWS
     if hidden > 0:
         yield Text(f"{hidden} more are in the verdict itself.", soft=True)
 
 
-def _region_row(cell: Cell) -> list[str]:
+def _region_row(cell: Cell, units: Quantities) -> list[str]:
     bias = cell.bias_N
     width = bias.hi - bias.lo if known(bias.hi) else None
     return [
-        cell.covariate,
+        units.name(cell.covariate),
         cell.label,
         str(cell.rows),
         number(bias.median, width),
@@ -179,13 +183,13 @@ def _robustness(found: VerdictAnswer) -> Iterator[str]:
         yield f"With other readings of the same kind, the ranking's top stays: {share}."
 
 
-def shrink_section(shrink: Closure) -> Section:
+def shrink_section(shrink: Closure, units: Quantities) -> Section:
     """Return how far the gap shrinks; its picture is called shrink."""
     caption = (
         "Left: what each model leaves over (root mean square). Right: how much of the "
         "gap is closed on readings that were not used in fitting. A free curve with as "
         "many parameters is the placebo: an effect should do better, above all where "
-        "the largest deformations are held out."
+        f"the largest {units.displacement}s are held out."
     )
     shows = (
         "Root mean square of measured minus model, from the nominal model to the noise"
@@ -194,17 +198,17 @@ def shrink_section(shrink: Closure) -> Section:
     closed = (
         Text(f"Not computed: {shrink.reason}.")
         if shrink.closed is None
-        else Facts(list(_closed_rows(shrink)))
+        else Facts(list(_closed_rows(shrink, units)))
     )
     return Section("How far the gap shrinks", [picture, closed])
 
 
-def _closed_rows(shrink: Closure) -> Iterator[tuple[str, str]]:
+def _closed_rows(shrink: Closure, units: Quantities) -> Iterator[tuple[str, str]]:
     if shrink.closed is not None:
         yield f"closed on {held_out(shrink)}", percent_span(shrink.closed)
     if known(shrink.extrapolated_closed):
         share = percent(shrink.extrapolated_closed)
-        yield "with the largest deformations held out", share
+        yield f"with the largest {units.displacement}s held out", share
     if known(shrink.placebo_closed):
         share = percent(shrink.placebo_closed)
         yield "by a free curve instead (placebo)", share
@@ -212,4 +216,5 @@ def _closed_rows(shrink: Closure) -> Iterator[tuple[str, str]]:
         yield f"by {hypothesis(name)}", percent(share)
     if shrink.remainder_N is not None:
         middle, span = estimate(shrink.remainder_N)
-        yield "left after it", f"{middle} N, 95 % interval {span} N"
+        unit = units.load_unit
+        yield "left after it", f"{middle} {unit}, 95 % interval {span} {unit}"

@@ -27,8 +27,9 @@ from hdcal.inference.residual_shapes import (
     find_structure,
 )
 from hdcal.inference.serial_correlation import CORRELATION
+from hdcal.quantities import Quantities
 from hdcal.report.intervals import INTERVAL, Interval
-from hdcal.report.words import newton
+from hdcal.report.words import load
 
 # Below this share of the largest force what is seen is said to be immaterial.
 _MATERIAL = 1e-3
@@ -69,7 +70,7 @@ def what_is_seen(evidence: CaseEvidence, case: Case) -> tuple[Seen, ...]:
     for each in found:
         once.setdefault(tried[each.name].told_once or each.name, each)
     clearest = sorted(once.values(), key=lambda each: each.p_value)
-    told = [_seen(tried[each.name], each, scale, quantile) for each in clearest]
+    told = [_seen(tried[e.name], e, scale, quantile, case.units) for e in clearest]
     if sum(each.covariate == "run" for each in told) < 2:
         return tuple(told)
     beside = [e.name for e in found if tried[e.name].covariate != "run"]
@@ -93,7 +94,8 @@ def _zeros_differ(
     zeros = np.append(0.0, found[-others.shape[1] :])
     lowest, highest = (case.run_labels[k] for k in (zeros.argmin(), zeros.argmax()))
     size = float(np.ptp(zeros))
-    words = f"the zeros of the runs differ by up to {newton(size)}, run {lowest} the "
+    least = load(size, case.units)
+    words = f"the zeros of the runs differ by up to {least}, run {lowest} the "
     return size, f"{words}lowest, run {highest} the highest"
 
 
@@ -172,13 +174,19 @@ def _whitened(
     )
 
 
-def _seen(contrast: Contrast, found: Structure, scale: float, quantile: float) -> Seen:
+def _seen(
+    contrast: Contrast,
+    found: Structure,
+    scale: float,
+    quantile: float,
+    units: Quantities,
+) -> Seen:
     swing = abs(found.coefficient) * contrast.swing
     half = quantile * found.error * contrast.swing
     size = Interval(swing, max(swing - half, 0.0), swing + half)
-    way = contrast.ways[found.coefficient < 0.0]
+    way, told = contrast.ways[found.coefficient < 0.0], load(size.median, units)
     return Seen(
-        statement=contrast.words.format(way=way, size=newton(size.median)),
+        statement=units.say(contrast.words.format(way=way, size=told)),
         covariate=contrast.covariate,
         size_N=size,
         p_value=found.p_value,

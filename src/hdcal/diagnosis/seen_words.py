@@ -2,7 +2,7 @@
 
 from hdcal.diagnosis.answer import VerdictAnswer
 from hdcal.diagnosis.places import places
-from hdcal.report.words import capital, known, newton, or_zero
+from hdcal.report.words import capital, known, load, or_zero
 
 # Things seen that the answer tells; the report has all.
 _MOST_SEEN = 3
@@ -22,22 +22,23 @@ def what_is_seen(found: VerdictAnswer) -> str:
 
 
 def _where(found: VerdictAnswer) -> str:
-    step, found_places = found.gap.rounding_N, list(places(found.where))
+    step, found_places = found.gap.rounding_N, list(places(found.where, found.units))
     if known(step):
+        steps = load(step, found.units)
         return (
-            f"The readings are rounded to steps of {newton(step)}; nothing else sets "
-            "them apart from the model."
+            f"The readings are rounded to steps of {steps}; nothing else sets them "
+            "apart from the model."
         )
     if not found_places:
         return _nowhere(found)
     first, *rest = (
-        f"{newton(abs(bias))} {'higher' if bias > 0.0 else 'lower'}"
+        f"{load(abs(bias), found.units)} {'higher' if bias > 0.0 else 'lower'}"
         + ("" if index else " than the calibrated model")
         + f" {words}"
         for index, (words, bias) in enumerate(found_places)
     )
     more = "".join(f", and {text}" for text in rest)
-    return f"The measured force is up to {first}{more}."
+    return f"The measured {found.units.load} is up to {first}{more}."
 
 
 def _nowhere(found: VerdictAnswer) -> str:
@@ -50,7 +51,7 @@ def _nowhere(found: VerdictAnswer) -> str:
             f"The readings depart from the model (p = {p}), but no range of them is "
             "off on average: the departure is in their scatter."
         )
-    size = newton(found.gap.rms_N.median)
+    size = load(found.gap.rms_N.median, found.units)
     return (
         f"The readings depart from the model by {size} rms (p = {p}), but no "
         "single range of them by enough to point at it."

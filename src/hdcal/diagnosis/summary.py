@@ -9,7 +9,7 @@ from typing import Any
 from hdcal.data.versions import versions
 from hdcal.diagnosis.answer import DiagnosedData, Refit, VerdictAnswer, WhereAnswer
 from hdcal.diagnosis.document import verdict_document
-from hdcal.diagnosis.verdict import Verdict
+from hdcal.diagnosis.verdict import Verdict, Which
 from hdcal.diagnosis.words import answer, headline, limits, next_step
 from hdcal.inference.model_average import ModelAverage
 from hdcal.inference.posterior import Posterior
@@ -39,7 +39,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         where=WhereAnswer(
             where.p_value, where.statistics, where.shares, where.regions, where.cells
         ),
-        which=verdict.which,
+        which=_which(verdict),
         shrink=verdict.shrink,
         next_test=verdict.next_test,
         next_test_reason=verdict.no_run,
@@ -47,6 +47,7 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         refits=tuple(Refit(name, share) for name, (share, _) in _ranked(verdict)),
         left_out=verdict.left_out,
         stiffness_N_per_mm=_stiffness(verdict),
+        units=case.units,
         library=verdict.library,
         notes=verdict.notes,
         seed=verdict.seed,
@@ -71,6 +72,15 @@ def verdict_answer(verdict: Verdict) -> VerdictAnswer:
         answer=tuple(answer(found)),
         limits=tuple(limits(found)),
     )
+
+
+def _which(verdict: Verdict) -> Which:
+    """Return the cause, its size in the unit of what was measured."""
+    which = verdict.which
+    if which.amplitude is None:
+        return which
+    unit = verdict.case.units.unit(which.amplitude.unit)
+    return replace(which, amplitude=replace(which.amplitude, unit=unit))
 
 
 def _stiffness(verdict: Verdict) -> Interval | None:

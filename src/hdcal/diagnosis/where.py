@@ -32,7 +32,7 @@ def declared_directions(
         case: for the labels.
     """
     records = evidence.prepared.records
-    cells = declare_cells(records, case.run_labels, case.specimen_labels)
+    cells = declare_cells(records, case.run_labels, case.specimen_labels, case.units)
     # Of five rows none makes a cell.
     empty = np.zeros((len(records.force), 0))
     curves = [_two(effect.shapes) for effect in evidence.piecewise]

@@ -20,12 +20,12 @@ from hdcal.report.words import (
     estimate,
     known,
     label,
-    newton,
+    load,
     percent,
 )
 
 _MOST_PAIRS = 4
-PROPORTIONAL = "An effect proportional to deformation is a wrong K, not a gap."
+PROPORTIONAL = "An effect proportional to {displacement} is a wrong K, not a gap."
 NO_PROOF = (
     "Closing the gap is not proof of cause: another effect of the same shape would "
     "close it as well."
@@ -83,10 +83,11 @@ def _sentences(found: VerdictAnswer) -> list[str]:
     said = list(say.get(found.which.verdict, unknown)(found))
     if found.stiffness_N_per_mm is not None:
         middle, span = estimate(found.stiffness_N_per_mm)
+        unit = found.units.stiffness_unit
         over = "" if found.which.verdict == "none" else ", causes weighed as told"
         said.append(
-            f"The stiffness{over}: {middle} N/mm, 95 % credible interval {span} N/mm, "
-            "per millimetre as read."
+            f"The {found.units.stiffness}{over}: {middle} {unit}, 95 % credible "
+            f"interval {span} {unit}, per {found.units.per} as read."
         )
     return said
 
@@ -113,7 +114,8 @@ def limits(found: VerdictAnswer) -> list[str]:
     which = found.which
     proof = [NO_PROOF] if _closes(found) else []
     worth = list(_certified(which))
-    return [*_correlated(found), *_blind(which), *worth, PROPORTIONAL, *proof]
+    proportional = found.units.say(PROPORTIONAL)
+    return [*_correlated(found), *_blind(which), *worth, proportional, *proof]
 
 
 def _certified(which: Which) -> Iterator[str]:
@@ -181,7 +183,7 @@ def _closes(found: VerdictAnswer) -> bool:
 
 def _none(found: VerdictAnswer) -> Iterator[str]:
     gap, chance = found.gap, found.which.probabilities.get("none")
-    noise = f"the noise of {one_reading(found)} is {newton(gap.noise_sd_N)}"
+    noise = f"the noise of {one_reading(found)} is {load(gap.noise_sd_N, found.units)}"
     if gap.detected:
         yield (
             "Something departs slightly from pure noise (p = "
@@ -200,7 +202,8 @@ def _none(found: VerdictAnswer) -> Iterator[str]:
 
 def _unseen(found: VerdictAnswer) -> str:
     """Say how small a gap could go unseen, on average and in a range of deformation."""
-    mean = newton(_DETECTABLE * found.gap.noise_sd_N / _worth(found) ** 0.5)
+    units = found.units
+    mean = load(_DETECTABLE * found.gap.noise_sd_N / _worth(found) ** 0.5, units)
     widths = [
         cell.bias_N.hi - cell.bias_N.median
         for cell in found.where.cells
@@ -209,6 +212,7 @@ def _unseen(found: VerdictAnswer) -> str:
     small = f"a gap of less than about {mean} on average"
     if not widths:
         return small
-    low, high = newton(min(widths)), newton(max(widths))
-    span = low if low == high else f"{low.removesuffix(' N')} … {high}"
-    return f"{small}, or of less than {span} in one range of deformation"
+    low, high = load(min(widths), units), load(max(widths), units)
+    bare = low.removesuffix(f" {units.load_unit}")
+    span = low if low == high else f"{bare} … {high}"
+    return f"{small}, or of less than {span} in one range of {units.displacement}"

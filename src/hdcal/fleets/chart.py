@@ -20,17 +20,28 @@ def fleet_chart(found: Fleet) -> Chart:
         shown[np.linspace(0, len(order) - 1, MOST_SHOWN).astype(int)] = True
         order = order[shown]
     place, off = np.arange(1.0, len(order) + 1.0), found.off_in["stiffness"][order]
-    curves = interval_boxes(place, low[order], high[order])
+    units = found.case.units
+    unit = units.stiffness_unit
+    curves = interval_boxes(place, low[order], high[order], unit=unit)
     odd = [found.case.specimen_labels[gear] for gear in order[off]]
     called = "off in stiffness" + f": {', '.join(odd)}" * (len(odd) <= _MOST_NAMED)
     kinds = (("gears", ~off, COLOURS[0]), (called, off, COLOURS[1]))
     points = [
-        Series(f"{words} [N/mm]", place[rows], middle[order][rows], hue, points=True)
+        Series(
+            f"{words} [{units.stiffness_unit}]",
+            place[rows],
+            middle[order][rows],
+            hue,
+            points=True,
+        )
         for words, rows, hue in kinds
         if rows.any()
     ]
     whose = "at one size" if found.at_one_size else "as read"
-    axis = "gears by their stiffness", f"stiffness {whose} [N/mm]"
+    axis = (
+        "gears by their stiffness",
+        f"{units.stiffness} {whose} [{units.stiffness_unit}]",
+    )
     names = [found.case.specimen_labels[gear] for gear in order]
     bands, marked = [(0, 1, 0.25)], (np.flatnonzero(off) + 1).tolist()
     return Chart(*axis, [*curves, *points], bands, names=names, marked=marked)

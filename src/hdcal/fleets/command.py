@@ -92,8 +92,9 @@ def fleet(
 
             kept = wrong.attempt(usable, readings, gears, skip_bad=skip_bad)
             if kept is not None and deformation is not None:
-                tested, reach = kept[0].largest, kept[0].case.gear.reach
-                wrong += deformation_findings(deformation, tested, reach)
+                tested, case = kept[0].largest, kept[0].case
+                about = tested, case.gear.reach, case.units
+                wrong += deformation_findings(deformation, *about)
             out = f"{readings.case.name}-fleet" if out is None else out
         console.reserve_folder(out, force)
     assert readings is not None

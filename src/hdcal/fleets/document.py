@@ -20,9 +20,10 @@ from hdcal.report.document import (
     Table,
     Tag,
     Text,
+    mapped,
     notices,
 )
-from hdcal.report.words import estimate, number, percent
+from hdcal.report.words import capital, estimate, number, percent
 
 # Gears in the table of a page, and of those that are shown at once; all of them are in
 # gears.csv.
@@ -42,7 +43,7 @@ def fleet_document(
         ("sampling", f"{sampled}, seed {settings['seed']}"),
         ("versions", versions),
     ]
-    return Document(
+    document = Document(
         name=found.case.name,
         kind="fleet",
         subtitle=f"{answer.gears} gears, {answer.rows} readings",
@@ -66,6 +67,7 @@ def fleet_document(
         provenance=provenance + ([("command", command)] if command else []),
         failed=found.reasons,
     )
+    return mapped(document, answer.units.say)
 
 
 def _beyond(answer: FleetAnswer) -> bool:
@@ -79,12 +81,13 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
         yield from force_words(answer.next_force)
     middle, span = estimate(answer.population.stiffness_N_per_mm)
     yield (
-        f"Centre of the ordinary gears: {middle} N/mm, 95 % credible interval {span} "
-        "N/mm, per millimetre as read."
+        f"Centre of the ordinary gears: {middle} {{N/mm}}, 95 % credible interval "
+        f"{span} {{N/mm}}, per {answer.units.per} as read."
     )
     middle, span = estimate(answer.next_gear.stiffness_N_per_mm)
     sized = " of the gear file's sizes" * answer.at_one_size
-    told = f"The next gear{sized}: {middle} N/mm, 95 % predictive interval {span} N/mm"
+    told = f"The next gear{sized}: {middle} {{N/mm}}, 95 % predictive interval {span} "
+    told += "{N/mm}"
     also = "; that it may be an odd one is in it" * bool(answer.off_in["stiffness"])
     yield f"{told}{also}."
     if answer.gears < FEW:
@@ -97,9 +100,9 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
     width = one.hi - one.lo
     ends = [
         f"at least {percent(each.content)} are stiffer than "
-        f"{number(each.stiffer_than_N_per_mm, width)} N/mm, and at least "
+        f"{number(each.stiffer_than_N_per_mm, width)} {{N/mm}}, and at least "
         f"{percent(each.content)} softer than "
-        f"{number(each.softer_than_N_per_mm, width)} N/mm"
+        f"{number(each.softer_than_N_per_mm, width)} {{N/mm}}"
         for each in answer.next_gear.bounds
     ]
     sure = percent(answer.next_gear.bounds[0].confidence)
@@ -110,7 +113,14 @@ def _answers(answer: FleetAnswer) -> Iterator[str]:
 def _gears(columns: Mapping[str, np.ndarray], answer: FleetAnswer) -> Section:
     far = np.lexsort([-columns["probability_off"], ~columns["called_off"]])
     far = far[:MOST_LISTED]
-    numbers = ["N/mm", "95 % interval", "apart [%]", "P(off)", "in sds", "noise [N]"]
+    numbers = [
+        "{N/mm}",
+        "95 % interval",
+        "apart [%]",
+        "P(off)",
+        "in sds",
+        "noise [{N}]",
+    ]
     numbers += ["rows"]
     rows = [_gear(columns, int(row)) for row in far]
     titles = ["gear", "", *(["lot"] if "lot" in columns else []), *numbers]
@@ -144,7 +154,11 @@ def _curves(found: Fleet) -> Section:
     whose = f"all {off}" if named == off else f"{named} of {off}"
     words += f" In colours: gears that are called off, {whose}." * bool(named)
     words += " Each is of its own size." * found.at_one_size
-    what = "Force over deformation of many gears, those called off in colours"
+    units = found.case.units
+    what = (
+        f"{capital(units.load)} over {units.displacement} of many gears, those called "
+    )
+    what += "off in colours"
     return Section("The readings", [Picture("curves", what, words)])
 
 
@@ -176,9 +190,9 @@ def _scatter(answer: FleetAnswer) -> Section:
         ("between lots", population.lot_sd_percent, "%"),
         ("between ordinary gears", population.gear_sd_percent, "%"),
         ("gain, between rigs", population.rig_sd_percent, "%"),
-        ("zero, between operators", population.operator_sd_N, "N"),
-        ("zero, between mountings", population.mounting_sd_N, "N"),
-        ("single readings", population.reading_sd_N, "N"),
+        ("zero, between operators", population.operator_sd_N, "{N}"),
+        ("zero, between mountings", population.mounting_sd_N, "{N}"),
+        ("single readings", population.reading_sd_N, "{N}"),
     ]
     told = [
         (what, f"{estimate(one)[0]} {unit} ({estimate(one)[1]})")
@@ -204,8 +218,8 @@ def _groups(answer: FleetAnswer) -> Iterator[Table]:
         for one in answer.rigs
     ]
     for title, many, what, rows in (
-        ("lot", "gears", "N/mm", lots),
-        ("operator", "mountings", "zero over the mean [N]", operators),
+        ("lot", "gears", "{N/mm}", lots),
+        ("operator", "mountings", "zero over the mean [{N}]", operators),
         ("rig", "mountings", "gain over the mean [%]", rigs),
     ):
         numbers = (many, what, "95 % interval")

@@ -11,6 +11,8 @@ from hdcal.fleets.curves import curve, shown_gears
 from hdcal.fleets.fleet import Fleet
 from hdcal.fleets.over_time import TimeSeries
 from hdcal.fleets.time_chart import time_charts
+from hdcal.quantities import Quantities
+from hdcal.report.axes import displacement_axis, load_axis
 from hdcal.report.canvas import FAILED, heading, plain, style
 from hdcal.report.chart import COLOURS
 from hdcal.report.chart_figure import draw_chart
@@ -40,10 +42,11 @@ def curves_figure(found: Fleet) -> Figure:
         for gear, hue in zip(shown.called, _HUES, strict=False):
             name = plain(found.case.specimen_labels[gear], _LONGEST)
             axes.plot(*curve(found, gear), color=hue, linewidth=1.2, label=name)
-        axes.set_xlabel(f"deformation as read ({found.case.gear.reading}) [mm]")
-        axes.set_ylabel("force as read [N]")
+        units = found.case.units
+        axes.set_xlabel(displacement_axis(found.case))
+        axes.set_ylabel(load_axis(units, f"{units.load} as read"))
         axes.legend(fontsize="small")
-        _head(axes, found, "the readings, force over deformation")
+        _head(axes, found, f"the readings, {units.load} over {units.displacement}")
     return figure
 
 
@@ -52,13 +55,14 @@ def _head(axes: Axes, found: Fleet, words: str) -> None:
     heading(axes, f"{plain(found.case.name, _LONGEST)}: {what}")
 
 
-def time_figure(series: Sequence[TimeSeries]) -> Figure:
+def time_figure(series: Sequence[TimeSeries], units: Quantities) -> Figure:
     """Draw the control charts of a fleet, one above the other.
 
     Args:
         series: one at least.
+        units: of what was measured.
     """
-    charts = time_charts(series)
+    charts = time_charts(series, units)
     with style():
         figure = Figure(figsize=(7.6, 3.0 * len(charts)), layout="constrained")
         for place, chart in enumerate(charts, 1):

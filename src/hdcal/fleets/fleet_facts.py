@@ -3,13 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from hdcal.data.gear_file.validation import within
 from hdcal.data.theory_names import Theory
 from hdcal.data.versions import versions
 from hdcal.fleets.typed_json import STRICT, Count, Number, Size, typed
 from hdcal.inference.checks import Check
+from hdcal.quantities import BY_LOAD, FORCE, Quantities
 
 if TYPE_CHECKING:
     from hdcal.fleets.fleet import Fleet
@@ -61,6 +62,7 @@ class FleetFacts:
         versions: of the packages that made them.
         reach_mm: deformation as read that no gear of this radius reaches; None where
             no radius is known.
+        load: what was measured over a displacement: force or torque.
     """
 
     __pydantic_config__: ClassVar = STRICT
@@ -80,12 +82,18 @@ class FleetFacts:
     settings: FleetSettings
     versions: dict[str, str]
     reach_mm: Size | None
+    load: Literal["force", "torque"] = FORCE.load
 
     @property
     def groups(self) -> Mapping[str, tuple[str, ...]]:
         """Lots, operators and rigs, where they are told."""
         told = {"lot": self.lots, "operator": self.operators, "rig": self.rigs}
         return {kind: names for kind, names in told.items() if names}
+
+    @property
+    def quantities(self) -> Quantities:
+        """Names and units of what was measured."""
+        return BY_LOAD[self.load]
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -96,7 +104,7 @@ class FleetFacts:
             each = [f"{kind}_{k}" for k in range(1, len(names) + 1)]
             units |= dict.fromkeys([f"{kind}_sd", *each], unit)
             units[f"{kind}_ratio"] = "1"
-        return units
+        return {name: self.quantities.unit(unit) for name, unit in units.items()}
 
 
 def facts_of(found: "Fleet") -> FleetFacts:
@@ -122,9 +130,10 @@ def facts_of(found: "Fleet") -> FleetFacts:
         lots=tuple(found.lots),
         operators=tuple(found.operators),
         rigs=tuple(found.rigs),
-        notes=(*changes, *notes_of(found)),
+        notes=tuple(map(case.units.say, (*changes, *notes_of(found)))),
         checks=found.checks,
         settings=typed(FleetSettings, how),
         versions=versions(),
         reach_mm=case.gear.reach if math.isfinite(case.gear.reach) else None,
+        load=case.units.load,
     )

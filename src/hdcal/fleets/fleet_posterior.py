@@ -98,7 +98,9 @@ class FleetPosterior:
         shares = {"confidence": confidence}
         shares |= {} if content is None else {"content": content}
         with Findings() as wrong:
-            wrong += deformation_findings(deformation, facts.largest_mm, reach)
+            wrong += deformation_findings(
+                deformation, facts.largest_mm, reach, facts.quantities
+            )
             wrong += implausible("limit_force", limit_force, "sigma")
             wrong += _share_findings(shares, len(draws["stiffness"]))
         if self.reasons:
@@ -110,6 +112,7 @@ class FleetPosterior:
         tested = abs(facts.largest_mm) * (1.0 + _ROUNDING)
         return replace(
             found,
+            units=facts.quantities,
             at_one_size=facts.at_one_size,
             beyond_tested=abs(deformation) > tested,
         )
@@ -169,7 +172,9 @@ class FleetPosterior:
             for place, name in enumerate(names, 1):
                 population[f"{kind}_{place}"].attrs["long_name"] = name
         stiffness = found.next_stiffness.reshape(chains, -1)
-        ahead = dataset({_NEXT: stiffness}, units={_NEXT: "N/mm"})
+        ahead = dataset(
+            {_NEXT: stiffness}, units={_NEXT: facts.quantities.stiffness_unit}
+        )
         groups = {"posterior": population, "predictions": ahead}
         return cls(xr.DataTree.from_dict(groups), facts)
 

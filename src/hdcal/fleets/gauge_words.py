@@ -10,9 +10,9 @@ from hdcal.report.words import estimate, known
 def gauge_section(found: GaugeAnswer) -> Section:
     """Return how well one reading tells gears apart, as quality people read it."""
     rows = [
-        ("repeatability: readings", found.repeatability_N, "N"),
-        ("reproducibility: mountings, operators, rigs", found.reproducibility_N, "N"),
-        ("gears and lots", found.gears_N, "N"),
+        ("repeatability: readings", found.repeatability_N, "{N}"),
+        ("reproducibility: mountings, operators, rigs", found.reproducibility_N, "{N}"),
+        ("gears and lots", found.gears_N, "{N}"),
         (
             "gauge, of all that scatters (study variation)",
             found.percent_study_variation,
@@ -28,7 +28,8 @@ def gauge_section(found: GaugeAnswer) -> Section:
     many = [f"{end:.0f}" for end in vars(found.distinct_categories).values()]
     told.append(("distinct categories", "{} ({} … {})".format(*many)))
     words = (
-        f"Of one reading of the force at {found.deformation_mm:g} mm, by standard "
+        f"Of one reading of the {{load}} at {found.deformation_mm:g} {{mm}}, by "
+        "standard "
         "deviations. Below 10 % of study variation or tolerance a gauge is usually "
         "called good, above 30 % it is not, and it should tell five categories or "
         "more. The stiffness above rests on all readings of a gear and is told far "

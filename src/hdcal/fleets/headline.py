@@ -33,7 +33,7 @@ def headline(
     if not called:
         told = (
             f"None of {total} gears is called off: they scatter by {middle} % (sd, "
-            f"{span} %) about {centre} N/mm"
+            f"{span} %) about {centre} {{N/mm}}"
         )
         far = columns["gear"][int(np.argmax(columns["probability_off"]))]
         odd = next(_off([str(far)], columns, than))
@@ -84,9 +84,9 @@ def _apart(
         # By its own readings: the law of all, which pulls it in, is not its own.
         noise = float(one["own_noise_sd_N"])
         times = noise / usual["own_noise_sd_N"]
-        yield f"has {times:.2g} times the noise of most ({noise:.2g} N)"
+        yield f"has {times:.2g} times the noise of most ({noise:.2g} {{N}})"
     if "zero" in kinds:
-        yield f"has its zero at {one['zero_N']:.2g} N"
+        yield f"has its zero at {one['zero_N']:.2g} {{N}}"
     if "shape" in kinds:
         yield _shaped(one, usual)
 
@@ -98,7 +98,7 @@ def _shaped(one: Mapping[str, Any], usual: Mapping[str, float]) -> str:
     what = {"loop_N": "a loop", "bend_N": "a bend"}[name]
     size, most = float(one[name]), usual[name]
     # As many digits of the others' as of its own: theirs may be next to nothing.
-    return f"has {what} of {size:.2g} N (others: {number(most, 10.0 * size)} N)"
+    return f"has {what} of {size:.2g} {{N}} (others: {number(most, 10.0 * size)} {{N}})"
 
 
 def far_apart(percent_apart):

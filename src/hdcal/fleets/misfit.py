@@ -142,15 +142,18 @@ def misfit_words(found: Misfit) -> Iterator[str]:
     if found.loop_N:
         way = "higher" if found.loop_N > 0.0 else "lower"
         yield (
-            f"In the mean of all gears the force is {abs(found.loop_N):.2g} N {way} "
-            "while the deformation increases than while it decreases, which counts as "
+            f"In the mean of all gears the {{load}} is {abs(found.loop_N):.2g} {{N}} "
+            f"{way} "
+            "while the {displacement} increases than while it decreases, which "
+            "counts as "
             "noise here."
         )
     if found.bend_N:
         way = "stiffens" if found.bend_N > 0.0 else "softens"
         yield (
-            f"In the mean of all gears the curve {way} with the deformation, by "
-            f"{abs(found.bend_N):.2g} N off straight lines, which counts as noise here."
+            f"In the mean of all gears the curve {way} with the {{displacement}}, by "
+            f"{abs(found.bend_N):.2g} {{N}} off straight lines, which counts as "
+            "noise here."
         )
     if found.correlation:
         yield (

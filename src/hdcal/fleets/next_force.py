@@ -1,7 +1,7 @@
 """The force that a gear to come needs at a deformation, and a capacity beside it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import ndtr
@@ -10,7 +10,8 @@ from hdcal.data.plausible import implausible
 from hdcal.errors import Finding
 from hdcal.fleets.next_gear import CONFIDENCE, new_group_sd, quantile_of_mixture
 from hdcal.notebook import Shown
-from hdcal.report.answer import Probability, Real
+from hdcal.quantities import FORCE, Quantities
+from hdcal.report.answer import Probability, Real, Units
 from hdcal.report.intervals import Interval, credible_interval
 
 # Shares of gears to come for which bounds are told.
@@ -47,6 +48,7 @@ class NextForce(Shown):
         at_one_size: whether all of this is of a gear of the gear file's sizes, as those
             that were measured differ in theirs.
         beyond_tested: whether the deformation is larger than any that was read.
+        units: names and units of what was measured; no part of the JSON answer.
     """
 
     deformation_mm: Real
@@ -56,6 +58,7 @@ class NextForce(Shown):
     probability_exceeded: Interval | None
     at_one_size: bool = False
     beyond_tested: bool = False
+    units: Units = field(default=FORCE, kw_only=True)
 
 
 def next_force(
@@ -100,7 +103,7 @@ def next_force(
 
 
 def deformation_findings(
-    deformation: float, largest: float, reach: float
+    deformation: float, largest: float, reach: float, units: Quantities
 ) -> list[Finding]:
     """Return what is wrong with the deformation that is asked about.
 
@@ -108,12 +111,14 @@ def deformation_findings(
         deformation: as read [mm].
         largest: that was read [mm].
         reach: what no gear of this radius reaches [mm].
+        units: of what was measured.
     """
     # Late: it is not needed to fit a fleet.
     from hdcal.prediction.engine.conditions import far_findings
 
-    wrong = implausible("deformation", deformation)
-    return wrong or far_findings(deformation, abs(largest), reach)
+    wrong = implausible("deformation", deformation, units.displacement)
+    unit = units.displacement_unit
+    return wrong or far_findings(deformation, abs(largest), reach, unit)
 
 
 def _sds(draws: Mapping[str, np.ndarray], size: float) -> tuple[np.ndarray, np.ndarray]:

@@ -87,7 +87,7 @@ def _far_from_theory(found: Fleet) -> Iterator[str]:
         times, way = (ratio, "stiffer") if ratio > 1.0 else (1.0 / ratio, "softer")
         yield (
             f"These gears are {times:.2g} times {way} than their theory lets expect of "
-            f"their sizes ({middle:.3g} N/mm): are units, sizes and the way the "
+            f"their sizes ({middle:.3g} {{N/mm}}): are units, sizes and the way the "
             "deformation is read right?"
         )
 
@@ -106,7 +106,7 @@ def _between_rigs(found: Fleet) -> Iterator[str]:
         return
     middle, span = estimate(apart)
     yield (
-        f"Rig {found.rigs[high]} reads {middle} % ({span} %) more force of the same "
+        f"Rig {found.rigs[high]} reads {middle} % ({span} %) more {{load}} of the same "
         f"gear than rig {found.rigs[low]}. Stiffness is told as they read it in the "
         "mean: which of them is right these readings do not tell; a gear of known "
         "stiffness, read on each, would."

@@ -30,6 +30,7 @@ from hdcal.fleets.notes import notes_of
 from hdcal.fleets.off_in import FALSE_CALLS
 from hdcal.fleets.over_time import time_answer, time_series
 from hdcal.inference.posterior_file import FILE_NAME
+from hdcal.report.document import mapped
 from hdcal.report.intervals import INTERVAL, Interval, credible_interval
 from hdcal.report.write import Report
 
@@ -39,8 +40,14 @@ _ENDS = (0.5 - 0.5 * INTERVAL, 0.5, 0.5 + 0.5 * INTERVAL)
 _TABLES = ("gears.csv", "gears.parquet")
 
 
+def gear_table(found: Fleet) -> dict[str, np.ndarray]:
+    """Return the columns of gears.csv under their names."""
+    key = found.case.units.key
+    return {key(name): column for name, column in gear_columns(found).items()}
+
+
 def gear_columns(found: Fleet) -> dict[str, np.ndarray]:
-    """Return what is known of each gear, the columns of gears.csv."""
+    """Return what is known of each gear, named after force and deformation."""
     own = found.stiffness * found.size_ratio
     low, middle, high = np.quantile(own, _ENDS, axis=0)
     columns = {
@@ -116,7 +123,8 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
     said = failed if found.reasons else headline(population, called, columns)
     # Where a force is asked for its tolerance is meant; else the largest force.
     read_at = found.readings.largest if force is None else force.deformation_mm
-    return FleetAnswer(
+    answer = FleetAnswer(
+        units=found.case.units,
         status="failed" if found.reasons else "ok",
         reasons=found.reasons,
         headline=said,
@@ -152,6 +160,7 @@ def fleet_answer(found: Fleet, force: NextForce | None = None) -> FleetAnswer:
         versions=versions(),
         data_sha256=found.case.data_sha256,
     )
+    return mapped(answer, answer.units.say)
 
 
 def _spread(
@@ -237,7 +246,8 @@ def fleet_report(
         from hdcal.fleets.figure import curves_figure, fleet_figure, time_figure
 
         series = time_series(found)
-        drawn = {"time": time_figure(series)} if series else {}
+        units = found.case.units
+        drawn = {"time": time_figure(series, units)} if series else {}
         drawn["curves"] = curves_figure(found)
         return {"gears": fleet_figure(found)} | drawn
 
@@ -246,7 +256,8 @@ def fleet_report(
         from hdcal.fleets.time_chart import time_charts
 
         series = time_series(found)
-        drawn = {"time": time_charts(series)} if series else {}
+        units = found.case.units
+        drawn = {"time": time_charts(series, units)} if series else {}
         return {} if found.reasons else {"gears": [fleet_chart(found)]} | drawn
 
     answer, columns = fleet_answer(found, force), gear_columns(found)
@@ -256,7 +267,9 @@ def fleet_report(
         answer,
         "summary.json",
         figures,
-        tables=lambda: dict.fromkeys(_TABLES, with_left_out(columns, found.case)),
+        tables=lambda: dict.fromkeys(
+            _TABLES, with_left_out(gear_table(found), found.case)
+        ),
         others=lambda: [(FILE_NAME, found.posterior.to_netcdf())],
         charts=charts,
         theory=found.case.gear.theory,

@@ -12,6 +12,7 @@ import numpy as np
 
 from hdcal.fleets.change_points import middle_sd
 from hdcal.fleets.over_time import TimeSeries
+from hdcal.quantities import Quantities
 from hdcal.report.chart import COLOURS, Chart, Series
 
 _LIMIT = 3.0
@@ -19,19 +20,19 @@ _LIMIT = 3.0
 _FORGIVEN, _REACH = 0.5, 5.0
 _TITLES = {
     "stiffness": "stiffness [%]",
-    "zero": "zero [N]",
+    "zero": "zero [{N}]",
     "noise": "noise [%]",
 }
 
 
-def time_charts(series: Sequence[TimeSeries]) -> list[Chart]:
+def time_charts(series: Sequence[TimeSeries], units: Quantities) -> list[Chart]:
     """Return a control chart of each quantity, then the sums of the stiffness."""
     sums = [_sums(one) for one in series if one.what == "stiffness"]
-    return [*map(_control, series), *sums]
+    return [*(_control(one, units) for one in series), *sums]
 
 
-def _control(series: TimeSeries) -> Chart:
-    unit = "%" if series.unit == "percent" else "N"
+def _control(series: TimeSeries, units: Quantities) -> Chart:
+    unit = "%" if series.unit == "percent" else units.load_unit
     place, limit = _place(series), _LIMIT * _sd(series)
     lines = [
         Series(f"{words} [{unit}]", place, np.full(len(place), y), "", dashed=True)
@@ -46,7 +47,7 @@ def _control(series: TimeSeries) -> Chart:
         for words, rows, hue in kinds
         if rows.any()
     ]
-    axis = _axis(series), _TITLES[series.what]
+    axis = _axis(series), units.say(_TITLES[series.what])
     return _chart(*axis, [*lines, *points], series)
 
 

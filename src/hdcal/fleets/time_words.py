@@ -28,7 +28,7 @@ def time_words(answer: TimeAnswer) -> str:
     told = f"{what} changes with the date (probability {sure})"
     way = answer.ways[answer.likeliest] / answer.probability_changed
     doubt = "" if way >= _SURE else "; which way is not settled, likeliest"
-    future = "Gears and forces to come are told as if it did not"
+    future = "Gears and {load}s to come are told as if it did not"
     if answer.likeliest == "steps":
         future += (
             f"; what holds since then is told with `--since {answer.steps[-1].before}`"
@@ -38,7 +38,7 @@ def time_words(answer: TimeAnswer) -> str:
 
 
 def _way(answer: TimeAnswer) -> str:
-    unit = "%" if answer.unit == "percent" else "N"
+    unit = "%" if answer.unit == "percent" else "{N}"
     if answer.likeliest == "steps":
         return "; ".join(_steps(answer, unit))
     if answer.likeliest == "drift":

@@ -25,7 +25,7 @@ from hdcal.inference.discrepancy import discrepancy_columns
 from hdcal.inference.distributions import sample_prior
 from hdcal.inference.identifiability import unidentified
 from hdcal.inference.padding import pad_records
-from hdcal.inference.posterior_tree import data_groups, dataset
+from hdcal.inference.posterior_tree import data_groups, dataset, units_in
 from hdcal.inference.problem import Problem
 from hdcal.inference.sample import Draws
 from hdcal.inference.sampled_problem import Sampled
@@ -101,12 +101,13 @@ def assemble(
         for name, prior in sampled.items()
     }
     units = _UNITS | {name: prior.unit for name, prior in priors.items() if prior.unit}
+    units = units_in(case.units, units)
     labels = {"run_label": case.run_labels, "specimen_label": case.specimen_labels}
     groups = {
         "posterior": dataset(values, units=units, labels=labels),
         "prior": dataset(prior_draws, units=units),
         "sample_stats": dataset(_statistics(draws)),
-        **data_groups(case.records, own.observed),
+        **data_groups(case.records, own.observed, case.units),
         "log_likelihood": dataset(own.log_likelihood),
     }
     if TOTAL in own.log_likelihood:

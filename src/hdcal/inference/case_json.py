@@ -14,6 +14,7 @@ from hdcal.data.full_scale import FullScale
 from hdcal.data.priors import Prior
 from hdcal.data.records import Geometry, Records
 from hdcal.inference.posterior_tree import COVARIATES, group_of
+from hdcal.quantities import BY_LOAD, FORCE
 
 _ABOUT = (
     *("name", "run_labels", "specimen_labels", "data_sha256", "notes"),
@@ -42,7 +43,8 @@ def describe_case(case: Case) -> str:
     gear = asdict(case.gear)
     sizes = gear["geometry"].items()
     gear["geometry"] = {n: None if isnan(size) else size for n, size in sizes}
-    return to_json({**about, "gear": gear, "known": sorted(case.records.known)})
+    about |= {"load": case.units.load, "known": sorted(case.records.known)}
+    return to_json({**about, "gear": gear})
 
 
 def restore_case(text: str, tree: xr.DataTree) -> Case:
@@ -73,7 +75,8 @@ def restore_case(text: str, tree: xr.DataTree) -> Case:
             raise ValueError(f"a {name} has no label")
     about = {name: _tuples(held[name]) for name in _ABOUT}
     records = Records(**rows, known=frozenset(held["known"]))
-    return Case(gear=Gear(**gear), records=records, **about)
+    units = BY_LOAD[held.get("load", FORCE.load)]
+    return Case(gear=Gear(**gear), records=records, units=units, **about)
 
 
 def _tuples(value: Any) -> Any:

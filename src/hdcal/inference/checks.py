@@ -157,12 +157,13 @@ def growth_check(draws: Mapping[str, np.ndarray], *, unasked: bool = False) -> C
         draws: by parameter.
         unasked: whether it is in the model because the readings show it.
     """
-    name = "readings scatter alike at any force"
+    name = "readings scatter alike at any {load}"
     share = draws.get("heteroscedastic_noise.share")
     if share is None:
         return Check(name, "passed", "the noise is of one size in this model")
     words = (
-        f"readings scatter by {np.median(share):.1%} of the force, beside σ at no force"
+        f"readings scatter by {np.median(share):.1%} of the {{load}}, beside σ at no "
+        "{load}"
     )
     words += "; every interval allows for it"
     if unasked:
@@ -183,8 +184,8 @@ def rounding_check(step: float, rounded: bool, sigma: np.ndarray) -> Check:
     return _check(
         "rounding is treated rightly",
         rounded or step <= limit,
-        f"step {step:g} N, {exact}"
-        + ("" if rounded else f"; that holds up to {limit:.3g} N"),
+        f"step {step:g} {{N}}, {exact}"
+        + ("" if rounded else f"; that holds up to {limit:.3g} {{N}}"),
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from hdcal.data.records import Records
+from hdcal.quantities import FORCE, Quantities
 
 OVER_DRAWS, OVER_ROWS = ("chain", "draw"), ("row",)
 _AXES = {
@@ -58,15 +59,23 @@ def dataset(
 
 
 def data_groups(
-    records: Records, observed: tuple[str, ...] = ("force",)
+    records: Records,
+    observed: tuple[str, ...] = ("force",),
+    units: Quantities = FORCE,
 ) -> dict[str, xr.Dataset]:
     """Return the groups of the rows: what the model explains, and the other columns."""
     columns = {name: np.asarray(getattr(records, name)) for name in COVARIATES}
     explained = {name: np.asarray(getattr(records, name)) for name in observed}
+    codes = units_in(units, {**COVARIATES, **_OBSERVED})
     return {
-        "observed_data": dataset(explained, OVER_ROWS, units=_OBSERVED),
-        "constant_data": dataset(columns, OVER_ROWS, units=COVARIATES),
+        "observed_data": dataset(explained, OVER_ROWS, units=codes),
+        "constant_data": dataset(columns, OVER_ROWS, units=codes),
     }
+
+
+def units_in(units: Quantities, codes: Mapping[str, str]) -> dict[str, str]:
+    """Return units that are written in N and mm as those of what was measured."""
+    return {name: units.unit(code) for name, code in codes.items()}
 
 
 def group_of(tree: xr.DataTree, name: str) -> xr.Dataset:

@@ -126,7 +126,8 @@ def _neighbours(left: _Left, before, sd: np.ndarray, correlation: float) -> Stru
     beyond = f" beyond the model's {correlation:.2f}" if correlation >= 0.005 else ""
     words = (
         f"Neighbouring readings err alike (correlation {alike:.2f}{beyond}): the "
-        f"intervals of stiffness and mean force are some {times:.1f} times too narrow."
+        f"intervals of stiffness and mean {{load}} are some {times:.1f} times too "
+        "narrow."
     )
     return Structure(NEIGHBOURS, p, alike * rms, words)
 
@@ -156,7 +157,8 @@ def _wild(left: _Left, records: Records, sd: np.ndarray) -> Structure:
     off = float(far[row] * sd[row])
     force, place = (float(v[row]) for v in (records.force, records.deformation))
     words = (
-        f"Reading {row + 1}, {force:.4g} N at {place:.4g} mm, lies {off:.3g} N off, "
+        f"Reading {row + 1}, {force:.4g} {{N}} at {place:.4g} "
+        f"{{mm}}, lies {off:.3g} {{N}} off, "
         f"{times[row]:.0f} times as far as readings scatter{others}: all that is said "
         "here may be off."
     )
@@ -172,7 +174,8 @@ def _scatter(left: _Left, records: Records, sd: np.ndarray) -> Structure:
         for rows in (far <= thirds[0], far >= thirds[1])
     )
     words = (
-        f"Readings scatter more at larger forces ({near:.2g} N in the lower third, "
-        f"{farther:.2g} N in the upper one): bounds at large forces are too low."
+        f"Readings scatter more at larger {{load}}s ({near:.2g} {{N}} in the "
+        f"lower third, {farther:.2g} {{N}} in the upper one): bounds at large "
+        "{load}s are too low."
     )
     return Structure(SCATTER, growth_p_value(square, far), farther - near, words)

@@ -97,17 +97,17 @@ def shapes_of(records: Records, reference_temperature: float) -> Shapes:
     rise = np.asarray(records.temperature) - reference_temperature
     rows = np.arange(len(scaled), dtype=float)
     drift = "with temperature: the zero of the reading drifts with it"
-    slope = "with temperature in proportion to deformation"
+    slope = "with temperature in proportion to {displacement}"
     shapes: Shapes = {
         "curvature": (
             scaled * np.abs(scaled),
-            "bend upwards (convex): the measured force grows faster than the model",
-            "bend downwards (concave): the measured force grows slower than the model",
+            "bend upwards (convex): the measured {load} grows faster than the model",
+            "bend downwards (concave): the measured {load} grows slower than the model",
         ),
         "end": (
             scaled**4,
-            "turn up at the largest deformations",
-            "turn down at the largest deformations",
+            "turn up at the largest {displacement}s",
+            "turn down at the largest {displacement}s",
         ),
         "direction": (
             np.asarray(records.sense),
@@ -162,7 +162,7 @@ def find_structure(
         shape = best.coefficient * best.remainder[: len(sd)] * sd
         rms = float(np.sqrt(np.mean(shape**2)))
         way = up if best.coefficient > 0.0 else down
-        words = f"The residuals {way} ({rms:.2g} N rms)."
+        words = f"The residuals {way} ({rms:.2g} {{N}} rms)."
         scale = float(best.remainder @ column)
         size = best.coefficient / scale, best.error / scale
         structures.append(Structure(best.name, p, rms, words, *size))

@@ -24,6 +24,7 @@ from hdcal.inference.residual_shapes import (
 from hdcal.inference.serial_correlation import CORRELATION, previous_rows
 from hdcal.inference.values import correlation_of, predict_rows
 from hdcal.notebook import Shown
+from hdcal.quantities import FORCE, Quantities
 
 # Draws that the fitted reading is averaged over: its error is then a tenth of the
 # posterior's own.
@@ -52,6 +53,7 @@ class Residuals(Shown):
         standardised: residual over the noise sd [-].
         structure: shapes that noise would rarely show.
         noise: in which ways the rest is not the noise that the model has.
+        units: names and units of what was measured.
     """
 
     deformation: np.ndarray
@@ -64,6 +66,7 @@ class Residuals(Shown):
     standardised: np.ndarray
     structure: tuple[Structure, ...]
     noise: tuple[Structure, ...]
+    units: Quantities = FORCE
 
 
 def residuals(posterior: Posterior) -> Residuals:
@@ -84,6 +87,14 @@ def residuals(posterior: Posterior) -> Residuals:
     structure = find_structure(whitened, near.sd, noise)
     shapes = [whitened.shapes[shape.name][0] for shape in structure]
     rest = replace(whitened, absorbed=np.column_stack([whitened.absorbed, *shapes]))
+    faults = noise_faults(
+        rest,
+        records,
+        near.sd,
+        rounded=float(problem.step) > float(np.median(near.sd)),
+        mixed=any(effect.mixture for effect in posterior.effects),
+        correlation=float(correlation_of(centre)),
+    )
     return Residuals(
         deformation=np.asarray(records.deformation),
         temperature=np.asarray(records.temperature),
@@ -93,16 +104,17 @@ def residuals(posterior: Posterior) -> Residuals:
         fitted=fitted,
         residual=residual,
         standardised=residual / near.sd,
-        structure=structure,
-        noise=noise_faults(
-            rest,
-            records,
-            near.sd,
-            rounded=float(problem.step) > float(np.median(near.sd)),
-            mixed=any(effect.mixture for effect in posterior.effects),
-            correlation=float(correlation_of(centre)),
-        ),
+        structure=_in_words(structure, posterior),
+        noise=_in_words(faults, posterior),
+        units=posterior.case.units,
     )
+
+
+def _in_words(
+    found: tuple[Structure, ...], posterior: Posterior
+) -> tuple[Structure, ...]:
+    units = posterior.case.units
+    return tuple(replace(one, words=units.say(one.words)) for one in found)
 
 
 @jit

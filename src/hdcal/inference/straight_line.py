@@ -75,14 +75,15 @@ def line_check(records: Records, stiffness: np.ndarray, *, sized: bool) -> Check
     """
     name, line = "the stiffness is that of a straight line", robust_line(records)
     if line is None:
-        return Check(name, "note", "no slope: the deformation does not change")
+        return Check(name, "note", "no slope: the {displacement} does not change")
     low, middle, high = np.quantile(stiffness, [0.025, 0.5, 0.975])
     apart = abs(middle - line.slope)
     near = apart <= (high - low) / 2.0 + line.half_width
     near = near or apart <= LEAST_DIFFERENCE * abs(line.slope)
     words = (
-        f"the model has {middle:.4g} N/mm ({low:.4g} to {high:.4g}), a robust straight "
-        f"line through the same readings {line.slope:.4g} ± {line.half_width:.2g} N/mm"
+        f"the model has {middle:.4g} {{N/mm}} ({low:.4g} to {high:.4g}), a "
+        f"robust straight line through the same readings {line.slope:.4g} ± "
+        f"{line.half_width:.2g} {{N/mm}}"
     )
     near = near and (sized or line.slope > line.half_width)
     if not near:

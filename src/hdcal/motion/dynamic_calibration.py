@@ -7,7 +7,7 @@ from functools import partial
 import jax
 import numpy as np
 
-from hdcal.data.case import Case, Theory, require_case
+from hdcal.data.case import Case, Theory, require_case, require_force
 from hdcal.errors import Finding, InputError
 from hdcal.exported import jit
 from hdcal.inference import laplace
@@ -83,6 +83,7 @@ def calibrate_dynamic(
         InputError: the record or an effect is none that the model can be held against.
     """
     require_case(case)
+    require_force(case, "calibrate with --dynamic")
     check_settings(chains, warmup, draws, seed)
     loss_effects(effects or ())
     check_motion(case)

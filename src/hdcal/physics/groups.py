@@ -7,6 +7,8 @@ from dataclasses import dataclass
 class Group:
     """What can be said and done before the one effect is known.
 
+    The texts name {load} and {displacement}, for `Quantities.say`.
+
     Attributes:
         meaning: what the causes have in common, to follow "that is".
         remedy: what helps against any of them.
@@ -20,16 +22,16 @@ class Group:
 
 GROUPS = {
     "curve up": Group(
-        "the curve stiffens with the deformation",
+        "the curve stiffens with the {displacement}",
         "preload or seat the gear before the first reading, look for a stop in reach, "
         "and have the displacement gauge calibrated over its range",
-        "finer steps at small deformations, then a run beyond the range",
+        "finer steps at small {displacement}s, then a run beyond the range",
     ),
     "curve down": Group(
-        "the curve softens with the deformation",
+        "the curve softens with the {displacement}",
         "stay in the lower half of the load cell's range, and allow for the softening "
         "of the gear's own geometry",
-        "the same forces on a cell of twice the range; unloading shows a yield",
+        "the same {load}s on a cell of twice the range; unloading shows a yield",
     ),
     "loop": Group(
         "loading and unloading differ",
@@ -39,7 +41,7 @@ GROUPS = {
         "small inner loops, and a second loading of the same specimen",
     ),
     "rate or time": Group(
-        "the force depends on speed or on time",
+        "the {load} depends on speed or on time",
         "read at one speed and after the same wait, and reset the amplifier before "
         "each run",
         "one run four times as fast and one hold of a minute",
@@ -67,12 +69,12 @@ GROUPS = {
     ),
     "screw": Group(
         "the error repeats along the stroke",
-        "read the deformation by a gauge of its own instead of the screw",
+        "read the {displacement} by a gauge of its own instead of the screw",
         "steps of an eighth of the pitch over two turns",
     ),
     "rig": Group(
         "the rig gives way beside the gear",
-        "measure the deformation between the points of load",
+        "measure the {displacement} between the points of load",
         "the bare rig against a block of steel",
     ),
     "noise": Group(

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
+from hdcal.quantities import FORCE, Quantities
+from hdcal.report.result_schema import schema_with_units
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -23,6 +26,17 @@ class Promise:
         return {"anyOf": [schema, {"type": "null"}]} if self._nullable else schema
 
 
+class _Unwritten:
+    """What a generated schema leaves out."""
+
+    def __get_pydantic_json_schema__(self, core, handler) -> dict:
+        from pydantic_core import PydanticOmit
+
+        raise PydanticOmit
+
+
+# Names and units of what was measured, which an answer holds and does not write.
+Units = Annotated[Quantities, _Unwritten()]
 # A float that is null in JSON where it is not finite.
 Real = Annotated[float, Promise(nullable=True)]
 # Sums of many probabilities may end a rounding error above one.
@@ -44,6 +58,7 @@ class Answer:
         reasons: why it may not.
         headline: the answer in one sentence.
         next_step: what to do next in one sentence, or None.
+        units: names and units of what was measured; no part of the JSON answer.
     """
 
     # What the parts of an answer promise each other, as JSON Schema.
@@ -60,15 +75,22 @@ class Answer:
     reasons: Sentences
     headline: Words
     next_step: Words | None
+    units: Units = FORCE
 
 
-def json_schema(answer: type[Answer]) -> dict:
-    """Return the JSON schema of an answer, generated from its class."""
+def json_schema(answer: type[Answer], units: Quantities = FORCE) -> dict:
+    """Return the JSON schema of an answer, generated from its class.
+
+    Args:
+        answer: its class.
+        units: names and units of what was measured.
+    """
     from pydantic import TypeAdapter
 
     found = TypeAdapter(answer).json_schema(mode="serialization")
     rules = {"allOf": list(answer.RULES)} if answer.RULES else {}
-    return {"$schema": DIALECT, **_as_written(found), **rules}
+    written = schema_with_units(_as_written(found), units)
+    return {"$schema": DIALECT, **written, **rules}
 
 
 def _as_written(schema: Any) -> Any:

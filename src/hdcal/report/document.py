@@ -5,11 +5,12 @@ A document holds texts and the names of figures, no numbers and no files: `html_
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, ClassVar, Literal, TypeVar, cast
 
 from hdcal.data.theory_names import SPRING
+from hdcal.quantities import Quantities
 
 # Sentences beside the headline: the first screen has three in all.
 MOST_SAID = 2
@@ -256,14 +257,28 @@ def answer_spoken_of(answer: A, theory: str) -> A:
 
 def _of_part(held: Any) -> Any:
     """Return a document or a piece of one, in other words."""
+    return mapped(held, _part_words)
+
+
+def _part_words(text: str) -> str:
+    told = text.replace("influence coefficient K", "stiffness K")
+    return _GEAR.sub(lambda g: ("P" if g[1] == "G" else "p") + f"art{g[2]}", told)
+
+
+def mapped(held: Any, change: Callable[[str], str]) -> Any:
+    """Return a document, a result or a piece of one with its texts changed.
+
+    Args:
+        held: of dataclasses, lists and texts.
+        change: returns a text in other words.
+    """
     if isinstance(held, str):
-        told = held.replace("influence coefficient K", "stiffness K")
-        return _GEAR.sub(lambda g: ("P" if g[1] == "G" else "p") + f"art{g[2]}", told)
-    if is_dataclass(held) and not isinstance(held, type):
+        return change(held)
+    if is_dataclass(held) and not isinstance(held, type | Quantities):
         # A picture is called for by its name.
         kept = {"name"} if isinstance(held, Picture) else set()
         changed = {f.name for f in fields(held)} - kept
-        return replace(held, **{n: _of_part(getattr(held, n)) for n in changed})
+        return replace(held, **{n: mapped(getattr(held, n), change) for n in changed})
     if isinstance(held, list | tuple | frozenset):
-        return type(held)(map(_of_part, held))
+        return type(held)(mapped(each, change) for each in held)
     return held

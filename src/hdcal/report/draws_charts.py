@@ -70,7 +70,7 @@ def _density_panel(posterior: Posterior, name: str) -> Panel:
         dash="dashed",
         width=1.0,
     )
-    name = label(name, posterior.theory)
+    name = label(name, posterior.theory, posterior.case.units)
     return Panel(
         x=f"{name} [{unit(shown)}]" if unit(shown) else name,
         y="",
@@ -89,7 +89,7 @@ def rank_chart(posterior: Posterior) -> Chart:
         _rank_panel(
             draws[name].values,
             f"rank of the draw (R-hat {found.rhat:.3f})",
-            label(name, posterior.theory),
+            label(name, posterior.theory, posterior.case.units),
         )
         for name, found in posterior.diagnoses.items()
     ]

@@ -43,6 +43,11 @@ class ParameterEstimate(Interval):
 
 def unit_of(posterior: Posterior, name: str) -> tuple[str, float]:
     """Return the unit in which a parameter is shown, and its factor."""
+    unit, factor = _code_unit(posterior, name)
+    return posterior.case.units.unit(unit), factor
+
+
+def _code_unit(posterior: Posterior, name: str) -> tuple[str, float]:
     if name == "K" and posterior.theory == SPRING:
         return "N/mm", 1.0
     if name in UNITS:

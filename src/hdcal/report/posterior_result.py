@@ -127,7 +127,8 @@ class PosteriorResult(Result):
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
         """The stiffness as read, which is no parameter, and the parameters."""
-        stiffness = Quantity(**self.stiffness_N_per_mm.model_dump(), unit="N/mm")
+        unit = self.units.stiffness_unit
+        stiffness = Quantity(**self.stiffness_N_per_mm.model_dump(), unit=unit)
         return {"stiffness": stiffness, **self.parameters}
 
     @property
@@ -156,8 +157,8 @@ class PosteriorResult(Result):
         """Label, prior and source of each parameter."""
         return [
             (
-                label(name, self.gear.theory),
-                prior_words(name, prior),
+                label(name, self.gear.theory, self.units),
+                prior_words(name, prior, self.units),
                 prior.source or "the gear file",
             )
             for name, prior in self.posterior.priors.items()
@@ -173,6 +174,7 @@ def posterior_fields(posterior: Posterior) -> dict[str, Any]:
     diverging = group_of(posterior.tree, "sample_stats")["diverging"]
     return {
         "reasons": posterior.reasons,
+        "units": case.units,
         "part": "part" if posterior.theory == SPRING else "gear",
         "warnings": tuple(capital(c.words) for c in checks if c.outcome == "warning"),
         "parameters": {

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from hdcal.inference.checks import Check
 from hdcal.inference.diagnostics import CLEAR_CONTRACTION, MIN_CONTRACTION
 from hdcal.inference.posterior import Posterior
+from hdcal.quantities import FORCE, Quantities
 from hdcal.report.document import Picture, Section, Table, Tag, Text, Tone
 from hdcal.report.parameters import ParameterEstimate
 from hdcal.report.words import estimate, label, percent, prior_words, unit
@@ -47,18 +48,21 @@ def parameter_section(
     return Section("Parameters", blocks, brief)
 
 
-def parameter_table(found: Mapping[str, ParameterEstimate]) -> Table:
+def parameter_table(
+    found: Mapping[str, ParameterEstimate], units: Quantities = FORCE
+) -> Table:
     """Return estimates as a table.
 
     Args:
         found: from `parameter_estimates`.
+        units: names and units of what was measured.
     """
     gained, sizes = "gained from data", "ESS bulk / tail"
     columns = ["parameter", "median", "95 % interval", "unit", "driven by"]
     columns += [gained, "R-hat", sizes]
     rows = [
         [
-            label(name),
+            label(name, units=units),
             *estimate(one),
             unit(one.unit),
             driver_tag(one.driven_by),

@@ -31,7 +31,7 @@ def provenance_rows(posterior: Posterior, command: str) -> list[tuple[str, str]]
 
 def data_rows(case: Case) -> list[tuple[str, str]]:
     """Return what was measured, as pairs of name and words."""
-    records, gear = case.records, case.gear
+    records, gear, units = case.records, case.gear, case.units
 
     def ends(values, shown: str) -> str:
         low, high = number(float(np.min(values))), number(float(np.max(values)))
@@ -43,10 +43,12 @@ def data_rows(case: Case) -> list[tuple[str, str]]:
     warmth = ends(records.temperature, "°C")
     if "temperature" not in records.known:
         warmth += ", not measured: the reference temperature"
+    along = ends(records.deformation, units.displacement_unit)
+    reading = f", {gear.reading}" if units.is_force else ""
     rows = [
         ("rows", str(len(records.force))),
-        ("deformation", f"{ends(records.deformation, 'mm')}, {gear.reading}, as read"),
-        ("force", f"{ends(records.force, 'N')}, as read"),
+        (units.displacement, f"{along}{reading}, as read"),
+        (units.load, f"{ends(records.force, units.load_unit)}, as read"),
         ("temperature", warmth),
         ("direction", ", ".join(f"{n} {word}" for word, n in count.items() if n)),
         ("runs", str(len(case.run_labels) or 1)),

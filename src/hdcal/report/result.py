@@ -10,10 +10,18 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import AliasGenerator, BaseModel, ConfigDict, Field, computed_field
+from pydantic import (
+    AliasGenerator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    InstanceOf,
+    computed_field,
+)
 
+from hdcal.quantities import FORCE, Quantities
 from hdcal.report.chart_spec import RED, Chart
-from hdcal.report.result_schema import DIALECT, ResultSchema
+from hdcal.report.result_schema import DIALECT, ResultSchema, schema_with_units
 from hdcal.report.sentences import rendered
 
 if TYPE_CHECKING:
@@ -108,6 +116,28 @@ class Item(BaseModel):
         return found
 
 
+def _with_units(value: Any, plain: Any, units: Quantities) -> Any:
+    """Return the JSON form of a value with its fields named after what was measured.
+
+    Args:
+        value: an item, or several of them.
+        plain: its JSON form.
+        units: names and units of what was measured.
+    """
+    if isinstance(value, Item):
+        names = {_json_name(name): name for name in type(value).model_fields}
+        held = {key: getattr(value, str(names.get(key, key))) for key in plain}
+        return {units.key(k): _with_units(held[k], plain[k], units) for k in plain}
+    if isinstance(value, Mapping):
+        return {k: _with_units(each, plain[k], units) for k, each in value.items()}
+    if isinstance(value, tuple):
+        return [
+            _with_units(each, item, units)
+            for each, item in zip(value, plain, strict=True)
+        ]
+    return plain
+
+
 class Interval(Item):
     """Median and ends of an equal-tailed interval."""
 
@@ -141,6 +171,7 @@ class Result(Item):
         table: name of the attribute that holds the main table: items, or items by name.
         reasons: why the result must not be used; empty if it may be.
         part: the word for what was measured.
+        units: names and units of what was measured.
     """
 
     model_config = ConfigDict(json_schema_extra={"allOf": [_RULE]})
@@ -149,6 +180,7 @@ class Result(Item):
 
     reasons: tuple[Words, ...] = ()
     part: Literal["gear", "part"] = Field(default="gear", exclude=True)
+    units: InstanceOf[Quantities] = Field(default=FORCE, exclude=True)
 
     @computed_field
     @property
@@ -190,6 +222,7 @@ class Result(Item):
         values = {
             "result": self,
             "part": self.part,
+            "units": self.units,
             "command": command,
             "on_page": on_page,
         }
@@ -206,7 +239,7 @@ class Result(Item):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result as a JSON-compatible dict."""
-        found = json.loads(self.model_dump_json())
+        found = _with_units(self, json.loads(self.model_dump_json()), self.units)
         return {name: found.pop(name) for name in _FIRST} | found
 
     def to_json(self) -> str:
@@ -214,12 +247,16 @@ class Result(Item):
         return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"
 
     @classmethod
-    def json_schema(cls) -> dict[str, Any]:
-        """Return the JSON Schema of what `to_json` returns."""
+    def json_schema(cls, units: Quantities = FORCE) -> dict[str, Any]:
+        """Return the JSON Schema of what `to_json` returns.
+
+        Args:
+            units: names and units of what was measured.
+        """
         found = cls.model_json_schema(
             mode="serialization", schema_generator=ResultSchema
         )
-        return {"$schema": DIALECT, **found}
+        return {"$schema": DIALECT, **schema_with_units(found, units)}
 
     def to_frame(self) -> "pd.DataFrame":
         """Return the main table; columns without any value are left out."""
@@ -233,7 +270,7 @@ class Result(Item):
         )
         names = dict.fromkeys(name for row in rows for name in row)
         kept = [n for n in names if any(row.get(n) is not None for row in rows)]
-        return pd.DataFrame(rows, columns=kept)
+        return pd.DataFrame(rows, columns=kept).rename(columns=self.units.key)
 
     def to_datatree(self) -> "xr.DataTree":
         """Return the main table as xarray's DataTree, over the dimension `row`."""

@@ -4,7 +4,26 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
+from hdcal.quantities import Quantities
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def schema_with_units(schema: Any, units: Quantities) -> Any:
+    """Return a schema whose fields are named after what was measured."""
+    if isinstance(schema, list):
+        return [schema_with_units(item, units) for item in schema]
+    if not isinstance(schema, dict):
+        return schema
+    found = {key: schema_with_units(item, units) for key, item in schema.items()}
+    if isinstance(found.get("properties"), dict):
+        found["properties"] = {
+            units.key(name): item for name, item in found["properties"].items()
+        }
+        found["required"] = [*map(units.key, found.get("required", ()))]
+    if isinstance(found.get("unit"), str):
+        found["unit"] = units.unit(found["unit"])
+    return found
 
 
 class ResultSchema(GenerateJsonSchema):

@@ -17,7 +17,7 @@ from jinja2.runtime import Context
 from markupsafe import Markup
 
 from hdcal.report.plain import printable
-from hdcal.report.words import capital, label, newton, number, percent, unit
+from hdcal.report.words import capital, label, load, number, percent, unit
 
 _PUNCTUATION = re.compile(r"([!-/:-@\[-`{-~])")
 
@@ -63,7 +63,7 @@ def _environment(plain: bool) -> Environment:
         "code": code,
         "label": label,
         "median": median,
-        "newton": newton,
+        "load": load,
         "number": number,
         "percent": percent,
         "span": span,

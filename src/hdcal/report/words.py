@@ -6,6 +6,7 @@ from typing import TypeGuard
 
 from hdcal.data.prior import FAMILIES, Prior
 from hdcal.data.theory_names import SPRING
+from hdcal.quantities import FORCE, Quantities
 from hdcal.report.intervals import Interval
 from hdcal.report.units import UNITS
 
@@ -13,10 +14,10 @@ LABELS = {
     "K": "influence coefficient K",
     "E0": "Young's modulus E₀",
     "alpha": "loss of modulus per kelvin α",
-    "force_offset": "force offset b",
-    "deformation_offset": "deformation offset ω₀",
+    "force_offset": "{load} offset b",
+    "deformation_offset": "{displacement} offset ω₀",
     "sigma": "reading noise σ",
-    "force_gain": "gain of the force gauge",
+    "force_gain": "gain of the {load} gauge",
     "deformation_gain": "gain of the displacement gauge",
     "temperature_offset": "offset of the thermometer",
     "run_offset_sd": "spread of zeros between runs",
@@ -26,9 +27,9 @@ LABELS = {
     "gap_length": "length of the leftover discrepancy",
     "mass": "moved mass m",
     "damping_ratio": "damping ratio ζ",
-    "initial_deformation": "deformation at the first row",
+    "initial_deformation": "{displacement} at the first row",
     "initial_velocity": "speed at the first row",
-    "deformation_sigma": "noise of the deformation reading",
+    "deformation_sigma": "noise of the {displacement} reading",
 }
 _FAMILY_WORDS = {
     "fixed": "exactly {0}",
@@ -98,9 +99,10 @@ def with_unit(text: str, name: str) -> str:
     return f"{text} {unit(name)}".rstrip()
 
 
-def prior_words(name: str, prior: Prior) -> str:
+def prior_words(name: str, prior: Prior, units: Quantities = FORCE) -> str:
     """Return a prior in words, in the units of the summary."""
     shown, factor = UNITS.get(name, (prior.unit, 1.0))
+    shown = units.unit(shown)
     texts = []
     for part, value in zip(FAMILIES[prior.family], prior.numbers, strict=True):
         plain = float(value) * (1.0 if part in _PURE else factor)
@@ -110,14 +112,15 @@ def prior_words(name: str, prior: Prior) -> str:
     return with_unit(_FAMILY_WORDS[prior.family].format(*texts), shown)
 
 
-def label(name: str, theory: str = "") -> str:
+def label(name: str, theory: str = "", units: Quantities = FORCE) -> str:
     """Return what a parameter is called on paper, under some theory."""
     if name == "K" and theory == SPRING:
-        return "stiffness K"
+        return f"{units.stiffness} K"
     effect, dot, parameter = name.partition(".")
     if dot:
         return f"{effect}: {parameter}".replace("_", " ")
-    return LABELS.get(name, name.replace("_", " "))
+    named = LABELS.get(name, name.replace("_", " "))
+    return named.format(load=units.load, displacement=units.displacement)
 
 
 def capital(text: str) -> str:
@@ -164,9 +167,10 @@ def percent_span(entry: Interval) -> str:
     return f"{percent(entry.median)} ({ends})"
 
 
-def newton(value: float | None) -> str:
-    """Return a force with two digits, or all those before the point."""
+def load(value: float | None, units: Quantities = FORCE) -> str:
+    """Return a force or torque with two digits, or all those before the point."""
     if not known(value):
-        return "– N"
+        return f"– {units.load_unit}"
     rounded = float(f"{value:.2g}")
-    return f"{value:.0f} N" if abs(rounded) >= 10.0 else f"{rounded:g} N"
+    text = f"{value:.0f}" if abs(rounded) >= 10.0 else f"{rounded:g}"
+    return f"{text} {units.load_unit}"

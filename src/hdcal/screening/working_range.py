@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
+from hdcal.quantities import Quantities
 from hdcal.screening.result import OUTSIDE, Observation, Screening, stretches
 
 _ENDS = re.compile(r"\s*([^:%\s]+)\s*(%?)\s*:\s*([^:%\s]+)\s*(%?)\s*")
 FORM = (
-    "Write it like 0.1:0.6 [mm], or 10%:40% of the largest force; or straight, for "
+    "Write it like 0.1:0.6, or 10%:40% of the largest force; or straight, for "
     "the longest straight part; or all"
 )
 STRAIGHT = "straight"
@@ -32,12 +33,14 @@ class WorkingRange:
     high: float
     unit: Literal["mm", "%", "straight"]
 
-    def __str__(self) -> str:
+    def words(self, units: Quantities) -> str:
+        """Return the range in words."""
         if math.isinf(self.high):
             return "all of the curve"
-        if self.unit != "%":
-            return f"{self.low:g} to {self.high:g} mm"
-        return f"{self.low:g} to {self.high:g} % of the largest force"
+        if self.unit == "%":
+            ends = f"{self.low:g} to {self.high:g} %"
+            return f"{ends} of the largest {units.load}"
+        return f"{self.low:g} to {self.high:g} {units.displacement_unit}"
 
     def inside(self, deformation: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Tell which rows of a run lie in the range.
@@ -79,13 +82,16 @@ def read_range(text: str) -> WorkingRange:
     return WorkingRange(low, high, unit)
 
 
-def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Screening:
+def in_range(
+    screening: Screening, wanted: WorkingRange, run: np.ndarray, units: Quantities
+) -> Screening:
     """Return a screening in which the rows outside the range are cut.
 
     Args:
         screening: of the whole record.
         wanted: the range.
         run: index of each row's run, shape (n,).
+        units: of what was measured.
     """
     part = screening.straight
     if wanted.unit == STRAIGHT and part is not None:
@@ -98,7 +104,7 @@ def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Scr
             inside[rows] = wanted.inside(x, y)
     outside = np.flatnonzero(screening.kept & ~inside)
     if not outside.size:
-        return replace(screening, working_range=str(wanted))
+        return replace(screening, working_range=wanted.words(units))
     segment = screening.segment.copy()
     segment[outside] = OUTSIDE
     observed = Observation(
@@ -113,5 +119,5 @@ def in_range(screening: Screening, wanted: WorkingRange, run: np.ndarray) -> Scr
         observations=(*screening.observations, observed),
         segment=segment,
         kept=inside,
-        working_range=str(wanted),
+        working_range=wanted.words(units),
     )

@@ -11,7 +11,7 @@ import numpy as np
 from hdcal.calibration.calibrate import check_effect_priors
 from hdcal.cli.cluster import completed_on_cluster
 from hdcal.cli.processes import run_all
-from hdcal.data.case import Case
+from hdcal.data.case import Case, require_force
 from hdcal.data.measurements.bad_gears import offer
 from hdcal.data.plausible import implausible
 from hdcal.diagnosis.library import library_of
@@ -158,6 +158,7 @@ def causes(
         effects = wrong.attempt(library_of, library)
     assert effects is not None
     readings = read_fleet(data, gear, columns=columns, skip_bad=skip_bad)
+    require_force(readings.case, "causes")
     case, gears = gears_alone(readings, effects, skip_bad=skip_bad, seed=seed)
     # What differs between mountings and between gears is told of the fleet.
     effects = {n: e for n, e in effects.items() if not e.needs & _OF_FLEETS}

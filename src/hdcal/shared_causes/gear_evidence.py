@@ -11,7 +11,6 @@ from hdcal.data.case import Case
 from hdcal.data.records import Records
 from hdcal.data.scatter import require_scatter
 from hdcal.diagnosis.model_posterior import carried, log_priors
-from hdcal.diagnosis.repeats import without_repeats
 from hdcal.diagnosis.weighing import weigh
 from hdcal.errors import Finding, Findings, quoted
 from hdcal.evidence.case_evidence import UNKNOWN, CaseEvidence
@@ -126,7 +125,7 @@ def weigh_gear(place: int, gear: Case, library: Mapping, seed: int):
         seed: of the draws of shares.
     """
     rng = np.random.default_rng(seed)
-    evidence = weigh(without_repeats(gear)[0], library, rng).evidence
+    evidence = weigh(gear, library, rng).evidence
     return place, _by_cause(evidence)
 
 

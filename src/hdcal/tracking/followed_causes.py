@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from hdcal.data.case import require_force
 from hdcal.inference.residuals import misfits
 from hdcal.prediction.engine.causes import Cause, averaging_words, causes_of, likeliest
 from hdcal.prediction.engine.models import Models
@@ -27,6 +28,7 @@ def followed_causes(models: Models, forget: float) -> tuple[Pooled, list[str]]:
         probability cannot be followed.
     """
     causes = causes_of(models)
+    require_force(causes[0].posterior.case, "track")
     if len(causes) == 1:
         return pool_causes(causes), averaging_words(causes) + _unexplained(causes)
     kept = [cause for cause in causes if _can_be_followed(cause, forget)]

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from hdcal.data.case import Case
+from hdcal.report.axes import displacement_axis
 from hdcal.report.chart_spec import (
     CYCLE,
     GREEN,
@@ -41,8 +42,8 @@ def readings_chart(case: Case) -> Chart:
     several = max(len(case.specimen_labels), len(case.run_labels)) > 1
     marks = [*(_members(case) if several or found is None else _kept(found))]
     panel = Panel(
-        x=f"deformation as read ({case.gear.reading}) [mm]",
-        y="force as read [N]",
+        x=displacement_axis(case),
+        y=f"{case.units.load} as read [{case.units.load_unit}]",
         marks=[*marks, *([] if found is None else left_out(found))],
         title=f"{case.name}: readings",
     )

@@ -189,6 +189,7 @@ def check(case: Case, *, each_effect: bool = False) -> Check:
         implausible_K=_implausible_K(case),
         each_effect=each_effect,
         part="part" if gear.theory == SPRING else "gear",
+        units=case.units,
     )
 
 

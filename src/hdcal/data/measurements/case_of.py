@@ -24,6 +24,10 @@ from hdcal.data.measurements.notes import (
 from hdcal.data.measurements.screened import asked_range, screened, screening_notes
 from hdcal.data.priors import rig_priors
 from hdcal.data.records import Records
+from hdcal.data.theory_names import SPRING
+from hdcal.data.turning_rows import sense_at_turns
+from hdcal.errors import Finding, InputError
+from hdcal.quantities import TORQUE
 from hdcal.screening.result import Screening
 
 MANY = 3  # labels from which a spread between runs or specimens can be estimated
@@ -74,6 +78,8 @@ def screened_case(
         notes: on how that was found.
         name: of the case.
     """
+    if measured.units == TORQUE:
+        _require_torsion(gear, name)
     (specimen, gears), (run, runs) = measured.gears, measured.runs
     motion = _motion(measured, run, screening)
     further, of_labels = further_labels(measured.frame, specimen, gears, run, runs)
@@ -81,7 +87,7 @@ def screened_case(
     mounted = len(measured.assign(zero=np.zeros(len(run), int)).runs[1])
     of_record += mountings_note(measured.stated, mounted, len(gears))
     of_record += rigs_note(measured.get("rig", ()), len(gears))
-    of_record += [] if screening is None else screening_notes(screening)
+    of_record += [] if screening is None else screening_notes(screening, measured.units)
     if screening is not None and screening.deformation_sd > 0.0:
         moved, force = without_scatter(measured["deformation"], measured["force"], run)
         measured = measured.assign(deformation=moved, force=force)
@@ -91,11 +97,17 @@ def screened_case(
         cutoff = gear.source.get("rig", {}).get("filter_Hz")
         prior = correlation_prior(cutoff, x, run, measured.get("time"))
         gear = replace(gear, scale_priors=gear.scale_priors | {_CORRELATION: prior})
+    scale = scale_of(force, x, gear.reading)
+    gear = at_full_scale(gear, scale)
+    if measured.units == TORQUE:
+        # The shipped prior is that of a contact, in mm.
+        zero = {"deformation_offset": scale.own(gear.priors["deformation_offset"])}
+        gear = replace(gear, priors=gear.priors | zero)
     cut = screening is not None and len(gears) == 1
     every = [*measured.notes, *notes, *of_record, *of_labels]
     return Case(
         name=name,
-        gear=at_full_scale(gear, scale_of(force, x, gear.reading)),
+        gear=gear,
         records=_records(measured, gear, motion, run, specimen),
         run_labels=runs,
         specimen_labels=gears,
@@ -105,17 +117,38 @@ def screened_case(
         left_out=measured.left_out,
         excluded=screening.excluded if cut and screening is not None else (),
         screening=screening,
+        units=measured.units,
         **further,
     )
+
+
+def _require_torsion(gear: Gear, name: str) -> None:
+    """Refuse a gear file that speaks of forces where torques were measured.
+
+    Raises:
+        InputError: it does.
+    """
+    if gear.theory != SPRING:
+        words = f"torques over angles are no readings of the theory {gear.theory}"
+        remedy = "Leave the gear file out, or state the theory spring in it"
+        raise InputError([Finding(name, words, remedy)])
+    stated = gear.source.get("measurement", {})
+    lengths = [key for key in stated if key.endswith(("_N", "_mm", "_calibration"))]
+    wrong = [*lengths, *(key for key in ("priors", "rig") if key in gear.source)]
+    if wrong:
+        words = f"the gear file states {', '.join(wrong)} of forces and deformations, "
+        words += "and the readings are torques over angles"
+        raise InputError([Finding(name, words, "Leave these entries out")])
 
 
 def _motion(
     measured: Measurements, run: np.ndarray, screening: Screening | None
 ) -> Motion:
     hidden = screening is not None and screening.trembling
-    return derive_motion(
-        measured["deformation"], run, measured.get("time"), hidden=hidden
-    )
+    x = measured["deformation"]
+    motion = derive_motion(x, run, measured.get("time"), hidden=hidden)
+    sense = sense_at_turns(motion.sense, x, measured["force"], run)
+    return replace(motion, sense=sense)
 
 
 def _records(

@@ -35,9 +35,9 @@ def check_whole(
         words = f"holds {filled} rows of readings"
         findings.add(words, f"At least {fewest} are needed")
     if "deformation" in frame and is_constant(frame["deformation"].to_numpy()):
-        words = "the deformation is constant, so no stiffness can be seen"
-        header = used["deformation"].header
-        findings.add(words, "Measure at several", None, header)
+        column = used["deformation"]
+        words = f"the {column.quantity} is constant, so no stiffness can be seen"
+        findings.add(words, "Measure at several", None, column.header)
 
 
 def is_constant(deformation: np.ndarray) -> bool:
@@ -57,12 +57,13 @@ def check_rows(
         findings: of the source.
     """
     for quantity in filter(frame.columns.__contains__, DIMENSIONS):
-        known, values = RANGES[quantity], frame[quantity].to_numpy()
+        column, values = used[quantity], frame[quantity].to_numpy()
+        known = RANGES[column.quantity]
         slack = _ROUNDED if quantity == "temperature" else 0.0
         wild = (values < known.low - slack) | (values > known.high)
         words = known.problem(), "Check the number and its unit"
         rows = frame.index[wild].tolist()
-        findings.add_rows(((row, *words) for row in rows), used[quantity].header)
+        findings.add_rows(((row, *words) for row in rows), column.header)
 
 
 def too_far(

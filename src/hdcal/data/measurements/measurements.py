@@ -20,16 +20,16 @@ from hdcal.data.measurements.checks import (
 from hdcal.data.measurements.labels import mountings, run_labels
 from hdcal.data.measurements.notes import ASSUMED, source_notes
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns
+from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
 from hdcal.data.tables.headers import DIMENSIONS, LABELS
 from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.sources import read_source, source_name
 from hdcal.data.tables.values import read_values, without_slow_channels
 from hdcal.errors import Finding, quoted
+from hdcal.quantities import FORCE, TORQUE, Quantities
 
 FEWEST_ROWS = 5
-# Quantities of a spring under a force.
-READ = (*(name for name in DIMENSIONS if name != "torque"), *LABELS)
+READ = (*DIMENSIONS, *LABELS)
 # Labels that one finding names.
 _LISTED = 20
 
@@ -48,6 +48,8 @@ class Measurements:
         named: quantity -> header with its unit, of headers that are not hdcal's own.
         notes: what was assumed.
         left_out: gears that are not among them, each with what is wrong with it.
+        units: names and units of force and deformation; of a torsional spring they
+            are a torque and an angle.
     """
 
     frame: pd.DataFrame
@@ -57,6 +59,7 @@ class Measurements:
     named: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     left_out: dict[str, Finding] = field(default_factory=dict)
+    units: Quantities = FORCE
 
     def __getitem__(self, quantity: str) -> np.ndarray:
         """Return a column, shape (n,)."""
@@ -117,7 +120,8 @@ def read_measurements(
     """
     with FileFindings(source_name(data)) as findings:
         table, sha256 = read_source(data, findings, encoding, sheet)
-        used = choose_columns(table, mapping or {}, READ, REQUIRED, findings)
+        chosen = choose_columns(table, mapping or {}, READ, REQUIRED, findings)
+        used = in_place_of_force(chosen)
         table, used, notes = without_slow_channels(table, used, REQUIRED)
         found = measured_in(table, used, findings, gear, skip_bad=skip_bad)
     used = {name: column for name, column in used.items() if name in found.stated}
@@ -192,7 +196,9 @@ def _measured(
     runs = pd.Categorical.from_codes(one, [""]) if runs is None else runs
     frame["specimen"], frame["run"] = pd.Categorical(gears), pd.Categorical(runs)
     frame["zero"] = 0
-    found = Measurements(frame, findings.file, stated=stated)
+    force = used.get("force")
+    units = TORQUE if force is not None and force.quantity == "torque" else FORCE
+    found = Measurements(frame, findings.file, stated=stated, units=units)
     found, note = _with_time(found, used, findings)
     if gear is not None and "deformation" in used:
         far = too_far(frame, gear, findings)
@@ -249,6 +255,7 @@ def of_specimen(measured: Measurements, label: str) -> Measurements:
         words = f"specimen {quoted(label)} has {len(found.frame)} rows"
         findings.refuse(words, f"Take one with {FEWEST_ROWS} or more")
     if is_constant(found["deformation"]):
-        words = f"the deformation of specimen {quoted(label)} is constant"
+        moved = measured.units.displacement
+        words = f"the {moved} of specimen {quoted(label)} is constant"
         findings.refuse(words, "Measure at several")
     return found

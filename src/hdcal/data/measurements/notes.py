@@ -61,12 +61,14 @@ def _assumed(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
 def _unused_columns(table: ReadTable, used: Mapping[str, Column]) -> Iterator[str]:
     """Yield what of a file was not read."""
     positions = {column.position for column in used.values()}
+    quantities = {column.quantity for column in used.values()}
     headers = [*enumerate(table.headers)]
     extra = [header for place, header in headers if place not in positions and header]
     for header in extra:
         found = parse_header(header)
         label = found.quantity in LABELS
-        if found.quantity and found.quantity not in used and (label or not found.unit):
+        named = found.quantity and found.quantity not in quantities
+        if named and (label or not found.unit):
             why = "differs from row to row" if label else "names no unit"
             option = f"'{found.quantity}={header}{'' if label else '[UNIT]'}'"
             yield (

@@ -18,7 +18,7 @@ from hdcal.data.measurements.screened import asked_range, screened, screening_no
 from hdcal.data.reading import gear_of
 from hdcal.data.tables.arrays import arrow_grid
 from hdcal.data.tables.blocks import ReadTable
-from hdcal.data.tables.columns import REQUIRED, choose_columns
+from hdcal.data.tables.columns import REQUIRED, choose_columns, in_place_of_force
 from hdcal.data.tables.headers import GROUPINGS
 from hdcal.data.tables.named_columns import Column, as_named
 from hdcal.data.tables.parquet_files import parquet_files, parquet_table
@@ -30,7 +30,8 @@ if TYPE_CHECKING:
 
 # Rows by which the columns are chosen, and rows of a batch.
 _SHOWN, _BATCH = 50_000, 1 << 18
-_USED = (*REQUIRED, "temperature", "time", "specimen", "run", *GROUPINGS)
+_USED = (*REQUIRED, "angle", "torque", "temperature", "time", "specimen", "run")
+_USED += GROUPINGS
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,8 @@ def open_parquet(
         first = dataset.head(_SHOWN, columns=_plain(dataset.schema))
         grid = arrow_grid(first.schema, first.column, first.num_rows, 2)
         table = table_of(grid, findings)
-        used = choose_columns(table, named, _USED, REQUIRED, findings)
+        chosen = choose_columns(table, named, _USED, REQUIRED, findings)
+        used = in_place_of_force(chosen)
         if "specimen" not in used:
             remedy = "Say `columns` specimen=HEADER, which names the gear of a row"
             findings.refuse("no column says which gear a row is of", remedy)
@@ -157,7 +159,7 @@ def read_batches(
         if len(found.frame):
             wanted = asked_range(source.range)
             found, screening = screened(found, wanted, skip_bad, whole=False)
-            found = replace(found, notes=tuple(screening_notes(screening)))
+            found = replace(found, notes=tuple(screening_notes(screening, found.units)))
         yield found
 
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 from hdcal.data.measurements.bad_gears import among, offer
 from hdcal.data.measurements.measurements import FEWEST_ROWS, Measurements
 from hdcal.errors import Finding, InputError
+from hdcal.quantities import Quantities
 from hdcal.screening.result import Screening
 from hdcal.screening.screen import screen
-from hdcal.screening.words import HIDDEN_DIRECTION, in_words, question
+from hdcal.screening.words import hidden_direction, in_words, question
 from hdcal.screening.working_range import (
     FORM,
     STRAIGHT,
@@ -53,11 +54,14 @@ def screened(
         InputError: holds what only the user can decide about; or hardly a row is left.
     """
     x, (run, _), rows = measured["deformation"], measured.runs, measured.rows
+    units = measured.units
     found = screen(x, measured["force"], measured.get("time"), run)
     if found.asked:
         gears = measured["specimen"]
         bad = {
-            str(gears[one.rows[0][0]]): Finding(measured.file, *question(one, rows))
+            str(gears[one.rows[0][0]]): Finding(
+                measured.file, *question(one, rows, units)
+            )
             for one in found.asked
         }
         many = len({*gears})
@@ -72,15 +76,18 @@ def screened(
         if wanted.unit == STRAIGHT and found.straight is None:
             words = "is straight, and the data are no single run with a straight part"
             raise InputError([Finding("range", words, FORM)])
-        found = in_range(found, wanted, run)
-    words = [in_words(one, rows, found.working_range) for one in found.observations]
-    found = replace(found, observations=tuple(words))
+        found = in_range(found, wanted, run, units)
+    observations = tuple(
+        in_words(one, rows, found.working_range, units) for one in found.observations
+    )
+    found = replace(found, observations=observations)
     kept = int(found.kept.sum())
     if whole and kept < min(FEWEST_ROWS, run.size):
         problem = f"{kept} of {run.size} rows are left"
-        problem += f" between {wanted}" if wanted is not None else ""
-        remedy = f"At least {FEWEST_ROWS} are needed. The deformation was read from "
-        remedy += f"{x.min():.4g} to {x.max():.4g} mm"
+        problem += f" between {wanted.words(units)}" if wanted is not None else ""
+        remedy = f"At least {FEWEST_ROWS} are needed. The {units.displacement} was "
+        ends = f"{x.min():.4g} to {x.max():.4g} {units.displacement_unit}"
+        remedy += f"read from {ends}"
         raise InputError([Finding(measured.file, problem, remedy)])
     moved = {"deformation": found.deformation, "force": found.force, "zero": found.zero}
     if found.time is not None:
@@ -88,13 +95,14 @@ def screened(
     return measured.assign(**moved).where(found.kept), found
 
 
-def screening_notes(found: Screening) -> list[str]:
+def screening_notes(found: Screening, units: Quantities) -> list[str]:
     """Return what was found in a record, each finding in one sentence.
 
     Args:
         found: its screening.
+        units: of what was measured.
     """
     notes = [one.words for one in found.observations]
     more = [f"and {len(notes) - _LISTED} more findings"] if notes[_LISTED:] else []
-    hidden = [HIDDEN_DIRECTION] if found.trembling else []
+    hidden = [hidden_direction(units)] if found.trembling else []
     return [*notes[:_LISTED], *more, *hidden]

@@ -23,6 +23,8 @@ from hdcal.data.tables.named_columns import Column, named_column
 from hdcal.errors import quoted
 
 REQUIRED = ("deformation", "force")
+# Of a torsional spring, in the same order.
+_TURNING = ("angle", "torque")
 # Beside other columns these are asked for where the user has to choose.
 _SHOWN = 12
 
@@ -44,7 +46,8 @@ def choose_columns(
         findings: of the file; gets one for each header that is wrong or missing.
 
     Returns:
-        The columns by quantity.
+        The columns by quantity; where deformation and force are required and the source
+        holds torques and no forces, these are angle and torque.
 
     Raises:
         InputError: there are no headers, and the user names no column by its number.
@@ -52,11 +55,13 @@ def choose_columns(
     _check_names(table, mapping, findings)
     chooser = _Chooser(table, findings)
     columns: dict[str, Column] = {}
-    if "force" in required and "force" not in mapping and chooser.is_torsion():
-        words = "holds torques and no forces: a torsional spring is not calibrated yet"
-        remedy = "Convert with a lever arm: a force is torque / arm, a deformation "
-        findings.add(words, f"{remedy}angle * arm", table.header_row)
-        required = ()
+    if {*REQUIRED} <= {*required}:
+        turning = "force" not in mapping and (
+            "torque" in mapping or chooser.is_torsion()
+        )
+        others = ("deformation", "force", "force_sd") if turning else ("torque",)
+        quantities = [name for name in quantities if name not in others]
+        required = _TURNING if turning else required
     for quantity in quantities:
         if quantity in mapping:
             column = named_column(quantity, mapping[quantity], table, findings)
@@ -68,6 +73,18 @@ def choose_columns(
             columns[quantity] = column
     _refuse_conflicts(columns, table, findings)
     return columns
+
+
+def in_place_of_force(used: Mapping[str, Column]) -> dict[str, Column]:
+    """Return columns in which torque and angle stand for force and deformation.
+
+    Args:
+        used: columns by quantity, of `choose_columns`.
+    """
+    if "torque" not in used:
+        return dict(used)
+    names: dict[str, str] = dict(zip(_TURNING, REQUIRED, strict=True))
+    return {names.get(quantity, quantity): column for quantity, column in used.items()}
 
 
 def _check_names(

@@ -116,8 +116,8 @@ def as_named(table: ReadTable, used: Mapping[str, Column]) -> dict[str, str]:
         used: columns by quantity.
     """
     named = {}
-    for quantity, column in used.items():
-        header = parse_header(column.header)
+    for column in used.values():
+        quantity, header = column.quantity, parse_header(column.header)
         if header.exact and header.quantity == quantity and not column.against:
             continue
         alone = table.headers.count(column.header) == 1

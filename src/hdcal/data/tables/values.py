@@ -100,8 +100,8 @@ def _numbers(
     table: ReadTable, used: Mapping[str, Column], findings: FileFindings
 ) -> dict[str, np.ndarray]:
     """Return the columns of numbers in the units of the file."""
-    numeric = [column for quantity, column in used.items() if quantity not in LABELS]
-    cells = table.grid.read(column.position for column in numeric)
+    numeric = {name: column for name, column in used.items() if name not in LABELS}
+    cells = table.grid.read(column.position for column in numeric.values())
     odd = {p: column for p, column in cells.items() if column.dtype == object}
     if odd and table.grid.has_commas():
         # One decimal mark serves all columns: some may have been read by another.
@@ -109,7 +109,7 @@ def _numbers(
         cells = odd
     comma = has_comma(odd.values())
     found = {}
-    for column in numeric:
+    for name, column in numeric.items():
         numbers, wrong = cells[column.position], []
         if column.position in odd:
             numbers, wrong = read_numbers(numbers, comma)
@@ -117,7 +117,7 @@ def _numbers(
         if not comma and not wrong and may_hold_thousands(numbers):
             wrong = thousands(table.grid.texts(column.position))
         _add(table, wrong, column, findings)
-        found[column.quantity] = numbers
+        found[name] = numbers
     return found
 
 

@@ -7,6 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from hdcal.diagnosis.verdict import Closure, Verdict
+from hdcal.quantities import Quantities
+from hdcal.report.axes import load_axis
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -20,7 +22,7 @@ from hdcal.report.canvas import (
     style,
     watermark,
 )
-from hdcal.report.words import hypothesis, newton
+from hdcal.report.words import hypothesis, load
 
 # Above this ratio of first to second rung the others would be slivers.
 _DWARFED = 8.0
@@ -28,18 +30,18 @@ _DWARFED = 8.0
 
 def shrink_figure(verdict: Verdict) -> Figure:
     """Draw the ladder from the nominal model to the noise, and the held-out share."""
-    shrink = verdict.shrink
+    shrink, units = verdict.shrink, verdict.case.units
     with style():
         figure = Figure(figsize=(7.6, 3.5), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
-        _draw_ladder(left, shrink)
-        _draw_closed(right, shrink)
+        _draw_ladder(left, shrink, units)
+        _draw_closed(right, shrink, units)
         if verdict.status != "ok":
             watermark(figure)
     return figure
 
 
-def _draw_ladder(axes: Axes, shrink: Closure) -> None:
+def _draw_ladder(axes: Axes, shrink: Closure, units: Quantities) -> None:
     heading(axes, "What is left, rung by rung")
     rungs = [r for r in shrink.ladder if np.isfinite(r.rms_N)]
     sizes = np.array([rung.rms_N for rung in rungs])
@@ -49,7 +51,7 @@ def _draw_ladder(axes: Axes, shrink: Closure) -> None:
     colours = [_colour(rung.model) for rung in rungs]
     axes.barh(range(len(rungs)), sizes, 0.66, color=colours)
     for place, size in enumerate(sizes):
-        note(axes, newton(float(size)), (size, place), (3, 0), va="center")
+        note(axes, load(float(size), units), (size, place), (3, 0), va="center")
         if place:
             line = {"color": GREY, "linewidth": 0.8, "linestyle": ":"}
             axes.plot([sizes[place - 1]] * 2, [place - 0.67, place - 0.33], **line)
@@ -62,7 +64,7 @@ def _draw_ladder(axes: Axes, shrink: Closure) -> None:
         axes.set_xlim(0.0, 1.25 * sizes.max() or 1.0)
     name_rows(axes, [_rung(rung.model) for rung in rungs], size=8)
     axes.set_ylim(len(rungs) - 0.4, -0.6)
-    axes.set_xlabel("measured − model, rms [N]")
+    axes.set_xlabel(load_axis(units, "measured − model, rms"))
 
 
 def _colour(model: str) -> str:
@@ -82,12 +84,12 @@ def _rung(model: str) -> str:
     )
 
 
-def _draw_closed(axes: Axes, shrink: Closure) -> None:
+def _draw_closed(axes: Axes, shrink: Closure, units: Quantities) -> None:
     heading(axes, "Share of the gap closed")
     if shrink.closed is None or not np.isfinite(shrink.closed.median):
         _say(axes, shrink.reason or "not computed")
         return
-    rows = _rows(shrink)
+    rows = _rows(shrink, units)
     for place, (_, value, span, colour) in enumerate(reversed(rows)):
         if span is not None:
             axes.plot(span, [place, place], color=colour, linewidth=3.0, alpha=0.45)
@@ -103,7 +105,7 @@ def _draw_closed(axes: Axes, shrink: Closure) -> None:
     axes.set_xticks(ticks, [f"{100 * tick:.0f} %" for tick in ticks])
 
 
-def _rows(shrink: Closure) -> list[tuple]:
+def _rows(shrink: Closure, units: Quantities) -> list[tuple]:
     """Return (words, value, interval or None, colour) of every mark, top first."""
     assert shrink.closed is not None
     closed = shrink.closed
@@ -117,7 +119,7 @@ def _rows(shrink: Closure) -> list[tuple]:
             if np.isfinite(value)
         ]
     for words, value, colour in (
-        ("largest deformations\nheld out", shrink.extrapolated_closed, BLUE),
+        (f"largest {units.displacement}s\nheld out", shrink.extrapolated_closed, BLUE),
         ("a free curve instead\n(placebo)", shrink.placebo_closed, GREY),
     ):
         if value is not None and np.isfinite(value):

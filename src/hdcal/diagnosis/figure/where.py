@@ -11,6 +11,8 @@ from matplotlib.patches import Patch
 from hdcal.diagnosis.chart import running_sums
 from hdcal.diagnosis.gap import Cell
 from hdcal.diagnosis.verdict import Verdict
+from hdcal.quantities import Quantities
+from hdcal.report.axes import covariate_axis, load_axis
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -41,7 +43,7 @@ def where_figure(verdict: Verdict) -> Figure:
         for axes, (covariate, cells) in zip(
             others[len(scales) - 1 :], labels.items(), strict=True
         ):
-            _draw_labels(axes, covariate, cells)
+            _draw_labels(axes, covariate, cells, verdict.case.units)
         _draw_sums(last, verdict)
         _legend(first, verdict)
         if verdict.status != "ok":
@@ -90,10 +92,10 @@ def _draw_scale(axes: Axes, verdict: Verdict, name: str, cells: list[Cell]) -> N
         if stop - start < thin:
             start, stop = start - thin, stop + thin
         _draw_cell(axes, cell, start, stop)
-    unit = cells[0].unit if cells else "mm"
-    heading(axes, f"Over {name}")
-    axes.set_xlabel(f"{name} [{unit}]" if unit else name)
-    axes.set_ylabel("measured − model [N]")
+    units = verdict.case.units
+    heading(axes, f"Over {units.name(name)}")
+    axes.set_xlabel(covariate_axis(name, cells[0].unit if cells else "mm", units))
+    axes.set_ylabel(load_axis(units, "measured − model"))
 
 
 def _draw_cell(axes: Axes, cell: Cell, start: float, stop: float) -> None:
@@ -122,7 +124,9 @@ def _draw_gap(axes: Axes, deformation: np.ndarray, gap: np.ndarray) -> None:
         axes.plot(deformation, gap, color=DARK, linewidth=0.9, zorder=3)
 
 
-def _draw_labels(axes: Axes, covariate: str, cells: list[Cell]) -> None:
+def _draw_labels(
+    axes: Axes, covariate: str, cells: list[Cell], units: Quantities
+) -> None:
     chosen = sorted(cells, key=lambda cell: -abs(cell.z))[:_MOST_LABELS]
     # In the order of the cells, the first one on top.
     shown = [cell for cell in cells if cell in chosen][::-1]
@@ -140,8 +144,8 @@ def _draw_labels(axes: Axes, covariate: str, cells: list[Cell]) -> None:
     name_rows(axes, [plain(cell.label, 34) for cell in shown], size=8)
     axes.set_ylim(-0.6, len(shown) - 0.4)
     more = f" (worst {len(shown)} of {len(cells)})" if len(shown) < len(cells) else ""
-    heading(axes, f"By {plain(covariate, 40)}{more}")
-    axes.set_xlabel("measured − model [N]")
+    heading(axes, f"By {plain(units.name(covariate), 40)}{more}")
+    axes.set_xlabel(load_axis(units, "measured − model"))
 
 
 def _draw_sums(panels: list[Axes], verdict: Verdict) -> None:
@@ -154,8 +158,9 @@ def _draw_sums(panels: list[Axes], verdict: Verdict) -> None:
             axes.axhspan(-reach, reach, color=GREY, alpha=0.14, linewidth=0.0)
         axes.plot(x, total, color=BLUE, linewidth=1.3)
         axes.set_xlabel(text)
-    panels[0].set_ylabel("running sum [N]")
-    heading(panels[0], "Running sum over deformation")
+    units = verdict.case.units
+    panels[0].set_ylabel(load_axis(units, "running sum"))
+    heading(panels[0], f"Running sum over {units.displacement}")
     heading(panels[1], "Running sum, row by row")
 
 

@@ -6,22 +6,34 @@ from dataclasses import replace
 from hdcal.fleets.fleet_facts import FleetFacts
 from hdcal.fleets.force.answer import ForceAnswer
 from hdcal.fleets.next_force import NextForce
-from hdcal.report.document import Document, Picture, Section, Table, Text, notices
-from hdcal.report.words import estimate, number, percent
+from hdcal.report.document import (
+    Document,
+    Picture,
+    Section,
+    Table,
+    Text,
+    mapped,
+    notices,
+)
+from hdcal.report.words import capital, estimate, number, percent
 
 WHOSE = (
-    "Whose forces these are: single readings of gears of this kind that were not "
+    "Whose {load}s these are: single readings of gears of this kind that were not "
     "measured, each on a new mounting, at the reference temperature. That some of them "
     "are off is in them."
 )
 BEYOND = (
-    "The deformation is larger than any that was read: that forces go on along a "
+    "The {displacement} is larger than any that was read: that {load}s go on along a "
     "straight line is assumed, it was not measured."
 )
 
 
 def force_words(found: NextForce) -> Iterator[str]:
     """Yield what a gear to come needs at the deformation that was asked for."""
+    yield from map(found.units.say, _force_words(found))
+
+
+def _force_words(found: NextForce) -> Iterator[str]:
     middle, span = estimate(found.force_N)
     width = found.force_N.hi - found.force_N.lo
     sized = " of the gear file's sizes" * found.at_one_size
@@ -29,17 +41,19 @@ def force_words(found: NextForce) -> Iterator[str]:
     if limit is not None and beyond is not None:
         middle_, low, high = map(_few, vars(beyond).values())
         yield (
-            f"{middle_} of gears to come{sized} need more than {limit:g} N at "
-            f"{found.deformation_mm:g} mm, 95 % credible interval {low} … {high}."
+            f"{middle_} of gears to come{sized} need more than {limit:g} {{N}} at "
+            f"{found.deformation_mm:g} {{mm}}, 95 % credible interval {low} … {high}."
         )
     many = "; ".join(
-        f"{shown(each.content)} need at most {number(each.at_most_N, width)} N"
+        f"{shown(each.content)} need at most {number(each.at_most_N, width)} {{N}}"
         for each in found.bounds
     )
     sure = shown(found.bounds[0].confidence)
     yield (
-        f"At {found.deformation_mm:g} mm the next gear{sized} needs {middle} N, 95 % "
-        f"predictive interval {span} N, in one reading on a new mounting; with {sure} "
+        f"At {found.deformation_mm:g} {{mm}} the next gear{sized} needs {middle} "
+        f"{{N}}, 95 % "
+        f"predictive interval {span} {{N}}, in one reading on a new mounting; with "
+        f"{sure} "
         f"confidence {many}."
     )
 
@@ -54,7 +68,7 @@ def _few(share: float) -> str:
 def force_document(found: NextForce) -> Document:
     """Return what the force of gears to come says by itself; its picture is force."""
     first, *others = force_words(found)
-    return Document(
+    document = Document(
         name="Gears to come",
         kind="margin",
         subtitle=_subtitle(found),
@@ -63,6 +77,7 @@ def force_document(found: NextForce) -> Document:
         notices=notices(("Outside what was tested", [BEYOND] * found.beyond_tested)),
         sections=[_bounds(found)],
     )
+    return mapped(document, found.units.say)
 
 
 def whole_document(
@@ -104,12 +119,15 @@ def shown(share: float) -> str:
 
 
 def _subtitle(found: NextForce) -> str:
-    return f"Force that gears to come need at {found.deformation_mm:g} mm"
+    return found.units.say(
+        f"{capital(found.units.load)} that gears to come need at "
+        f"{found.deformation_mm:g} {{mm}}"
+    )
 
 
 def _bounds(found: NextForce) -> Section:
     width = found.force_N.hi - found.force_N.lo
-    numbers = ["share of gears", "confidence", "at least [N]", "at most [N]"]
+    numbers = ["share of gears", "confidence", "at least [{N}]", "at most [{N}]"]
     rows = [
         [
             shown(each.content),
@@ -121,7 +139,7 @@ def _bounds(found: NextForce) -> Section:
     ]
     picture = Picture(
         "force",
-        "Force of the next gear, and the bounds that many keep",
+        f"{capital(found.units.load)} of the next gear, and the bounds that many keep",
         "The next gear with its 95 % predictive interval; then the bounds that many "
         "gears keep, by the share of them and the confidence: 99/95.",
     )

@@ -18,5 +18,5 @@ def force_figure(found: NextForce, name: str) -> Figure:
     with style():
         figure = Figure(figsize=(7.6, 4.0), layout="constrained")
         axes = draw_chart(force_chart(found), figure.add_subplot())
-        heading(axes, f"{plain(name, 40)}: force of gears to come")
+        heading(axes, f"{plain(name, 40)}: {found.units.load} of gears to come")
     return figure

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
+from hdcal.data.case import require_force
 from hdcal.data.plausible import implausible
 from hdcal.errors import Finding, Findings, InputError, NotUsable
 from hdcal.exported import jit
@@ -120,6 +121,7 @@ def respond(
         InputError: a setting is out of range.
     """
     pooled = pool(models)
+    require_force(pooled.case, "respond")
     with Findings() as wrong:
         request = wrong.attempt(
             make_request, force, amplitude, frequency, duration, points

@@ -1,12 +1,10 @@
 """The JSON answer of `hdcal predict`: the table by column."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from hdcal.prediction.bands.bands import Bands
+from hdcal.prediction.bands.bands import COLUMNS
 from hdcal.report.answer import Answer, Probability, Promise, Real
-
-_COLUMNS = [field.name for field in fields(Bands)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,5 +24,5 @@ class PredictionAnswer(Answer):
     causes: dict[str, Probability]
     weight_left_out: Probability
     columns: Annotated[
-        dict[str, tuple[Real | bool | str, ...]], Promise(required=_COLUMNS)
+        dict[str, tuple[Real | bool | str, ...]], Promise(required=[*COLUMNS])
     ]

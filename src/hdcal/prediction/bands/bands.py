@@ -32,6 +32,7 @@ from hdcal.prediction.engine.mixture import draw_quantiles
 from hdcal.prediction.engine.models import Models
 from hdcal.prediction.engine.readings import readings
 from hdcal.prediction.engine.untested import with_untested
+from hdcal.quantities import FORCE, Quantities
 
 # Rows predicted at a time: with 4000 draws a block takes 32 MB, on unloading 64 MB.
 _BLOCK = 1000
@@ -60,6 +61,7 @@ class Bands(Shown):
         new_measurement_hi_N: its upper end.
         tested: deformation, temperature and direction lie within the data.
         usable: the calibration passed its checks.
+        units: names and units of what was measured.
     """
 
     deformation_mm: np.ndarray
@@ -76,10 +78,15 @@ class Bands(Shown):
     new_measurement_hi_N: np.ndarray
     tested: np.ndarray
     usable: np.ndarray
+    units: Quantities = FORCE
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the columns in the order of bands.csv."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """Return the columns of bands.csv in their order."""
+        return {self.units.key(name): getattr(self, name) for name in COLUMNS}
+
+
+# Fields of `Bands` that are columns of bands.csv.
+COLUMNS = tuple(field.name for field in fields(Bands) if field.name != "units")
 
 
 def predict(
@@ -169,6 +176,7 @@ def _bands(
         *new,
         tested=tested,
         usable=np.full(len(at), usable),
+        units=case.units,
     )
 
 
@@ -221,19 +229,20 @@ def _check(cause: Cause, deformation, temperature, direction, interval, seed) ->
     """Refuse what cannot be asked, slips of the unit as the data's reader does."""
     case, findings = cause.posterior.case, []
     gear, tested = case.gear, case.records.deformation
+    unit = case.units.displacement_unit
 
     def find(name, problem, remedy):
         findings.append(Finding(name, problem, remedy))
 
     if deformation.size == 0:
-        find("deformation", "is empty", "give numbers in mm")
-    elif wrong := implausible("deformation", deformation):
+        find("deformation", "is empty", f"give numbers in {unit}")
+    elif wrong := implausible("deformation", deformation, case.units.displacement):
         findings += wrong
     elif (worst := float(np.max(np.abs(deformation)))) >= gear.reach:
         problem = f"{worst:g} mm on a radius of {gear.geometry.radius:g} mm"
         find("deformation", problem, "Give it in mm")
     else:
-        findings += far_findings(worst, float(np.max(np.abs(tested))))
+        findings += far_findings(worst, float(np.max(np.abs(tested))), unit=unit)
         each = (excluded_findings(cause.posterior.case, one) for one in deformation)
         findings += next(filter(None, each), [])
     if temperature.size == 0:
@@ -288,5 +297,5 @@ def default_bands(models: Models, interval: float = 0.95) -> Bands:
         for side in DIRECTIONS
         if SENSE[side] in np.asarray(records.sense)
     ]
-    tables = [part.columns() for part in parts]
-    return Bands(**{n: np.concatenate([t[n] for t in tables]) for n in tables[0]})
+    tables = {n: np.concatenate([getattr(p, n) for p in parts]) for n in COLUMNS}
+    return Bands(**tables, units=case.units)

@@ -7,6 +7,7 @@ import numpy as np
 
 from hdcal.data.loading import loading_side, movement_words
 from hdcal.prediction.bands.bands import Bands
+from hdcal.report.axes import load_axis
 from hdcal.report.chart_spec import (
     Band,
     Chart,
@@ -18,12 +19,11 @@ from hdcal.report.chart_spec import (
     beyond,
 )
 
-AXIS, FORCE = "deformation as read [mm]", "force [N]"
 # Kind of a band, its label and its opacity; each lies on those before it.
 _BANDS = (
     ("new_measurement", "one new reading", 0.16),
     ("with_gap", "with the leftover discrepancy", 0.22),
-    ("physics", "force model", 0.38),
+    ("physics", "{load} model", 0.38),
 )
 _UNTESTED = "not tested: extrapolated"
 
@@ -53,7 +53,9 @@ class Branch:
 
 def bands_chart(bands: Bands) -> Chart:
     """Return force over deformation."""
-    return Chart(panels=[Panel(x=AXIS, y=FORCE, marks=band_marks(bands))])
+    units = bands.units
+    axis = f"{units.displacement} as read [{units.displacement_unit}]"
+    return Chart(panels=[Panel(x=axis, y=load_axis(units), marks=band_marks(bands))])
 
 
 def band_marks(bands: Bands) -> list[Mark]:
@@ -69,7 +71,8 @@ def branches(bands: Bands) -> list[Branch]:
     # The tested side; the curves may go beyond zero to a nominal deformation.
     tested = np.asarray(bands.tested, bool)
     places = bands.deformation_mm[tested if tested.any() else slice(None)]
-    side, words = loading_side(places), movement_words(places)
+    side, name = loading_side(places), bands.units.displacement
+    words = movement_words(places, name)
     found: list[Branch] = []
     for level, colour in zip(levels.tolist(), colours, strict=True):
         here = bands.temperature_C == level
@@ -116,6 +119,7 @@ def branch_marks(
         return np.where(shown, values - zero, np.nan)
 
     def label(text: str) -> str:
+        text = text.format(load=bands.units.load)
         return text if branch.first and not around_median else ""
 
     for kind, words, full in _BANDS:

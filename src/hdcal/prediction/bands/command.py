@@ -8,9 +8,10 @@ from hdcal.cli.command import command
 from hdcal.cli.console import Console
 from hdcal.cli.option_types import DEFORMATIONS, NUMBERS
 from hdcal.cli.options import direction_option, force_option, json_option
+from hdcal.quantities import FORCE
 
 # By these columns --force knows an older table.
-_BEGINNING = b"deformation_mm,temperature_C,direction,physics_lo_N,"
+_COLUMNS = ("deformation_mm", "temperature_C", "direction", "physics_lo_N", "")
 
 
 @command(short_help="Bands on the force from a result folder.")
@@ -48,10 +49,13 @@ def predict(console: Console, run, deformation, temperature, direction, out, for
     from hdcal.report.saving import Target
 
     file = None
-    with console.wrong:
+    with console.wrong as wrong:
+        models = wrong.attempt(load_models, run)
+        units = FORCE if models is None else causes_of(models)[0].posterior.case.units
         if out is not None:
-            file = console.hold(partial(Target, out, force, beginning=_BEGINNING))
-    models = load_models(run)
+            beginning = ",".join(map(units.key, _COLUMNS)).encode()
+            file = console.hold(partial(Target, out, force, beginning=beginning))
+    assert models is not None
     causes = causes_of(models)
     from hdcal.prediction.bands.bands import predict as bands_of
     from hdcal.prediction.bands.document import untested_rows

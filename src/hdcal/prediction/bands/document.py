@@ -12,17 +12,19 @@ _MOST_ROWS = 40
 
 def headline(bands: Bands, interval: float) -> str:
     """Return which forces were predicted, in one sentence."""
-    force, at = bands.physics_median_N, bands.deformation_mm
+    force, at, units = bands.physics_median_N, bands.deformation_mm, bands.units
+    unit = units.load_unit
     if len(force) == 1:
         ends = {"median": force, "lo": bands.physics_lo_N, "hi": bands.physics_hi_N}
         middle, span = estimate({name: end.item() for name, end in ends.items()})
         return (
-            f"At {at.item():g} mm the mean force is {middle} N, {100 * interval:g} % "
-            f"credible interval {span} N."
+            f"At {at.item():g} {units.displacement_unit} the mean {units.load} is "
+            f"{middle} {unit}, {100 * interval:g} % credible interval {span} {unit}."
         )
     return (
-        f"From {at.min():g} to {at.max():g} mm the mean force lies between "
-        f"{number(force.min())} and {number(force.max())} N."
+        f"From {at.min():g} to {at.max():g} {units.displacement_unit} the mean "
+        f"{units.load} lies between {number(force.min())} and {number(force.max())} "
+        f"{unit}."
     )
 
 
@@ -44,15 +46,16 @@ def untested_rows(bands: Bands, records: Records) -> str:
     seen = " and ".join(way for sense, way in ways.items() if sense in records.sense)
     return (
         f"{untested} of {size} rows lie outside what was tested: {low:g} … {high:g} "
-        f"mm, {cold:g} … {warm:g} °C, {seen}"
+        f"{bands.units.displacement_unit}, {cold:g} … {warm:g} °C, {seen}"
     )
 
 
 def bands_document(bands: Bands) -> Document:
     """Return bands as a table for a notebook."""
-    size = len(bands.tested)
-    numbers = ("deformation [mm]", "temperature [°C]", "mean [N]", "band of the mean")
-    numbers += ("band of a new reading",)
+    size, units = len(bands.tested), bands.units
+    along = f"{units.displacement} [{units.displacement_unit}]"
+    numbers = (along, "temperature [°C]", f"mean [{units.load_unit}]")
+    numbers += ("band of the mean", "band of a new reading")
     rows = [_row(bands, row) for row in range(min(size, _MOST_ROWS))]
     columns = [*numbers[:2], "direction", *numbers[2:], "tested"]
     more = [Text(f"The first {_MOST_ROWS} of {size}.")] if size > _MOST_ROWS else []
@@ -60,8 +63,8 @@ def bands_document(bands: Bands) -> Document:
     return Document(
         name="Bands",
         kind="bands",
-        subtitle="force as read",
-        headline=f"The force at {size} places, with its bands.",
+        subtitle=f"{units.load} as read",
+        headline=f"The {units.load} at {size} places, with its bands.",
         sections=[
             Section("Bands", [Table(columns, rows, frozenset(numbers)), *more], True)
         ],

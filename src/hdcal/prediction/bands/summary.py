@@ -19,6 +19,7 @@ def prediction_answer(
         causes: that they average over.
     """
     return PredictionAnswer(
+        units=bands.units,
         reasons=(),
         headline=headline(bands, interval),
         next_step=next_step(bands),

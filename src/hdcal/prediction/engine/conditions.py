@@ -15,6 +15,7 @@ from hdcal.errors import Finding
 from hdcal.inference.values import Values
 from hdcal.prediction.engine.sizes import StiffnessStrata
 from hdcal.prediction.engine.untested import Untested
+from hdcal.quantities import FORCE, Quantities
 
 Direction = Literal["up", "down"]
 DIRECTIONS: tuple[Direction, ...] = get_args(Direction)
@@ -134,7 +135,7 @@ def _within(values, measured, slack: float) -> np.ndarray:
 
 
 def slip_findings(
-    name: str, force: float, usual: float, deformation: float
+    name: str, force: float, usual: float, deformation: float, units: Quantities = FORCE
 ) -> list[Finding]:
     """Return a finding where a force can only be a slip of the unit.
 
@@ -143,15 +144,17 @@ def slip_findings(
         force: as given, of either sign [N].
         usual: what the deformation takes, a size [N].
         deformation: as given [mm].
+        units: of what was measured.
     """
     if not usual > 0.0 or usual / _OFF < abs(force) < usual * _OFF:
         return []
-    words = f"{force:g} N, where {deformation:g} mm takes about {usual:.3g} N"
-    return [Finding(name, words, "Give it in N")]
+    unit, place = units.load_unit, f"{deformation:g} {units.displacement_unit}"
+    words = f"{force:g} {unit}, where {place} takes about {usual:.3g} {unit}"
+    return [Finding(name, words, f"Give it in {unit}")]
 
 
 def far_findings(
-    deformation: float, tested: float, reach: float = math.inf
+    deformation: float, tested: float, reach: float = math.inf, unit: str = "mm"
 ) -> list[Finding]:
     """Return a finding where a deformation can only be a slip of the unit.
 
@@ -159,11 +162,12 @@ def far_findings(
         deformation: as given, of either sign [mm].
         tested: the largest that was read, a size [mm].
         reach: what no gear of this radius reaches [mm].
+        unit: of all of them.
     """
     if abs(deformation) < reach and abs(deformation) <= tested * _OFF:
         return []
-    words = f"{deformation:g} mm, where the readings reach to {tested:g} mm"
-    return [Finding("deformation", words, "Give it in mm")]
+    words = f"{deformation:g} {unit}, where the readings reach to {tested:g} {unit}"
+    return [Finding("deformation", words, f"Give it in {unit}")]
 
 
 def excluded_findings(case: Case, deformation: float) -> list[Finding]:
@@ -175,10 +179,10 @@ def excluded_findings(case: Case, deformation: float) -> list[Finding]:
     """
     if not any(low < deformation < high for low, high in case.excluded):
         return []
-    tested = np.asarray(case.records.deformation)
+    tested, unit = np.asarray(case.records.deformation), case.units.displacement_unit
     words = (
-        f"{deformation:g} mm is outside the part of the curve that was calibrated, "
-        f"{tested.min():.4g} to {tested.max():.4g} mm; readings there were left out"
+        f"{deformation:g} {unit} is outside the part of the curve that was calibrated, "
+        f"{tested.min():.4g} to {tested.max():.4g} {unit}; readings there were left out"
     )
     remedy = "See the notes of the calibration; `range` chooses another part"
     return [Finding("deformation", words, remedy)]

@@ -13,6 +13,7 @@ from typing import Literal
 
 from hdcal.errors import Finding
 from hdcal.prediction.engine.causes import Cause
+from hdcal.quantities import FORCE, Quantities
 from hdcal.report.intervals import Interval
 
 # +1: pressed, deformation and force are positive; −1: pulled, both are negative.
@@ -60,7 +61,11 @@ def interval_along(median, low, high, sense: LoadingSense) -> Interval:
 
 
 def capacity_findings(
-    name: str, capacity: float, sense: LoadingSense, place: str
+    name: str,
+    capacity: float,
+    sense: LoadingSense,
+    place: str,
+    units: Quantities = FORCE,
 ) -> list[Finding]:
     """Return why a capacity cannot be one of the force; empty where it can.
 
@@ -71,9 +76,12 @@ def capacity_findings(
         capacity: as given [N].
         sense: of loading.
         place: where the force is asked for, as in "0.4 mm".
+        units: of what was measured.
     """
     if not capacity < 0.0 < sense:
         return []
-    words = f"{capacity:g} N is no limit of the force at {place}, which is positive"
-    remedy = f"Give {-capacity:g} N, or ask at a negative deformation"
+    unit = units.load_unit
+    words = f"{capacity:g} {unit} is no limit of the {units.load} at {place}, which is "
+    words += "positive"
+    remedy = f"Give {-capacity:g} {unit}, or ask at a negative {units.displacement}"
     return [Finding(name, words, remedy)]

@@ -17,8 +17,8 @@ from hdcal.report.words import number
 
 GEAR = "gear"
 _LABELS = {
-    "resolution": "resolution of the force reading",
-    "force_offset": "zero of the force gauge",
+    "resolution": "resolution of the {load} reading",
+    "force_offset": "zero of the {load} gauge",
     "force_gain": "load cell, certificate",
     "deformation_gain": "displacement gauge, certificate",
     "temperature_offset": "thermometer, certificate",
@@ -30,8 +30,8 @@ _UNITS = {
     "deformation_gain": ("%", 100.0),
     "temperature_offset": ("K", 1.0),
     GEAR: ("%", 100.0),
-    "zero_drift": ("N/K", 1.0),
-    "frame": ("mm/K", 1.0),
+    "zero_drift": ("{N}/K", 1.0),
+    "frame": ("{mm}/K", 1.0),
     **dict.fromkeys(("wall_thickness", "radius", "length", "load_height"), ("mm", 1.0)),
 }
 _REMEDIES = {
@@ -54,7 +54,7 @@ def component_label(name: str) -> str:
 
 def shown_unit(name: str) -> tuple[str, float]:
     """Return the unit in which people read a component, and the factor to it."""
-    return _UNITS.get(name, ("N", 1.0))
+    return _UNITS.get(name, ("{N}", 1.0))
 
 
 def halved_by(part: Component, force: PopulationForce) -> str:
@@ -71,12 +71,12 @@ def halved_by(part: Component, force: PopulationForce) -> str:
         count = {"mounting": problem.runs, GEAR: problem.specimens}[name]
         return _more_members(count, f"{name}s")
     if name == "resolution":
-        return f"a display in steps of {0.5 * float(problem.step):.3g} N"
+        return f"a display in steps of {0.5 * float(problem.step):.3g} {{N}}"
     if name == "force_offset":
         half = 0.5 * part.standard_uncertainty
-        return f"its zero out of contact, known to {half:.2g} N (sd)"
+        return f"its zero out of contact, known to {half:.2g} {{N}} (sd)"
     if name == "leftover":
-        return f"readings at {float(where.deformation):g} mm"
+        return f"readings at {float(where.deformation):g} {{mm}}"
     if name in ("zero_drift", "frame"):
         return f"readings at {float(where.temperature):g} °C"
     rows = len(force.cause.posterior.case.records.force)
@@ -111,17 +111,18 @@ def check_words(about, drawn, check: LinearCheck, error: float) -> str:
     off = max(check.low, check.high)
     near = (
         f"The linear budget gives {ends[0]}, Monte Carlo {ends[1]} (95 %): the ends "
-        f"differ by up to {off:.2g} N, where two digits of the standard uncertainty "
-        f"allow {check.tolerance:.2g} N (JCGM 101, clause 8)"
+        f"differ by up to {off:.2g} {{N}}, where two digits of the standard "
+        f"uncertainty allow {check.tolerance:.2g} {{N}} (JCGM 101, clause 8)"
     )
     if check.valid:
         return f"{near}. The linear budget stands."
     shift = abs(sum(about) - sum(drawn)) / 2.0
     spread = abs((about[1] - about[0]) - (drawn[1] - drawn[0])) / 2.0
     if off <= check.tolerance + 2.0 * error:
-        why = f"the draws are too few to tell, an end is known to {error:.2g} N (sd)"
+        why = f"the draws are too few to tell, an end is known to {error:.2g} "
+        why += "{N} (sd)"
     elif shift > spread:
-        why = "the force is no straight line of its inputs, or their laws are skewed"
+        why = "the {load} is no straight line of its inputs, or their laws are skewed"
     else:
         why = "the tails are not those of Student's t"
     return f"{near}. It is not confirmed, and Monte Carlo is given: {why}."
@@ -148,23 +149,23 @@ def rule_words(rule: Rule, limit: float, guard: float, most: float) -> str:
     steps = ""
     if most != limit:
         steps = (
-            f" No reading exceeds the limit of {limit:g} N up to a force of "
-            f"{most:g} N, with which the force before rounding is compared."
+            f" No reading exceeds the limit of {limit:g} {{N}} up to a {{load}} "
+            f"of {most:g} {{N}}, with which the {{load}} before rounding is compared."
         )
     if rule == "simple":
         return (
-            f"Simple acceptance ({source}): the force conforms if its estimate is at "
-            f"most the limit, {most:g} N, and does not conform otherwise. The "
+            f"Simple acceptance ({source}): the {{load}} conforms if its estimate is "
+            f"at most the limit, {most:g} {{N}}, and does not conform otherwise. The "
             "uncertainty is not taken into account: an estimate at the limit is "
             f"accepted with a risk of about 50 %.{steps}"
         )
     return (
-        f"Guarded acceptance ({source}): the force conforms if its estimate and the "
-        f"guard band w together are at most the limit, {most:g} N; w = {guard:.3g} N "
-        "is what the 95 % coverage interval reaches beyond the estimate on the side of "
-        "the limit. It does not conform if that whole interval lies beyond the limit. "
-        "Between the two nothing is decided. An estimate at the acceptance limit is "
-        f"accepted with a risk of 2.5 %.{steps}"
+        f"Guarded acceptance ({source}): the {{load}} conforms if its estimate and the "
+        f"guard band w together are at most the limit, {most:g} {{N}}; w = {guard:.3g} "
+        f"{{N}} is what the 95 % coverage interval reaches beyond the estimate on the "
+        "side of the limit. It does not conform if that whole interval lies beyond "
+        "the limit. Between the two nothing is decided. An estimate at the acceptance "
+        f"limit is accepted with a risk of 2.5 %.{steps}"
     )
 
 
@@ -177,13 +178,14 @@ def decision_words(
     overall: float | None,
 ) -> str:
     """Return a decision in words; all forces are along the sense of loading."""
-    than = f"the limit {limit:g} N"
+    than = f"the limit {limit:g} {{N}}"
     if guard > 0.0:
         # No estimate above the limit may seem to lie below it.
-        than = f"the acceptance limit {newtons_down(limit - guard)} = {limit:g} N − w"
+        than = f"the acceptance limit {newtons_down(limit - guard)} = {limit:g} "
+        than += "{N} − w"
     side = "at most" if statement == "conforms" else "above"
     if statement == "does not conform" and guard > 0.0:
-        than = f"the limit {limit:g} N by more than its uncertainty"
+        than = f"the limit {limit:g} {{N}} by more than its uncertainty"
     accepted = "" if statement == "conforms" else ", if it were accepted,"
     words = (
         f"{statement.capitalize()}: the estimate {newtons(estimate)} is {side} {than}. "
@@ -203,14 +205,14 @@ def stated_words(stated: StatedUncertainty) -> str:
     """Return a result as it is stated: estimate, uncertainty, factor, coverage."""
     half, sd = stated.expanded_uncertainty_N, stated.combined_standard_uncertainty_N
     words = (
-        f"{_digits(stated.estimate_N, half)} N ± {_upwards(half)} N (k = "
-        f"{stated.coverage_factor:.2f}, 95 % coverage), u = {_digits(sd, sd)} N"
+        f"{_digits(stated.estimate_N, half)} {{N}} ± {_upwards(half)} {{N}} (k = "
+        f"{stated.coverage_factor:.2f}, 95 % coverage), u = {_digits(sd, sd)} {{N}}"
     )
     if stated.linear_budget_valid:
         return f"{words}."
     ends = stated.coverage_lo_N, stated.coverage_hi_N
     low, high = (_digits(end, half) for end in ends)
-    return f"{words}; by Monte Carlo, whose coverage interval is {low} … {high} N."
+    return f"{words}; by Monte Carlo, whose coverage interval is {low} … {high} {{N}}."
 
 
 def _upwards(uncertainty: float) -> str:

@@ -12,7 +12,15 @@ from hdcal.prediction.margin.budget import CERTIFIED
 from hdcal.prediction.margin.budget_words import stated_words
 from hdcal.prediction.margin.document import budget_table
 from hdcal.prediction.margin.sentences import measurand
-from hdcal.report.document import Block, Document, Facts, Section, Sentences, Text
+from hdcal.report.document import (
+    Block,
+    Document,
+    Facts,
+    Section,
+    Sentences,
+    Text,
+    mapped,
+)
 from hdcal.report.html import html_page
 from hdcal.report.provenance import data_rows, gear_rows
 from hdcal.report.words import capital, hypothesis
@@ -32,8 +40,8 @@ _OF_GAUGES = {
     "deformation_offset": "zero of the displacement gauge",
 }
 _METHOD = (
-    "Bayesian calibration of the force model with the readings; uncertainty by the law "
-    "of propagation (JCGM 100) and by Monte Carlo (JCGM 101), which are compared; "
+    "Bayesian calibration of the {{load}} model with the readings; uncertainty by the "
+    "law of propagation (JCGM 100) and by Monte Carlo (JCGM 101), which are compared; "
     "hdcal {version}, seed {seed}"
 )
 
@@ -60,12 +68,12 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
     """
     posterior.require_usable()
     name = found.gear.name or found.data.name
-    return Document(
+    document = Document(
         name=name if len(name) <= _LONGEST else f"{name[:_LONGEST]}…",
         kind="certificate",
         subtitle="Calibration of a model from measurements. No accreditation, such as "
         "that of ISO/IEC 17025, is claimed by it.",
-        headline=f"{capital(measurand(found))} at {found.deformation_mm:g} mm: "
+        headline=f"{capital(measurand(found))} at {found.deformation_mm:g} {{mm}}: "
         f"{stated_words(found)}",
         sections=[
             Section("What was measured, and with what", [_measured(posterior)]),
@@ -76,6 +84,7 @@ def certificate(found: MarginAnswer, posterior: Posterior, issued: date) -> Docu
         ],
         provenance=[("date of issue", issued.isoformat()), ("signature", "")],
     )
+    return mapped(document, found.units.say)
 
 
 def _measured(posterior: Posterior) -> Facts:
@@ -92,8 +101,11 @@ def _measured(posterior: Posterior) -> Facts:
     gear = dict(gear_rows(case, posterior.theory))
     sizes = [f"{name} {words}" for name, words in gear.items() if name not in apart]
     read = dict(data_rows(case))
-    names = "deformation", "force", "temperature", "force read in steps of", "runs"
-    seen = [f"{name} {read[name]}" for name in (*names, "gears") if name in read]
+    units = case.units
+    names = units.displacement, units.load, "temperature", "force read in steps of"
+    seen = [
+        f"{name} {read[name]}" for name in (*names, "runs", "gears") if name in read
+    ]
     rows = [
         ("gear", "; ".join([gear["gear"], *sizes])),
         ("readings", "; ".join([gear["case"], f"{read['rows']} rows", *seen])),
@@ -113,7 +125,7 @@ def _asked(found: MarginAnswer) -> Facts:
     if len(found.levels) > 1:
         ends = [level.temperature_C for level in found.levels]
         warm += f", the worst of {min(ends):g} … {max(ends):g} °C"
-    what = "force that the gauge of this rig shows"
+    what = "{load} that the gauge of this rig shows"
     if found.quantity == "load":
         what = "load on the gear, without the gauge's zero and errors"
     way = {"up": "loading", "down": "unloading"}[found.direction]
@@ -121,7 +133,10 @@ def _asked(found: MarginAnswer) -> Facts:
     sizes = "; ".join(f"{n} ± {t:g}" for n, t in found.tolerances_mm.items())
     rows = [
         ("measurand", what),
-        ("conditions", f"{found.deformation_mm:g} mm as read, {way}, {warm}"),
+        (
+            "conditions",
+            f"{found.deformation_mm:g} {{mm}} as read, {way}, {warm}",
+        ),
         ("whose", found.population_words),
         _model(found),
         ("method", _METHOD.format(**method)),
@@ -134,7 +149,7 @@ def _model(found: MarginAnswer) -> tuple[str, str]:
     if len(found.causes) == 1:
         (name,) = found.causes
         effects = "alone" if name == "none" else f"with {hypothesis(name)}"
-        return "model", f"the force model {effects}, taken for right"
+        return "model", f"the {{load}} model {effects}, taken for right"
     causes = ", ".join(
         f"{hypothesis(name)} ({100.0 * chance:.0f} %)"
         for name, chance in found.causes.items()
@@ -156,10 +171,11 @@ def _decision(found: MarginAnswer) -> Iterator[Section]:
 
 def _untested(found: MarginAnswer, posterior: Posterior) -> Iterator[str]:
     yield from found.extrapolated
+    place = capital(found.units.displacement)
     if not found.extrapolated and "temperature" in posterior.case.records.known:
-        yield "Deformation, temperature and direction lie within what was tested."
+        yield f"{place}, temperature and direction lie within what was tested."
     elif not found.extrapolated:
-        yield "Deformation and direction lie within what was tested."
+        yield f"{place} and direction lie within what was tested."
         yield "The temperature of the test was not measured: the reference is assumed."
     if found.population != "specimens":
         yield "Other gears: nothing here says how much they differ from this one."

@@ -27,6 +27,7 @@ from hdcal.prediction.margin.result import Level
 from hdcal.prediction.margin.stated import RULES
 from hdcal.prediction.margin.temperatures import MOST_TEMPERATURES
 from hdcal.prediction.shares import check_rarity, check_shares
+from hdcal.quantities import Quantities
 
 
 def check_margin(
@@ -52,7 +53,8 @@ def check_margin(
     gear, theory = cause.posterior.case.gear, cause.posterior.theory
     names = "content", "confidence", "required_probability"
     shares = {n: v for n in names if (v := getattr(criteria, n)) is not None}
-    limit, place = criteria.limit_force, f"{at:g} mm"
+    units = cause.posterior.case.units
+    limit, place = criteria.limit_force, f"{at:g} {units.displacement_unit}"
     forces = {"limit_force": limit, "given_force": request.given_force}
     draws = sum(min(c.size, MOST_DRAWS) for c in causes)
     more = ", or calibrate with more draws" if draws < MOST_DRAWS else ""
@@ -69,7 +71,7 @@ def check_margin(
         *([] if wrong else _check_forces(cause, at, forces)),
     ]
     if limit is not None and not wrong:
-        findings += capacity_findings("limit_force", limit, sense, place)
+        findings += capacity_findings("limit_force", limit, sense, place, units)
     findings += _check_choices(request, criteria)
     if request.quantity == "load" and not _knows_contact(cause.posterior):
         words = "needs the place of first contact, and the readings are far from 0"
@@ -91,6 +93,7 @@ def check_sign(
     request: MarginRequest,
     criteria: Criteria,
     sense: LoadingSense,
+    units: Quantities,
 ) -> None:
     """Refuse a capacity where the force has the sign against the sense of loading.
 
@@ -99,6 +102,7 @@ def check_sign(
         request: whose force, and where.
         criteria: with the capacity, if there is one.
         sense: of loading.
+        units: of what was measured.
 
     Raises:
         InputError: the gauge's zero is larger than the load.
@@ -107,23 +111,26 @@ def check_sign(
     against = [one for one in members if max(sense * one.lo, sense * one.hi) < 0.0]
     if criteria.limit_force is None or not against:
         return
+    unit = units.load_unit
+    place = f"{request.deformation:g} {units.displacement_unit}"
     done, sign = ("pressed", "negative") if sense > 0 else ("pulled", "positive")
     words = (
-        f"nothing can be said of {criteria.limit_force:g} N at "
-        f"{request.deformation:g} mm: the gear is {done} there, and its "
-        f"{request.quantity} is {sign}, {against[0].lo:.3g} … {against[0].hi:.3g} N"
+        f"nothing can be said of {criteria.limit_force:g} {unit} at {place}: the gear "
+        f"is {done} there, and its {request.quantity} is {sign}, "
+        f"{against[0].lo:.3g} … {against[0].hi:.3g} {unit}"
     )
-    remedy = "Ask for the quantity load, or at a larger deformation"
+    remedy = f"Ask for the quantity load, or at a larger {units.displacement}"
     raise InputError([Finding("limit_force", words, remedy)])
 
 
 def _check_deformation(cause: Cause, deformation: float) -> list[Finding]:
-    gear = cause.posterior.case.gear
-    if wrong := implausible("deformation", deformation):
+    gear, units = cause.posterior.case.gear, cause.posterior.case.units
+    if wrong := implausible("deformation", deformation, units.displacement):
         return wrong
     if deformation == 0.0:
-        words = f"{deformation:g} mm is no deformation"
-        return [Finding("deformation", words, "Give a number of mm")]
+        unit = units.displacement_unit
+        words = f"{deformation:g} {unit} is no {units.displacement}"
+        return [Finding("deformation", words, f"Give a number of {unit}")]
     if abs(deformation) >= gear.reach:
         words = f"{deformation:g} mm on a radius of {gear.geometry.radius:g} mm"
         return [Finding("deformation", words, "Give it in mm")]
@@ -156,15 +163,16 @@ def _check_temperature(cause: Cause, temperature) -> list[Finding]:
 
 def _check_forces(cause: Cause, deformation, forces) -> list[Finding]:
     usual = abs(float(np.median(cause.values["stiffness"])) * deformation)
-    findings = []
+    findings, units = [], cause.posterior.case.units
     for name, force in forces.items():
         if force is None:
             continue
         if wrong := implausible(name, force):
             findings += wrong
         elif force == 0.0:
-            words = f"{force:g} N is no force"
-            findings.append(Finding(name, words, "Give a number of N"))
+            words = f"{force:g} {units.load_unit} is no {units.load}"
+            remedy = f"Give a number of {units.load_unit}"
+            findings.append(Finding(name, words, remedy))
         else:
-            findings += slip_findings(name, force, usual, deformation)
+            findings += slip_findings(name, force, usual, deformation, units)
     return findings

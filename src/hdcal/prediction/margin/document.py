@@ -26,6 +26,7 @@ from hdcal.report.document import (
     Table,
     Tag,
     Text,
+    mapped,
     notices,
 )
 from hdcal.report.intervals import Interval
@@ -60,7 +61,7 @@ def margin_document(found: Margin) -> Document:
         blocks = [Text(found.decision.words), rule]
         title = f"Decision on one future {member_word(found)}"
         sections.append(Section(title, blocks, brief=True))
-    return Document(
+    document = Document(
         name="Margin",
         kind="margin",
         subtitle=_subtitle(found),
@@ -73,6 +74,7 @@ def margin_document(found: Margin) -> Document:
         ),
         sections=sections,
     )
+    return mapped(document, found.units.say)
 
 
 def whole_document(
@@ -99,24 +101,32 @@ def whole_document(
 
 
 def _subtitle(found: Margin) -> str:
-    return f"Force needed at {found.deformation_mm} mm and the margin to it"
+    words = f"{capital(found.units.load)} needed at {found.deformation_mm} "
+    words += f"{found.units.displacement_unit} and the margin to it"
+    return words
 
 
 def _bounds(found: Margin) -> Section:
     bounds = bound_name(found)
-    numbers = ["mean [N]", "one member [N]", "lower", "upper", "P", "β"]
+    numbers = [
+        "mean [{N}]",
+        "one member [{N}]",
+        "lower",
+        "upper",
+        "P",
+        "β",
+    ]
     shown = Picture(
         "margin",
-        "Force needed with its bounds and the capacity",
-        "Dark: where the mean force lies with 95 % probability. Light: where one "
+        f"{capital(found.units.load)} needed with its bounds and the capacity",
+        "Dark: where the mean {load} lies with 95 % probability. Light: where one "
         f"future member lies with 95 % probability. Arrows: the {bounds} bounds, "
         "one-sided each.",
     )
     words = (
         "Mean: 95 % credible interval. One member: 95 % predictive interval. P: "
         f"probability that one future member needs more{in_tension(found)} than the "
-        "capacity; "
-        f"β = −Φ⁻¹(P). Lower and upper: a {bounds} bound is one that "
+        f"capacity; β = −Φ⁻¹(P). Lower and upper: a {bounds} bound is one that "
         f"{100.0 * found.content:g} % of the population keep to, with "
         f"{100.0 * found.confidence:g} % confidence. Each is one-sided: both together "
         "promise less."
@@ -174,17 +184,18 @@ def _sensitivities(found: Margin) -> Section:
     shown = Picture(
         "tornado",
         "Shares of the budget, and the change of the bound for one per cent",
-        "Left: shares of the variance of one future member's force, all at "
+        "Left: shares of the variance of one future member's {load}, all at "
         f"{found.worst.temperature_C} °C. Right: change of the {larger} bound when an "
         "input grows by one per cent.",
     )
-    slopes = ["d bound / d input [N per unit]", "d mean / d input [N per unit]"]
-    numbers = ["at", *slopes, "bound for + 1 % [N]"]
+    per = "[{N} per unit]"
+    slopes = [f"d bound / d input {per}", f"d mean / d input {per}"]
+    numbers = ["at", *slopes, "bound for + 1 % [{N}]"]
     rows = [
         [
             input_label(slope.name),
             number(slope.value),
-            {"E0_GPa": "GPa", "K": ""}.get(slope.name, "mm"),
+            {"E0_GPa": "GPa", "K": ""}.get(slope.name, "{mm}"),
             number(slope.bound_N),
             number(slope.force_N),
             f"{slope.bound_N_per_percent:+.2f}",
@@ -210,7 +221,7 @@ def budget_table(found: Margin, *, brief: bool = False) -> Table:
         found: the margin, with a budget.
         brief: without what would halve each row.
     """
-    numbers = ["u", "N per unit", "N", "share"]
+    numbers = ["u", "{N} per unit", "{N}", "share"]
     columns = ["component", "type", "distribution", "u", "unit", *numbers[1:]]
     large = [line for line in found.budget if line.share >= _SMALL]
     small = [line for line in found.budget if line.share < _SMALL]

@@ -15,6 +15,7 @@ from hdcal.prediction.margin.sentences import (
 )
 from hdcal.prediction.margin.stated import BudgetLine
 from hdcal.prediction.margin.temperatures import shown_levels
+from hdcal.report.axes import load_axis
 from hdcal.report.canvas import (
     BLUE,
     DARK,
@@ -48,10 +49,12 @@ def margin_figure(found: Margin, name: str) -> Figure:
         ratios = [1.0, 1.5] if several else [1.0]
         panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)
         _draw_spans(panels[0, 0], found)
-        at = f"{found.deformation_mm:g} mm"
+        at = f"{found.deformation_mm:g} {found.units.displacement_unit}"
         warm = f"{found.worst.temperature_C:g} °C"
         worst = f", worst temperature {warm}" if several else f", {warm}"
-        heading(panels[0, 0], f"{plain(name)}: force needed at {at}{worst}")
+        heading(
+            panels[0, 0], f"{plain(name)}: {found.units.load} needed at {at}{worst}"
+        )
         if several:
             _draw_window(panels[1, 0], found)
     return figure
@@ -65,7 +68,7 @@ def draw_margin(found: Margin, axes: Axes) -> Axes:
 
 
 def _draw_spans(axes: Axes, found: Margin) -> None:
-    level = found.worst
+    level, unit = found.worst, found.units.load_unit
     rows = [
         ("mean, 95 % credible", level.force_N, 0.75),
         (f"one {member_word(found)},\n95 % predictive", level.member_N, 0.35),
@@ -86,14 +89,14 @@ def _draw_spans(axes: Axes, found: Margin) -> None:
     for end, mark, side in zip(ends, "<>", ("right", "left"), strict=True):
         axes.plot(end, 2, mark, color=DARK, markersize=7)
         shift = -3 if side == "right" else 3
-        note(axes, f"{end:.1f} N", (end, 2), (shift, -15), ha=side)
+        note(axes, f"{end:.1f} {unit}", (end, 2), (shift, -15), ha=side)
     words = [row[0] for row in rows] + [f"{bound_name(found)} bounds,\none-sided each"]
     name_rows(axes, words)
     axes.set_ylim(2.75, -0.6)
-    axes.set_xlabel("force [N]")
+    axes.set_xlabel(load_axis(found.units))
     axes.margins(x=0.15)
     if found.limit_force_N is not None:
-        sense, words = found.loading_sense, f"capacity {found.limit_force_N:g} N"
+        sense, words = found.loading_sense, f"capacity {found.limit_force_N:g} {unit}"
         limit = sense * found.limit_force_N
         axes.axvline(limit, color=RED, linewidth=1.4)
         behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
@@ -144,7 +147,7 @@ def _draw_window(axes: Axes, found: Margin) -> None:
         handles.append(Line2D([], [], color=RED))
         texts.append("capacity")
     axes.set_xlabel("temperature [°C]")
-    axes.set_ylabel("force [N]")
+    axes.set_ylabel(load_axis(found.units))
     axes.margins(y=0.12)
     under = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
     axes.legend(handles, texts, ncols=3, **under)
@@ -193,9 +196,16 @@ def _draw_gradients(axes: Axes, found: Margin) -> None:
     axes.barh(range(len(ranked)), values, 0.66, color=colours, alpha=0.75)
     for place, value in enumerate(values):
         shift, side = ((3, 0), "left") if value > 0.0 else ((-3, 0), "right")
-        note(axes, f"{value:+.2f} N", (value, place), shift, va="center", ha=side)
+        note(
+            axes,
+            f"{value:+.2f} {found.units.load_unit}",
+            (value, place),
+            shift,
+            va="center",
+            ha=side,
+        )
     axes.axvline(0.0, color=DARK, linewidth=0.8)
     name_rows(axes, [input_label(slope.name) for slope in ranked])
     axes.set_ylim(len(ranked) - 0.4, -0.6)
     axes.margins(x=0.4)
-    axes.set_xlabel("change [N]")
+    axes.set_xlabel(load_axis(found.units, "change"))

@@ -62,6 +62,7 @@ from hdcal.prediction.margin.temperatures import levels_between, nodes_of
 from hdcal.prediction.margin.uncertainty import stated_uncertainty
 from hdcal.prediction.margin.variance_shares import variance_shares
 from hdcal.prediction.shares import BASES
+from hdcal.report.document import mapped
 
 
 def margin(
@@ -145,6 +146,7 @@ def _margin(
     sensitivities: bool,
 ) -> Margin:
     main, sense = likeliest(causes), loading_sense(causes, request.deformation)
+    units = main.posterior.case.units
     warm = request.temperatures(main.posterior.case)
     check_margin(causes, request, warm, criteria, sense)
     criteria = criteria.of_size()
@@ -152,12 +154,12 @@ def _margin(
     forces = _forces(causes, request, whose, sense)
     grid = _grid(forces, sense)
     unrounded = criteria.before_rounding(grid)
-    found = _answered(forces, request, unrounded, warm)
-    check_sign(found.computed, request, criteria, sense)
-    worst = shown(found.worst, grid, sense)
+    answered = _answered(forces, request, unrounded, warm)
+    check_sign(answered.computed, request, criteria, sense, units)
+    worst = shown(answered.worst, grid, sense)
     there = [force.at(worst.temperature_C) for force in forces]
     stated = stated_uncertainty(there, worst, with_budget=sensitivities)
-    return Margin(
+    found = Margin(
         **vars(stated),
         deformation_mm=float(request.deformation),
         direction=request.direction,
@@ -171,19 +173,21 @@ def _margin(
         required_probability=criteria.required,
         limit_force_N=criteria.limit_force,
         tolerances_mm=request.tolerances,
-        levels=tuple(shown(level, grid, sense) for level in found.levels),
+        levels=tuple(shown(level, grid, sense) for level in answered.levels),
         worst=worst,
         reached=_reached(there, request, criteria),
         decision=decision(stated, worst, criteria, unrounded, sense, there),
-        models=tuple(shown_bounds(model, grid, sense) for model in found.models),
+        models=tuple(shown_bounds(model, grid, sense) for model in answered.models),
         causes=chances_of(causes),
         weight_left_out=weight_left_out(causes),
-        gradients=gradients(there, found.upper, criteria) if sensitivities else (),
+        gradients=gradients(there, answered.upper, criteria) if sensitivities else (),
         shares=variance_shares(there, request.seed) if sensitivities else (),
         beyond_tested=beyond_tested(forces[0].conditions),
         extrapolated=extrapolations(forces, warm),
-        remarks=remarks(forces, found.computed, worst, criteria, grid),
+        remarks=remarks(forces, answered.computed, worst, criteria, grid),
+        units=units,
     )
+    return mapped(found, units.say)
 
 
 class _Answered(NamedTuple):

@@ -29,8 +29,9 @@ def index(beta: float) -> str:
 
 
 def newtons(value: float) -> str:
-    """Return a force to four digits."""
-    return f"{value:.1f} N" if 10.0 <= abs(value) < 1e4 else f"{value:.4g} N"
+    """Return a force to four digits, with {N}, for `Quantities.say`."""
+    text = f"{value:.1f}" if 10.0 <= abs(value) < 1e4 else f"{value:.4g}"
+    return f"{text} {{N}}"
 
 
 def newtons_down(value: float) -> str:

@@ -25,7 +25,7 @@ _LOAD = (
     "A leftover discrepancy counts as the gear's."
 )
 _GAUGES = {
-    "force_gain": "the force gauge",
+    "force_gain": "the {load} gauge",
     "deformation_gain": "the displacement gauge",
     "temperature_offset": "the thermometer",
 }
@@ -39,9 +39,9 @@ _NOT_CERTIFIED = (
 )
 _ZERO = (
     "What the gauge shows without a load rests on its prior, not on these data: it is "
-    "known to {sd:.2g} N (sd) and makes a load uncertain over some {both:.2g} N. Read "
-    "the gauge with the gear out of contact, and state that zero as the prior of the "
-    "force offset."
+    "known to {sd:.2g} {{N}} (sd) and makes a load uncertain over some {both:.2g} "
+    "{{N}}. Read the gauge with the gear out of contact, and state that zero as the "
+    "prior of the force offset."
 )
 _LOAD_OF_MOUNTINGS = (
     "Mountings differ by the gauge's zero, which is no load: here they are alike."
@@ -51,30 +51,30 @@ _TOLERANCES_OF_GEARS = (
     "holds their own."
 )
 _TOLERANCES_ALONE = (
-    "With tolerances the forces are those of gears that differ from the tested ones in "
-    "these sizes and in nothing else."
+    "With tolerances the {load}s are those of gears that differ from the tested ones "
+    "in these sizes and in nothing else."
 )
 _EITHER_SIGN = (
-    "The force may have either sign here: 95 % of members lie between {low:.3g} and "
-    "{high:.3g} N. Capacities and probabilities count the {sign} ones only."
+    "The {{load}} may have either sign here: 95 % of members lie between {low:.3g} and "
+    "{high:.3g} {{N}}. Capacities and probabilities count the {sign} ones only."
 )
 _AGAINST = (
-    "The gauge's zero turns the sign of the force here, {low:.3g} … {high:.3g} N: no "
-    "capacity can be compared with it. The load has the sign of the loading."
+    "The gauge's zero turns the sign of the {{load}} here, {low:.3g} … {high:.3g} "
+    "{{N}}: no capacity can be compared with it. The load has the sign of the loading."
 )
 _NORMAL_TAILS = (
     "Such rare cases rest on the normal tails of noise and scatter, which no test of "
     "this size has seen."
 )
 _GRID = (
-    "Readings come in steps of {step:.3g} N: bounds and capacities are values that are "
-    "read, and the force itself may lie up to {half:.3g} N beyond them. U takes the "
-    "steps for an error that is anywhere in half a step."
+    "Readings come in steps of {step:.3g} {{N}}: bounds and capacities are values that "
+    "are read, and the {{load}} itself may lie up to {half:.3g} {{N}} beyond them. U "
+    "takes the steps for an error that is anywhere in half a step."
 )
 _NO_GRID = (
-    "Readings have steps of {step:.3g} N but lie on no one grid of such steps: bounds, "
-    "capacities and what exceeds them are for the worst place of a grid, {half:.3g} N "
-    "away."
+    "Readings have steps of {step:.3g} {{N}} but lie on no one grid of such steps: "
+    "bounds, capacities and what exceeds them are for the worst place of a grid, "
+    "{half:.3g} {{N}} away."
 )
 _FAR_OUT = (
     " So far out a bound rests on that assumption, and its confidence with it: test "
@@ -108,8 +108,8 @@ def _extrapolations(force: PopulationForce, temperature: np.ndarray) -> Iterator
     if beyond > 0.0:
         far = _FAR_OUT * (beyond > FAR)
         yield (
-            f"Extrapolated: {at:g} mm lies {max(low - at, at - high):.3g} mm outside "
-            f"the tested {low:g} … {high:g} mm. {_bend(force)}{far}"
+            f"Extrapolated: {at:g} {{mm}} lies {max(low - at, at - high):.3g} {{mm}} "
+            f"outside the tested {low:g} … {high:g} {{mm}}. {_bend(force)}{far}"
         )
     if float(where.movement) not in np.asarray(records.sense):
         word = "unloading" if where.down else "loading"
@@ -124,10 +124,12 @@ def _bend(force: PopulationForce) -> str:
     """Say what a bend may bring where nothing was tested, and what one that is seen."""
     mean, sd = bend_law(force)
     if abs(mean) < sd:
-        return f"A bend that these rows need not show may bring {sd:.2g} N (sd) there."
+        return (
+            f"A bend that these rows need not show may bring {sd:.2g} {{N}} (sd) there."
+        )
     return (
-        f"The bend that these rows leave over goes on there: {mean:+.2g} N of the mean "
-        f"are its, and it may bring {sd:.2g} N (sd) more or less."
+        f"The bend that these rows leave over goes on there: {mean:+.2g} {{N}} of the "
+        f"mean are its, and it may bring {sd:.2g} {{N}} (sd) more or less."
     )
 
 
@@ -143,8 +145,8 @@ def _untested_temperature(force: PopulationForce, temperature: np.ndarray) -> st
     low, high = np.min(temperature), np.max(temperature)
     asked = f"{low:g} °C" if low == high else f"{low:g} … {high:g} °C"
     return (
-        f"Extrapolated: {asked} lies "
-        f"outside the tested {seen}{assumed}. Young's modulus carries it, linearly; "
+        f"Extrapolated: {asked} lies outside the tested {seen}{assumed}. Young's "
+        "modulus carries it, linearly; "
         f"its loss per kelvin is from {source}." + _rig_drift(force)
     )
 
@@ -157,7 +159,7 @@ def _rig_drift(force: PopulationForce) -> str:
     moves = frame * float(np.median(stiff)) / radial
     drifts = (zero, "zero of its gauge"), (moves, "length of its frame")
     parts = [
-        f"{sd:.2g} N per kelvin by the {cause}" for sd, cause in drifts if sd > 0.0
+        f"{sd:.2g} {{N}} per kelvin by the {cause}" for sd, cause in drifts if sd > 0.0
     ]
     if force.whose.quantity == "load" or not parts:
         return ""
@@ -208,7 +210,7 @@ def _of_turning(asked: Conditions) -> Iterator[str]:
         return
     turn, at = float(asked.turn), float(asked.deformation)
     why = "the largest tested" if turn != at else "as far as what is asked for"
-    yield f"Unloading is taken to begin at {turn:g} mm, {why}."
+    yield f"Unloading is taken to begin at {turn:g} {{mm}}, {why}."
 
 
 def _of_steps(grid: ReadingGrid) -> Iterator[str]:
@@ -271,14 +273,14 @@ def population_words(population: Population, problem: Problem) -> str:
         place = "mountings on average" if problem.runs else "mounting"
         return (
             f"Single readings of {gears} in the tested {place}. Another gear or "
-            "another mounting may need a force outside these bounds."
+            "another mounting may need a {load} outside these bounds."
         )
     runs = f", each in a new mounting ({problem.runs} were tested)"
     if population == "mountings":
         gears = "the tested gears on average" if problem.specimens else "this one gear"
         return (
             f"New mountings of {gears} ({problem.runs} were tested), a reading each. "
-            "Another gear may need a force outside these bounds."
+            "Another gear may need a {load} outside these bounds."
         )
     place = runs if problem.runs else ", in the tested mounting"
     return f"New gears of this kind ({problem.specimens} were tested){place}."

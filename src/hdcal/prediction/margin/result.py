@@ -14,7 +14,8 @@ from hdcal.prediction.margin.gradients import Gradient
 from hdcal.prediction.margin.stated import Chance, Decision, Size, StatedUncertainty
 from hdcal.prediction.margin.variance_shares import VarianceShare
 from hdcal.prediction.shares import BASES
-from hdcal.report.answer import Promise, Real, Sentences, Words
+from hdcal.quantities import FORCE
+from hdcal.report.answer import Promise, Real, Sentences, Units, Words
 from hdcal.report.intervals import Interval
 
 INTERVAL = 0.95
@@ -140,6 +141,7 @@ class Margin(StatedUncertainty, Shown):
             share of that range.
         extrapolated: what lies outside the data, in sentences.
         remarks: what else to know, in sentences.
+        units: names and units of what was measured; no part of the JSON answer.
     """
 
     deformation_mm: float
@@ -166,3 +168,4 @@ class Margin(StatedUncertainty, Shown):
     beyond_tested: Size
     extrapolated: Sentences
     remarks: Sentences
+    units: Units = FORCE

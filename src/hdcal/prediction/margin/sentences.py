@@ -76,17 +76,22 @@ def larger_bound(found: Margin) -> str:
 
 def headline(found: Margin) -> str:
     """Return whether the capacity is enough, or which force is needed."""
+    say = found.units.say
     if found.limit_force_N is not None:
-        return _enough(found, found.limit_force_N)
-    return (
-        f"At {found.deformation_mm:g} mm {_percent(found.content)} of {_many(found)} "
-        f"need at most {_at_most(found, found.worst)}, with "
+        return say(_enough(found, found.limit_force_N))
+    return say(
+        f"At {found.deformation_mm:g} {{mm}} {_percent(found.content)} of "
+        f"{_many(found)} need at most {_at_most(found, found.worst)}, with "
         f"{_percent(found.confidence)} confidence{_if_bent_so(found)}."
     )
 
 
 def next_steps(found: Margin) -> Iterator[str]:
     """Yield what to do about what the model lacks, a small capacity, or no test."""
+    yield from map(found.units.say, _steps(found))
+
+
+def _steps(found: Margin) -> Iterator[str]:
     level, limit = found.worst, found.limit_force_N
     shaped = [words for words in found.remarks if words.startswith(SHAPED)]
     if any(UNNAMED in words for words in shaped):
@@ -106,14 +111,15 @@ def next_steps(found: Margin) -> Iterator[str]:
         )
     if found.extrapolated:
         yield (
-            f"Measure at {found.deformation_mm:g} mm {_where(found)} too: what was not "
-            "tested is extrapolated."
+            f"Measure at {found.deformation_mm:g} {{mm}} {_where(found)} too: what was "
+            "not tested is extrapolated."
         )
 
 
 def answer(found: Margin) -> list[str]:
     """Return the answer in sentences."""
-    return [*_inverse(found), *_force(found), *_capacity(found), *_models(found)]
+    told = [*_inverse(found), *_force(found), *_capacity(found), *_models(found)]
+    return [*map(found.units.say, told)]
 
 
 def _if_bent_so(found: Margin) -> str:
@@ -144,7 +150,7 @@ def _at_most(found: Margin, of: Level | ModelBound) -> str:
 
 def _force(found: Margin) -> Iterator[str]:
     level, share = found.worst, _percent(found.content)
-    what = "force that the gauge shows" if found.quantity == "reading" else "load"
+    what = "{load} that the gauge shows" if found.quantity == "reading" else "load"
     way = "" if found.direction == "up" else ", unloading,"
     several = len(found.levels) > 1
     at = f" at its worst, {level.temperature_C:g} °C," if several else ""
@@ -155,8 +161,8 @@ def _force(found: Margin) -> Iterator[str]:
         for end in (level.force_N.lo, level.force_N.median, level.force_N.hi)
     )
     yield (
-        f"At {found.deformation_mm:g} mm{way} the mean {what}{at} is {middle} N, 95 % "
-        f"credible interval {low} … {high} N."
+        f"At {found.deformation_mm:g} {{mm}}{way} the mean {what}{at} is {middle} "
+        f"{{N}}, 95 % credible interval {low} … {high} {{N}}."
     )
     basis = f", an {found.basis} value" if found.basis[:1] == "A" else ""
     basis = f", a {found.basis} value" if found.basis[:1] == "B" else basis
@@ -166,7 +172,7 @@ def _force(found: Margin) -> Iterator[str]:
         f"bound from below is as sure: {share} need at least "
         f"{newtons(sizes_needed(level, found.loading_sense)[0])}."
     )
-    yield f"Whose forces these are: {_lower(found.population_words)}"
+    yield f"Whose {{load}}s these are: {_lower(found.population_words)}"
 
 
 def _lower(text: str) -> str:
@@ -194,7 +200,7 @@ def _enough(found: Margin, limit: float) -> str:
     level = found.worst
     share = f"{100.0 * found.required_probability:.8g} % of {_many(found)}"
     sure = _percent(found.confidence)
-    given = f"A capacity of {limit:g} N{in_tension(found)}"
+    given = f"A capacity of {limit:g} {{N}}{in_tension(found)}"
     if limit >= level.capacity_N:
         return (
             f"{given} is enough for {share}, with {sure} confidence"
@@ -209,7 +215,7 @@ def _enough(found: Margin, limit: float) -> str:
 
 
 def _exceedance(found: Margin, risk: Exceedance) -> Iterator[str]:
-    more = f"more than {found.limit_force_N:g} N{in_tension(found)}"
+    more = f"more than {found.limit_force_N:g} {{N}}{in_tension(found)}"
     one = f"One future {member_word(found)} needs {more}"
     sure = _percent(found.confidence)
     if max(risk.hi, risk.probability) < RAREST:
@@ -252,28 +258,30 @@ def _inverse(found: Margin) -> Iterator[str]:
     if got is None:
         return
     low, high = got.searched_mm
-    beyond = f"a deformation outside {low:g} … {high:.3g} mm"
+    beyond = f"a {{displacement}} outside {low:g} … {high:.3g} {{mm}}"
 
     def at(value: float | None) -> str:
-        return beyond if value is None else f"{value:.4g} mm"
+        return beyond if value is None else f"{value:.4g} {{mm}}"
 
-    middle = f"{got.force_N:g} N reach {at(got.median_mm)} at {got.temperature_C:g} °C"
+    middle = (
+        f"{got.force_N:g} {{N}} reach {at(got.median_mm)} at {got.temperature_C:g} °C"
+    )
     span = ""
     if got.lo_mm is not None and got.hi_mm is not None:
-        span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} mm)"
+        span = f" (95 % credible interval {got.lo_mm:.4g} … {got.hi_mm:.4g} {{mm}})"
     share = _percent(found.content)
     least, most = got.lower_bound_mm, got.upper_bound_mm
     if got.median_mm is least is most is None:
-        yield f"No deformation within {low:g} … {high:.3g} mm needs {got.force_N:g} N."
+        within = f"No {{displacement}} within {low:g} … {high:.3g} {{mm}} needs"
+        yield f"{within} {got.force_N:g} {{N}}."
         return
     if got.force_N < 0.0:
         least, most = most, least
     tested = "" if got.tested else " Part of this lies outside what was tested."
     yield (
-        f"{middle} in the mean{span}. With "
-        f"{_percent(found.confidence)} confidence {share} of "
-        f"{_many(found)} get at least to {at(least)}, and as surely {share} get at "
-        f"most to {at(most)}.{tested}"
+        f"{middle} in the mean{span}. With {_percent(found.confidence)} confidence "
+        f"{share} of {_many(found)} get at least to {at(least)}, and as surely {share} "
+        f"get at most to {at(most)}.{tested}"
     )
 
 
@@ -292,5 +300,5 @@ def _models(found: Margin) -> Iterator[str]:
     yield (
         "The bounds average over the causes that are left, by their probability. Upper "
         f"bound with each alone: {each}. The average is "
-        f"{newtons(bound)}, {bound - alone:+.2g} N from the likeliest alone."
+        f"{newtons(bound)}, {bound - alone:+.2g} {{N}} from the likeliest alone."
     )

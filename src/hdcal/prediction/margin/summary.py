@@ -39,7 +39,7 @@ def margin_answer(
         answer=tuple(answer(found)),
         **vars(found),
         shares_note=CALIBRATION_SHARE,
-        kinds=KINDS,
+        kinds={found.units.key(name): kind for name, kind in KINDS.items()},
         seed=seed,
         versions=versions(),
         gear=CalibratedGear(gear.name, gear.material, posterior.theory),
@@ -50,7 +50,10 @@ def margin_answer(
 def budget_columns(found: Margin) -> dict[str, np.ndarray]:
     """Return the columns of budget.csv."""
     names = [field.name for field in fields(BudgetLine)]
-    return {n: np.array([getattr(line, n) for line in found.budget]) for n in names}
+    key = found.units.key
+    return {
+        key(n): np.array([getattr(line, n) for line in found.budget]) for n in names
+    }
 
 
 def margin_report(

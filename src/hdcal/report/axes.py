@@ -1,0 +1,23 @@
+"""Words of the axes that many charts share."""
+
+from hdcal.data.case import Case
+from hdcal.quantities import Quantities
+
+
+def displacement_axis(case: Case) -> str:
+    """Return the axis of the deformation as read, radial or diametral."""
+    units = case.units
+    word, unit = units.displacement, units.displacement_unit
+    reading = f" ({case.gear.reading})" if units.is_force else ""
+    return f"{word} as read{reading} [{unit}]"
+
+
+def load_axis(units: Quantities, words: str = "") -> str:
+    """Return an axis of forces: what it shows, by default the force, and the unit."""
+    return f"{words or units.load} [{units.load_unit}]"
+
+
+def covariate_axis(name: str, unit: str, units: Quantities) -> str:
+    """Return the axis of a covariate, whose unit is written in mm and N."""
+    shown = units.unit(unit)
+    return f"{units.name(name)} [{shown}]" if unit else units.name(name)

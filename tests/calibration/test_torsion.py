@@ -1,0 +1,229 @@
+"""A torque over an angle is a torsional spring, named so in every answer."""
+
+import io
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from jsonschema import Draft202012Validator
+
+import hdcal
+from hdcal.calibration.calibration import Calibration, calibration_of
+from hdcal.calibration.check.check import check
+from hdcal.diagnosis.answer import VerdictAnswer
+from hdcal.diagnosis.summary import verdict_report
+from hdcal.errors import InputError
+from hdcal.fleets.answer import FleetAnswer
+from hdcal.fleets.summary import fleet_report
+from hdcal.prediction.bands.summary import prediction_answer
+from hdcal.prediction.margin.answer import MarginAnswer
+from hdcal.prediction.margin.summary import margin_report
+from hdcal.quantities import TORQUE
+from hdcal.report.answer import json_schema
+from hdcal.report.plain import as_json
+from hdcal.report.write import report_files
+
+STIFFNESS = 9000.0  # [N·m/rad]
+SHORT = {"chains": 2, "warmup": 500, "draws": 1000, "seed": 1}
+ARCMIN, DEGREE = np.pi / 10800.0, np.pi / 180.0
+POUND_INCH = 0.0254 * 4.4482216152605  # [N·m]
+
+
+def _readings(torque_unit: float, angle_unit: float, torque: str, angle: str) -> dict:
+    up = np.linspace(0.0, 12.0 * ARCMIN, 25)
+    way = np.concatenate([up, up[-2::-1]])
+    sense = np.where(np.arange(way.size) < up.size, 1.0, -1.0)
+    noise = np.random.default_rng(3).normal(0.0, 0.05, way.size)
+    load = STIFFNESS * way + 0.4 * sense + noise
+    return {angle: way / angle_unit, torque: load / torque_unit}
+
+
+def _file(tmp_path, name: str, table: dict):
+    path = tmp_path / name
+    pd.DataFrame(table).to_csv(path, index=False, float_format="%.9g")
+    return path
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    table = _readings(1.0, ARCMIN, "Torque [Nm]", "Twist [arcmin]")
+    return hdcal.read_case(_file(tmp_path_factory.mktemp("t"), "a.csv", table))
+
+
+@pytest.fixture(scope="module")
+def posterior(case):
+    return hdcal.calibrate(case, effects=["coulomb_friction"], **SHORT)
+
+
+def _keys(value) -> set[str]:
+    if isinstance(value, dict):
+        return {*value} | {key for item in value.values() for key in _keys(item)}
+    if isinstance(value, list):
+        return {key for item in value for key in _keys(item)}
+    return set()
+
+
+def _in_newtons(keys: set[str]) -> set[str]:
+    return {key for key in keys if key.endswith(("_N", "_mm", "_N_per_mm"))}
+
+
+def _units(value) -> set[str]:
+    if isinstance(value, dict):
+        own = {value["unit"]} if isinstance(value.get("unit"), str) else set()
+        return own.union(*map(_units, value.values()))
+    return set().union(*map(_units, value)) if isinstance(value, list) else set()
+
+
+@pytest.mark.parametrize(
+    ("torque", "angle", "sizes"),
+    [
+        ("torque_Nm", "angle_rad", (1.0, 1.0)),
+        ("Moment (mNm)", "Drehwinkel (arcmin)", (1e-3, ARCMIN)),
+        ("load [lbf*in]", "travel [deg]", (POUND_INCH, DEGREE)),
+    ],
+)
+def test_units_do_not_matter(tmp_path, torque, angle, sizes):
+    found = hdcal.read_case(_file(tmp_path, "b.csv", _readings(*sizes, torque, angle)))
+    own = hdcal.read_case(_readings(1.0, 1.0, "torque_Nm", "angle_rad"))
+    assert found.units is TORQUE
+    for name in ("deformation", "force"):
+        read, expected = (getattr(c.records, name) for c in (found, own))
+        np.testing.assert_allclose(read, expected, rtol=1e-7, atol=1e-9)
+    assert [*found.to_frame().columns] == ["angle_rad", "torque_Nm"]
+    slope = found.screening.straight.slope
+    assert slope == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_columns_may_be_named(tmp_path):
+    table = _readings(1.0, ARCMIN, "Kanal 1", "Kanal 2")
+    path = _file(tmp_path, "c.csv", table)
+    named = {"torque": "Kanal 1[Nm]", "angle": "Kanal 2[arcmin]"}
+    found = hdcal.read_case(path, columns=named)
+    assert found.columns == {"torque": "Kanal 1[Nm]", "angle": "Kanal 2[arcmin]"}
+    assert found.units is TORQUE
+
+
+def test_the_check_is_of_torques(case):
+    found = check(case)
+    told = found.to_dict()
+    assert not _in_newtons(_keys(told))
+    assert told["data"]["torque_N_m"][1] == pytest.approx(31.5, rel=0.05)
+    assert told["screening"]["straight_part"]["stiffness_N_m_per_rad"] > 0.0
+    Draft202012Validator(type(found).json_schema(TORQUE)).validate(told)
+    page = found.page()
+    assert "N·m/rad" in page
+    assert "N/mm" not in page
+    assert found.charts()["readings"].panels[0].y == "torque as read [N·m]"
+
+
+def test_the_calibration_is_of_torques(posterior):
+    found = calibration_of(posterior)
+    told = found.to_dict()
+    assert not _in_newtons(_keys(told))
+    stiffness = told["stiffness_N_m_per_rad"]
+    assert stiffness["lo"] < STIFFNESS < stiffness["hi"]
+    assert stiffness["hi"] - stiffness["lo"] < 0.05 * STIFFNESS
+    assert not {"N", "mm", "N/mm"} & _units(told)
+    assert told["parameters"]["K"]["unit"] == "N·m/rad"
+    assert told["parameters"]["coulomb_friction.force"]["unit"] == "N·m"
+    Draft202012Validator(Calibration.json_schema(TORQUE)).validate(told)
+    for words in (found.headline, found.text(), found.page()):
+        assert "N·m/rad" in words
+        assert "N·m/arcmin" in words
+        assert "N/mm" not in words
+        assert " mm" not in words
+    axes = {panel.x for chart in found.charts().values() for panel in chart.panels}
+    assert not [axis for axis in axes if "mm]" in axis or "[N]" in axis]
+
+
+def test_a_saved_posterior_knows_its_quantities(posterior, tmp_path):
+    path = tmp_path / "posterior.nc"
+    path.write_bytes(posterior.to_netcdf())
+    again = hdcal.Posterior.load(path)
+    assert again.case.units is TORQUE
+    assert again.tree["posterior"]["stiffness"].attrs["units"] == "N·m/rad"
+    bands = hdcal.predict(again, [0.001, 0.003])
+    assert "angle_rad" in bands.columns()
+    table = pd.read_csv(io.StringIO(bands.to_frame().to_csv()))
+    assert not _in_newtons({*table.columns})
+    told = json.loads(as_json(prediction_answer(bands)))
+    assert not _in_newtons(_keys(told))
+    assert "N·m" in told["headline"]
+    with pytest.raises(InputError, match="rad"):
+        hdcal.predict(again, [0.5 / ARCMIN])
+
+
+def test_the_diagnosis_is_of_torques(case):
+    verdict = hdcal.diagnose(case, quick=True)
+    assert "coulomb_friction" in verdict.which.set
+    report = verdict_report(verdict)
+    told = json.loads(as_json(report.answer))
+    assert not _in_newtons(_keys(told))
+    assert told["gap"]["rms_N_m"]["median"] == pytest.approx(0.4, rel=0.2)
+    assert {"direction", "angle"} & {
+        cell["covariate"] for cell in told["where"]["cells"]
+    }
+    assert not {"N", "mm"} & _units(told)
+    Draft202012Validator(json_schema(VerdictAnswer, TORQUE)).validate(told)
+    words = " ".join([told["headline"], *told["answer"], *told["limits"]])
+    assert "torque" in words
+    assert " force " not in words.replace("force saturation", "")
+    assert " N " not in words
+    charts = report.charts()["where"]
+    assert charts[0].x == "angle [rad]"
+    assert charts[0].y == "measured − model [N·m]"
+
+
+@pytest.mark.parametrize("ask", [hdcal.fit, hdcal.causes, hdcal.calibrate_dynamic])
+def test_what_is_of_forces_refuses_torques(case, ask):
+    with pytest.raises(InputError, match="torque"):
+        ask(case)
+
+
+def test_a_gear_file_of_forces_is_refused(case):
+    table = _readings(1.0, 1.0, "torque_Nm", "angle_rad")
+    sized = {"wall_thickness_mm": 0.68, "radius_mm": 40.0, "length_mm": 70.0}
+    with pytest.raises(InputError, match="theory"):
+        hdcal.read_case(table, sized)
+
+
+def test_a_margin_is_of_torques(posterior):
+    at = 8.0 * ARCMIN
+    found = hdcal.margin(posterior, at, limit_force=30.0, given_force=20.0)
+    report = margin_report(found, posterior)
+    told = json.loads(as_json(report.answer))
+    assert not _in_newtons(_keys(told))
+    assert told["worst"]["torque_N_m"]["median"] == pytest.approx(21.3, rel=0.03)
+    assert told["reached"]["median_rad"] == pytest.approx(20.0 / STIFFNESS, rel=0.05)
+    assert not {"N", "mm"} & _units(told)
+    Draft202012Validator(json_schema(MarginAnswer, TORQUE)).validate(told)
+    page = report_files(report.document, report.figures())["report.html"].decode()
+    text = re.sub(r"<(style|script|svg).*?</\1>", "", page, flags=re.DOTALL)
+    for words in (told["headline"], *told["answer"], *told["remarks"], text):
+        assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)
+    assert "N·m" in told["headline"]
+
+
+def test_a_fleet_is_of_torques():
+    rng = np.random.default_rng(5)
+    angle = np.tile(np.linspace(0.0, 12.0 * ARCMIN, 12), 12)
+    gear = np.repeat(np.arange(12), 12)
+    stiffness = STIFFNESS * (1.0 + 0.03 * rng.normal(size=12))
+    torque = stiffness[gear] * angle + 0.1 * rng.normal(size=angle.size)
+    table = {"angle_rad": angle, "torque_Nm": torque}
+    found = hdcal.fleet({**table, "specimen": gear.astype(str)}, seed=1)
+    force = found.posterior.next_force(0.003, 40.0)
+    report = fleet_report(found, force=force)
+    told = json.loads(as_json(report.answer))
+    assert not _in_newtons(_keys(told))
+    centre = told["population"]["stiffness_N_m_per_rad"]
+    assert centre["lo"] < STIFFNESS < centre["hi"]
+    assert told["next_force"]["torque_N_m"]["median"] == pytest.approx(27.0, rel=0.05)
+    assert not _in_newtons({*report.tables()["gears.csv"]})
+    Draft202012Validator(json_schema(FleetAnswer, TORQUE)).validate(told)
+    page = report_files(report.document, report.figures())["report.html"].decode()
+    text = re.sub(r"<(style|script|svg).*?</\1>", "", page, flags=re.DOTALL)
+    for words in (told["headline"], *told["notes"], text):
+        assert not re.search(r"[{}]| mm\b|N/mm| N\b(?!·)", words)
